@@ -1,0 +1,164 @@
+//! The pinhole camera: pixel ↔ ray ↔ point on a plane.
+
+use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::GeometryError;
+
+/// A pinhole camera without distortion, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PinholeCamera {
+    /// Image width.
+    pub width: u32,
+    /// Image height.
+    pub height: u32,
+    /// Horizontal focal length.
+    pub fx: f64,
+    /// Vertical focal length.
+    pub fy: f64,
+    /// The optical axis's x; the middle of a 640-pixel image is 320.
+    pub cx: f64,
+    /// The optical axis's y.
+    pub cy: f64,
+}
+
+impl PinholeCamera {
+    /// The paper's wrist camera: 640 × 480, f = 550 px, axis in the middle.
+    pub const WRIST: Self = Self { width: 640, height: 480, fx: 550.0, fy: 550.0, cx: 320.0, cy: 240.0 };
+
+    /// A camera from its intrinsics.
+    ///
+    /// # Errors
+    /// A focal length that is not positive and finite, an empty image, or a centre that is not finite.
+    pub fn new(width: u32, height: u32, fx: f64, fy: f64, cx: f64, cy: f64) -> Result<Self, GeometryError> {
+        let focal = |f: f64| f.is_finite() && f > 0.0;
+        if !(focal(fx) && focal(fy)) || width == 0 || height == 0 {
+            return Err(GeometryError::BadIntrinsics { fx, fy, width, height });
+        }
+        for value in [cx, cy] {
+            if !value.is_finite() {
+                return Err(GeometryError::NotFinite { what: "the camera's centre", value });
+            }
+        }
+        Ok(Self { width, height, fx, fy, cx, cy })
+    }
+
+    /// Where a point in the camera's frame appears; `None` at or behind the camera.
+    pub fn project(&self, p_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
+        (p_in_camera.z > 0.0).then(|| {
+            Point2::new(
+                self.fx * p_in_camera.x / p_in_camera.z + self.cx,
+                self.fy * p_in_camera.y / p_in_camera.z + self.cy,
+            )
+        })
+    }
+
+    /// The point at depth 1 m that appears at `pixel`.
+    pub fn unproject(&self, pixel: &Point2<f64>) -> Point3<f64> {
+        Point3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
+    }
+}
+
+/// A half-line in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where it starts, in metres.
+    pub origin: Point3<f64>,
+    /// Where it goes.
+    pub direction: Unit<Vector3<f64>>,
+}
+
+impl Ray {
+    /// Where the ray meets the plane z = `height_m`; `None` when it runs along the plane or away from it.
+    pub fn at_height(&self, height_m: f64) -> Option<Point3<f64>> {
+        let t = (height_m - self.origin.z) / self.direction.z;
+        (t.is_finite() && t > 0.0).then(|| self.origin + self.direction.into_inner() * t)
+    }
+}
+
+/// A camera with its place in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PosedCamera {
+    /// Size and focal length.
+    pub intrinsics: PinholeCamera,
+    /// Takes the optical frame (x right, y down, z forward) to the world, metres.
+    pub world_from_camera: Isometry3<f64>,
+}
+
+impl PosedCamera {
+    /// Where a point in the world appears; `None` behind the camera.
+    pub fn project(&self, p_in_world: &Point3<f64>) -> Option<Point2<f64>> {
+        self.intrinsics.project(&self.world_from_camera.inverse_transform_point(p_in_world))
+    }
+
+    /// The ray through a pixel.
+    pub fn ray(&self, pixel: &Point2<f64>) -> Ray {
+        let direction = self.world_from_camera * self.intrinsics.unproject(pixel).coords;
+        Ray { origin: self.world_from_camera.translation.vector.into(), direction: Unit::new_normalize(direction) }
+    }
+
+    /// The point of the plane z = `height_m` that appears at `pixel`; `None` when the ray misses the plane.
+    pub fn at_height(&self, pixel: &Point2<f64>, height_m: f64) -> Option<Point3<f64>> {
+        self.ray(pixel).at_height(height_m)
+    }
+
+    /// Metres on the plane z = `height_m` for one pixel near `pixel` (the mean of both axes); `None` off the plane.
+    pub fn metres_per_pixel(&self, pixel: &Point2<f64>, height_m: f64) -> Option<f64> {
+        let here = self.at_height(pixel, height_m)?;
+        let right = self.at_height(&Point2::new(pixel.x + 1.0, pixel.y), height_m)?;
+        let down = self.at_height(&Point2::new(pixel.x, pixel.y + 1.0), height_m)?;
+        Some(0.5 * ((right - here).norm() + (down - here).norm()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    /// Half a metre above (0.4, 0, 0), looking straight down with image x along world x.
+    fn looking_down() -> PosedCamera {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+        PosedCamera {
+            intrinsics: PinholeCamera::WRIST,
+            world_from_camera: Isometry3::from_parts(Vector3::new(0.4, 0.0, 0.5).into(), turn),
+        }
+    }
+
+    #[test]
+    fn one_hundred_and_ten_pixels_are_ten_centimetres_at_half_a_metre() {
+        let camera = looking_down();
+        let seen = camera.project(&Point3::new(0.5, 0.0, 0.0)).unwrap();
+        assert!((seen - Point2::new(430.0, 240.0)).norm() < 1e-9);
+        // World y points up in the image: the camera was turned about x.
+        let left_of_robot = camera.project(&Point3::new(0.4, 0.1, 0.0)).unwrap();
+        assert!((left_of_robot - Point2::new(320.0, 130.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_ray_upwards_misses_the_table() {
+        let mut camera = looking_down();
+        camera.world_from_camera.rotation = UnitQuaternion::identity();
+        assert_eq!(camera.at_height(&Point2::new(320.0, 240.0), 0.0), None);
+        assert_eq!(camera.project(&Point3::new(0.4, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn refuses_a_focal_length_of_zero() {
+        assert!(matches!(PinholeCamera::new(640, 480, 0.0, 550.0, 0.0, 0.0), Err(GeometryError::BadIntrinsics { .. })));
+    }
+
+    proptest! {
+        #[test]
+        fn pixel_to_plane_and_back(x in 0.0..640.0f64, y in 0.0..480.0f64, height in 0.0..0.2f64, tilt in -0.3..0.3f64) {
+            let mut camera = looking_down();
+            camera.world_from_camera.rotation *= UnitQuaternion::from_axis_angle(&Vector3::y_axis(), tilt);
+            let pixel = Point2::new(x, y);
+            let point = camera.at_height(&pixel, height).unwrap();
+            prop_assert!((point.z - height).abs() < 1e-9);
+            prop_assert!((camera.project(&point).unwrap() - pixel).norm() < 1e-6);
+        }
+    }
+}

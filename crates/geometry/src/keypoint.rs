@@ -1,0 +1,118 @@
+//! Keypoints and the line along which a grasp is taught.
+
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+use crate::{Angle, PlanarSimilarity};
+
+/// What is known of a keypoint; COCO's `v`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Visibility {
+    /// Not labelled, or outside the image: the place says nothing (COCO 0).
+    Unlabelled,
+    /// Labelled though hidden (COCO 1).
+    Occluded,
+    /// Labelled and seen (COCO 2).
+    Visible,
+}
+
+/// A labelled or detected point, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Keypoint {
+    /// Pixels to the right.
+    pub x: f64,
+    /// Pixels down.
+    pub y: f64,
+    /// Whether the place may be relied on.
+    pub visibility: Visibility,
+}
+
+impl Keypoint {
+    /// A visible keypoint.
+    pub fn visible(point: Point2<f64>) -> Self {
+        Self { x: point.x, y: point.y, visibility: Visibility::Visible }
+    }
+
+    /// Its place.
+    pub fn point(&self) -> Point2<f64> {
+        Point2::new(self.x, self.y)
+    }
+
+    /// Whether the place was labelled at all.
+    pub fn is_labelled(&self) -> bool {
+        self.visibility != Visibility::Unlabelled
+    }
+}
+
+/// The two points by which a person marks a grasp: the gripper's centre goes to their middle and its jaws close
+/// across the line. The direction from start to end is the grasp's angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GraspLine {
+    /// The first point.
+    pub start: Point2<f64>,
+    /// The second point.
+    pub end: Point2<f64>,
+}
+
+impl GraspLine {
+    /// The line from `start` to `end`, in pixels.
+    pub fn new(start: Point2<f64>, end: Point2<f64>) -> Self {
+        Self { start, end }
+    }
+
+    /// The middle.
+    pub fn center(&self) -> Point2<f64> {
+        nalgebra::center(&self.start, &self.end)
+    }
+
+    /// The direction from start to end.
+    pub fn angle(&self) -> Angle {
+        let direction = self.end - self.start;
+        Angle::from_direction(direction.x, direction.y)
+    }
+
+    /// Length in pixels.
+    pub fn length(&self) -> f64 {
+        (self.end - self.start).norm()
+    }
+
+    /// `count` keypoints evenly spaced from start to end, both included.
+    ///
+    /// # Source
+    /// OpenDR single_demo_grasp: the two clicked points and ten between them.
+    pub fn keypoints(&self, count: usize) -> Vec<Keypoint> {
+        assert!(count >= 2, "a line has two ends, so at least two keypoints; asked for {count}");
+        (0..count)
+            .map(|k| {
+                let t = k as f64 / (count - 1) as f64;
+                Keypoint::visible(self.start + (self.end - self.start) * t)
+            })
+            .collect()
+    }
+
+    /// The line moved with its part.
+    pub fn transformed(&self, image_from_demonstration: &PlanarSimilarity) -> Self {
+        Self { start: image_from_demonstration.apply(&self.start), end: image_from_demonstration.apply(&self.end) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn twelve_keypoints_are_eleven_equal_steps() {
+        let line = GraspLine::new(Point2::new(0.0, 0.0), Point2::new(11.0, 22.0));
+        let keypoints = line.keypoints(12);
+        assert_eq!(keypoints.len(), 12);
+        for (k, keypoint) in keypoints.iter().enumerate() {
+            assert!((keypoint.x - k as f64).abs() < 1e-12 && (keypoint.y - 2.0 * k as f64).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn angle_points_from_start_to_end_with_y_down() {
+        let down = GraspLine::new(Point2::new(5.0, 5.0), Point2::new(5.0, 9.0));
+        assert!((down.angle().degrees() - 90.0).abs() < 1e-12);
+    }
+}

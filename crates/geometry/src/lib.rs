@@ -1,0 +1,45 @@
+//! The shapes that every other crate speaks in: boxes, polygons, masks, keypoints, angles, the pinhole camera
+//! and the planar grasp.
+//!
+//! ```text
+//! annotation ─ BoundingBox, GraspLine, Polygon ─┐
+//! network    ─ BoundingBox, Keypoint, Mask ─────┼─ PlanarGrasp ─ PosedCamera ─ Ray ─ point on the grasp plane
+//! shape      ─ PlanarSimilarity ────────────────┘
+//! ```
+//!
+//! **Frames.** Pixels: x right, y down, the centre of the first pixel at (0.5, 0.5), so an image of width `w`
+//! spans `[0, w]`. Camera: the optical frame, x right, y down, z forward. World: whatever `world_from_camera`
+//! says; in this project the robot's base. Angles are radians.
+//!
+//! What is deliberately absent: pictures (the `image` crate), tensors (burn), files.
+//!
+//! ```
+//! use sdg_geometry::{GraspLine, PlanarGrasp};
+//! use nalgebra::Point2;
+//!
+//! let line = GraspLine::new(Point2::new(10.0, 20.0), Point2::new(30.0, 20.0));
+//! let grasp = PlanarGrasp::from_keypoints(&line.keypoints(12), 18.0).expect("twelve visible keypoints");
+//! assert!((grasp.x - 20.0).abs() < 1e-9 && grasp.angle.degrees().abs() < 1e-9);
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod angle;
+mod bounding_box;
+mod camera;
+mod error;
+mod keypoint;
+mod mask;
+mod planar_grasp;
+mod planar_similarity;
+mod polygon;
+
+pub use angle::Angle;
+pub use bounding_box::BoundingBox;
+pub use camera::{PinholeCamera, PosedCamera, Ray};
+pub use error::GeometryError;
+pub use keypoint::{GraspLine, Keypoint, Visibility};
+pub use mask::{Mask, RunLengthMask};
+pub use planar_grasp::PlanarGrasp;
+pub use planar_similarity::PlanarSimilarity;
+pub use polygon::Polygon;
