@@ -1,0 +1,36 @@
+# `make demo` and `make test` are all that a new user needs; both install what is missing and build once.
+
+CARGO ?= cargo
+# One profile for tests and runs: a fresh machine compiles burn once.
+PROFILE := --release
+
+.DEFAULT_GOAL := help
+.PHONY: help setup build demo test lint clean
+
+help: ## Lists the targets
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+
+setup: ## Installs what is missing from Debian (sudo only when not root)
+	@scripts/setup.sh
+
+build: setup ## Builds target/release/sdg
+	$(CARGO) build $(PROFILE) --locked -p sdg-cli
+
+demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
+	target/release/sdg demo
+
+# nextest where it is installed, cargo's own runner elsewhere; nextest leaves the examples in the docs to cargo.
+test: setup ## Runs every test
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		$(CARGO) nextest run $(PROFILE) --locked --workspace && $(CARGO) test $(PROFILE) --locked --workspace --doc -q; \
+	else \
+		$(CARGO) test $(PROFILE) --locked --workspace; \
+	fi
+
+lint: setup ## Formatting and lints, as CI denies them
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
+
+clean: ## Removes what was built and reported
+	$(CARGO) clean
+	rm -rf report

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Installs what the build and the simulator need from Debian, and nothing that is already there.
+# Uses sudo only when not root. Called by every make target; finishes in milliseconds when there is nothing to do.
+set -euo pipefail
+
+packages=(gcc libc6-dev libmujoco-dev libegl1 libgl1-mesa-dri)
+
+if ! command -v cargo >/dev/null; then
+    echo "setup: Rust is missing: install it with rustup (https://rustup.rs), or your distribution's rustc 1.95 or later" >&2
+    exit 1
+fi
+if ! command -v dpkg-query >/dev/null; then
+    echo "setup: this is not Debian; the build needs MuJoCo 2.2.2 (libmujoco.so and headers), EGL and Mesa's software" >&2
+    echo "setup: renderer. Carrying on in the hope that they are installed." >&2
+    exit 0
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+    status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+    [ "$status" = installed ] || missing+=("$package")
+done
+[ ${#missing[@]} -gt 0 ] || exit 0
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+        echo "setup: as root, run: apt-get install ${missing[*]}" >&2
+        exit 1
+    fi
+    as_root=(sudo)
+fi
+echo "setup: installing ${missing[*]}" >&2
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" >/dev/null
