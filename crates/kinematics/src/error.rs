@@ -1,0 +1,110 @@
+//! What can go wrong, with what was expected and what was found.
+
+use crate::inverse::IkSolution;
+use crate::limits::LimitViolation;
+
+/// Errors of this crate.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum KinematicsError {
+    /// An input holds NaN or an infinity.
+    #[error("{what} must be finite numbers, found {found}")]
+    NotFinite {
+        /// Which input.
+        what: &'static str,
+        /// The input as given.
+        found: String,
+    },
+    /// A pose's quaternion is not of unit length.
+    #[error("{what} must have a unit quaternion, found one of length {found}")]
+    NotARotation {
+        /// Which input.
+        what: &'static str,
+        /// Length of the quaternion.
+        found: f64,
+    },
+    /// An option is outside its range.
+    #[error("{option} must be {expected}, found {found}")]
+    InvalidOption {
+        /// Which option.
+        option: &'static str,
+        /// What it may be.
+        expected: &'static str,
+        /// What it is.
+        found: f64,
+    },
+    /// A joint configuration is outside the position limits.
+    #[error(
+        "{what}: joint {} must lie in [{:.4}, {:.4}] rad, found {:.4}",
+        .violation.joint, .violation.min_rad, .violation.max_rad, .violation.found_rad
+    )]
+    JointOutOfRange {
+        /// Which input.
+        what: &'static str,
+        /// The worst joint.
+        violation: LimitViolation,
+    },
+    /// No configuration reaches the pose, whatever the joint limits.
+    #[error(
+        "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the tcp misses it by {:.4} m and {:.2}° at best{}",
+        .target_m[0], .target_m[1], .target_m[2],
+        .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees(),
+        list_joints(.nearest_at_limit)
+    )]
+    OutOfReach {
+        /// The tcp position asked for, base frame, m.
+        target_m: [f64; 3],
+        /// The nearest pose that the arm reaches within its limits, and by how much it misses.
+        nearest: Box<IkSolution>,
+        /// Joints (1 to 7) that stand at a limit there.
+        nearest_at_limit: Vec<usize>,
+    },
+    /// Configurations reach the pose, but each of them breaks a joint limit.
+    #[error(
+        "a joint limit forbids the pose: joint {} would have to be at {:.4} rad, outside [{:.4}, {:.4}]; \
+         within the limits the tcp misses by {:.4} m and {:.2}°",
+        .violation.joint, .violation.found_rad, .violation.min_rad, .violation.max_rad,
+        .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees()
+    )]
+    JointLimit {
+        /// The limit that binds in the configuration that breaks limits least.
+        violation: LimitViolation,
+        /// The nearest pose that the arm reaches within its limits, and by how much it misses.
+        nearest: Box<IkSolution>,
+    },
+    /// A straight path meets a joint limit on its way.
+    #[error(
+        "the straight path meets a joint limit {:.1} % along: joint {} would have to be at {:.4} rad, outside [{:.4}, {:.4}]",
+        .at_share * 100.0, .violation.joint, .violation.found_rad, .violation.min_rad, .violation.max_rad
+    )]
+    PathJointLimit {
+        /// Share of the path done, 0 to 1.
+        at_share: f64,
+        /// The limit that binds.
+        violation: LimitViolation,
+    },
+    /// A straight path passes a singularity or leaves the reach of the arm.
+    #[error(
+        "the straight path cannot be followed beyond {:.1} %: {reason}", .at_share * 100.0
+    )]
+    PathBlocked {
+        /// Share of the path done, 0 to 1.
+        at_share: f64,
+        /// What stands in the way.
+        reason: &'static str,
+    },
+    /// The trajectory generator refused its input or failed.
+    #[error("no trajectory within the limits: {reason}")]
+    Trajectory {
+        /// Why.
+        reason: String,
+    },
+}
+
+fn list_joints(joints: &[usize]) -> String {
+    if joints.is_empty() {
+        return String::new();
+    }
+    let names: Vec<String> = joints.iter().map(usize::to_string).collect();
+    format!(", with joint {} at its limit", names.join(", "))
+}

@@ -1,0 +1,394 @@
+//! Inverse kinematics: the best configuration that reaches a tcp pose within the joint limits.
+//!
+//! The arm has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
+//! configuration; those inside the limits are compared by [`IkOptions`]' cost, and the best is refined over q7. So the
+//! search sees all ways of the arm, needs no random restarts and is the same on every call. Where the grid finds nothing, the
+//! branches that break limits least are refined over q7, which finds poses that only a sliver of angles reaches; if that
+//! fails as well, damped least squares within the limits gives the nearest pose and the error names the reason.
+
+use nalgebra::Isometry3;
+
+use crate::analytic::{Candidate, NUM_BRANCHES, candidates};
+use crate::check::{check_joints, check_options, check_pose};
+use crate::error::KinematicsError;
+use crate::limits::{JointLimits, JointVector, ready_pose};
+use crate::nearest::descend;
+use crate::panda::{Panda, pose_error};
+
+/// What [`Panda::inverse`] prefers among the configurations that reach a pose.
+///
+/// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
+/// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IkOptions {
+    /// Weight of the distance to the seed configuration: short motions.
+    pub seed_weight: f64,
+    /// The preferred posture.
+    pub posture: JointVector,
+    /// Weight of the distance to the preferred posture.
+    pub posture_weight: f64,
+    /// Weight of closeness to joint limits.
+    pub limit_weight: f64,
+    /// A joint nearer than this to one of its limits costs, rad.
+    pub comfortable_margin_rad: f64,
+    /// Joint positions must keep this distance from the limits, rad.
+    pub required_margin_rad: f64,
+    /// Number of angles of joint 7 tried, at least 2.
+    pub num_redundancy_samples: usize,
+    /// A solution may miss the position by this much, m.
+    pub position_tolerance_m: f64,
+    /// A solution may miss the orientation by this much, rad.
+    pub angle_tolerance_rad: f64,
+    /// What a radian is worth in metres when a nearest pose must be found for one out of reach.
+    pub metres_per_rad: f64,
+}
+
+impl Default for IkOptions {
+    fn default() -> Self {
+        Self {
+            seed_weight: 1.0,
+            posture: ready_pose(),
+            posture_weight: 0.3,
+            limit_weight: 2.0,
+            comfortable_margin_rad: 0.3,
+            required_margin_rad: 0.0,
+            num_redundancy_samples: 64,
+            position_tolerance_m: 1e-6,
+            angle_tolerance_rad: 1e-6,
+            metres_per_rad: 0.3,
+        }
+    }
+}
+
+/// A configuration and how well it reaches the pose asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IkSolution {
+    /// Joint positions within the limits, rad.
+    pub q: JointVector,
+    /// The tcp pose that `q` reaches.
+    pub base_from_tcp: Isometry3<f64>,
+    /// Distance between the positions reached and asked for, m.
+    pub position_residual_m: f64,
+    /// Angle between the orientations reached and asked for, rad.
+    pub angle_residual_rad: f64,
+    /// Distance of the joint nearest to one of its limits, rad.
+    pub limit_margin_rad: f64,
+    /// The cost of [`IkOptions`]; lower is better.
+    pub cost: f64,
+}
+
+impl Panda {
+    /// Finds the configuration that reaches `base_from_tcp` at the least cost of `options`.
+    ///
+    /// # Units and frames
+    /// `base_from_tcp` in m in the base frame; `seed` in rad, usually the present configuration; it need not be inside the
+    /// limits.
+    ///
+    /// # Errors
+    /// [`KinematicsError::OutOfReach`] and [`KinematicsError::JointLimit`] carry the nearest pose;
+    /// [`KinematicsError::NotFinite`], [`KinematicsError::NotARotation`] and [`KinematicsError::InvalidOption`] for input that
+    /// makes no sense.
+    pub fn inverse(
+        &self,
+        base_from_tcp: &Isometry3<f64>,
+        seed: &JointVector,
+        options: &IkOptions,
+    ) -> Result<IkSolution, KinematicsError> {
+        let search = Search::new(self, base_from_tcp, seed, options)?;
+        let mut best: Option<Branch> = None;
+        for branch in search.branches() {
+            if best.as_ref().is_none_or(|b| branch.cost < b.cost) {
+                best = Some(branch);
+            }
+        }
+        best.map(|branch| search.refine(branch)).and_then(|q| search.accept(&q)).map_or_else(|| search.rescue(), Ok)
+    }
+
+    /// Finds the best configuration of each way of the arm (elbow, shoulder, stretch of joint 7), best first.
+    ///
+    /// For a caller that has further wishes, such as a straight path that must follow from there.
+    ///
+    /// # Errors
+    /// As [`Panda::inverse`]; the list is never empty.
+    pub fn inverse_all(
+        &self,
+        base_from_tcp: &Isometry3<f64>,
+        seed: &JointVector,
+        options: &IkOptions,
+    ) -> Result<Vec<IkSolution>, KinematicsError> {
+        let search = Search::new(self, base_from_tcp, seed, options)?;
+        let mut solutions: Vec<IkSolution> =
+            search.branches().into_iter().filter_map(|branch| search.accept(&search.refine(branch))).collect();
+        if solutions.is_empty() {
+            solutions.push(search.rescue()?);
+        }
+        solutions.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        Ok(solutions)
+    }
+}
+
+/// The best grid point of one stretch of q7 over which one branch stays inside the limits.
+#[derive(Debug, Clone, Copy)]
+struct Branch {
+    branch_idx: usize,
+    q: JointVector,
+    cost: f64,
+}
+
+struct Search<'a> {
+    panda: &'a Panda,
+    base_from_tcp: &'a Isometry3<f64>,
+    base_from_flange: Isometry3<f64>,
+    seed: JointVector,
+    limits: JointLimits,
+    options: &'a IkOptions,
+}
+
+/// Violations this small are rounding, and are clamped away.
+const LIMIT_ROUNDING_RAD: f64 = 1e-9;
+/// Weight of geometric infeasibility against radians beyond limits when the least bad candidate is sought.
+const INFEASIBILITY_RAD: f64 = 10.0;
+const NUM_REFINEMENTS: usize = 24;
+/// Branches tried when nothing on the grid is feasible.
+const NUM_RESCUES: usize = 8;
+
+impl<'a> Search<'a> {
+    fn new(
+        panda: &'a Panda,
+        base_from_tcp: &'a Isometry3<f64>,
+        seed: &JointVector,
+        options: &'a IkOptions,
+    ) -> Result<Self, KinematicsError> {
+        check_pose("base_from_tcp", base_from_tcp)?;
+        check_joints("seed", seed)?;
+        check_options(options)?;
+        let margin = JointVector::repeat(options.required_margin_rad);
+        let mut limits = panda.limits.clone();
+        limits.position_min += margin;
+        limits.position_max -= margin;
+        Ok(Self {
+            panda,
+            base_from_tcp,
+            base_from_flange: base_from_tcp * panda.flange_from_tcp.inverse(),
+            seed: *seed,
+            limits,
+            options,
+        })
+    }
+
+    fn grid(&self) -> impl Iterator<Item = f64> + '_ {
+        let (low, high) = (self.limits.position_min[6], self.limits.position_max[6]);
+        let num = self.options.num_redundancy_samples;
+        (0..num).map(move |i| low + (high - low) * i as f64 / (num - 1) as f64)
+    }
+
+    fn grid_step(&self) -> f64 {
+        (self.limits.position_max[6] - self.limits.position_min[6]) / (self.options.num_redundancy_samples - 1) as f64
+    }
+
+    fn candidates(&self, q7: f64) -> [Option<Candidate>; NUM_BRANCHES] {
+        candidates(&self.base_from_flange, q7, self.seed[0])
+    }
+
+    /// The best grid point of every feasible stretch of every branch.
+    fn branches(&self) -> Vec<Branch> {
+        let mut open: [Option<Branch>; NUM_BRANCHES] = [None; NUM_BRANCHES];
+        let mut closed = Vec::new();
+        for q7 in self.grid() {
+            for (branch_idx, candidate) in self.candidates(q7).iter().enumerate() {
+                match self.feasible_cost(candidate) {
+                    Some((q, cost)) => {
+                        if open[branch_idx].is_none_or(|b| cost < b.cost) {
+                            open[branch_idx] = Some(Branch { branch_idx, q, cost });
+                        }
+                    }
+                    None => closed.extend(open[branch_idx].take()),
+                }
+            }
+        }
+        closed.extend(open.into_iter().flatten());
+        closed
+    }
+
+    fn feasible_cost(&self, candidate: &Option<Candidate>) -> Option<(JointVector, f64)> {
+        let candidate = candidate.as_ref()?;
+        if candidate.infeasibility > 0.0 {
+            return None;
+        }
+        let margins = self.limits.margins(&candidate.q);
+        (margins.min() >= -LIMIT_ROUNDING_RAD).then(|| (candidate.q, self.cost(&candidate.q)))
+    }
+
+    fn cost(&self, q: &JointVector) -> f64 {
+        let options = self.options;
+        let crowding: f64 = self
+            .limits
+            .margins(q)
+            .iter()
+            .map(|margin| (1.0 - margin / options.comfortable_margin_rad).max(0.0).powi(2))
+            .sum();
+        options.seed_weight * (q - self.seed).norm_squared()
+            + options.posture_weight * (q - options.posture).norm_squared()
+            + options.limit_weight * crowding
+    }
+
+    /// Lowers a branch's cost over q7 within a grid step to either side.
+    fn refine(&self, branch: Branch) -> JointVector {
+        let cost_at = |q7: f64| {
+            self.feasible_cost(&self.candidates(q7)[branch.branch_idx])
+                .map_or((branch.q, f64::INFINITY), |(q, cost)| (q, cost))
+        };
+        let step = self.grid_step();
+        let (q, cost) = golden_section(
+            (branch.q[6] - step).max(self.limits.position_min[6]),
+            (branch.q[6] + step).min(self.limits.position_max[6]),
+            cost_at,
+        );
+        if cost < branch.cost { q } else { branch.q }
+    }
+
+    fn solution(&self, q: &JointVector) -> IkSolution {
+        let q = self.limits.clamp(q);
+        let reached = self.panda.forward(&q);
+        let error = pose_error(&reached, self.base_from_tcp);
+        IkSolution {
+            q,
+            base_from_tcp: reached,
+            position_residual_m: error.fixed_rows::<3>(0).norm(),
+            angle_residual_rad: error.fixed_rows::<3>(3).norm(),
+            limit_margin_rad: self.panda.limits.margins(&q).min(),
+            cost: self.cost(&q),
+        }
+    }
+
+    /// The solution at `q`, polished where the closed form lost digits, if it meets the tolerances.
+    fn accept(&self, q: &JointVector) -> Option<IkSolution> {
+        let meets = |solution: &IkSolution| {
+            solution.position_residual_m <= self.options.position_tolerance_m
+                && solution.angle_residual_rad <= self.options.angle_tolerance_rad
+        };
+        let solution = self.solution(q);
+        if meets(&solution) {
+            return Some(solution);
+        }
+        let polished = self.solution(&self.descend(q));
+        meets(&polished).then_some(polished)
+    }
+
+    fn descend(&self, start: &JointVector) -> JointVector {
+        let metres_per_rad = self.options.metres_per_rad;
+        descend(self.panda, &self.limits, self.base_from_tcp, start, metres_per_rad)
+    }
+
+    /// Looks between the grid points, then for the nearest pose and the reason of the failure.
+    fn rescue(&self) -> Result<IkSolution, KinematicsError> {
+        let mut least_bad = self.least_bad_branches();
+        least_bad.truncate(NUM_RESCUES);
+        for candidate in &least_bad {
+            if self.badness(candidate) <= LIMIT_ROUNDING_RAD
+                && let Some(solution) = self.accept(&candidate.q)
+            {
+                return Ok(solution);
+            }
+        }
+
+        let starts = least_bad.iter().map(|c| c.q).chain([self.seed, self.options.posture]);
+        let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
+        let nearest = starts
+            .map(|start| self.solution(&self.descend(&start)))
+            .min_by(|a, b| miss(a).total_cmp(&miss(b)))
+            .expect("the seed is always a start");
+        if let Some(solution) = self.accept(&nearest.q) {
+            return Ok(solution);
+        }
+        let nearest = Box::new(nearest);
+        let reaches_without_limits = least_bad.iter().find(|c| c.infeasibility <= 0.0);
+        Err(match reaches_without_limits {
+            Some(candidate) => KinematicsError::JointLimit {
+                violation: self.limits.violation_at(&candidate.q, self.limits.margins(&candidate.q).argmin().0),
+                nearest,
+            },
+            None => KinematicsError::OutOfReach {
+                target_m: self.base_from_tcp.translation.vector.into(),
+                nearest_at_limit: joints_at_limit(&self.limits, &nearest.q),
+                nearest,
+            },
+        })
+    }
+
+    /// How much a candidate breaks limits and geometry: 0 where it is a solution.
+    fn badness(&self, candidate: &Candidate) -> f64 {
+        let beyond: f64 = self.limits.margins(&candidate.q).iter().map(|m| (-m).max(0.0)).sum();
+        beyond + INFEASIBILITY_RAD * candidate.infeasibility
+    }
+
+    /// The local minima over q7 of each branch's badness, refined, least bad first.
+    fn least_bad_branches(&self) -> Vec<Candidate> {
+        let q7: Vec<f64> = self.grid().collect();
+        let on_grid: Vec<_> = q7.iter().map(|q7| self.candidates(*q7)).collect();
+        let step = self.grid_step();
+        let mut minima = Vec::new();
+        for branch_idx in 0..NUM_BRANCHES {
+            let badness_on_grid: Vec<f64> =
+                on_grid.iter().map(|c| c[branch_idx].as_ref().map_or(f64::INFINITY, |c| self.badness(c))).collect();
+            for i in 0..q7.len() {
+                let here = badness_on_grid[i];
+                let before = if i > 0 { badness_on_grid[i - 1] } else { f64::INFINITY };
+                let after = badness_on_grid.get(i + 1).copied().unwrap_or(f64::INFINITY);
+                if here.is_finite() && here <= before && here <= after {
+                    minima.push((here, branch_idx, q7[i]));
+                }
+            }
+        }
+        minima.sort_by(|a, b| a.0.total_cmp(&b.0));
+        minima.truncate(2 * NUM_RESCUES);
+
+        let mut refined: Vec<Candidate> = minima
+            .into_iter()
+            .filter_map(|(_, branch_idx, q7)| {
+                let badness_at = |q7: f64| {
+                    let candidate = self.candidates(q7)[branch_idx];
+                    (candidate, candidate.map_or(f64::INFINITY, |c| self.badness(&c)))
+                };
+                let (candidate, _) = golden_section(
+                    (q7 - step).max(self.limits.position_min[6]),
+                    (q7 + step).min(self.limits.position_max[6]),
+                    badness_at,
+                );
+                candidate
+            })
+            .collect();
+        refined.sort_by(|a, b| self.badness(a).total_cmp(&self.badness(b)));
+        refined
+    }
+}
+
+/// The lowest value seen of `f` on [low, high] and what came with it, by golden-section search.
+fn golden_section<T>(mut low: f64, mut high: f64, f: impl Fn(f64) -> (T, f64)) -> (T, f64) {
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    let mut left = high - SHARE * (high - low);
+    let mut right = low + SHARE * (high - low);
+    let mut at_left = f(left);
+    let mut at_right = f(right);
+    for _ in 0..NUM_REFINEMENTS {
+        if at_left.1 <= at_right.1 {
+            (high, right, at_right) = (right, left, at_left);
+            left = high - SHARE * (high - low);
+            at_left = f(left);
+        } else {
+            (low, left, at_left) = (left, right, at_right);
+            right = low + SHARE * (high - low);
+            at_right = f(right);
+        }
+    }
+    if at_left.1 <= at_right.1 { at_left } else { at_right }
+}
+
+fn joints_at_limit(limits: &JointLimits, q: &JointVector) -> Vec<usize> {
+    const AT_LIMIT_RAD: f64 = 1e-6;
+    let margins = limits.margins(q);
+    (0..margins.len()).filter(|i| margins[*i] < AT_LIMIT_RAD).map(|i| i + 1).collect()
+}
+
+#[cfg(test)]
+mod tests;

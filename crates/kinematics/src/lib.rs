@@ -1,0 +1,43 @@
+//! Franka Panda: where the hand is, how to get it somewhere, and how fast it may go there.
+//!
+//! ```text
+//! base_from_tcp ──► inverse ──► q ──► point-to-point trajectory ─┐
+//!                                └──► straight path ──► timed ───┴──► Trajectory::sample(t) = q, q̇, q̈
+//! ```
+//!
+//! Left out: collisions other than with the table's plane, planning around obstacles, dynamics (masses, torques),
+//! communication with a real robot.
+//!
+//! ```
+//! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+//! use sdg_kinematics::{IkOptions, Panda, ready_pose};
+//!
+//! let panda = Panda::new();
+//! let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+//! let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.1, 0.2).into(), down);
+//! let solution = panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default())?;
+//! let reached = panda.forward(&solution.q);
+//! assert!((reached.translation.vector - base_from_tcp.translation.vector).norm() < 1e-6);
+//! # Ok::<(), sdg_kinematics::KinematicsError>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod analytic;
+mod check;
+mod error;
+mod inverse;
+mod limits;
+mod nearest;
+mod panda;
+
+pub use error::KinematicsError;
+pub use inverse::{IkOptions, IkSolution};
+pub use limits::{
+    ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, JointVector, LimitViolation, NUM_JOINTS,
+    POSITION_MAX_RAD, POSITION_MIN_RAD, READY_RAD, TORQUE_MAX_NM, VELOCITY_MAX_RAD_S, ready_pose,
+};
+pub use panda::{
+    DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, Frames, HAND_OPENING_MAX_M, HAND_TURN_RAD, Jacobian, Panda,
+    TCP_OFFSET_M,
+};

@@ -1,0 +1,238 @@
+//! What the robot may do: positions, velocities, accelerations and jerks, in joint and Cartesian space.
+//!
+//! # Source
+//! Franka Control Interface documentation, "Robot and interface specifications", Franka Emika Robot ("Panda").
+
+use nalgebra::SVector;
+
+use crate::error::KinematicsError;
+
+/// Number of joints of the arm.
+pub const NUM_JOINTS: usize = 7;
+
+/// One number a joint, joint 1 (at the base) first; radians unless said otherwise.
+pub type JointVector = SVector<f64, NUM_JOINTS>;
+
+/// Smallest joint positions, rad.
+pub const POSITION_MIN_RAD: [f64; NUM_JOINTS] = [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973];
+/// Largest joint positions, rad.
+pub const POSITION_MAX_RAD: [f64; NUM_JOINTS] = [2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973];
+/// Joint velocity limits, rad/s.
+pub const VELOCITY_MAX_RAD_S: [f64; NUM_JOINTS] = [2.1750, 2.1750, 2.1750, 2.1750, 2.6100, 2.6100, 2.6100];
+/// Joint acceleration limits, rad/s².
+pub const ACCELERATION_MAX_RAD_S2: [f64; NUM_JOINTS] = [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0];
+/// Joint jerk limits, rad/s³.
+pub const JERK_MAX_RAD_S3: [f64; NUM_JOINTS] = [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0];
+/// Joint torque limits, N·m.
+pub const TORQUE_MAX_NM: [f64; NUM_JOINTS] = [87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0];
+
+/// Franka's ready pose, rad: elbow up, hand pointing down in front of the base.
+pub const READY_RAD: [f64; NUM_JOINTS] = {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4]
+};
+
+/// Franka's ready pose as a vector, see [`READY_RAD`].
+pub fn ready_pose() -> JointVector {
+    JointVector::from(READY_RAD)
+}
+
+/// Where a joint leaves its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitViolation {
+    /// Joint number as Franka counts, 1 to 7.
+    pub joint: usize,
+    /// The position asked for, rad.
+    pub found_rad: f64,
+    /// Smallest position allowed, rad.
+    pub min_rad: f64,
+    /// Largest position allowed, rad.
+    pub max_rad: f64,
+}
+
+impl LimitViolation {
+    /// How far outside its range the joint is, rad, positive.
+    pub fn excess_rad(&self) -> f64 {
+        (self.min_rad - self.found_rad).max(self.found_rad - self.max_rad)
+    }
+}
+
+/// Limits of every joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointLimits {
+    /// Smallest positions, rad.
+    pub position_min: JointVector,
+    /// Largest positions, rad.
+    pub position_max: JointVector,
+    /// Largest speeds, rad/s.
+    pub velocity_max: JointVector,
+    /// Largest accelerations, rad/s².
+    pub acceleration_max: JointVector,
+    /// Largest jerks, rad/s³.
+    pub jerk_max: JointVector,
+}
+
+impl JointLimits {
+    /// The limits that Franka publishes.
+    pub fn franka() -> Self {
+        Self {
+            position_min: POSITION_MIN_RAD.into(),
+            position_max: POSITION_MAX_RAD.into(),
+            velocity_max: VELOCITY_MAX_RAD_S.into(),
+            acceleration_max: ACCELERATION_MAX_RAD_S2.into(),
+            jerk_max: JERK_MAX_RAD_S3.into(),
+        }
+    }
+
+    /// The same ranges with velocity, acceleration and jerk multiplied by the given factors.
+    ///
+    /// # Errors
+    /// A factor outside (0, 1] is a [`KinematicsError::InvalidOption`].
+    pub fn scaled(&self, velocity: f64, acceleration: f64, jerk: f64) -> Result<Self, KinematicsError> {
+        check_factors(&[velocity, acceleration, jerk])?;
+        Ok(Self {
+            velocity_max: self.velocity_max * velocity,
+            acceleration_max: self.acceleration_max * acceleration,
+            jerk_max: self.jerk_max * jerk,
+            ..self.clone()
+        })
+    }
+
+    /// Distance of each joint to its nearer position limit, rad; negative outside.
+    pub fn margins(&self, q: &JointVector) -> JointVector {
+        (q - self.position_min).zip_map(&(self.position_max - q), f64::min)
+    }
+
+    /// The joint that is furthest outside its range, if any is by more than `tolerance_rad`.
+    pub fn worst_violation(&self, q: &JointVector, tolerance_rad: f64) -> Option<LimitViolation> {
+        let (joint_idx, margin) = self.margins(q).argmin();
+        (margin < -tolerance_rad).then(|| self.violation_at(q, joint_idx))
+    }
+
+    /// The nearest joint positions inside the ranges.
+    pub fn clamp(&self, q: &JointVector) -> JointVector {
+        q.sup(&self.position_min).inf(&self.position_max)
+    }
+
+    /// Middle of each joint's range, rad.
+    pub fn middle(&self) -> JointVector {
+        (self.position_min + self.position_max) * 0.5
+    }
+
+    pub(crate) fn violation_at(&self, q: &JointVector, joint_idx: usize) -> LimitViolation {
+        LimitViolation {
+            joint: joint_idx + 1,
+            found_rad: q[joint_idx],
+            min_rad: self.position_min[joint_idx],
+            max_rad: self.position_max[joint_idx],
+        }
+    }
+}
+
+impl Default for JointLimits {
+    fn default() -> Self {
+        Self::franka()
+    }
+}
+
+/// Limits of the tcp's motion along a Cartesian path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CartesianLimits {
+    /// Largest speed, m/s.
+    pub velocity_m_s: f64,
+    /// Largest acceleration, m/s².
+    pub acceleration_m_s2: f64,
+    /// Largest jerk, m/s³.
+    pub jerk_m_s3: f64,
+    /// Largest angular speed, rad/s.
+    pub angular_velocity_rad_s: f64,
+    /// Largest angular acceleration, rad/s².
+    pub angular_acceleration_rad_s2: f64,
+    /// Largest angular jerk, rad/s³.
+    pub angular_jerk_rad_s3: f64,
+}
+
+impl CartesianLimits {
+    /// The limits that Franka publishes.
+    pub const fn franka() -> Self {
+        Self {
+            velocity_m_s: 1.7,
+            acceleration_m_s2: 13.0,
+            jerk_m_s3: 6500.0,
+            angular_velocity_rad_s: 2.5,
+            angular_acceleration_rad_s2: 25.0,
+            angular_jerk_rad_s3: 12500.0,
+        }
+    }
+
+    /// The same limits multiplied by the given factors, linear and angular alike.
+    ///
+    /// # Errors
+    /// A factor outside (0, 1] is a [`KinematicsError::InvalidOption`].
+    pub fn scaled(&self, velocity: f64, acceleration: f64, jerk: f64) -> Result<Self, KinematicsError> {
+        check_factors(&[velocity, acceleration, jerk])?;
+        Ok(Self {
+            velocity_m_s: self.velocity_m_s * velocity,
+            acceleration_m_s2: self.acceleration_m_s2 * acceleration,
+            jerk_m_s3: self.jerk_m_s3 * jerk,
+            angular_velocity_rad_s: self.angular_velocity_rad_s * velocity,
+            angular_acceleration_rad_s2: self.angular_acceleration_rad_s2 * acceleration,
+            angular_jerk_rad_s3: self.angular_jerk_rad_s3 * jerk,
+        })
+    }
+}
+
+impl Default for CartesianLimits {
+    fn default() -> Self {
+        Self::franka()
+    }
+}
+
+fn check_factors(factors: &[f64]) -> Result<(), KinematicsError> {
+    match factors.iter().find(|f| !(**f > 0.0 && **f <= 1.0)) {
+        None => Ok(()),
+        Some(found) => Err(KinematicsError::InvalidOption {
+            option: "limit scaling",
+            expected: "a factor in (0, 1]",
+            found: *found,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ready_pose_is_inside_and_margins_are_hand_checkable() {
+        let limits = JointLimits::franka();
+        let margins = limits.margins(&ready_pose());
+        assert!((margins[0] - 2.8973).abs() < 1e-12);
+        assert!((margins[3] - (3.0718 - 3.0 * std::f64::consts::FRAC_PI_4)).abs() < 1e-12);
+        assert_eq!(limits.worst_violation(&ready_pose(), 0.0), None);
+    }
+
+    #[test]
+    fn the_worst_joint_is_named_as_franka_counts() {
+        let limits = JointLimits::franka();
+        let mut q = ready_pose();
+        q[3] = 0.0; // 0.0698 too high
+        q[5] = -0.1175; // 0.1 too low
+        let worst = limits.worst_violation(&q, 1e-9).unwrap();
+        assert_eq!(worst.joint, 6);
+        assert!((worst.excess_rad() - 0.1).abs() < 1e-12);
+        assert_eq!(limits.worst_violation(&limits.clamp(&q), 0.0), None);
+    }
+
+    #[test]
+    fn scaling_refuses_what_is_no_share() {
+        for bad in [0.0, -0.5, 1.5, f64::NAN] {
+            assert!(JointLimits::franka().scaled(1.0, bad, 1.0).is_err());
+            assert!(CartesianLimits::franka().scaled(bad, 1.0, 1.0).is_err());
+        }
+        let half = JointLimits::franka().scaled(0.5, 0.25, 0.125).unwrap();
+        assert_eq!(half.velocity_max[0], 1.0875);
+        assert_eq!(half.acceleration_max[1], 1.875);
+        assert_eq!(half.jerk_max[6], 1250.0);
+    }
+}

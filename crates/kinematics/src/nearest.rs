@@ -1,0 +1,96 @@
+//! The configuration within the joint limits whose tcp comes nearest to a pose: damped least squares in a box.
+
+use nalgebra::{Isometry3, SMatrix, Vector6};
+
+use crate::limits::{JointLimits, JointVector, NUM_JOINTS};
+use crate::panda::{Panda, pose_error};
+
+const MAX_ITERATIONS: usize = 300;
+const INITIAL_DAMPING: f64 = 1e-3;
+const MIN_DAMPING: f64 = 1e-12;
+const MAX_DAMPING: f64 = 1e6;
+/// Steps that gain less than this share of the cost end the descent.
+const MIN_RELATIVE_GAIN: f64 = 1e-10;
+const NEGLIGIBLE_COST: f64 = 1e-26;
+
+/// Levenberg–Marquardt from `start`, joints held inside `limits` by projection.
+///
+/// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit that wants further out is left out of the
+/// step, so the others slide along the limit instead of stopping there.
+pub(crate) fn descend(
+    panda: &Panda,
+    limits: &JointLimits,
+    target: &Isometry3<f64>,
+    start: &JointVector,
+    metres_per_rad: f64,
+) -> JointVector {
+    let weights = Vector6::new(1.0, 1.0, 1.0, metres_per_rad, metres_per_rad, metres_per_rad);
+    let mut q = limits.clamp(start);
+    let mut damping = INITIAL_DAMPING;
+    let (mut pose, mut jacobian) = panda.forward_and_jacobian(&q);
+    let mut error = pose_error(&pose, target).component_mul(&weights);
+
+    for _ in 0..MAX_ITERATIONS {
+        let cost = error.norm_squared();
+        if cost < NEGLIGIBLE_COST {
+            break;
+        }
+        for mut column in jacobian.column_iter_mut() {
+            column.component_mul_assign(&weights);
+        }
+        let gradient = jacobian.transpose() * error;
+        let normal = jacobian.transpose() * jacobian;
+        let is_free: [bool; NUM_JOINTS] = std::array::from_fn(|i| {
+            !(q[i] >= limits.position_max[i] && gradient[i] > 0.0
+                || q[i] <= limits.position_min[i] && gradient[i] < 0.0)
+        });
+
+        let mut next = None;
+        while damping < MAX_DAMPING {
+            let step = damped_step(&normal, &gradient, &is_free, damping);
+            let q_next = limits.clamp(&(q + step));
+            let (pose_next, jacobian_next) = panda.forward_and_jacobian(&q_next);
+            let error_next = pose_error(&pose_next, target).component_mul(&weights);
+            if error_next.norm_squared() < cost {
+                damping = (damping * 0.2).max(MIN_DAMPING);
+                next = Some((q_next, pose_next, jacobian_next, error_next));
+                break;
+            }
+            damping *= 4.0;
+        }
+        let Some((q_next, pose_next, jacobian_next, error_next)) = next else {
+            break;
+        };
+        let gain = cost - error_next.norm_squared();
+        (q, pose, jacobian, error) = (q_next, pose_next, jacobian_next, error_next);
+        if gain < MIN_RELATIVE_GAIN * cost {
+            break;
+        }
+    }
+    debug_assert!(pose.translation.vector.iter().all(|x| x.is_finite()));
+    q
+}
+
+fn damped_step(
+    normal: &SMatrix<f64, NUM_JOINTS, NUM_JOINTS>,
+    gradient: &JointVector,
+    is_free: &[bool; NUM_JOINTS],
+    damping: f64,
+) -> JointVector {
+    let mut matrix = *normal;
+    let mut right = *gradient;
+    for joint_idx in 0..NUM_JOINTS {
+        matrix[(joint_idx, joint_idx)] += damping;
+        if !is_free[joint_idx] {
+            matrix.row_mut(joint_idx).fill(0.0);
+            matrix.column_mut(joint_idx).fill(0.0);
+            matrix[(joint_idx, joint_idx)] = 1.0;
+            right[joint_idx] = 0.0;
+        }
+    }
+    match matrix.cholesky() {
+        Some(factor) => factor.solve(&right),
+        // Positive definite up to rounding: a gradient step is always downhill.
+        None => right / (damping + normal.trace()),
+    }
+}
