@@ -1,0 +1,108 @@
+//! The operations as compositions of burn's own tensor operations, on any backend.
+//!
+//! They are the default bodies of [`KernelBackend`](crate::KernelBackend), and the second opinion that the
+//! kernels' tests ask for. They are right, differentiable, and make no attempt at speed.
+
+use burn::backend::ops::{ConvOptions, ConvTransposeOptions};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, TensorMetadata, read_sync};
+use burn::tensor::{Shape, Slice, TensorData};
+
+use crate::conv::Conv2dParams;
+use crate::roi_align::{RoiAlignParams, RoiBins};
+
+/// [`conv2d`](crate::conv2d) by burn's `conv2d`.
+pub fn conv2d<B: Backend>(
+    x: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
+    params: Conv2dParams,
+) -> FloatTensor<B> {
+    let options = ConvOptions::new(params.stride, params.padding, [1, 1], 1);
+    B::conv2d(x, weight, Some(bias), options)
+}
+
+/// [`conv_transpose2d`](crate::conv_transpose2d) by burn's `conv_transpose2d`.
+pub fn conv_transpose2d<B: Backend>(
+    x: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
+    params: Conv2dParams,
+) -> FloatTensor<B> {
+    let options = ConvTransposeOptions::new(params.stride, params.padding, [0, 0], [1, 1], 1);
+    B::conv_transpose2d(x, weight, Some(bias), options)
+}
+
+/// [`roi_align`](crate::roi_align()) by two matrix products an image, one per axis.
+///
+/// Holds `R·C·Ph·W` floats at a time, R the most ROIs of one image.
+pub fn roi_align<B: Backend>(
+    features: FloatTensor<B>,
+    rois: FloatTensor<B>,
+    params: RoiAlignParams,
+) -> FloatTensor<B> {
+    let shape = features.shape();
+    let [num_images, channels, height, width] = [shape[0], shape[1], shape[2], shape[3]];
+    let [bins_y, bins_x] = params.output_size;
+    let device = features.device();
+    let dtype = features.dtype();
+    let rois = read_sync(B::float_into_data(rois))
+        .expect("roi_align: the ROIs can be read back from the device")
+        .convert::<f32>()
+        .try_into_vec::<f32>()
+        .expect("roi_align: converted to f32 above");
+    let bins: Vec<RoiBins> = rois
+        .chunks_exact(5)
+        .enumerate()
+        .map(|(idx, roi)| RoiBins::new(roi, idx, num_images, [height, width], &params))
+        .collect();
+
+    let from_vec = |values: Vec<f32>, shape: Vec<usize>| {
+        B::float_from_data(TensorData::new(values, shape).convert_dtype(dtype), &device)
+    };
+    let mut crops = Vec::new();
+    let mut row_of_roi = vec![0; bins.len()];
+    let mut rows_done = 0;
+    for image_idx in 0..num_images {
+        let of_image: Vec<usize> = (0..bins.len())
+            .filter(|&roi| bins[roi].image_idx == image_idx)
+            .collect();
+        if of_image.is_empty() {
+            continue;
+        }
+        let num_rois = of_image.len();
+        let mut weights_y = vec![0.0; num_rois * bins_y * height];
+        let mut weights_x = vec![0.0; num_rois * bins_x * width];
+        for (slot, &roi) in of_image.iter().enumerate() {
+            row_of_roi[roi] = rows_done + slot;
+            let y = slot * bins_y * height;
+            let x = slot * bins_x * width;
+            bins[roi]
+                .y
+                .write_dense(&mut weights_y[y..y + bins_y * height], height);
+            bins[roi]
+                .x
+                .write_dense(&mut weights_x[x..x + bins_x * width], width);
+        }
+        rows_done += num_rois;
+
+        let image = B::float_slice(features.clone(), &[Slice::from(image_idx..image_idx + 1)]);
+        // [C, H, W] -> [H, C·W]
+        let image = B::float_reshape(image, Shape::from(vec![channels, height, width]));
+        let image = B::float_permute(image, &[1, 0, 2]);
+        let image = B::float_reshape(image, Shape::from(vec![height, channels * width]));
+        // [R·Ph, H] x [H, C·W] -> [R, Ph·C, W]
+        let rows = B::float_matmul(from_vec(weights_y, vec![num_rois * bins_y, height]), image);
+        let rows = B::float_reshape(rows, Shape::from(vec![num_rois, bins_y * channels, width]));
+        // [R, Ph·C, W] x [R, W, Pw] -> [R, C, Ph, Pw]
+        let columns = B::float_swap_dims(from_vec(weights_x, vec![num_rois, bins_x, width]), 1, 2);
+        let crop = B::float_matmul(rows, columns);
+        let crop = B::float_reshape(crop, Shape::from(vec![num_rois, bins_y, channels, bins_x]));
+        crops.push(B::float_permute(crop, &[0, 2, 1, 3]));
+    }
+    let crops = B::float_cat(crops, 0);
+    // Back from the order of images to that of the ROIs.
+    let order: Vec<i64> = row_of_roi.iter().map(|&row| row as i64).collect();
+    let order = TensorData::new(order, [bins.len()]);
+    B::float_select(crops, 0, B::int_from_data(order, &device))
+}

@@ -1,0 +1,186 @@
+//! Two-dimensional convolution and its transpose.
+//!
+//! Shapes: N images, Ci channels in, Co channels out, a kernel of Kh × Kw, maps of Hi × Wi and Ho × Wo.
+
+use burn::backend::Dispatch;
+use burn::tensor::Tensor;
+
+use crate::extension::KernelBackend;
+
+/// How a convolution's kernel moves over its input. Every pair is `[vertical, horizontal]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Conv2dParams {
+    /// Step of the kernel from one output pixel to the next, at least 1.
+    pub stride: [usize; 2],
+    /// Zeros added before and after each axis.
+    pub padding: [usize; 2],
+}
+
+impl Conv2dParams {
+    /// Stride 1, no padding.
+    pub const UNIT: Self = Self {
+        stride: [1, 1],
+        padding: [0, 0],
+    };
+
+    /// The same stride and padding on both axes.
+    pub const fn square(stride: usize, padding: usize) -> Self {
+        Self {
+            stride: [stride, stride],
+            padding: [padding, padding],
+        }
+    }
+
+    /// Size of the convolution's output map, or `None` where the padded input is smaller than the kernel.
+    ///
+    /// # Shapes
+    /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
+    pub fn output_size(&self, input: [usize; 2], kernel: [usize; 2]) -> Option<[usize; 2]> {
+        let mut output = [0; 2];
+        for axis in 0..2 {
+            let padded = input[axis] + 2 * self.padding[axis];
+            output[axis] = padded.checked_sub(kernel[axis])? / self.stride[axis] + 1;
+        }
+        Some(output)
+    }
+
+    /// Size of the transposed convolution's output map, or `None` where the padding eats all of it.
+    ///
+    /// # Shapes
+    /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
+    pub fn transposed_output_size(
+        &self,
+        input: [usize; 2],
+        kernel: [usize; 2],
+    ) -> Option<[usize; 2]> {
+        let mut output = [0; 2];
+        for axis in 0..2 {
+            let full = input[axis].checked_sub(1)? * self.stride[axis] + kernel[axis];
+            output[axis] = full
+                .checked_sub(2 * self.padding[axis])
+                .filter(|&size| size > 0)?;
+        }
+        Some(output)
+    }
+}
+
+impl Default for Conv2dParams {
+    fn default() -> Self {
+        Self::UNIT
+    }
+}
+
+/// Convolves `x` with `weight` (cross-correlation, as everywhere in deep learning) and adds `bias`.
+///
+/// # Shapes
+/// `x` `[N, Ci, Hi, Wi]`, `weight` `[Co, Ci, Kh, Kw]`, `bias` `[Co]`; the result is `[N, Co, Ho, Wo]` with
+/// `Ho = (Hi + 2·padding − Kh) / stride + 1`, rounded down.
+///
+/// # Panics
+/// Where the shapes do not fit each other, a dimension or stride is 0, or the kernel is larger than the
+/// padded input.
+pub fn conv2d(
+    x: Tensor<4>,
+    weight: Tensor<4>,
+    bias: Option<Tensor<1>>,
+    params: Conv2dParams,
+) -> Tensor<4> {
+    let [num_images, in_channels, in_height, in_width] = x.dims();
+    let [out_channels, weight_channels, kernel_height, kernel_width] = weight.dims();
+    check_parameters("conv2d", x.dims(), weight.dims(), params);
+    assert!(
+        weight_channels == in_channels,
+        "conv2d: expected a weight of [Co, {in_channels}, Kh, Kw] for an input of {:?}, found {:?}",
+        x.dims(),
+        weight.dims(),
+    );
+    assert!(
+        params
+            .output_size([in_height, in_width], [kernel_height, kernel_width])
+            .is_some(),
+        "conv2d: expected a padded input of at least the kernel's {kernel_height} x {kernel_width}, found \
+         {num_images} maps of {in_height} x {in_width} with padding {:?}",
+        params.padding,
+    );
+    let bias = bias_or_zeros("conv2d", bias, out_channels, &x);
+    Tensor::from_dispatch(Dispatch::kernel_conv2d(
+        x.into_dispatch(),
+        weight.into_dispatch(),
+        bias.into_dispatch(),
+        params,
+    ))
+}
+
+/// Transposed convolution: the map whose gradient with respect to its input is [`conv2d`].
+///
+/// # Shapes
+/// `x` `[N, Ci, Hi, Wi]`, `weight` `[Ci, Co, Kh, Kw]` (input channels first, as in PyTorch), `bias` `[Co]`;
+/// the result is `[N, Co, Ho, Wo]` with `Ho = (Hi − 1)·stride + Kh − 2·padding`.
+///
+/// # Panics
+/// Where the shapes do not fit each other, a dimension or stride is 0, or the padding leaves no output.
+pub fn conv_transpose2d(
+    x: Tensor<4>,
+    weight: Tensor<4>,
+    bias: Option<Tensor<1>>,
+    params: Conv2dParams,
+) -> Tensor<4> {
+    let [_, in_channels, in_height, in_width] = x.dims();
+    let [weight_channels, out_channels, kernel_height, kernel_width] = weight.dims();
+    check_parameters("conv_transpose2d", x.dims(), weight.dims(), params);
+    assert!(
+        weight_channels == in_channels,
+        "conv_transpose2d: expected a weight of [{in_channels}, Co, Kh, Kw] for an input of {:?}, found {:?}",
+        x.dims(),
+        weight.dims(),
+    );
+    assert!(
+        params
+            .transposed_output_size([in_height, in_width], [kernel_height, kernel_width])
+            .is_some(),
+        "conv_transpose2d: expected padding that leaves an output, found {:?} for an input of {in_height} x \
+         {in_width}, kernel {kernel_height} x {kernel_width}, stride {:?}",
+        params.padding,
+        params.stride,
+    );
+    let bias = bias_or_zeros("conv_transpose2d", bias, out_channels, &x);
+    Tensor::from_dispatch(Dispatch::kernel_conv_transpose2d(
+        x.into_dispatch(),
+        weight.into_dispatch(),
+        bias.into_dispatch(),
+        params,
+    ))
+}
+
+fn check_parameters(name: &str, x: [usize; 4], weight: [usize; 4], params: Conv2dParams) {
+    assert!(
+        x.iter().chain(&weight).all(|&size| size > 0),
+        "{name}: expected no empty dimension, found input {x:?} and weight {weight:?}"
+    );
+    assert!(
+        params.stride.iter().all(|&step| step > 0),
+        "{name}: expected strides of at least 1, found {:?}",
+        params.stride
+    );
+}
+
+/// The extension's methods take tensors, not options of tensors, so an absent bias is zeros, which no
+/// gradient reaches.
+fn bias_or_zeros(
+    name: &str,
+    bias: Option<Tensor<1>>,
+    out_channels: usize,
+    x: &Tensor<4>,
+) -> Tensor<1> {
+    match bias {
+        Some(bias) => {
+            assert!(
+                bias.dims() == [out_channels],
+                "{name}: expected a bias of [{out_channels}], found {:?}",
+                bias.dims()
+            );
+            bias
+        }
+        None => Tensor::zeros([out_channels], (&x.device(), x.dtype())),
+    }
+}

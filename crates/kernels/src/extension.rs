@@ -1,0 +1,46 @@
+//! The backend extension: one method per operation, with a default body of burn's own tensor operations.
+
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, backend_extension};
+
+
+use crate::composed;
+use crate::conv::Conv2dParams;
+use crate::roi_align::RoiAlignParams;
+
+/// Backends that run this crate's operations.
+///
+/// The default bodies are differentiable compositions, so that implementing the trait for another backend
+/// takes no more than `impl KernelBackend for That {}`. Shapes were checked by the functions on
+/// [`Tensor`](burn::tensor::Tensor) that call these methods.
+#[backend_extension(Flex, Autodiff: cfg(feature = "autodiff"))]
+pub trait KernelBackend: Backend {
+    /// See [`conv2d`](crate::conv2d).
+    fn kernel_conv2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        composed::conv2d::<Self>(x, weight, bias, params)
+    }
+
+    /// See [`conv_transpose2d`](crate::conv_transpose2d).
+    fn kernel_conv_transpose2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        composed::conv_transpose2d::<Self>(x, weight, bias, params)
+    }
+
+    /// See [`roi_align`](crate::roi_align).
+    fn kernel_roi_align(
+        features: FloatTensor<Self>,
+        rois: FloatTensor<Self>,
+        params: RoiAlignParams,
+    ) -> FloatTensor<Self> {
+        composed::roi_align::<Self>(features, rois, params)
+    }
+}

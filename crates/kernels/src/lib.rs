@@ -1,0 +1,52 @@
+//! CPU kernels for the operations on which a detector spends its time, behind burn's backend extension.
+//!
+//! burn's CPU backend `Flex` runs a convolution forwards at a fair speed and backwards through a generic
+//! fallback, and it has no ROIAlign. This crate adds both, and what else training was seen to wait for.
+//!
+//! ```text
+//! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`
+//!   └─ KernelBackend::kernel_conv2d       the backend extension: one method per operation
+//!        ├─ Flex                          hand-written kernel on f32 slices
+//!        ├─ Autodiff<Flex>                the same, with a hand-written backward
+//!        └─ any other backend             the default body: burn's own tensor operations
+//! ```
+//!
+//! Tensors are `[N, C, H, W]`, contiguous or not. The kernels are for `f32`; any other float type takes the
+//! composed default. Results do not depend on the number of threads, to the last bit.
+//!
+//! Left out on purpose: groups and dilation (no detector here has them), gradients with respect to ROI
+//! coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.
+//!
+//! ```
+//! use burn::tensor::{Device, Tensor};
+//! use sdg_kernels::{Conv2dParams, conv2d, nms};
+//!
+//! let device = Device::flex();
+//! let image = Tensor::<4>::ones([1, 1, 4, 4], &device);
+//! let box_blur = Tensor::<4>::ones([1, 1, 3, 3], &device) / 9.0;
+//! let params = Conv2dParams { stride: [1, 1], padding: [1, 1] };
+//! let blurred = conv2d(image, box_blur, None, params);
+//! assert_eq!(blurred.dims(), [1, 1, 4, 4]);
+//! // A corner sees four of the nine pixels of its window.
+//! let corner: f32 = blurred.slice([0..1, 0..1, 0..1, 0..1]).into_scalar();
+//! assert!((corner - 4.0 / 9.0).abs() < 1e-6);
+//!
+//! let boxes = [[0.0, 0.0, 10.0, 10.0], [1.0, 0.0, 11.0, 10.0], [50.0, 50.0, 60.0, 60.0]];
+//! assert_eq!(nms(&boxes, &[0.9, 0.8, 0.7], 0.5), [0, 2]);
+//! ```
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+#[cfg(feature = "autodiff")]
+mod autodiff;
+pub mod composed;
+mod conv;
+mod extension;
+mod flex;
+mod nms;
+mod parallel;
+mod roi_align;
+
+pub use conv::{Conv2dParams, conv_transpose2d, conv2d};
+pub use extension::KernelBackend;
+pub use nms::{batched_nms, nms};
+pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};
