@@ -1,0 +1,351 @@
+//! The state of a model at one instant, and its way through time.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_mujoco_sys as mj;
+
+use crate::error::{Result, SimulationError};
+use crate::guard::{guarded, take_warnings};
+use crate::model::{Body, Camera, Geom, Id, Joint, Kind, Model, Site};
+
+/// Positions, velocities, forces and contacts of a [`Model`] at one instant.
+///
+/// Positions of bodies, sites and cameras are those of the last [`Data::forward`], [`Data::step1`]
+/// or [`Data::step`]; after changing `qpos`, call one of them first.
+pub struct Data {
+    model: Arc<Model>,
+    ptr: *mut mj::mjData,
+}
+
+// SAFETY: the data is owned by this value and MuJoCo ties it to no thread.
+unsafe impl Send for Data {}
+
+/// Two geoms that touch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// One of the geoms.
+    pub geom1: Id<Geom>,
+    /// The other.
+    pub geom2: Id<Geom>,
+    /// Middle of the contact in the world frame, in metres.
+    pub position: Vector3<f64>,
+    /// Distance between the surfaces in metres, negative where they overlap.
+    pub distance_m: f64,
+    /// Force along the contact's normal, in newtons, never negative.
+    pub normal_force_n: f64,
+}
+
+impl Data {
+    /// The initial state of a model, positions of all things computed.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] where memory runs out.
+    pub fn new(model: Arc<Model>) -> Result<Self> {
+        // SAFETY: the model is live.
+        let ptr = guarded("mj_makeData", || unsafe { mj::mj_makeData(model.as_ptr()) })?;
+        if ptr.is_null() {
+            return Err(SimulationError::MuJoCo { call: "mj_makeData", message: "out of memory".into() });
+        }
+        let mut data = Self { model, ptr };
+        data.forward()?;
+        Ok(data)
+    }
+
+    /// The model that this is a state of.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    fn raw(&self) -> &mj::mjData {
+        // SAFETY: the pointer comes from `mj_makeData`, is not null, and lives as long as `self`.
+        unsafe { &*self.ptr }
+    }
+
+    pub(crate) fn as_mut_ptr(&mut self) -> *mut mj::mjData {
+        self.ptr
+    }
+
+    /// Puts the initial state back.
+    pub fn reset(&mut self) {
+        // SAFETY: model and data are live and belong together.
+        unsafe { mj::mj_resetData(self.model.as_ptr(), self.ptr) };
+    }
+
+    /// Computes everything that follows from `qpos`, `qvel` and `ctrl`, without moving in time.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    pub fn forward(&mut self) -> Result<()> {
+        // SAFETY: model and data are live and belong together.
+        guarded("mj_forward", || unsafe { mj::mj_forward(self.model.as_ptr(), self.ptr) })?;
+        self.check()
+    }
+
+    /// Moves one timestep on.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    pub fn step(&mut self) -> Result<()> {
+        // SAFETY: model and data are live and belong together.
+        guarded("mj_step", || unsafe { mj::mj_step(self.model.as_ptr(), self.ptr) })?;
+        self.check()
+    }
+
+    /// The first half of a step: everything that follows from positions and velocities, for a
+    /// controller to read before it sets `ctrl`.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    pub fn step1(&mut self) -> Result<()> {
+        // SAFETY: model and data are live and belong together.
+        guarded("mj_step1", || unsafe { mj::mj_step1(self.model.as_ptr(), self.ptr) })?;
+        self.check()
+    }
+
+    /// The second half of a step: forces from `ctrl`, accelerations, new positions.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    pub fn step2(&mut self) -> Result<()> {
+        // SAFETY: model and data are live and belong together.
+        guarded("mj_step2", || unsafe { mj::mj_step2(self.model.as_ptr(), self.ptr) })?;
+        self.check()
+    }
+
+    /// MuJoCo answers bad numbers and a full contact list with a warning and, for the former, a
+    /// silent reset; neither may pass for physics.
+    fn check(&self) -> Result<()> {
+        let bad = [
+            mj::mjWARN_BADQPOS,
+            mj::mjWARN_BADQVEL,
+            mj::mjWARN_BADQACC,
+            mj::mjWARN_BADCTRL,
+            mj::mjWARN_CONTACTFULL,
+            mj::mjWARN_CNSTRFULL,
+        ];
+        if bad.iter().any(|&warning| self.raw().warning[warning as usize].number > 0) {
+            let message = take_warnings().pop().unwrap_or_else(|| "a number is not finite or too large".into());
+            return Err(SimulationError::Unstable { time_secs: self.time_secs(), message });
+        }
+        Ok(())
+    }
+
+    /// Simulated time in seconds.
+    pub fn time_secs(&self) -> f64 {
+        self.raw().time
+    }
+
+    /// Generalised positions (joint angles in radians, slides in metres, quaternions w x y z).
+    pub fn qpos(&self) -> &[f64] {
+        // SAFETY: the array has `nq` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qpos, self.model.raw().nq as usize) }
+    }
+
+    /// Generalised positions, to be set.
+    pub fn qpos_mut(&mut self) -> &mut [f64] {
+        // SAFETY: as in `qpos`, and `self` is borrowed mutably.
+        unsafe { std::slice::from_raw_parts_mut(self.raw().qpos, self.model.raw().nq as usize) }
+    }
+
+    /// Generalised velocities (rad/s, m/s).
+    pub fn qvel(&self) -> &[f64] {
+        // SAFETY: the array has `nv` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qvel, self.model.raw().nv as usize) }
+    }
+
+    /// Generalised velocities, to be set.
+    pub fn qvel_mut(&mut self) -> &mut [f64] {
+        // SAFETY: as in `qvel`, and `self` is borrowed mutably.
+        unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
+    }
+
+    /// Controls, one an actuator, to be set (N·m and N for motors).
+    pub fn ctrl_mut(&mut self) -> &mut [f64] {
+        // SAFETY: the array has `nu` entries, lives as long as the data, and `self` is borrowed
+        // mutably.
+        unsafe { std::slice::from_raw_parts_mut(self.raw().ctrl, self.model.raw().nu as usize) }
+    }
+
+    /// Gravity, Coriolis and centrifugal forces as the joints have to balance them (N·m, N).
+    pub fn qfrc_bias(&self) -> &[f64] {
+        // SAFETY: the array has `nv` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qfrc_bias, self.model.raw().nv as usize) }
+    }
+
+    /// Springs and dampers of the joints (N·m, N).
+    pub fn qfrc_passive(&self) -> &[f64] {
+        // SAFETY: the array has `nv` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qfrc_passive, self.model.raw().nv as usize) }
+    }
+
+    /// The joint-space inertia matrix, `nv` x `nv`.
+    pub fn mass_matrix(&self) -> DMatrix<f64> {
+        let nv = self.model.raw().nv as usize;
+        let mut dense = DMatrix::zeros(nv, nv);
+        // SAFETY: the output has nv * nv entries (symmetric, so row or column order is the same),
+        // and `qM` is the data's own sparse matrix.
+        unsafe { mj::mj_fullM(self.model.as_ptr(), dense.as_mut_ptr(), self.raw().qM) };
+        dense
+    }
+
+    /// Where a body stands.
+    pub fn world_from_body(&self, body: Id<Body>) -> Isometry3<f64> {
+        assert!(body.index() < Body::count(&self.model), "{body:?} is not of this model");
+        // SAFETY: the arrays have 3 and 4 entries a body.
+        let (position, quaternion) = unsafe {
+            (
+                *self.raw().xpos.add(3 * body.index()).cast::<[f64; 3]>(),
+                *self.raw().xquat.add(4 * body.index()).cast::<[f64; 4]>(),
+            )
+        };
+        isometry_from_quaternion(position, quaternion)
+    }
+
+    /// Where a site stands.
+    pub fn world_from_site(&self, site: Id<Site>) -> Isometry3<f64> {
+        assert!(site.index() < Site::count(&self.model), "{site:?} is not of this model");
+        // SAFETY: the arrays have 3 and 9 entries a site.
+        unsafe { isometry_at(self.raw().site_xpos, self.raw().site_xmat, site.index()) }
+    }
+
+    /// Where a camera stands, in MuJoCo's camera frame (x right, y up, looking along -z).
+    pub fn world_from_mujoco_camera(&self, camera: Id<Camera>) -> Isometry3<f64> {
+        assert!(camera.index() < Camera::count(&self.model), "{camera:?} is not of this model");
+        // SAFETY: the arrays have 3 and 9 entries a camera.
+        unsafe { isometry_at(self.raw().cam_xpos, self.raw().cam_xmat, camera.index()) }
+    }
+
+    /// Where a geom's centre stands.
+    pub fn world_from_geom(&self, geom: Id<Geom>) -> Isometry3<f64> {
+        assert!(geom.index() < Geom::count(&self.model), "{geom:?} is not of this model");
+        // SAFETY: the arrays have 3 and 9 entries a geom.
+        unsafe { isometry_at(self.raw().geom_xpos, self.raw().geom_xmat, geom.index()) }
+    }
+
+    /// Sets the pose of a free joint (its body's pose in the world) and stops it.
+    pub fn place(&mut self, free_joint: Id<Joint>, world_from_body: &Isometry3<f64>) {
+        let (position, velocity) = (self.model.qpos_index(free_joint), self.model.qvel_index(free_joint));
+        let (p, q) = (world_from_body.translation.vector, world_from_body.rotation);
+        self.qpos_mut()[position..position + 7].copy_from_slice(&[p.x, p.y, p.z, q.w, q.i, q.j, q.k]);
+        self.qvel_mut()[velocity..velocity + 6].fill(0.0);
+    }
+
+    /// The contacts of the last step that carry force.
+    pub fn contacts(&self) -> impl Iterator<Item = Contact> + '_ {
+        let raw = self.raw();
+        // SAFETY: the array has `ncon` valid entries and lives as long as the data.
+        let contacts = unsafe { std::slice::from_raw_parts(raw.contact, raw.ncon as usize) };
+        contacts.iter().enumerate().filter(|(_, contact)| contact.efc_address >= 0).map(|(index, contact)| {
+            let mut force = [0.0; 6];
+            // SAFETY: the index is below `ncon` and the output has the six entries asked for.
+            unsafe { mj::mj_contactForce(self.model.as_ptr(), self.ptr, index as i32, force.as_mut_ptr()) };
+            Contact {
+                geom1: Id::new(contact.geom1 as usize),
+                geom2: Id::new(contact.geom2 as usize),
+                position: Vector3::from(contact.pos),
+                distance_m: contact.dist,
+                normal_force_n: force[0],
+            }
+        })
+    }
+}
+
+impl Drop for Data {
+    fn drop(&mut self) {
+        // SAFETY: the pointer came from `mj_makeData` and is freed once.
+        unsafe { mj::mj_deleteData(self.ptr) };
+    }
+}
+
+fn isometry_from_quaternion([x, y, z]: [f64; 3], [w, i, j, k]: [f64; 4]) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        Translation3::new(x, y, z),
+        UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)),
+    )
+}
+
+/// Reads the `index`th position and row-major rotation matrix.
+///
+/// # Safety
+/// The arrays must hold more than `index` triples and ninefolds.
+unsafe fn isometry_at(positions: *const f64, rotations: *const f64, index: usize) -> Isometry3<f64> {
+    // SAFETY: promised by the caller.
+    let (position, rotation) = unsafe {
+        (*positions.add(3 * index).cast::<[f64; 3]>(), *rotations.add(9 * index).cast::<[f64; 9]>())
+    };
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&rotation));
+    Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BALL_ON_PLANE: &str = "<mujoco><option timestep='0.001'/><worldbody><geom name='plane' type='plane' size='1 1 1'/>\
+        <body name='ball' pos='0 0 1'><freejoint name='free'/><geom name='ball' size='.05' mass='0.5'/></body></worldbody></mujoco>";
+
+    fn data(xml: &str) -> Data {
+        Data::new(Arc::new(Model::from_xml(xml, &[]).unwrap())).unwrap()
+    }
+
+    #[test]
+    fn a_ball_falls_as_galileo_says() {
+        let mut data = data(BALL_ON_PLANE);
+        for _ in 0..300 {
+            data.step().unwrap();
+        }
+        let ball = data.model().id::<Body>("ball").unwrap();
+        data.forward().unwrap();
+        let fallen = 1.0 - data.world_from_body(ball).translation.z;
+        // g t^2 / 2 = 0.441 m; semi-implicit Euler adds g t dt / 2 = 1.5 mm.
+        assert!((fallen - 0.5 * 9.81 * 0.09).abs() < 0.002, "{fallen}");
+    }
+
+    #[test]
+    fn a_resting_ball_presses_with_its_weight() {
+        let mut data = data(BALL_ON_PLANE);
+        let model = data.model().clone();
+        data.place(model.id("free").unwrap(), &Isometry3::translation(0.2, 0.0, 0.05));
+        for _ in 0..2000 {
+            data.step().unwrap();
+        }
+        let contacts: Vec<Contact> = data.contacts().collect();
+        assert_eq!(contacts.len(), 1);
+        assert!((contacts[0].normal_force_n - 0.5 * 9.81).abs() < 0.01, "{contacts:?}");
+        assert!((contacts[0].position - Vector3::new(0.2, 0.0, 0.0)).norm() < 0.002);
+    }
+
+    #[test]
+    fn poses_are_read_in_the_right_order() {
+        let data = data(
+            "<mujoco><compiler angle='degree'/><worldbody><body name='b' pos='1 2 3' euler='0 0 90'>\
+             <site name='s' pos='0.5 0 0'/></body></worldbody></mujoco>",
+        );
+        let body = data.world_from_body(data.model().id("b").unwrap());
+        let site = data.world_from_site(data.model().id("s").unwrap());
+        let quarter_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+        for pose in [body, site] {
+            assert!(pose.rotation.angle_to(&quarter_turn) < 1e-9, "{pose}");
+        }
+        assert!((site.translation.vector - Vector3::new(1.0, 2.5, 3.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn divergence_is_an_error() {
+        let mut data = data(BALL_ON_PLANE);
+        data.qpos_mut()[2] = f64::NAN;
+        assert!(matches!(data.step(), Err(SimulationError::Unstable { .. })));
+    }
+
+    #[test]
+    fn the_mass_matrix_of_a_pendulum_is_its_inertia() {
+        let data = data(
+            "<mujoco><worldbody><body><joint axis='0 1 0'/><geom size='.1' mass='2' pos='0.5 0 0'/></body></worldbody></mujoco>",
+        );
+        // m l^2 + 2/5 m r^2.
+        assert!((data.mass_matrix()[(0, 0)] - (2.0 * 0.25 + 0.4 * 2.0 * 0.01)).abs() < 1e-9);
+        // Held level, gravity pulls with m g l.
+        assert!((data.qfrc_bias()[0].abs() - 2.0 * 9.81 * 0.5).abs() < 1e-9);
+    }
+}

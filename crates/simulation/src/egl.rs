@@ -1,0 +1,106 @@
+//! An OpenGL context that needs no display: EGL on Mesa's surfaceless platform.
+
+use std::ffi::c_void;
+use std::sync::OnceLock;
+
+use khronos_egl as egl;
+
+use crate::error::{Result, SimulationError};
+
+/// `EGL_PLATFORM_SURFACELESS_MESA`, of the extension `EGL_MESA_platform_surfaceless`.
+const PLATFORM_SURFACELESS_MESA: egl::Enum = 0x31DD;
+
+type Egl = egl::DynamicInstance<egl::EGL1_5>;
+
+/// EGL and its display: opened once a process and left open, since MuJoCo keeps pointers to
+/// functions of the driver.
+struct Surfaceless {
+    egl: Egl,
+    display: egl::Display,
+    config: egl::Config,
+}
+
+// SAFETY: EGL's functions may be called from any thread (EGL 1.5, section 2.2), and the handles are
+// only passed back to them.
+unsafe impl Send for Surfaceless {}
+// SAFETY: as above.
+unsafe impl Sync for Surfaceless {}
+
+fn surfaceless() -> Result<&'static Surfaceless> {
+    static SURFACELESS: OnceLock<std::result::Result<Surfaceless, String>> = OnceLock::new();
+    SURFACELESS
+        .get_or_init(open)
+        .as_ref()
+        .map_err(|reason| SimulationError::Rendering { reason: reason.clone() })
+}
+
+fn open() -> std::result::Result<Surfaceless, String> {
+    // SAFETY: loading libEGL runs its initialisers only; Debian's has no precondition.
+    let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
+    // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
+    // attributes.
+    let display = unsafe {
+        egl.get_platform_display(
+            PLATFORM_SURFACELESS_MESA,
+            egl::DEFAULT_DISPLAY as *mut c_void,
+            &[egl::ATTRIB_NONE],
+        )
+    }
+    .map_err(|error| format!("no surfaceless display ({error})"))?;
+    egl.initialize(display).map_err(|error| format!("EGL could not be initialised ({error})"))?;
+    egl.bind_api(egl::OPENGL_API).map_err(|error| format!("no desktop OpenGL ({error})"))?;
+    let wanted = [egl::RENDERABLE_TYPE, egl::OPENGL_BIT, egl::SURFACE_TYPE, 0, egl::NONE];
+    let config = egl
+        .choose_first_config(display, &wanted)
+        .map_err(|error| format!("no EGL configuration ({error})"))?
+        .ok_or("no EGL configuration for desktop OpenGL without a surface")?;
+    Ok(Surfaceless { egl, display, config })
+}
+
+/// An OpenGL context of its own, current on no thread except while a [`Current`] lives.
+pub(crate) struct OffscreenContext {
+    egl: &'static Surfaceless,
+    context: egl::Context,
+}
+
+impl OffscreenContext {
+    pub(crate) fn new() -> Result<Self> {
+        let surfaceless = surfaceless()?;
+        let failed = |error| SimulationError::Rendering { reason: format!("no OpenGL context ({error})") };
+        // The bound API is a thread's own state.
+        surfaceless.egl.bind_api(egl::OPENGL_API).map_err(failed)?;
+        let context = surfaceless
+            .egl
+            .create_context(surfaceless.display, surfaceless.config, None, &[egl::NONE])
+            .map_err(failed)?;
+        Ok(Self { egl: surfaceless, context })
+    }
+
+    /// Makes the context current on this thread until the guard is dropped.
+    pub(crate) fn make_current(&self) -> Result<Current> {
+        let failed =
+            |error| SimulationError::Rendering { reason: format!("OpenGL context not made current ({error})") };
+        self.egl.egl.bind_api(egl::OPENGL_API).map_err(failed)?;
+        self.egl.egl.make_current(self.egl.display, None, None, Some(self.context)).map_err(failed)?;
+        Ok(Current { egl: self.egl })
+    }
+}
+
+impl Drop for OffscreenContext {
+    fn drop(&mut self) {
+        // A context that cannot be destroyed is leaked; nothing better can be done while dropping.
+        let _ = self.egl.egl.destroy_context(self.egl.display, self.context);
+    }
+}
+
+/// Keeps a context current on this thread, and releases it when dropped.
+pub(crate) struct Current {
+    egl: &'static Surfaceless,
+}
+
+impl Drop for Current {
+    fn drop(&mut self) {
+        // On failure the context stays current here and the next `make_current` says so.
+        let _ = self.egl.egl.make_current(self.egl.display, None, None, None);
+    }
+}

@@ -1,0 +1,93 @@
+//! What can go wrong in the simulation.
+
+use std::path::PathBuf;
+
+/// An error of the simulation; a grasp that fails is not one of them (see `AttemptOutcome`).
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// libmujoco is not the version that the bindings describe.
+    #[error(transparent)]
+    Library(#[from] sdg_mujoco_sys::LibraryMismatch),
+
+    /// MuJoCo refused an MJCF model.
+    #[error("MuJoCo could not load the model: {message}")]
+    Model {
+        /// MuJoCo's own words, with the line of the XML where it gives one.
+        message: String,
+    },
+
+    /// A file of the model could not be handed to MuJoCo.
+    #[error("asset {name:?} of the model: {reason}")]
+    Asset {
+        /// File name under which the MJCF asks for it.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+
+    /// MuJoCo stopped in the middle of a computation.
+    #[error("MuJoCo stopped in {call}: {message}")]
+    MuJoCo {
+        /// The function that was called.
+        call: &'static str,
+        /// MuJoCo's own words.
+        message: String,
+    },
+
+    /// The simulation diverged (not a number, or huge, positions, velocities or accelerations).
+    #[error("the simulation became unstable at {time_secs:.3} s of simulated time: {message}")]
+    Unstable {
+        /// Simulated time at which it was noticed, in seconds.
+        time_secs: f64,
+        /// MuJoCo's own words.
+        message: String,
+    },
+
+    /// The model has no object of that kind and name.
+    #[error("the model has no {kind} named {name:?}; it has: {}", existing.join(", "))]
+    UnknownName {
+        /// Body, joint, geom, site, camera or actuator.
+        kind: &'static str,
+        /// The name that was asked for.
+        name: String,
+        /// The names that exist.
+        existing: Vec<String>,
+    },
+
+    /// No OpenGL context could be made without a display.
+    #[error(
+        "offscreen OpenGL through EGL failed: {reason}. On Debian 12: `apt-get install libegl1 libgl1-mesa-dri`"
+    )]
+    Rendering {
+        /// The step that failed and EGL's or MuJoCo's own words.
+        reason: String,
+    },
+
+    /// A file of the object or the scene could not be read.
+    #[error("{}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it: expected and found.
+        reason: String,
+    },
+
+    /// A number of a configuration is out of its range.
+    #[error("{field}: expected {expected}, found {found}")]
+    Configuration {
+        /// Name of the configuration's field.
+        field: &'static str,
+        /// The range that is allowed.
+        expected: String,
+        /// The value that was given.
+        found: String,
+    },
+
+    /// Perception itself failed (which is not the same as seeing nothing).
+    #[error("perception failed: {0}")]
+    Perception(String),
+}
+
+/// Shorthand of this crate.
+pub type Result<T> = std::result::Result<T, SimulationError>;

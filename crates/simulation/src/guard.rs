@@ -1,0 +1,100 @@
+//! MuJoCo's error and warning handlers, made safe for Rust.
+//!
+//! By default MuJoCo writes its errors to a file and ends the process. Here an error unwinds from
+//! the handler through MuJoCo (which is built with unwind tables, and whose functions are bound as
+//! `C-unwind`) to [`guarded`], which turns it into a [`SimulationError::MuJoCo`]. Whatever MuJoCo
+//! had allocated in between is leaked, and the data it worked on is left half-computed; callers
+//! return the error and do not go on with that data.
+
+use std::any::Any;
+use std::cell::RefCell;
+use std::ffi::{CStr, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::OnceLock;
+
+use sdg_mujoco_sys as mj;
+
+use crate::error::{Result, SimulationError};
+
+/// What the error handler throws.
+struct MuJoCoError(String);
+
+thread_local! {
+    /// Warnings that MuJoCo gave on this thread since they were last taken.
+    static WARNINGS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Checks the library and installs the handlers, once a process.
+///
+/// # Errors
+/// [`SimulationError::Library`] where libmujoco is not the version of the bindings.
+pub(crate) fn initialise() -> Result<()> {
+    static INITIALISED: OnceLock<std::result::Result<(), mj::LibraryMismatch>> = OnceLock::new();
+    INITIALISED
+        .get_or_init(|| {
+            mj::check_library()?;
+            // SAFETY: the statics are written here only, inside `get_or_init`, and before any
+            // function of MuJoCo that could read them: every constructor of this crate comes
+            // through here first.
+            unsafe {
+                mj::mju_user_error = Some(on_error);
+                mj::mju_user_warning = Some(on_warning);
+            }
+            Ok(())
+        })
+        .clone()
+        .map_err(SimulationError::from)
+}
+
+/// Runs a call of MuJoCo and turns its error handler's unwinding into an error.
+pub(crate) fn guarded<T>(call: &'static str, body: impl FnOnce() -> T) -> Result<T> {
+    // Unwind safety: what the closure leaves behind is C memory that the caller gives up on error.
+    catch_unwind(AssertUnwindSafe(body)).map_err(|payload: Box<dyn Any + Send>| {
+        match payload.downcast::<MuJoCoError>() {
+            Ok(error) => SimulationError::MuJoCo { call, message: error.0 },
+            Err(panic) => resume_unwind(panic),
+        }
+    })
+}
+
+/// Takes the warnings that MuJoCo gave on this thread.
+pub(crate) fn take_warnings() -> Vec<String> {
+    WARNINGS.with_borrow_mut(std::mem::take)
+}
+
+unsafe extern "C-unwind" fn on_error(message: *const c_char) {
+    // SAFETY: MuJoCo passes a string that ends in NUL and lives during this call.
+    let message = unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned();
+    // Not `panic!`: this is an ordinary error and must not print a panic message.
+    resume_unwind(Box::new(MuJoCoError(message)));
+}
+
+unsafe extern "C-unwind" fn on_warning(message: *const c_char) {
+    // SAFETY: MuJoCo passes a string that ends in NUL and lives during this call.
+    let message = unsafe { CStr::from_ptr(message) }.to_string_lossy().into_owned();
+    WARNINGS.with_borrow_mut(|warnings| warnings.push(message));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_inside_mujoco_comes_back_as_an_error() {
+        initialise().unwrap();
+        let result = guarded("mju_error", || {
+            // SAFETY: the string ends in NUL.
+            unsafe { mj::mju_error(c"the stack overflowed".as_ptr()) }
+        });
+        assert_eq!(
+            result,
+            Err(SimulationError::MuJoCo { call: "mju_error", message: "the stack overflowed".into() })
+        );
+    }
+
+    #[test]
+    fn a_panic_of_ours_stays_a_panic() {
+        let outcome = catch_unwind(|| guarded("x", || resume_unwind(Box::new("ours"))).is_ok());
+        assert_eq!(*outcome.unwrap_err().downcast::<&str>().unwrap(), "ours");
+    }
+}

@@ -1,0 +1,44 @@
+//! A Franka Panda with a wrist camera at a table, in MuJoCo: pictures, motion, and grasp attempts.
+//!
+//! ```text
+//! objects ─┐                      ┌─> Renderer ─> CameraView ─> Perception ─> GraspTarget ─┐
+//! scene   ─┴─> Workcell (MJCF) ─> Model, Data                                              │
+//!                                 └<── controller, gripper <── kinematics <── attempt <────┘
+//! ```
+//!
+//! The picture of an MJCF model takes four lines:
+//!
+//! ```
+//! use std::sync::Arc;
+//! use sdg_simulation::{CameraView, Data, Model, RenderConfig, Renderer};
+//!
+//! # fn main() -> Result<(), sdg_simulation::SimulationError> {
+//! let xml = "<mujoco><worldbody><light pos='0 0 1'/><geom name='ball' size='.05' rgba='1 0 0 1'/>\
+//!            <camera name='above' pos='0 0 1' fovy='47.15'/></worldbody></mujoco>";
+//! let model = Arc::new(Model::from_xml(xml, &[])?); // files of the MJCF go into the slice of `Asset`s
+//! let mut data = Data::new(model.clone())?;
+//! let mut renderer = Renderer::new(&model, RenderConfig::default())?;
+//! let view = CameraView::capture(&mut renderer, &mut data, model.id("above")?)?;
+//! let [red, green, _] = view.image.get_pixel(320, 240).0;
+//! assert!(red > 2 * green);
+//! # Ok(())
+//! # }
+//! ```
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod camera;
+mod data;
+mod egl;
+mod error;
+mod guard;
+mod model;
+pub mod objects;
+mod render;
+pub mod scene;
+
+pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
+pub use data::{Contact, Data};
+pub use error::{Result, SimulationError};
+pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
+pub use render::{RenderConfig, Renderer, Segmentation};
