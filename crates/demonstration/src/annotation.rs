@@ -1,0 +1,249 @@
+//! What a person marked on a photo: the box, the grasp line, the outline.
+
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, GraspLine, Polygon};
+use serde_json::Value;
+
+use crate::json::{self, Node};
+use crate::{Error, Result, coco, labelme};
+
+/// A click may miss the image by this much and is moved to its edge; annotation tools let it.
+const EDGE_TOLERANCE_PX: f64 = 1.0;
+/// Boxes, grasp lines and outlines smaller than this were clicked by mistake.
+const LEAST_EXTENT_PX: f64 = 1.0;
+/// More vertices than any hand draws; bounds the time that checking an outline takes.
+const MOST_VERTICES: usize = 10_000;
+
+/// One object marked on one image, in pixels of that image: x right, y down, centre of the first pixel (0.5, 0.5).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Annotation {
+    /// The object's name.
+    pub label: String,
+    /// The box around it: as drawn, or around the outline where none was drawn.
+    pub bbox: BoundingBox,
+    /// The two points of the grasp, if marked.
+    pub grasp: Option<GraspLine>,
+    /// The outline, if drawn.
+    pub outline: Option<Polygon>,
+}
+
+/// The image that an annotation is read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageFacts<'a> {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// The image's file name, by which a COCO file of several images is searched; folders are ignored.
+    pub file_name: Option<&'a str>,
+}
+
+impl ImageFacts<'_> {
+    pub(crate) fn check_declared(&self, width: u32, height: u32) -> Result<()> {
+        let (annotated, image) = ([width, height], [self.width, self.height]);
+        if annotated == image { Ok(()) } else { Err(Error::OtherImageSize { annotated, image }) }
+    }
+}
+
+impl Annotation {
+    /// Reads every object that a COCO or LabelMe file marks on the image; the content says which of the two it is.
+    ///
+    /// # Errors
+    /// A file that is neither, one made on an image of another size, and whatever a [`Annotation`] may not be:
+    /// outside the image by more than a pixel, without extent, not finite, half a grasp line, an outline of fewer
+    /// than three points or one that crosses itself. Several objects need group ids (LabelMe). The message says where.
+    pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
+        let value = json::parse(bytes)?;
+        let root = Node::root(&value);
+        let is_list = |name: &str| value.get(name).is_some_and(Value::is_array);
+        if is_list("shapes") {
+            labelme::read(&root, image)
+        } else if is_list("images") && is_list("annotations") {
+            coco::read(&root, image)
+        } else {
+            Err(Error::WrongFile { found: json::describe(&value) })
+        }
+    }
+
+    /// The grasp line, or an error that says who needs it.
+    ///
+    /// # Errors
+    /// [`Error::Lacking`].
+    pub fn require_grasp(&self) -> Result<&GraspLine> {
+        self.grasp.as_ref().ok_or_else(|| Error::Lacking {
+            label: self.label.clone(),
+            missing: "the grasp",
+            why: "mark two points, `grasp_start` and `grasp_end`; the gripper goes to their middle and closes across \
+                  the line"
+                .into(),
+        })
+    }
+
+    /// The outline, or an error that says who needs it.
+    ///
+    /// # Errors
+    /// [`Error::Lacking`].
+    pub fn require_outline(&self) -> Result<&Polygon> {
+        self.outline.as_ref().ok_or_else(|| Error::Lacking {
+            label: self.label.clone(),
+            missing: "the outline",
+            why: "draw a polygon around the part; masks and the check of detections against the demonstration are \
+                  made from it"
+                .into(),
+        })
+    }
+}
+
+/// What a reader has gathered of one object, each with its place in the file.
+#[derive(Default)]
+pub(crate) struct Draft {
+    pub label: Option<String>,
+    pub place: String,
+    /// Two or more corners.
+    pub corners: Option<(Vec<Point2<f64>>, String)>,
+    pub grasp_start: Option<(Point2<f64>, String)>,
+    pub grasp_end: Option<(Point2<f64>, String)>,
+    pub outline: Option<(Vec<Point2<f64>>, String)>,
+}
+
+impl Draft {
+    /// Checks everything and makes the annotation.
+    pub fn finish(self, image: &ImageFacts) -> Result<Annotation> {
+        let outline = self.outline.map(|(points, place)| check_outline(&points, &place, image)).transpose()?;
+        let bbox = match self.corners {
+            Some((corners, place)) => check_box(&corners, &place, image)?,
+            None => outline.as_ref().map(Polygon::bounds).ok_or_else(|| Error::NoObject {
+                expected: "a box (LabelMe: a `rectangle`; COCO: `bbox`) or an outline (a polygon)".into(),
+                found: format!("neither at {}", self.place),
+            })?,
+        };
+        let grasp = match (self.grasp_start, self.grasp_end) {
+            (Some((start, start_place)), Some((end, end_place))) => {
+                let line = GraspLine::new(inside(start, &start_place, image)?, inside(end, &end_place, image)?);
+                if line.length() < LEAST_EXTENT_PX {
+                    return Err(Error::ZeroSize {
+                        place: end_place,
+                        expected: format!("grasp points at least {LEAST_EXTENT_PX} pixel apart"),
+                        found: format!("{:.3} pixels", line.length()),
+                    });
+                }
+                Some(line)
+            }
+            (None, None) => None,
+            (start, _) => {
+                let (has, lacks) =
+                    if start.is_some() { ("grasp_start", "grasp_end") } else { ("grasp_end", "grasp_start") };
+                return Err(Error::Malformed {
+                    place: self.place,
+                    expected: "both `grasp_start` and `grasp_end`".into(),
+                    found: format!("`{has}` without `{lacks}`"),
+                });
+            }
+        };
+        let label = self.label.filter(|label| !label.is_empty()).unwrap_or_else(|| "object".into());
+        Ok(Annotation { label, bbox, grasp, outline })
+    }
+}
+
+/// The point, moved to the edge if it misses the image by no more than the tolerance.
+fn inside(point: Point2<f64>, place: &str, image: &ImageFacts) -> Result<Point2<f64>> {
+    let (width, height) = (f64::from(image.width), f64::from(image.height));
+    let kept = Point2::new(point.x.clamp(0.0, width), point.y.clamp(0.0, height));
+    let missed_by = (kept.x - point.x).abs().max((kept.y - point.y).abs());
+    // Written so that NaN is refused as well.
+    if missed_by <= EDGE_TOLERANCE_PX {
+        Ok(kept)
+    } else {
+        Err(Error::OutsideImage { place: place.into(), x: point.x, y: point.y, image: [image.width, image.height] })
+    }
+}
+
+fn check_box(corners: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result<BoundingBox> {
+    let corners = corners.iter().map(|&corner| inside(corner, place, image)).collect::<Result<Vec<_>>>()?;
+    BoundingBox::around(corners)
+        .filter(|bbox| bbox.width() >= LEAST_EXTENT_PX && bbox.height() >= LEAST_EXTENT_PX)
+        .ok_or_else(|| Error::ZeroSize {
+            place: place.into(),
+            expected: "a box of at least 1×1 pixels".into(),
+            found: "one without width or height".into(),
+        })
+}
+
+fn check_outline(points: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result<Polygon> {
+    let mut vertices = points.iter().map(|&point| inside(point, place, image)).collect::<Result<Vec<_>>>()?;
+    // Tools repeat the first vertex at the end, and double clicks repeat any.
+    vertices.dedup();
+    if vertices.len() > 1 && vertices.first() == vertices.last() {
+        vertices.pop();
+    }
+    if vertices.len() < 3 || vertices.len() > MOST_VERTICES {
+        return Err(Error::Malformed {
+            place: place.into(),
+            expected: format!("a polygon of 3 to {MOST_VERTICES} distinct points"),
+            found: vertices.len().to_string(),
+        });
+    }
+    let polygon = Polygon { vertices };
+    if polygon.crosses_itself() {
+        return Err(Error::SelfCrossing { place: place.into() });
+    }
+    if polygon.area() < LEAST_EXTENT_PX * LEAST_EXTENT_PX {
+        return Err(Error::ZeroSize {
+            place: place.into(),
+            expected: "an outline of at least 1 square pixel".into(),
+            found: format!("{:.3} square pixels", polygon.area()),
+        });
+    }
+    Ok(polygon)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const IMAGE: ImageFacts = ImageFacts { width: 640, height: 480, file_name: None };
+
+    fn draft(outline: &[(f64, f64)]) -> Draft {
+        let points = outline.iter().map(|&(x, y)| Point2::new(x, y)).collect();
+        Draft { outline: Some((points, "here".into())), ..Draft::default() }
+    }
+
+    #[test]
+    fn a_missing_box_is_taken_from_the_outline() {
+        let made = draft(&[(10.0, 20.0), (50.0, 25.0), (30.0, 70.0)]).finish(&IMAGE).unwrap();
+        assert_eq!(made.bbox, BoundingBox { x1: 10.0, y1: 20.0, x2: 50.0, y2: 70.0 });
+    }
+
+    #[test]
+    fn clicks_just_outside_are_moved_to_the_edge() {
+        let made = draft(&[(-0.8, 20.0), (50.0, 480.9), (640.5, 70.0)]).finish(&IMAGE).unwrap();
+        assert_eq!(made.bbox, BoundingBox { x1: 0.0, y1: 20.0, x2: 640.0, y2: 480.0 });
+        let found = draft(&[(-1.2, 20.0), (50.0, 25.0), (30.0, 70.0)]).finish(&IMAGE).unwrap_err();
+        assert_eq!(found, Error::OutsideImage { place: "here".into(), x: -1.2, y: 20.0, image: [640, 480] });
+    }
+
+    #[test]
+    fn closing_vertex_is_dropped() {
+        let made = draft(&[(1.0, 1.0), (9.0, 1.0), (9.0, 1.0), (5.0, 9.0), (1.0, 1.0)]).finish(&IMAGE).unwrap();
+        assert_eq!(made.outline.unwrap().vertices.len(), 3);
+    }
+
+    #[test]
+    fn lacking_parts_are_named() {
+        let made = draft(&[(10.0, 20.0), (50.0, 25.0), (30.0, 70.0)]).finish(&IMAGE).unwrap();
+        let message = made.require_grasp().unwrap_err().to_string();
+        assert!(message.contains("grasp_start") && message.contains("`object`"), "{message}");
+        assert!(made.require_outline().is_ok());
+        let no_outline = Annotation { outline: None, ..made };
+        assert!(no_outline.require_outline().unwrap_err().to_string().contains("polygon"));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+        #[test]
+        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..120)) {
+            prop_assert!(Annotation::read(&bytes, &IMAGE).is_err());
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Randomness by address: every sample has its own generator, made from (seed, stream, index).
+
+use rand::Rng;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+/// The generator of one sample.
+pub(crate) type SampleRng = Pcg64Mcg;
+
+/// Streams of one seed never meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Stream {
+    /// What a model is taught with.
+    Training = 1,
+    /// What it is validated with.
+    HeldOut = 2,
+    /// What is drawn once, when the augmenter is made.
+    Preparation = 3,
+}
+
+/// The generator of sample `index`, the same whoever asks and in whatever order.
+pub(crate) fn sample_rng(seed: u64, stream: Stream, index: u64) -> SampleRng {
+    let first = scramble(seed ^ scramble(stream as u64 ^ scramble(index)));
+    let second = scramble(first ^ index);
+    let mut state = [0u8; 16];
+    state[..8].copy_from_slice(&first.to_le_bytes());
+    state[8..].copy_from_slice(&second.to_le_bytes());
+    Pcg64Mcg::from_seed(state)
+}
+
+/// A bijection of 64 bits in which neighbours end up far apart.
+///
+/// # Source
+/// Steele, Lea and Flood 2014, the output function of SplitMix64.
+pub(crate) fn scramble(value: u64) -> u64 {
+    let z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// Uniform in `[low, high)`, or `low` where the two agree.
+pub(crate) fn uniform(rng: &mut SampleRng, low: f32, high: f32) -> f32 {
+    low + (high - low) * rng.random::<f32>()
+}
+
+/// A factor between `low` and `high` that is as often above as below their geometric mean.
+pub(crate) fn log_uniform(rng: &mut SampleRng, low: f32, high: f32) -> f32 {
+    uniform(rng, low.ln(), high.ln()).exp()
+}
+
+/// True with probability `p`.
+pub(crate) fn chance(rng: &mut SampleRng, p: f32) -> bool {
+    rng.random::<f32>() < p
+}
+
+/// A whole number in `0..count`, drawn as 32 bits so that 32-bit targets draw the same.
+pub(crate) fn index_below(rng: &mut SampleRng, count: usize) -> usize {
+    rng.random_range(0..count as u32) as usize
+}
+
+/// A direction, as (cos, sin).
+pub(crate) fn direction(rng: &mut SampleRng) -> [f32; 2] {
+    let angle = uniform(rng, 0.0, std::f32::consts::TAU);
+    [angle.cos(), angle.sin()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_give_different_and_repeatable_generators() {
+        let draw = |seed, stream, index| sample_rng(seed, stream, index).random::<u64>();
+        assert_eq!(draw(1, Stream::Training, 5), draw(1, Stream::Training, 5));
+        let mut seen = std::collections::BTreeSet::new();
+        for seed in 0..10 {
+            for index in 0..10 {
+                for stream in [Stream::Training, Stream::HeldOut, Stream::Preparation] {
+                    assert!(seen.insert(draw(seed, stream, index)), "seed {seed}, index {index}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! COCO JSON, the canonical annotation: `bbox` xywh, `keypoints` x y v named `grasp_start` and `grasp_end`,
+//! `segmentation` polygons. Coordinates are this project's: the centre of the first pixel is (0.5, 0.5).
+
+use nalgebra::Point2;
+use serde_json::{Value, json};
+
+use crate::annotation::{Annotation, Draft, ImageFacts};
+use crate::json::{Node, describe, shorten};
+use crate::{Error, Result};
+
+/// Reads the objects of one image of a COCO file.
+pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    let images = root.field("images", "the list of images")?.items()?;
+    let chosen = choose_image(&images, image)?;
+    if let (Some(width), Some(height)) = (chosen.optional("width")?, chosen.optional("height")?) {
+        image.check_declared(width.pixels()?, height.pixels()?)?;
+    }
+    let image_id = chosen.field("id", "the image's number")?;
+    let categories = match root.optional("categories")? {
+        Some(categories) => categories.items()?,
+        None => Vec::new(),
+    };
+
+    let mut objects = Vec::new();
+    for annotation in root.field("annotations", "the list of annotations")?.items()? {
+        if annotation.field("image_id", "the number of its image")?.value == image_id.value {
+            objects.push(read_object(&annotation, &categories, image)?);
+        }
+    }
+    if objects.is_empty() {
+        return Err(Error::NoObject {
+            expected: format!("an annotation with `image_id` {}", image_id.value),
+            found: "none".into(),
+        });
+    }
+    Ok(objects)
+}
+
+fn base_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// The image of that name; the only image whatever its name, since people rename files.
+fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>> {
+    if let [only] = images {
+        return Ok(only.clone());
+    }
+    let mut names = Vec::new();
+    for node in images {
+        let name = base_name(node.field("file_name", "the image's name")?.text()?);
+        if image.file_name.is_some_and(|wanted| base_name(wanted) == name) {
+            return Ok(node.clone());
+        }
+        names.push(shorten(name));
+    }
+    const SHOWN: usize = 6;
+    let count = names.len();
+    names.truncate(SHOWN);
+    Err(Error::ImageNotFound {
+        expected: match image.file_name {
+            Some(name) => format!("an image named `{}`", base_name(name)),
+            None => "a single image, or the name of one".into(),
+        },
+        found: if count == 0 { "no image".into() } else { format!("{count} images: {}", names.join(", ")) },
+    })
+}
+
+fn read_object(node: &Node, categories: &[Node], image: &ImageFacts) -> Result<Annotation> {
+    let mut draft = Draft { place: node.place.clone(), ..Draft::default() };
+    let category_id = node.optional("category_id")?;
+    let category = categories
+        .iter()
+        .find(|category| category_id.as_ref().is_some_and(|id| category.value.get("id") == Some(id.value)));
+    if let Some(name) = category.map(|category| category.optional("name")).transpose()?.flatten() {
+        draft.label = Some(name.text()?.to_string());
+    }
+    if let Some(bbox) = node.optional("bbox")?.filter(not_empty_list) {
+        let [x, y, width, height] = bbox.numbers()?[..] else {
+            return Err(bbox.malformed("four numbers x, y, width, height"));
+        };
+        if width <= 0.0 || height <= 0.0 {
+            return Err(Error::ZeroSize {
+                place: bbox.place,
+                expected: "a positive width and height".into(),
+                found: format!("{width}×{height}"),
+            });
+        }
+        draft.corners = Some((vec![Point2::new(x, y), Point2::new(x + width, y + height)], bbox.place));
+    }
+    if let Some(keypoints) = node.optional("keypoints")?.filter(not_empty_list) {
+        read_keypoints(&keypoints, category, &mut draft)?;
+    }
+    if let Some(segmentation) = node.optional("segmentation")?.filter(not_empty_list) {
+        if segmentation.value.is_object() {
+            return Err(segmentation.malformed("a list of polygons (a run-length mask has no outline)"));
+        }
+        let polygons = segmentation.items()?;
+        let [polygon] = polygons.as_slice() else {
+            return Err(segmentation.malformed("one polygon around the whole part"));
+        };
+        let numbers = polygon.numbers()?;
+        if numbers.len() % 2 == 1 {
+            return Err(polygon.malformed("an even count of numbers x, y, x, y, …"));
+        }
+        let points = numbers.chunks_exact(2).map(|xy| Point2::new(xy[0], xy[1])).collect();
+        draft.outline = Some((points, polygon.place.clone()));
+    }
+    draft.finish(image)
+}
+
+/// Exporters write `[]` for what is not there.
+fn not_empty_list(node: &Node) -> bool {
+    node.value.as_array().is_none_or(|items| !items.is_empty())
+}
+
+fn read_keypoints(keypoints: &Node, category: Option<&Node>, draft: &mut Draft) -> Result<()> {
+    let names = match category.map(|category| category.optional("keypoints")).transpose()?.flatten() {
+        Some(names) => names.items()?,
+        None => {
+            return Err(
+                keypoints.malformed("a category that names the keypoints, `grasp_start` and `grasp_end` among them")
+            );
+        }
+    };
+    let items = keypoints.items()?;
+    if items.len() != 3 * names.len() {
+        return Err(keypoints.malformed(format!("x, y, v for each of the category's {} keypoints", names.len())));
+    }
+    for (name, xyv) in names.iter().zip(items.chunks_exact(3)) {
+        let visibility = xyv[2].number()?;
+        if ![0.0, 1.0, 2.0].contains(&visibility) {
+            return Err(xyv[2].malformed("a visibility 0, 1 or 2"));
+        }
+        let point = (Point2::new(xyv[0].number()?, xyv[1].number()?), xyv[0].place.clone());
+        match name.text()? {
+            _ if visibility == 0.0 => {}
+            "grasp_start" => draft.grasp_start = Some(point),
+            "grasp_end" => draft.grasp_end = Some(point),
+            _ => {}
+        }
+    }
+    let known = |wanted: &str| names.iter().any(|name| name.value.as_str() == Some(wanted));
+    if !known("grasp_start") || !known("grasp_end") {
+        let found = names.iter().take(6).map(|name| describe(name.value)).collect::<Vec<_>>().join(", ");
+        return Err(Error::Malformed {
+            place: format!("{} of {}", "names", keypoints.place),
+            expected: "keypoints `grasp_start` and `grasp_end`".into(),
+            found,
+        });
+    }
+    Ok(())
+}
+
+/// A COCO file in the making: images and the objects on them.
+///
+/// ```
+/// use sdg_demonstration::CocoFile;
+///
+/// let mut file = CocoFile::new();
+/// file.push_image("empty.png", 640, 480, &[]);
+/// assert!(file.to_json().contains("\"file_name\": \"empty.png\""));
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct CocoFile {
+    labels: Vec<String>,
+    images: Vec<Value>,
+    annotations: Vec<Value>,
+}
+
+impl CocoFile {
+    /// A file without images.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds an image and what is marked on it; ids count up from 1.
+    pub fn push_image(&mut self, file_name: &str, width: u32, height: u32, objects: &[Annotation]) {
+        let image_id = self.images.len() + 1;
+        self.images.push(json!({"id": image_id, "file_name": file_name, "width": width, "height": height}));
+        for object in objects {
+            let category = self.labels.iter().position(|label| *label == object.label).unwrap_or_else(|| {
+                self.labels.push(object.label.clone());
+                self.labels.len() - 1
+            });
+            let [x, y, box_width, box_height] = object.bbox.to_xywh();
+            let mut annotation = json!({
+                "id": self.annotations.len() + 1,
+                "image_id": image_id,
+                "category_id": category + 1,
+                "bbox": [x, y, box_width, box_height],
+                "area": object.outline.as_ref().map_or(object.bbox.area(), |outline| outline.area()),
+                "iscrowd": 0,
+                "segmentation": object.outline.iter().map(|outline| {
+                    outline.vertices.iter().flat_map(|vertex| [vertex.x, vertex.y]).collect::<Vec<_>>()
+                }).collect::<Vec<_>>(),
+            });
+            let keypoints = match &object.grasp {
+                Some(line) => [line.start.x, line.start.y, 2.0, line.end.x, line.end.y, 2.0],
+                None => [0.0; 6],
+            };
+            annotation["keypoints"] = keypoints
+                .iter()
+                .enumerate()
+                .map(|(i, &value)| if i % 3 == 2 { json!(value as u8) } else { json!(value) })
+                .collect();
+            annotation["num_keypoints"] = json!(if object.grasp.is_some() { 2 } else { 0 });
+            self.annotations.push(annotation);
+        }
+    }
+
+    /// The file's text.
+    pub fn to_json(&self) -> String {
+        let categories: Vec<Value> = self
+            .labels
+            .iter()
+            .enumerate()
+            .map(|(i, label)| {
+                json!({"id": i + 1, "name": label, "keypoints": ["grasp_start", "grasp_end"], "skeleton": [[1, 2]]})
+            })
+            .collect();
+        format!("{:#}\n", json!({"images": self.images, "annotations": self.annotations, "categories": categories}))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
+
+    const IMAGE: ImageFacts = ImageFacts { width: 640, height: 480, file_name: None };
+
+    fn pendulum() -> Annotation {
+        Annotation {
+            label: "pendulum".into(),
+            bbox: BoundingBox { x1: 100.0, y1: 80.25, x2: 300.5, y2: 260.0 },
+            grasp: Some(GraspLine::new(Point2::new(150.5, 120.0), Point2::new(250.0, 220.0))),
+            outline: Some(Polygon {
+                vertices: vec![Point2::new(110.0, 90.0), Point2::new(290.0, 95.5), Point2::new(200.0, 250.0)],
+            }),
+        }
+    }
+
+    fn full() -> Value {
+        let mut file = CocoFile::new();
+        file.push_image("a.png", 640, 480, &[pendulum()]);
+        serde_json::from_str(&file.to_json()).unwrap()
+    }
+
+    fn read_named(value: &Value, file_name: Option<&str>) -> Result<Vec<Annotation>> {
+        Annotation::read(&serde_json::to_vec(value).unwrap(), &ImageFacts { file_name, ..IMAGE })
+    }
+
+    fn message(change: impl FnOnce(&mut Value)) -> String {
+        let mut value = full();
+        change(&mut value);
+        read_named(&value, None).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_written_is_what_coco_says() {
+        let value = full();
+        let annotation = &value["annotations"][0];
+        assert_eq!(annotation["bbox"], json!([100.0, 80.25, 200.5, 179.75]));
+        assert_eq!(annotation["keypoints"], json!([150.5, 120.0, 2, 250.0, 220.0, 2]));
+        assert_eq!(annotation["segmentation"], json!([[110.0, 90.0, 290.0, 95.5, 200.0, 250.0]]));
+        assert_eq!(value["categories"][0]["keypoints"], json!(["grasp_start", "grasp_end"]));
+    }
+
+    #[test]
+    fn one_of_several_images_is_chosen_by_name() {
+        let mut file = CocoFile::new();
+        let other = Annotation { label: "rod".into(), grasp: None, outline: None, ..pendulum() };
+        file.push_image("a.png", 640, 480, &[pendulum()]);
+        file.push_image("b.png", 640, 480, &[other.clone()]);
+        let value: Value = serde_json::from_str(&file.to_json()).unwrap();
+        assert_eq!(read_named(&value, Some("folder/b.png")).unwrap(), [other]);
+        let found = read_named(&value, Some("c.png")).unwrap_err().to_string();
+        assert!(found.contains("an image named `c.png`") && found.contains("2 images: a.png, b.png"), "{found}");
+        assert!(read_named(&value, None).unwrap_err().to_string().contains("a single image"));
+        assert!(read_named(&full(), Some("renamed.png")).is_ok(), "the only image needs no name");
+    }
+
+    #[test]
+    fn box_from_the_polygon_and_keypoints_of_visibility_zero() {
+        let mut value = full();
+        value["annotations"][0]["bbox"] = json!([]);
+        value["annotations"][0]["keypoints"] = json!([0, 0, 0, 0, 0, 0]);
+        let made = read_named(&value, None).unwrap();
+        assert_eq!(made[0].bbox, BoundingBox { x1: 110.0, y1: 90.0, x2: 290.0, y2: 250.0 });
+        assert_eq!(made[0].grasp, None);
+    }
+
+    #[test]
+    fn each_fault_is_named_with_its_place() {
+        let annotation = |v: &mut Value, field: &str, value: Value| v["annotations"][0][field] = value;
+        let cases: [(String, &str); 13] = [
+            (message(|v| v["images"][0]["width"] = json!(1280)), "made on 1280×480"),
+            (message(|v| annotation(v, "bbox", json!([1, 2, 0, 5]))), "annotations[0].bbox: expected a positive width"),
+            (message(|v| annotation(v, "bbox", json!([1, 2, 5]))), "annotations[0].bbox: expected four numbers"),
+            (
+                message(|v| annotation(v, "bbox", json!([600, 2, 100, 5]))),
+                "annotations[0].bbox: expected a place inside",
+            ),
+            (message(|v| annotation(v, "keypoints", json!([1, 2, 2]))), "each of the category's 2 keypoints"),
+            (message(|v| annotation(v, "keypoints", json!([9, 9, 2, 9, 9, 2]))), "at least 1 pixel apart"),
+            (message(|v| annotation(v, "keypoints", json!([9, 9, 2, 0, 0, 0]))), "`grasp_start` without `grasp_end`"),
+            (message(|v| annotation(v, "keypoints", json!([9, 9, 7, 0, 0, 0]))), "a visibility 0, 1 or 2"),
+            (message(|v| annotation(v, "segmentation", json!([[1, 2, 3, 4]]))), "3 to 10000 distinct points"),
+            (message(|v| annotation(v, "segmentation", json!({"counts": [1], "size": [1, 1]}))), "run-length mask"),
+            (message(|v| annotation(v, "segmentation", json!([[1, 2], [3, 4]]))), "one polygon around the whole part"),
+            (message(|v| annotation(v, "image_id", json!(5))), "holds no object"),
+            (message(|v| v["categories"][0]["keypoints"] = json!(["nose", "tail"])), "`grasp_start` and `grasp_end`"),
+        ];
+        for (message, expected) in cases {
+            assert!(message.contains(expected), "expected `{expected}` in `{message}`");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn round_trip(x in 0.0..300.0f64, y in 0.0..200.0f64, w in 2.0..300.0f64, h in 2.0..200.0f64, with_outline in any::<bool>()) {
+            let bbox = BoundingBox { x1: x, y1: y, x2: x + w, y2: y + h };
+            let made = Annotation {
+                label: "part".into(),
+                bbox,
+                grasp: Some(GraspLine::new(Point2::new(x, y), Point2::new(x + w, y + h))),
+                outline: with_outline.then(|| Polygon::from_box(&bbox)),
+            };
+            let mut file = CocoFile::new();
+            file.push_image("a.png", 640, 480, std::slice::from_ref(&made));
+            let read = Annotation::read(file.to_json().as_bytes(), &IMAGE).unwrap().remove(0);
+            // Decimal text and x + (x2 - x) each cost a last bit.
+            let close = |a: Point2<f64>, b: Point2<f64>| (a - b).norm() < 1e-9;
+            prop_assert!(read.bbox.corners().iter().zip(bbox.corners()).all(|(&a, b)| close(a, b)));
+            let (grasp, wanted) = (read.grasp.unwrap(), made.grasp.unwrap());
+            prop_assert!(close(grasp.start, wanted.start) && close(grasp.end, wanted.end));
+            prop_assert_eq!(read.outline.is_some(), with_outline);
+            for (&a, b) in read.outline.iter().flat_map(|o| &o.vertices).zip(bbox.corners()) {
+                prop_assert!(close(a, b));
+            }
+        }
+
+        #[test]
+        fn any_value_in_any_field_never_panics(path in 0usize..9, number in any::<f64>(), text in ".{0,12}", kind in 0usize..5) {
+            let replacement = match kind {
+                0 => json!(number), 1 => json!(text), 2 => Value::Null, 3 => json!([number, text]), _ => json!({"id": number}),
+            };
+            let mut value = full();
+            let slot = match path {
+                0 => &mut value["images"], 1 => &mut value["images"][0], 2 => &mut value["images"][0]["width"],
+                3 => &mut value["annotations"], 4 => &mut value["annotations"][0], 5 => &mut value["annotations"][0]["bbox"],
+                6 => &mut value["annotations"][0]["segmentation"], 7 => &mut value["annotations"][0]["keypoints"],
+                _ => &mut value["categories"],
+            };
+            *slot = replacement;
+            let _ = read_named(&value, Some("a.png"));
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What can be wrong with a photo or its annotation, each with what was expected and what was found.
+
+use thiserror::Error;
+
+/// The crate's result.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Why a photo, an annotation or an augmentation was refused.
+///
+/// `place` fields say where in the file: `line 3, column 7` for text that is no JSON, a path such as
+/// `shapes[2].points[0]` for JSON of the wrong content.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The bytes are neither a PNG nor a JPEG.
+    #[error("not a readable image: expected a PNG or JPEG file, found {found}")]
+    NotAnImage {
+        /// What the bytes look like.
+        found: String,
+    },
+    /// The image starts well and then breaks off or is damaged.
+    #[error("damaged {format} image: {reason}")]
+    DamagedImage {
+        /// `PNG` or `JPEG`.
+        format: &'static str,
+        /// The decoder's complaint.
+        reason: String,
+    },
+    /// Width or height is zero.
+    #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]
+    EmptyImage {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+    },
+    /// More pixels than the limit allows; found in the header, before anything was allocated.
+    #[error(
+        "enormous image: expected at most {max_pixels} pixels, found {width}×{height} = {}",
+        u64::from(*.width) * u64::from(*.height)
+    )]
+    EnormousImage {
+        /// Pixels across, by the file's header.
+        width: u32,
+        /// Pixels down, by the file's header.
+        height: u32,
+        /// [`crate::ImageLimits::max_pixels`].
+        max_pixels: u64,
+    },
+    /// The annotation is not JSON at all.
+    #[error("annotation is not JSON ({place}): {reason}")]
+    NotJson {
+        /// Line and column.
+        place: String,
+        /// The parser's complaint.
+        reason: String,
+    },
+    /// JSON, but neither COCO nor LabelMe.
+    #[error(
+        "wrong annotation file: expected COCO JSON (`images`, `annotations`) or LabelMe JSON (`shapes`), found {found}"
+    )]
+    WrongFile {
+        /// The keys or the kind of value at the top.
+        found: String,
+    },
+    /// A value in the annotation is missing or of the wrong kind.
+    #[error("annotation, {place}: expected {expected}, found {found}")]
+    Malformed {
+        /// Path inside the JSON.
+        place: String,
+        /// What belongs there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("annotation, {place}: expected a finite number, found {found}")]
+    NotFinite {
+        /// Path inside the JSON, or line and column.
+        place: String,
+        /// The offending literal.
+        found: String,
+    },
+    /// The annotation belongs to an image of another size.
+    #[error(
+        "annotation of another image: it was made on {}×{} pixels, the image has {}×{}",
+        annotated[0], annotated[1], image[0], image[1]
+    )]
+    OtherImageSize {
+        /// Width and height that the annotation declares.
+        annotated: [u32; 2],
+        /// Width and height of the image.
+        image: [u32; 2],
+    },
+    /// A coordinate lies outside the image.
+    #[error(
+        "annotation, {place}: expected a place inside the image of {}×{} pixels, found ({x}, {y})",
+        image[0], image[1]
+    )]
+    OutsideImage {
+        /// What lies outside.
+        place: String,
+        /// Pixels from the left.
+        x: f64,
+        /// Pixels from the top.
+        y: f64,
+        /// Width and height of the image.
+        image: [u32; 2],
+    },
+    /// A box, line or outline without extent.
+    #[error("annotation, {place}: expected {expected}, found {found}")]
+    ZeroSize {
+        /// What has no extent.
+        place: String,
+        /// The least extent.
+        expected: String,
+        /// The extent found.
+        found: String,
+    },
+    /// Two edges of the outline cross.
+    #[error("annotation, {place}: expected an outline that does not cross itself, found edges that cross")]
+    SelfCrossing {
+        /// The polygon's path.
+        place: String,
+    },
+    /// There is no object in the annotation of this image.
+    #[error("annotation holds no object: expected {expected}, found {found}")]
+    NoObject {
+        /// What would make an object.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// Several shapes of one kind and nothing that says which belong together.
+    #[error("annotation of several objects: expected a `group_id` on every shape, found {found}")]
+    Ungrouped {
+        /// What cannot be told apart.
+        found: String,
+    },
+    /// One object was expected and several are annotated.
+    #[error("expected one annotated object, found {found}")]
+    SeveralObjects {
+        /// How many.
+        found: usize,
+    },
+    /// The COCO file has no image of that name, or several images and no name was given.
+    #[error("annotation of several images: expected {expected}, found {found}")]
+    ImageNotFound {
+        /// The file name looked for.
+        expected: String,
+        /// The names that the file has.
+        found: String,
+    },
+    /// What a model needs and the annotation lacks.
+    #[error("annotation of `{label}` lacks {missing}: {why}")]
+    Lacking {
+        /// The object's label.
+        label: String,
+        /// The missing part.
+        missing: &'static str,
+        /// Who needs it, and how to add it.
+        why: String,
+    },
+    /// An augmentation setting makes no sense.
+    #[error("augmentation, {setting}: expected {expected}, found {found}")]
+    Setting {
+        /// The field's name.
+        setting: &'static str,
+        /// The range allowed.
+        expected: String,
+        /// The value given.
+        found: String,
+    },
+}

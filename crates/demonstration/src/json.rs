@@ -1,0 +1,128 @@
+//! A JSON value that knows its place, so that a complaint can say where.
+
+use serde_json::{Map, Value};
+
+use crate::{Error, Result};
+
+/// A value and the path that leads to it.
+#[derive(Clone)]
+pub(crate) struct Node<'a> {
+    pub value: &'a Value,
+    pub place: String,
+}
+
+/// Parses the bytes, naming line and column of what is no JSON.
+pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
+    // Windows editors like to put a byte order mark first; the parser does not.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    serde_json::from_slice(bytes).map_err(|error| {
+        let place = format!("line {}, column {}", error.line(), error.column());
+        let line = bytes.split(|&b| b == b'\n').nth(error.line().saturating_sub(1)).unwrap_or(&[]);
+        let rest = &line[error.column().saturating_sub(1).min(line.len())..];
+        // Python writes these three literals, which JSON does not have.
+        let literal = ["NaN", "Infinity", "-Infinity"].into_iter().find(|literal| {
+            // The parser stops at the literal, or one byte into `-Infinity`.
+            rest.starts_with(literal.as_bytes()) || rest.starts_with(literal.trim_start_matches('-').as_bytes())
+        });
+        match literal {
+            Some(found) => Error::NotFinite { place, found: found.into() },
+            None if error.to_string().starts_with("number out of range") => {
+                Error::NotFinite { place, found: "a number too large for 64 bits".into() }
+            }
+            None if bytes.is_empty() => Error::NotJson { place, reason: "the file is empty".into() },
+            None => Error::NotJson { place, reason: error.to_string() },
+        }
+    })
+}
+
+impl<'a> Node<'a> {
+    pub fn root(value: &'a Value) -> Self {
+        Self { value, place: String::new() }
+    }
+
+    pub fn malformed(&self, expected: impl Into<String>) -> Error {
+        Error::Malformed { place: self.place.clone(), expected: expected.into(), found: describe(self.value) }
+    }
+
+    pub fn object(&self) -> Result<&'a Map<String, Value>> {
+        self.value.as_object().ok_or_else(|| self.malformed("an object"))
+    }
+
+    /// The field, absent and `null` alike being `None`.
+    pub fn optional(&self, name: &str) -> Result<Option<Self>> {
+        let place = if self.place.is_empty() { name.to_string() } else { format!("{}.{name}", self.place) };
+        let value = self.object()?.get(name).filter(|value| !value.is_null());
+        Ok(value.map(|value| Self { value, place }))
+    }
+
+    pub fn field(&self, name: &str, expected: &str) -> Result<Self> {
+        self.optional(name)?.ok_or_else(|| Error::Malformed {
+            place: self.place.clone(),
+            expected: format!("a field `{name}`: {expected}"),
+            found: format!("fields {}", key_list(self.value)),
+        })
+    }
+
+    pub fn items(&self) -> Result<Vec<Self>> {
+        let items = self.value.as_array().ok_or_else(|| self.malformed("a list"))?;
+        Ok(items.iter().enumerate().map(|(i, value)| Self { value, place: format!("{}[{i}]", self.place) }).collect())
+    }
+
+    pub fn number(&self) -> Result<f64> {
+        let number = self.value.as_f64().ok_or_else(|| self.malformed("a number"))?;
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(Error::NotFinite { place: self.place.clone(), found: number.to_string() })
+        }
+    }
+
+    pub fn numbers(&self) -> Result<Vec<f64>> {
+        self.items()?.iter().map(Self::number).collect()
+    }
+
+    pub fn text(&self) -> Result<&'a str> {
+        self.value.as_str().ok_or_else(|| self.malformed("text"))
+    }
+
+    /// A size in pixels.
+    pub fn pixels(&self) -> Result<u32> {
+        let number = self.number()?;
+        if number.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&number) {
+            Ok(number as u32)
+        } else {
+            Err(self.malformed("a positive whole number of pixels"))
+        }
+    }
+}
+
+/// A short picture of a value.
+pub(crate) fn describe(value: &Value) -> String {
+    match value {
+        Value::Null => "null".into(),
+        Value::Bool(value) => value.to_string(),
+        Value::Number(number) => number.to_string(),
+        Value::String(text) => format!("the text {:?}", shorten(text)),
+        Value::Array(items) => format!("a list of {}", items.len()),
+        Value::Object(_) => format!("an object with {}", key_list(value)),
+    }
+}
+
+fn key_list(value: &Value) -> String {
+    const SHOWN: usize = 8;
+    let Some(object) = value.as_object() else { return describe(value) };
+    let mut names: Vec<String> = object.keys().take(SHOWN).map(|key| format!("`{}`", shorten(key))).collect();
+    if object.is_empty() {
+        return "none".into();
+    }
+    if object.len() > SHOWN {
+        names.push("…".into());
+    }
+    names.join(", ")
+}
+
+/// File contents end up in messages; no more of them than a reader wants.
+pub(crate) fn shorten(text: &str) -> String {
+    const LONGEST: usize = 40;
+    if text.chars().count() <= LONGEST { text.to_string() } else { text.chars().take(LONGEST).chain(['…']).collect() }
+}

@@ -1,0 +1,234 @@
+//! LabelMe JSON: a `rectangle`, points `grasp_start` and `grasp_end`, an optional `polygon`, tied by `group_id`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::Point2;
+
+use crate::annotation::{Annotation, Draft, ImageFacts};
+use crate::json::{Node, shorten};
+use crate::{Error, Result};
+
+/// Reads every object of a LabelMe file.
+pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
+        image.check_declared(width.pixels()?, height.pixels()?)?;
+    }
+    let shapes =
+        root.field("shapes", "the list of shapes")?.items()?.iter().map(Shape::read).collect::<Result<Vec<_>>>()?;
+    if shapes.is_empty() {
+        return Err(Error::NoObject {
+            expected: "at least a `rectangle` or a `polygon`".into(),
+            found: "an empty list of shapes".into(),
+        });
+    }
+
+    // One group or none at all is one object, whether or not every shape carries the id.
+    let ids: BTreeSet<&str> = shapes.iter().filter_map(|shape| shape.group.as_deref()).collect();
+    let ungrouped = shapes.iter().filter(|shape| shape.group.is_none()).count();
+    if ids.len() <= 1 {
+        return Ok(vec![object(shapes, image)?]);
+    }
+    if ungrouped > 0 {
+        return Err(Error::Ungrouped { found: format!("{} groups and {ungrouped} shapes without one", ids.len()) });
+    }
+    let mut groups: BTreeMap<String, Vec<Shape>> = BTreeMap::new();
+    for shape in shapes {
+        groups.entry(shape.group.clone().unwrap_or_default()).or_default().push(shape);
+    }
+    groups.into_values().map(|shapes| object(shapes, image)).collect()
+}
+
+enum Kind {
+    Box,
+    Outline,
+    GraspStart,
+    GraspEnd,
+}
+
+struct Shape {
+    kind: Kind,
+    label: String,
+    group: Option<String>,
+    points: Vec<Point2<f64>>,
+    place: String,
+}
+
+impl Shape {
+    fn read(node: &Node) -> Result<Self> {
+        let label = node.field("label", "the shape's name")?.text()?.trim().to_string();
+        let group = node.optional("group_id")?.map(|id| id.value.to_string());
+        let points_node = node.field("points", "a list of [x, y]")?;
+        let mut points = Vec::new();
+        for point in points_node.items()? {
+            match point.numbers()?.as_slice() {
+                &[x, y] => points.push(Point2::new(x, y)),
+                _ => return Err(point.malformed("a pair [x, y]")),
+            }
+        }
+        // LabelMe's own default, left out by old versions.
+        let shape_type = node.optional("shape_type")?.map_or(Ok("polygon"), |kind| kind.text())?;
+        let (kind, least_points) = match (shape_type, label.as_str()) {
+            ("rectangle", _) => (Kind::Box, 2),
+            ("polygon", _) => (Kind::Outline, 3),
+            ("point", "grasp_start") => (Kind::GraspStart, 1),
+            ("point", "grasp_end") => (Kind::GraspEnd, 1),
+            ("point", other) => {
+                return Err(Error::Malformed {
+                    place: node.place.clone(),
+                    expected: "a point labelled `grasp_start` or `grasp_end`".into(),
+                    found: format!("`{}`", shorten(other)),
+                });
+            }
+            (other, _) => {
+                return Err(Error::Malformed {
+                    place: format!("{}.shape_type", node.place),
+                    expected: "`rectangle`, `polygon` or `point`".into(),
+                    found: format!("`{}`", shorten(other)),
+                });
+            }
+        };
+        if points.len() < least_points {
+            return Err(points_node.malformed(format!("at least {least_points} points for a {shape_type}")));
+        }
+        Ok(Self { kind, label, group, points, place: node.place.clone() })
+    }
+}
+
+fn object(shapes: Vec<Shape>, image: &ImageFacts) -> Result<Annotation> {
+    let mut draft =
+        Draft { place: shapes.first().map(|shape| shape.place.clone()).unwrap_or_default(), ..Draft::default() };
+    let (mut box_label, mut outline_label) = (None, None);
+    for shape in shapes {
+        let twice = match shape.kind {
+            Kind::Box => {
+                box_label = Some(shape.label);
+                draft.corners.replace((shape.points, shape.place.clone())).is_some()
+            }
+            Kind::Outline => {
+                outline_label = Some(shape.label);
+                draft.outline.replace((shape.points, shape.place.clone())).is_some()
+            }
+            Kind::GraspStart => draft.grasp_start.replace((shape.points[0], shape.place.clone())).is_some(),
+            Kind::GraspEnd => draft.grasp_end.replace((shape.points[0], shape.place.clone())).is_some(),
+        };
+        if twice {
+            let kind = match shape.kind {
+                Kind::Box => "rectangle",
+                Kind::Outline => "polygon",
+                Kind::GraspStart => "grasp_start",
+                Kind::GraspEnd => "grasp_end",
+            };
+            return Err(Error::Ungrouped { found: format!("a second `{kind}` at {} in one group", shape.place) });
+        }
+    }
+    draft.label = box_label.or(outline_label);
+    draft.finish(image)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    const IMAGE: ImageFacts = ImageFacts { width: 640, height: 480, file_name: None };
+
+    fn full() -> Value {
+        json!({
+            "version": "5.4.1", "flags": {}, "imagePath": "p.png", "imageData": null,
+            "imageHeight": 480, "imageWidth": 640,
+            "shapes": [
+                {"label": "pendulum", "points": [[300, 260], [100, 80]], "group_id": 1, "shape_type": "rectangle", "flags": {}},
+                {"label": "grasp_start", "points": [[150.5, 120]], "group_id": 1, "shape_type": "point", "flags": {}},
+                {"label": "grasp_end", "points": [[250, 220]], "group_id": 1, "shape_type": "point", "flags": {}},
+                {"label": "pendulum", "points": [[110, 90], [290, 95], [200, 250]], "group_id": 1, "shape_type": "polygon"},
+            ]
+        })
+    }
+
+    fn read_value(value: &Value) -> Result<Vec<Annotation>> {
+        Annotation::read(&serde_json::to_vec(value).unwrap(), &IMAGE)
+    }
+
+    /// The message after `change`, which must spoil the file.
+    fn message(change: impl FnOnce(&mut Value)) -> String {
+        let mut value = full();
+        change(&mut value);
+        read_value(&value).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn reads_box_grasp_and_outline() {
+        let made = read_value(&full()).unwrap();
+        assert_eq!(made.len(), 1);
+        assert_eq!(made[0].label, "pendulum");
+        assert_eq!(made[0].bbox.to_xywh(), [100.0, 80.0, 200.0, 180.0]);
+        let grasp = made[0].require_grasp().unwrap();
+        assert_eq!((grasp.start, grasp.end), (Point2::new(150.5, 120.0), Point2::new(250.0, 220.0)));
+        assert_eq!(made[0].outline.as_ref().unwrap().vertices[2], Point2::new(200.0, 250.0));
+    }
+
+    #[test]
+    fn group_ids_tell_objects_apart() {
+        let mut value = full();
+        let second = json!({"label": "rod", "points": [[1, 1], [9, 9]], "group_id": 2, "shape_type": "rectangle"});
+        value["shapes"].as_array_mut().unwrap().push(second);
+        let made = read_value(&value).unwrap();
+        assert_eq!(made.iter().map(|a| a.label.as_str()).collect::<Vec<_>>(), ["pendulum", "rod"]);
+        assert!(made[1].grasp.is_none());
+    }
+
+    #[test]
+    fn without_any_group_id_all_shapes_are_one_object() {
+        let mut value = full();
+        for shape in value["shapes"].as_array_mut().unwrap() {
+            shape["group_id"] = Value::Null;
+        }
+        assert_eq!(read_value(&value).unwrap(), read_value(&full()).unwrap());
+    }
+
+    #[test]
+    fn each_fault_is_named_with_its_place() {
+        let second_box =
+            json!({"label": "rod", "points": [[1, 1], [9, 9]], "group_id": null, "shape_type": "rectangle"});
+        let cases: [(String, &str); 12] = [
+            (message(|v| v["imageWidth"] = json!(320)), "made on 320×480 pixels, the image has 640×480"),
+            (message(|v| v["shapes"][1]["points"][0][0] = json!(700)), "shapes[1]: expected a place inside"),
+            (message(|v| v["shapes"][1]["label"] = json!("grasp-start")), "found `grasp-start`"),
+            (message(|v| drop(v["shapes"].as_array_mut().unwrap().remove(1))), "`grasp_end` without `grasp_start`"),
+            (message(|v| v["shapes"][0]["points"] = json!([[5, 5], [5, 90]])), "shapes[0]: expected a box of at least"),
+            (message(|v| v["shapes"][0]["points"] = json!([[5, 5]])), "shapes[0].points: expected at least 2 points"),
+            (message(|v| v["shapes"][3]["points"][0] = json!([1, null])), "shapes[3].points[0][1]: expected a number"),
+            (message(|v| v["shapes"][3]["points"][0] = json!([1])), "shapes[3].points[0]: expected a pair"),
+            (
+                message(|v| v["shapes"][3]["points"].as_array_mut().unwrap().truncate(2)),
+                "at least 3 points for a polygon",
+            ),
+            (message(|v| v["shapes"][3]["points"] = json!([[0, 0], [9, 9], [9, 0], [0, 9]])), "does not cross itself"),
+            (message(|v| v["shapes"].as_array_mut().unwrap().push(second_box)), "a second `rectangle` at shapes[4]"),
+            (message(|v| v["shapes"] = json!([])), "empty list of shapes"),
+        ];
+        for (message, expected) in cases {
+            assert!(message.contains(expected), "expected `{expected}` in `{message}`");
+        }
+    }
+
+    #[test]
+    fn literals_of_python_are_not_finite() {
+        for literal in ["NaN", "Infinity", "-Infinity", "1e999"] {
+            let text = serde_json::to_string_pretty(&full()).unwrap().replace("150.5", literal);
+            let found = Annotation::read(text.as_bytes(), &IMAGE).unwrap_err();
+            assert!(matches!(found, Error::NotFinite { .. }), "{literal}: {found:?}");
+            assert!(found.to_string().contains("line "), "{found}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let message = |text: &str| Annotation::read(text.as_bytes(), &IMAGE).unwrap_err().to_string();
+        assert!(message("").contains("is empty"));
+        assert!(message("{\"shapes\": [").contains("not JSON (line 1"));
+        assert!(message("[1, 2]").contains("found a list of 2"));
+        assert!(message("{\"model\": 3}").contains("an object with `model`"));
+        assert!(message("\u{89}PNG").contains("not JSON"));
+    }
+}
