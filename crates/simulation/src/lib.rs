@@ -34,6 +34,7 @@ mod error;
 mod guard;
 mod model;
 pub mod objects;
+mod panda;
 mod render;
 pub mod scene;
 
@@ -41,4 +42,7 @@ pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field
 pub use data::{Contact, Data};
 pub use error::{Result, SimulationError};
 pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
+pub use panda::{
+    ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
+};
 pub use render::{RenderConfig, Renderer, Segmentation};

@@ -1,0 +1,218 @@
+//! The arm in the model: its MJCF and where its joints, motors and frames are.
+
+use nalgebra::{Isometry3, SVector};
+
+use crate::data::Data;
+use crate::error::Result;
+use crate::model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Model, Site};
+
+/// Number of the arm's joints.
+pub const NUM_ARM_JOINTS: usize = 7;
+
+/// Joint positions, velocities or torques of the arm, joint 1 first.
+pub type ArmVector = SVector<f64, NUM_ARM_JOINTS>;
+
+/// File name under which a model includes the arm.
+pub const PANDA_FILE: &str = "panda.xml";
+
+/// Travel of each finger in metres; the hand opens twice as far.
+pub const FINGER_TRAVEL_M: f64 = 0.04;
+
+/// How far the finger tips reach beyond the tcp, in metres.
+pub const FINGERTIP_BEYOND_TCP_M: f64 = 0.004;
+
+/// The MJCF of the arm, to be included by a model: base frame = world frame, hand and wrist camera
+/// mounted, one motor a joint.
+pub fn panda_asset() -> Asset {
+    Asset { name: PANDA_FILE.to_owned(), bytes: include_bytes!("../assets/panda.xml").to_vec() }
+}
+
+/// The arm's parts in a compiled model.
+#[derive(Debug, Clone)]
+pub struct PandaIds {
+    /// Joints 1 to 7.
+    pub joints: [Id<Joint>; NUM_ARM_JOINTS],
+    /// Motors of joints 1 to 7.
+    pub motors: [Id<Actuator>; NUM_ARM_JOINTS],
+    /// Left and right finger's slides.
+    pub finger_joints: [Id<Joint>; 2],
+    /// Left and right finger's motors.
+    pub finger_motors: [Id<Actuator>; 2],
+    /// Left and right finger.
+    pub fingers: [Id<Body>; 2],
+    /// The tool centre point between the finger tips.
+    pub tcp: Id<Site>,
+    /// The camera on the hand.
+    pub wrist_camera: Id<Camera>,
+    qpos: [usize; NUM_ARM_JOINTS],
+    qvel: [usize; NUM_ARM_JOINTS],
+    finger_qpos: [usize; 2],
+    finger_qvel: [usize; 2],
+}
+
+impl PandaIds {
+    /// Finds the arm in a model that includes [`panda_asset`].
+    ///
+    /// # Errors
+    /// `UnknownName` where the model has no such arm.
+    pub fn find(model: &Model) -> Result<Self> {
+        let names: [String; NUM_ARM_JOINTS] = std::array::from_fn(|joint| format!("joint{}", joint + 1));
+        let mut joints = [Id::new(0); NUM_ARM_JOINTS];
+        let mut motors = [Id::new(0); NUM_ARM_JOINTS];
+        for (index, name) in names.iter().enumerate() {
+            joints[index] = model.id(name)?;
+            motors[index] = model.id(name)?;
+        }
+        let finger_joints = [model.id("finger_joint1")?, model.id("finger_joint2")?];
+        Ok(Self {
+            joints,
+            motors,
+            finger_joints,
+            finger_motors: [model.id("finger1")?, model.id("finger2")?],
+            fingers: [model.id("left_finger")?, model.id("right_finger")?],
+            tcp: model.id("tcp")?,
+            wrist_camera: model.id("wrist")?,
+            qpos: joints.map(|joint| model.qpos_index(joint)),
+            qvel: joints.map(|joint| model.qvel_index(joint)),
+            finger_qpos: finger_joints.map(|joint| model.qpos_index(joint)),
+            finger_qvel: finger_joints.map(|joint| model.qvel_index(joint)),
+        })
+    }
+
+    /// Joint angles in radians.
+    pub fn position(&self, data: &Data) -> ArmVector {
+        ArmVector::from_fn(|joint, _| data.qpos()[self.qpos[joint]])
+    }
+
+    /// Joint velocities in rad/s.
+    pub fn velocity(&self, data: &Data) -> ArmVector {
+        ArmVector::from_fn(|joint, _| data.qvel()[self.qvel[joint]])
+    }
+
+    /// Puts the arm somewhere at rest; only right before a simulation starts.
+    pub fn set_position(&self, data: &mut Data, q: &ArmVector) {
+        for joint in 0..NUM_ARM_JOINTS {
+            data.qpos_mut()[self.qpos[joint]] = q[joint];
+            data.qvel_mut()[self.qvel[joint]] = 0.0;
+        }
+    }
+
+    /// Indices of the joints in `qvel`.
+    pub(crate) fn qvel_indices(&self) -> &[usize; NUM_ARM_JOINTS] {
+        &self.qvel
+    }
+
+    /// Positions of left and right finger in metres, 0 closed.
+    pub fn finger_position_m(&self, data: &Data) -> [f64; 2] {
+        self.finger_qpos.map(|index| data.qpos()[index])
+    }
+
+    /// Velocities of left and right finger in m/s, positive opening.
+    pub fn finger_velocity_m_s(&self, data: &Data) -> [f64; 2] {
+        self.finger_qvel.map(|index| data.qvel()[index])
+    }
+
+    /// Puts the fingers somewhere at rest; only right before a simulation starts.
+    pub fn set_finger_position_m(&self, data: &mut Data, position_m: f64) {
+        for finger in 0..2 {
+            data.qpos_mut()[self.finger_qpos[finger]] = position_m;
+            data.qvel_mut()[self.finger_qvel[finger]] = 0.0;
+        }
+    }
+
+    /// Pose of the tool centre point in the base frame.
+    pub fn base_from_tcp(&self, data: &Data) -> Isometry3<f64> {
+        data.world_from_site(self.tcp)
+    }
+
+    /// Which finger (0 left, 1 right) a geom belongs to.
+    pub fn finger_of(&self, model: &Model, geom: Id<Geom>) -> Option<usize> {
+        let body = model.body_of(geom);
+        self.fingers.iter().position(|&finger| finger == body)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use rand::{Rng, SeedableRng};
+    use rand_pcg::Pcg64;
+    use sdg_kinematics as kinematics;
+
+    use super::*;
+    use crate::camera::{WRIST_FOCAL_LENGTH_PX, vertical_field_of_view_rad};
+
+    fn arm() -> (Data, PandaIds) {
+        let xml = "<mujoco><compiler angle='radian'/><include file='panda.xml'/></mujoco>";
+        let model = Arc::new(Model::from_xml(xml, &[panda_asset()]).unwrap());
+        let ids = PandaIds::find(&model).unwrap();
+        (Data::new(model).unwrap(), ids)
+    }
+
+    #[test]
+    fn mujoco_and_kinematics_agree_everywhere() {
+        let (mut data, ids) = arm();
+        let panda = kinematics::Panda::new();
+        let mut rng = Pcg64::seed_from_u64(7);
+        for _ in 0..200 {
+            let q = ArmVector::from_fn(|joint, _| {
+                rng.random_range(kinematics::POSITION_MIN_RAD[joint]..kinematics::POSITION_MAX_RAD[joint])
+            });
+            ids.set_position(&mut data, &q);
+            data.forward().unwrap();
+            let frames = panda.frames(&q);
+            for (index, &joint) in ids.joints.iter().enumerate() {
+                let body = data.model().id::<Body>(&data.model().name(joint).unwrap().replace("joint", "link")).unwrap();
+                let difference = frames.base_from_link[index].inverse() * data.world_from_body(body);
+                assert!(difference.translation.vector.norm() < 1e-9, "link {}", index + 1);
+                assert!(difference.rotation.angle() < 1e-7, "link {}", index + 1);
+            }
+            let difference = frames.base_from_tcp.inverse() * ids.base_from_tcp(&data);
+            assert!(difference.translation.vector.norm() < 1e-9 && difference.rotation.angle() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn limits_are_frankas() {
+        let (data, ids) = arm();
+        let raw = data.model().raw();
+        for joint in 0..NUM_ARM_JOINTS {
+            // SAFETY: two numbers a joint and two an actuator.
+            let (range, torque) = unsafe {
+                (
+                    *raw.jnt_range.add(2 * ids.joints[joint].index()).cast::<[f64; 2]>(),
+                    *raw.actuator_ctrlrange.add(2 * ids.motors[joint].index()).cast::<[f64; 2]>(),
+                )
+            };
+            assert_eq!(range, [kinematics::POSITION_MIN_RAD[joint], kinematics::POSITION_MAX_RAD[joint]]);
+            assert_eq!(torque, [-kinematics::TORQUE_MAX_NM[joint], kinematics::TORQUE_MAX_NM[joint]]);
+        }
+    }
+
+    #[test]
+    fn the_camera_looks_along_the_approach_axis() {
+        let (data, ids) = arm();
+        let optical_axis = data.world_from_mujoco_camera(ids.wrist_camera).rotation * -nalgebra::Vector3::z();
+        let approach_axis = ids.base_from_tcp(&data).rotation * nalgebra::Vector3::z();
+        assert!((optical_axis - approach_axis).norm() < 1e-9);
+        let fovy = data.model().vertical_field_of_view_rad(ids.wrist_camera);
+        assert!((fovy - vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, 480)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn closed_fingers_meet_at_the_tcp() {
+        let (mut data, ids) = arm();
+        ids.set_finger_position_m(&mut data, 0.0);
+        data.forward().unwrap();
+        let tcp = ids.base_from_tcp(&data);
+        for (side, name) in [(1.0, "left_pad_3"), (-1.0, "right_pad_3")] {
+            let pad = data.world_from_geom(data.model().id(name).unwrap());
+            let in_tcp = tcp.inverse_transform_point(&pad.translation.vector.into());
+            // The pad is 6 mm thick: its inner face lies in the plane between the fingers.
+            assert!((in_tcp.y - side * 0.003).abs() < 1e-9, "{name} at {in_tcp}");
+            let tip = in_tcp.z + 0.0045;
+            assert!((tip - FINGERTIP_BEYOND_TCP_M - 0.0016).abs() < 0.002, "{name}: tip {tip} m beyond the tcp");
+        }
+    }
+}
