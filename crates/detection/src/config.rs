@@ -1,0 +1,594 @@
+//! The configuration of a detector: every knob in which the R-CNN implementations differ.
+//!
+//! Nothing here computes. Each enum names a choice that a bare bool or number would hide; the two
+//! ends of most choices are Detectron2 and torchvision. A configuration is plain data and
+//! serialises, so a model file can carry the one it was trained with.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{DetectionError, Result};
+
+/// The whole detector.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RcnnConfig {
+    /// From the image as given to the network's input.
+    pub input: ImageTransformConfig,
+    /// The residual network, "bottom-up" of the feature pyramid.
+    pub backbone: ResNetConfig,
+    /// The feature pyramid.
+    pub fpn: FpnConfig,
+    /// The anchors of the region proposal network.
+    pub anchors: AnchorConfig,
+    /// The region proposal network.
+    pub rpn: RpnConfig,
+    /// The second stage.
+    pub roi_heads: RoiHeadsConfig,
+}
+
+/// Order of the channels in the network's input tensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ChannelOrder {
+    /// Red first: torchvision.
+    Rgb,
+    /// Blue first: Detectron2.
+    Bgr,
+}
+
+/// Range of a channel before the mean is subtracted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum PixelRange {
+    /// 0 to 255: Detectron2.
+    Byte,
+    /// 0 to 1: torchvision.
+    Unit,
+}
+
+/// How an image is resampled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ResizeFilter {
+    /// A triangle filter that widens when shrinking, rounded to bytes after each pass: Pillow's
+    /// `BILINEAR`, used by Detectron2.
+    AntialiasedBytes,
+    /// Two by two neighbours whatever the scale, not rounded: `torch.nn.functional.interpolate`,
+    /// used by torchvision.
+    Bilinear,
+}
+
+/// The size to which an image is resized, aspect ratio kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ResizeRule {
+    /// Short side to `short_px` unless the long side would exceed `max_long_px`.
+    ShortSide {
+        /// Short side after resizing.
+        short_px: u32,
+        /// Bound on the long side.
+        max_long_px: u32,
+        /// From the exact size to whole pixels.
+        rounding: SizeRounding,
+    },
+    /// As large as fits into `width_px` by `height_px`, rounded to nearest.
+    FitWithin {
+        /// Bound on the width.
+        width_px: u32,
+        /// Bound on the height.
+        height_px: u32,
+    },
+}
+
+/// From an exact size to whole pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SizeRounding {
+    /// `int(x + 0.5)`: Detectron2.
+    Nearest,
+    /// `floor(x)`: torchvision.
+    Floor,
+}
+
+/// Resize, channel order, normalisation, padding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ImageTransformConfig {
+    /// Size of the resized image.
+    pub resize: ResizeRule,
+    /// Resampling.
+    pub filter: ResizeFilter,
+    /// Channel order of the input tensor.
+    pub channel_order: ChannelOrder,
+    /// Range before normalisation.
+    pub pixel_range: PixelRange,
+    /// Subtracted from each channel, in `channel_order` and `pixel_range`.
+    pub mean: [f32; 3],
+    /// Divides each channel, in `channel_order` and `pixel_range`.
+    pub std: [f32; 3],
+    /// Width and height are padded with zeros (after normalisation) to multiples of this.
+    pub size_divisibility: usize,
+}
+
+/// Normalisation after a convolution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum NormKind {
+    /// None: the convolution has a bias instead.
+    Identity,
+    /// Mean and variance over groups of channels of one image, trained.
+    Group {
+        /// Number of groups.
+        num_groups: usize,
+    },
+    /// Stored mean and variance, never trained.
+    FrozenBatch {
+        /// Added to the variance; 1e-5 in Detectron2, 0 in some of torchvision's builders.
+        eps: f64,
+    },
+}
+
+/// Residual block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BlockKind {
+    /// Two 3×3 convolutions: ResNet-18, -34.
+    Basic,
+    /// 1×1, 3×3, 1×1: ResNet-50 and deeper.
+    Bottleneck {
+        /// Channels of the inner convolutions in res2; doubled in each later stage.
+        inner_channels: usize,
+        /// Where a stage halves the resolution.
+        stride_in: StrideIn,
+    },
+}
+
+/// The convolution of a bottleneck that carries the stride.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum StrideIn {
+    /// The first, 1×1: Detectron2 (and the original MSRA models).
+    Conv1x1,
+    /// The second, 3×3: torchvision.
+    Conv3x3,
+}
+
+/// The part of the backbone that is never trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Freeze {
+    /// Everything is trained.
+    Nothing,
+    /// The stem is frozen.
+    Stem,
+    /// The stem and res2 are frozen: Detectron2's `FREEZE_AT` 2.
+    ThroughRes2,
+    /// The stem, res2 and res3 are frozen.
+    ThroughRes3,
+}
+
+/// A residual network with four stages, res2 to res5, at strides 4, 8, 16, 32.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ResNetConfig {
+    /// Channels after the 7×7 stem.
+    pub stem_channels: usize,
+    /// Channels that res2 gives; doubled in each later stage.
+    pub res2_channels: usize,
+    /// Blocks in res2, res3, res4, res5.
+    pub num_blocks: [usize; 4],
+    /// Kind of block.
+    pub block: BlockKind,
+    /// Norm after every convolution.
+    pub norm: NormKind,
+    /// What stays as initialised or loaded.
+    pub freeze: Freeze,
+}
+
+impl ResNetConfig {
+    /// Channels of res2, res3, res4, res5.
+    pub fn stage_channels(&self) -> [usize; 4] {
+        [1, 2, 4, 8].map(|factor| self.res2_channels * factor)
+    }
+}
+
+/// A feature pyramid p2 to p5, and p6 by subsampling p5.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FpnConfig {
+    /// Channels of every level.
+    pub channels: usize,
+    /// Norm after the lateral and output convolutions.
+    pub norm: NormKind,
+}
+
+/// The base anchor's corners.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum AnchorRounding {
+    /// As computed: Detectron2.
+    Exact,
+    /// Rounded to whole pixels, half to even: torchvision.
+    Rounded,
+}
+
+/// Distance between neighbouring anchors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum AnchorStride {
+    /// The level's nominal stride, 4 to 64: Detectron2.
+    Nominal,
+    /// Padded image size divided by grid size, rounded down: torchvision.
+    ImageOverGrid,
+}
+
+/// Anchors on p2 to p6.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AnchorConfig {
+    /// Side of the square anchor on p2 to p6, in pixels of the resized image.
+    pub sizes_px: [f64; 5],
+    /// Height over width.
+    pub aspect_ratios: Vec<f64>,
+    /// Centre of the first anchor, in strides. Detectron2 and torchvision: 0.
+    pub offset: f64,
+    /// Rounding of the base anchors.
+    pub rounding: AnchorRounding,
+    /// Distance between neighbours.
+    pub stride: AnchorStride,
+}
+
+/// Weights of the box coder: dx, dy, dw, dh.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BoxCoderConfig {
+    /// Factors on dx, dy, dw, dh.
+    pub weights: [f64; 4],
+}
+
+/// The penalty on a difference of box deltas.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum RegressionLoss {
+    /// `|d|`.
+    L1,
+    /// `d² / (2 beta)` below `beta`, `|d| - beta/2` above.
+    SmoothL1 {
+        /// Where the parabola meets the line.
+        beta: f64,
+    },
+}
+
+/// What the losses of the region proposal network are divided by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RpnNormaliser {
+    /// Nominal samples an image times images: Detectron2.
+    NominalSamples,
+    /// Samples actually drawn: torchvision.
+    DrawnSamples,
+}
+
+/// Which boxes a matcher calls positive, negative, or neither.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MatcherConfig {
+    /// IoU below which a box is negative.
+    pub negative_below: f64,
+    /// IoU from which on a box is positive; between the two it is ignored.
+    pub positive_from: f64,
+    /// Whether an object that no box reaches takes its best boxes anyway.
+    pub low_quality: LowQualityMatches,
+}
+
+/// Whether an object that no box reaches takes its best boxes anyway.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LowQualityMatches {
+    /// They become positive: the region proposal network.
+    Allowed,
+    /// They do not: the ROI heads.
+    Forbidden,
+}
+
+/// How many boxes of an image take part in a loss.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SamplerConfig {
+    /// Boxes an image.
+    pub batch_size_per_image: usize,
+    /// Largest part of them that is positive.
+    pub positive_fraction: f64,
+}
+
+/// A number that differs between training and inference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PerMode {
+    /// While training.
+    pub train: usize,
+    /// In inference.
+    pub test: usize,
+}
+
+/// The region proposal network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RpnConfig {
+    /// Which anchors are objects.
+    pub matcher: MatcherConfig,
+    /// Anchors in the loss.
+    pub sampler: SamplerConfig,
+    /// Box coder.
+    pub box_coder: BoxCoderConfig,
+    /// Best anchors kept on each level before NMS.
+    pub pre_nms_top_n: PerMode,
+    /// Proposals kept an image.
+    pub post_nms_top_n: PerMode,
+    /// IoU above which the lesser of two proposals of a level is dropped.
+    pub nms_threshold: f64,
+    /// Proposals with a side not above this are dropped, pixels.
+    pub min_box_size_px: f64,
+    /// Loss on deltas.
+    pub regression_loss: RegressionLoss,
+    /// Divisor of both losses.
+    pub normaliser: RpnNormaliser,
+}
+
+/// Where the background stands among the class scores.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BackgroundClass {
+    /// Class 0: torchvision, which also has (unused) box deltas for it.
+    First,
+    /// Class K: Detectron2.
+    Last,
+}
+
+/// Whether each class has its own box deltas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BoxDeltas {
+    /// 4·K (background last) or 4·(K+1) (background first) outputs.
+    ClassSpecific,
+    /// 4 outputs.
+    ClassAgnostic,
+}
+
+/// Where the samples of ROIAlign lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RoiAlignment {
+    /// Shifted by half a cell so that the pixel model is right: Detectron2's `aligned`.
+    HalfPixel,
+    /// Not shifted: torchvision's detectors.
+    Legacy,
+}
+
+/// Samples a bin of ROIAlign averages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SamplingRatio {
+    /// `ceil(roi size / output size)` along each axis.
+    Adaptive,
+    /// A fixed number along each axis.
+    Fixed(usize),
+}
+
+/// Where the small number stands that keeps `log2` from rounding down on exact powers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum LevelEpsilon {
+    /// `floor(canonical_level + log2(s / canonical_size + eps))`: Detectron2, 1e-8.
+    InsideLog(f64),
+    /// `floor(canonical_level + log2(s / canonical_size) + eps)`: torchvision, 1e-6.
+    OutsideLog(f64),
+}
+
+/// Pools boxes of any size from p2 to p5 into squares.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RoiPoolerConfig {
+    /// Side of the pooled square.
+    pub output_size: usize,
+    /// Alignment of the samples.
+    pub alignment: RoiAlignment,
+    /// Number of samples.
+    pub sampling_ratio: SamplingRatio,
+    /// Side of the box that belongs on `canonical_level`, pixels.
+    pub canonical_size_px: f64,
+    /// Level of a box of `canonical_size_px`.
+    pub canonical_level: usize,
+    /// Guard against rounding.
+    pub level_epsilon: LevelEpsilon,
+}
+
+/// The second stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RoiHeadsConfig {
+    /// Object classes, without background.
+    pub num_classes: usize,
+    /// Which proposals are objects.
+    pub matcher: MatcherConfig,
+    /// Proposals in the loss.
+    pub sampler: SamplerConfig,
+    /// The box head.
+    pub box_head: BoxHeadConfig,
+    /// The keypoint head, if the detector has one.
+    pub keypoint_head: Option<KeypointHeadConfig>,
+}
+
+/// Two fully connected layers, class scores and box deltas.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BoxHeadConfig {
+    /// Pooling.
+    pub pooler: RoiPoolerConfig,
+    /// Width of the two fully connected layers.
+    pub fc_channels: usize,
+    /// Place of the background class.
+    pub background: BackgroundClass,
+    /// Own deltas for each class or not.
+    pub box_deltas: BoxDeltas,
+    /// Box coder.
+    pub box_coder: BoxCoderConfig,
+    /// Loss on deltas.
+    pub regression_loss: RegressionLoss,
+    /// Least score of a detection.
+    pub score_threshold: f64,
+    /// IoU above which the lesser of two detections of a class is dropped.
+    pub nms_threshold: f64,
+    /// Detections kept an image.
+    pub detections_per_image: usize,
+    /// Detections with a side not above this are dropped, pixels of the resized image.
+    pub min_box_size_px: f64,
+}
+
+/// From heatmap to keypoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeypointReadout {
+    /// The map is resized to the box's ceiling by a bicubic filter, and the centre of the highest
+    /// pixel taken: Detectron2 and torchvision.
+    BicubicArgmax,
+    /// The mean position under the map's softmax in a square of `2 radius + 1` cells around its
+    /// highest cell: finer than a cell, and cheaper.
+    LocalMean {
+        /// Cells on each side of the highest.
+        radius: usize,
+    },
+}
+
+/// The score of a keypoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeypointScore {
+    /// Height of the peak of the map normalised to sum 1: Detectron2.
+    NormalisedPeak,
+    /// The raw logit of the peak: torchvision.
+    Logit,
+}
+
+/// Convolutions, a transposed convolution to K maps, and bilinear doubling.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KeypointHeadConfig {
+    /// Pooling.
+    pub pooler: RoiPoolerConfig,
+    /// Channels of each 3×3 convolution.
+    pub conv_channels: Vec<usize>,
+    /// Keypoints of an object.
+    pub num_keypoints: usize,
+    /// Most positive proposals an image that go through the head while training.
+    pub max_train_rois_per_image: Option<usize>,
+    /// Factor on the keypoint loss.
+    pub loss_weight: f64,
+    /// From heatmap to keypoint.
+    pub readout: KeypointReadout,
+    /// Score of a keypoint.
+    pub score: KeypointScore,
+}
+
+impl KeypointHeadConfig {
+    /// Side of the heatmaps: the pooled side times four (transposed convolution, bilinear).
+    pub fn heatmap_size(&self) -> usize {
+        self.pooler.output_size * 4
+    }
+}
+
+fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString) -> Result<()> {
+    if holds {
+        return Ok(());
+    }
+    Err(DetectionError::Config {
+        field,
+        expected: expected.to_owned(),
+        found: found.to_string(),
+    })
+}
+
+impl RcnnConfig {
+    /// Checks that every value is usable and that values that depend on each other agree.
+    ///
+    /// # Errors
+    /// [`DetectionError::Config`] names the first field that is not.
+    pub fn validate(&self) -> Result<()> {
+        let (w, h) = match self.input.resize {
+            ResizeRule::ShortSide {
+                short_px,
+                max_long_px,
+                ..
+            } => (short_px, max_long_px),
+            ResizeRule::FitWithin {
+                width_px,
+                height_px,
+            } => (width_px, height_px),
+        };
+        check(
+            (1..=8192).contains(&w) && (1..=8192).contains(&h),
+            "input.resize",
+            "from 1 to 8192 px",
+            format!("{w}, {h}"),
+        )?;
+        check(
+            self.input.size_divisibility % 32 == 0 && self.input.size_divisibility > 0,
+            "input.size_divisibility",
+            "a multiple of 32, so that the levels of the pyramid halve exactly",
+            self.input.size_divisibility,
+        )?;
+        check(
+            self.input.std.iter().all(|s| *s > 0.0 && s.is_finite()),
+            "input.std",
+            "positive",
+            format!("{:?}", self.input.std),
+        )?;
+        for (field, norm, channels) in [
+            ("backbone.norm", self.backbone.norm, self.backbone.stem_channels),
+            ("backbone.norm", self.backbone.norm, self.backbone.res2_channels),
+            ("fpn.norm", self.fpn.norm, self.fpn.channels),
+        ] {
+            if let NormKind::Group { num_groups } = norm {
+                check(
+                    num_groups > 0 && channels % num_groups == 0,
+                    field,
+                    "a number of groups that divides the channels",
+                    format!("{num_groups} groups of {channels} channels"),
+                )?;
+            }
+        }
+        check(
+            self.backbone.num_blocks.iter().all(|n| *n > 0),
+            "backbone.num_blocks",
+            "at least one block a stage",
+            format!("{:?}", self.backbone.num_blocks),
+        )?;
+        check(
+            !self.anchors.aspect_ratios.is_empty()
+                && self.anchors.aspect_ratios.iter().all(|r| *r > 0.0),
+            "anchors.aspect_ratios",
+            "one or more positive numbers",
+            format!("{:?}", self.anchors.aspect_ratios),
+        )?;
+        check(
+            self.anchors.sizes_px.iter().all(|s| *s > 0.0 && s.is_finite()),
+            "anchors.sizes_px",
+            "positive",
+            format!("{:?}", self.anchors.sizes_px),
+        )?;
+        for (field, matcher) in [
+            ("rpn.matcher", &self.rpn.matcher),
+            ("roi_heads.matcher", &self.roi_heads.matcher),
+        ] {
+            check(
+                0.0 <= matcher.negative_below
+                    && matcher.negative_below <= matcher.positive_from
+                    && matcher.positive_from <= 1.0,
+                field,
+                "0 <= negative_below <= positive_from <= 1",
+                format!("{} and {}", matcher.negative_below, matcher.positive_from),
+            )?;
+        }
+        for (field, sampler) in [
+            ("rpn.sampler", &self.rpn.sampler),
+            ("roi_heads.sampler", &self.roi_heads.sampler),
+        ] {
+            check(
+                sampler.batch_size_per_image > 0
+                    && (0.0..=1.0).contains(&sampler.positive_fraction),
+                field,
+                "at least one sample, and a fraction from 0 to 1",
+                format!(
+                    "{}, {}",
+                    sampler.batch_size_per_image, sampler.positive_fraction
+                ),
+            )?;
+        }
+        check(
+            self.roi_heads.num_classes > 0,
+            "roi_heads.num_classes",
+            "at least 1",
+            self.roi_heads.num_classes,
+        )?;
+        if let Some(head) = &self.roi_heads.keypoint_head {
+            check(
+                head.num_keypoints > 0,
+                "roi_heads.keypoint_head.num_keypoints",
+                "at least 1",
+                head.num_keypoints,
+            )?;
+            check(
+                !head.conv_channels.is_empty(),
+                "roi_heads.keypoint_head.conv_channels",
+                "one or more convolutions",
+                "none",
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,53 @@
+//! What can be wrong with the inputs of this crate.
+
+use thiserror::Error;
+
+/// An input that the detector cannot work with. Each message says what was expected and found.
+#[derive(Debug, Error, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum DetectionError {
+    /// A configuration value is outside its range, or two values contradict each other.
+    #[error("detector configuration: {field} must be {expected}, found {found}")]
+    Config {
+        /// Path of the field in [`crate::RcnnConfig`].
+        field: &'static str,
+        /// What the field may be.
+        expected: String,
+        /// What it is.
+        found: String,
+    },
+    /// A batch holds another number of targets than of images.
+    #[error("a batch needs one target an image: expected {expected} targets, found {found}")]
+    BatchSize {
+        /// Number of images.
+        expected: usize,
+        /// Number of targets.
+        found: usize,
+    },
+    /// The batch is empty.
+    #[error("a training batch needs at least one image, found none")]
+    EmptyBatch,
+    /// A target contradicts itself or the configuration.
+    #[error("target {image_idx}: {field} expected {expected}, found {found}")]
+    Target {
+        /// Index of the image in the batch.
+        image_idx: usize,
+        /// The part of the target.
+        field: &'static str,
+        /// What it should be.
+        expected: String,
+        /// What it is.
+        found: String,
+    },
+    /// An image has no pixels.
+    #[error("an image needs at least 1x1 pixels, found {width}x{height}")]
+    EmptyImage {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+    },
+}
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, DetectionError>;

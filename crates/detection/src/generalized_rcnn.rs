@@ -1,0 +1,316 @@
+//! The whole detector: transform, backbone, proposals, ROI heads, back to the original image.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, TensorData};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use sdg_geometry::{BoundingBox, Keypoint};
+
+use crate::config::RcnnConfig;
+use crate::error::{DetectionError, Result};
+use crate::fpn::Fpn;
+use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
+use crate::initialization::Initializer;
+use crate::losses::Losses;
+use crate::resnet::ResNet;
+use crate::roi_heads::{ResizedTarget, RoiDetection, RoiHeads};
+use crate::rpn::{ImageSize, Mode, RegionProposalNetwork};
+
+/// Residual network and feature pyramid.
+#[derive(Module, Debug)]
+pub struct Backbone {
+    /// The residual network.
+    pub bottom_up: ResNet,
+    /// 1×1 and 3×3 convolutions of the pyramid.
+    pub fpn: Fpn,
+}
+
+impl Backbone {
+    /// Gives p2 to p6 of a padded batch `[N, 3, H, W]`.
+    pub fn forward(&self, images: Tensor<4>) -> [Tensor<4>; 5] {
+        self.fpn.forward(self.bottom_up.forward(images))
+    }
+}
+
+/// A detector of the R-CNN family.
+///
+/// Paths of the parameters follow Detectron2, but for `backbone.fpn.`, which stands before the
+/// pyramid's names, and `conv_fcn.0` for `conv_fcn1`.
+#[derive(Module, Debug)]
+pub struct GeneralizedRcnn {
+    /// Features.
+    pub backbone: Backbone,
+    /// Proposals.
+    pub proposal_generator: RegionProposalNetwork,
+    /// Detections.
+    pub roi_heads: RoiHeads,
+    #[module(skip)]
+    config: RcnnConfig,
+}
+
+/// What is to be found in one image, in pixels of the original image.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Target {
+    /// Boxes; none for an image without objects.
+    pub boxes: Vec<BoundingBox>,
+    /// Class of each box, from 0.
+    pub labels: Vec<usize>,
+    /// Keypoints of each box; may be empty where the detector has no keypoint head.
+    pub keypoints: Vec<Vec<Keypoint>>,
+}
+
+/// A keypoint as detected, in pixels of the original image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoredKeypoint {
+    /// Pixels, x right.
+    pub x: f64,
+    /// Pixels, y down.
+    pub y: f64,
+    /// As [`crate::config::KeypointScore`] says.
+    pub score: f64,
+}
+
+/// What was found in one image, best first, in pixels of the original image.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Detections {
+    /// Boxes.
+    pub boxes: Vec<BoundingBox>,
+    /// Probability of each box's class.
+    pub scores: Vec<f64>,
+    /// Class of each box.
+    pub classes: Vec<usize>,
+    /// Keypoints of each box; empty lists without a keypoint head.
+    pub keypoints: Vec<Vec<ScoredKeypoint>>,
+}
+
+impl RcnnConfig {
+    /// Builds the detector with parameters drawn from a seed.
+    ///
+    /// For training the device must carry autodiff (`device.autodiff()`, feature `training`).
+    ///
+    /// # Errors
+    /// Where [`RcnnConfig::validate`] finds one.
+    pub fn init(&self, device: &Device, seed: u64) -> Result<GeneralizedRcnn> {
+        self.validate()?;
+        let mut init = Initializer::new(device, seed);
+        let stage_channels = self.backbone.stage_channels();
+        Ok(GeneralizedRcnn {
+            backbone: Backbone {
+                bottom_up: ResNet::init(&self.backbone, &mut init),
+                fpn: Fpn::init(&self.fpn, stage_channels, &mut init),
+            },
+            proposal_generator: RegionProposalNetwork::init(
+                &self.rpn,
+                &self.anchors,
+                self.fpn.channels,
+                &mut init,
+            ),
+            roi_heads: RoiHeads::init(&self.roi_heads, &self.fpn, &mut init),
+            config: self.clone(),
+        })
+    }
+}
+
+impl GeneralizedRcnn {
+    /// The configuration that the detector was built from.
+    pub fn config(&self) -> &RcnnConfig {
+        &self.config
+    }
+
+    /// The transform that images go through before [`Self::losses`] and [`Self::detect`].
+    pub fn image_transform(&self) -> ImageTransform {
+        ImageTransform::new(&self.config.input)
+    }
+
+    /// The device that the parameters are on, autodiff included.
+    pub fn device(&self) -> Device {
+        self.roi_heads.box_head.fc1.weight.val().device()
+    }
+
+    fn batch(&self, images: &[TransformedImage]) -> (Tensor<4>, Vec<ImageSize>) {
+        let padded = pad_batch(images, self.config.input.size_divisibility);
+        let data = TensorData::new(padded.pixels, padded.dims);
+        let sizes = images.iter().map(|i| [i.height, i.width]).collect();
+        (Tensor::from_data(data, &self.device()), sizes)
+    }
+
+    /// Gives the training losses of a batch.
+    ///
+    /// `seed` draws the anchors and proposals that take part; give another one each step. Images
+    /// without objects are fine: they teach what is background.
+    ///
+    /// # Errors
+    /// Where images and targets differ in number, or a target contradicts the configuration.
+    pub fn losses(
+        &self,
+        images: &[TransformedImage],
+        targets: &[Target],
+        seed: u64,
+    ) -> Result<Losses> {
+        let targets = self.resized_targets(images, targets)?;
+        Ok(self.losses_of_resized(images, &targets, seed))
+    }
+
+    /// The same with targets in pixels of the resized images, unchecked.
+    pub(crate) fn losses_of_resized(
+        &self,
+        images: &[TransformedImage],
+        targets: &[ResizedTarget],
+        seed: u64,
+    ) -> Losses {
+        // A stream for each image and purpose: what one image draws does not move the others.
+        let rngs = |purpose: u128| -> Vec<Pcg64Mcg> {
+            let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
+            (0..images.len())
+                .map(|idx| Pcg64Mcg::from_seed((state(idx) << 1 | 1).to_le_bytes()))
+                .collect()
+        };
+        let (tensor, sizes) = self.batch(images);
+        let [_, _, height, width] = tensor.dims();
+        let features = self.backbone.forward(tensor);
+        let predictions = self.proposal_generator.predict(&features, [height, width]);
+        let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Train);
+        let gt_boxes: Vec<_> = targets.iter().map(|target| target.boxes.clone()).collect();
+        let [rpn_cls, rpn_loc] =
+            self.proposal_generator.losses(predictions, &gt_boxes, &mut rngs(1));
+        let rois = self.roi_heads.sample_rois(&proposals, targets, &mut rngs(2));
+        let roi = self.roi_heads.losses(&features, &rois, targets, &mut rngs(3));
+        Losses {
+            rpn_cls,
+            rpn_loc,
+            cls: roi.cls,
+            box_reg: roi.box_reg,
+            keypoint: roi.keypoint,
+        }
+    }
+
+    /// Finds the objects in each image.
+    ///
+    /// On a detector in training, call this on `valid()`, so that no gradients are recorded.
+    pub fn detect(&self, images: &[TransformedImage]) -> Vec<Detections> {
+        if images.is_empty() {
+            return Vec::new();
+        }
+        let (tensor, sizes) = self.batch(images);
+        let [_, _, height, width] = tensor.dims();
+        let features = self.backbone.forward(tensor);
+        let predictions = self.proposal_generator.predict(&features, [height, width]);
+        let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Test);
+        let found = self.roi_heads.detect(&features, &proposals, &sizes);
+        images
+            .iter()
+            .zip(found)
+            .map(|(image, found)| original_detections(image, &found))
+            .collect()
+    }
+
+    fn resized_targets(
+        &self,
+        images: &[TransformedImage],
+        targets: &[Target],
+    ) -> Result<Vec<ResizedTarget>> {
+        if images.is_empty() {
+            return Err(DetectionError::EmptyBatch);
+        }
+        if images.len() != targets.len() {
+            return Err(DetectionError::BatchSize {
+                expected: images.len(),
+                found: targets.len(),
+            });
+        }
+        targets
+            .iter()
+            .enumerate()
+            .map(|(image_idx, target)| {
+                self.check_target(image_idx, target)?;
+                Ok(resized_target(&images[image_idx], target))
+            })
+            .collect()
+    }
+
+    fn check_target(&self, image_idx: usize, target: &Target) -> Result<()> {
+        let fail = |field, expected: String, found: String| {
+            Err(DetectionError::Target {
+                image_idx,
+                field,
+                expected,
+                found,
+            })
+        };
+        let heads = &self.config.roi_heads;
+        let count = target.boxes.len();
+        if target.labels.len() != count {
+            let found = target.labels.len().to_string();
+            return fail("labels", format!("{count}, one a box"), found);
+        }
+        if let Some(label) = target.labels.iter().find(|l| **l >= heads.num_classes) {
+            let expected = format!("classes below {}", heads.num_classes);
+            return fail("labels", expected, label.to_string());
+        }
+        for b in &target.boxes {
+            let finite = [b.x1, b.y1, b.x2, b.y2].iter().all(|v| v.is_finite());
+            if !finite || b.width() <= 0.0 || b.height() <= 0.0 {
+                let expected = "finite, with width and height".to_owned();
+                return fail("boxes", expected, format!("{b:?}"));
+            }
+        }
+        let Some(head) = &heads.keypoint_head else {
+            return Ok(());
+        };
+        if target.keypoints.len() != count {
+            let found = target.keypoints.len().to_string();
+            return fail("keypoints", format!("{count}, one list a box"), found);
+        }
+        for keypoints in &target.keypoints {
+            if keypoints.len() != head.num_keypoints {
+                let expected = format!("{} in a list", head.num_keypoints);
+                return fail("keypoints", expected, keypoints.len().to_string());
+            }
+            let broken = |k: &&Keypoint| k.is_labelled() && !(k.x.is_finite() && k.y.is_finite());
+            if let Some(keypoint) = keypoints.iter().find(broken) {
+                let expected = "finite coordinates".to_owned();
+                return fail("keypoints", expected, format!("{keypoint:?}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn resized_target(image: &TransformedImage, target: &Target) -> ResizedTarget {
+    let [sx, sy] = image.resized_from_original();
+    let scaled = |keypoint: &Keypoint| Keypoint {
+        x: keypoint.x * sx,
+        y: keypoint.y * sy,
+        visibility: keypoint.visibility,
+    };
+    ResizedTarget {
+        boxes: target.boxes.iter().map(|b| image.resized_box(b)).collect(),
+        labels: target.labels.clone(),
+        keypoints: target
+            .keypoints
+            .iter()
+            .map(|list| list.iter().map(scaled).collect())
+            .collect(),
+    }
+}
+
+fn original_detections(image: &TransformedImage, found: &[RoiDetection]) -> Detections {
+    let [sx, sy] = image.resized_from_original();
+    let mut detections = Detections::default();
+    for detection in found {
+        let original = image.original_box(&detection.corners);
+        if original.width() <= 0.0 || original.height() <= 0.0 {
+            continue;
+        }
+        detections.boxes.push(original);
+        detections.scores.push(f64::from(detection.score));
+        detections.classes.push(detection.class_idx);
+        let keypoints = detection.keypoints.iter().map(|keypoint| ScoredKeypoint {
+            x: f64::from(keypoint.x) / sx,
+            y: f64::from(keypoint.y) / sy,
+            score: f64::from(keypoint.score),
+        });
+        detections.keypoints.push(keypoints.collect());
+    }
+    detections
+}

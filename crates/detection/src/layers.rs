@@ -1,0 +1,364 @@
+//! The layers that the network is built of, with parameters named as in PyTorch.
+//!
+//! Shapes: N images or ROIs, C channels, H×W cells.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Tensor, activation};
+use sdg_kernels::{Conv2dParams, conv2d};
+
+use crate::config::NormKind;
+use crate::initialization::{Distribution, Initializer};
+
+/// Normalisation with a weight and a bias for each channel.
+#[derive(Module, Debug)]
+pub struct Norm {
+    /// Factor, `[C]`.
+    pub weight: Param<Tensor<1>>,
+    /// Summand, `[C]`.
+    pub bias: Param<Tensor<1>>,
+    /// Stored mean, `[C]`, for frozen batch norm.
+    pub running_mean: Option<Param<Tensor<1>>>,
+    /// Stored variance, `[C]`, for frozen batch norm.
+    pub running_var: Option<Param<Tensor<1>>>,
+    #[module(skip)]
+    kind: NormKind,
+}
+
+/// Added to a group's variance.
+const GROUP_NORM_EPS: f64 = 1e-5;
+
+impl Norm {
+    /// A norm of `channels` channels, or `None` for [`NormKind::Identity`].
+    pub fn init(kind: NormKind, channels: usize, init: &mut Initializer) -> Option<Self> {
+        match kind {
+            NormKind::Identity => None,
+            NormKind::Group { .. } => Some(Self {
+                weight: init.param([channels], Distribution::Constant(1.0)),
+                bias: init.param([channels], Distribution::Constant(0.0)),
+                running_mean: None,
+                running_var: None,
+                kind,
+            }),
+            NormKind::FrozenBatch { .. } => Some(Self {
+                weight: init.frozen([channels], 1.0),
+                bias: init.frozen([channels], 0.0),
+                running_mean: Some(init.frozen([channels], 0.0)),
+                running_var: Some(init.frozen([channels], 1.0)),
+                kind,
+            }),
+        }
+    }
+
+    /// The stored normalisation as `x · scale + shift`, each `[C]`; `None` for group norm.
+    fn as_affine(&self) -> Option<[Tensor<1>; 2]> {
+        let NormKind::FrozenBatch { eps } = self.kind else {
+            return None;
+        };
+        let (mean, var) = (self.running_mean.as_ref()?, self.running_var.as_ref()?);
+        let scale = self.weight.val() / (var.val() + eps).sqrt();
+        let shift = self.bias.val() - mean.val() * scale.clone();
+        Some([scale, shift])
+    }
+
+    /// Normalises groups of channels of each image.
+    ///
+    /// # Shapes
+    /// - `x`, output: `[N, C, H, W]`
+    fn group_norm(&self, x: Tensor<4>, num_groups: usize) -> Tensor<4> {
+        let [n, c, h, w] = x.dims();
+        let grouped: Tensor<3> = x.clone().reshape([n, num_groups, c / num_groups * h * w]);
+        let mean = grouped.clone().mean_dim(2);
+        let mean_square = grouped.square().mean_dim(2);
+        let variance = (mean_square - mean.clone().square()).clamp_min(0.0);
+        let rstd = (variance + GROUP_NORM_EPS).sqrt().recip();
+        // Scale and shift are small, [N, C, 1, 1]: the image is passed over twice, not six times.
+        let spread = |per_group: Tensor<3>| -> Tensor<4> {
+            per_group
+                .expand([n, num_groups, c / num_groups])
+                .reshape([n, c, 1, 1])
+        };
+        let scale = spread(rstd) * self.weight.val().reshape([1, c, 1, 1]);
+        let shift = self.bias.val().reshape([1, c, 1, 1]) - spread(mean) * scale.clone();
+        x * scale + shift
+    }
+}
+
+/// A convolution, with a bias or a norm behind it.
+#[derive(Module, Debug)]
+pub struct Conv2d {
+    /// Kernel, `[C_out, C_in, K, K]`.
+    pub weight: Param<Tensor<4>>,
+    /// Bias, `[C_out]`.
+    pub bias: Option<Param<Tensor<1>>>,
+    /// Norm of the output.
+    pub norm: Option<Norm>,
+    stride: usize,
+    padding: usize,
+}
+
+/// Shape of a [`Conv2d`]; the padding keeps the size (at stride 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conv2dShape {
+    /// C_in.
+    pub in_channels: usize,
+    /// C_out.
+    pub out_channels: usize,
+    /// Side of the kernel, odd.
+    pub kernel: usize,
+    /// Step.
+    pub stride: usize,
+}
+
+impl Conv2dShape {
+    /// A shape of stride 1.
+    pub fn new(in_channels: usize, out_channels: usize, kernel: usize) -> Self {
+        Self {
+            in_channels,
+            out_channels,
+            kernel,
+            stride: 1,
+        }
+    }
+
+    /// The same with another stride.
+    pub fn with_stride(self, stride: usize) -> Self {
+        Self { stride, ..self }
+    }
+
+    /// Weights that feed one output.
+    pub fn fan_in(&self) -> usize {
+        self.in_channels * self.kernel * self.kernel
+    }
+
+    /// Weights that one input feeds.
+    pub fn fan_out(&self) -> usize {
+        self.out_channels * self.kernel * self.kernel
+    }
+
+    /// Draws the parameters. A norm stands instead of the bias.
+    pub fn init(
+        self,
+        distribution: Distribution,
+        norm: NormKind,
+        init: &mut Initializer,
+    ) -> Conv2d {
+        let Self {
+            in_channels,
+            out_channels,
+            kernel,
+            stride,
+        } = self;
+        let weight = init.param([out_channels, in_channels, kernel, kernel], distribution);
+        let norm = Norm::init(norm, out_channels, init);
+        let bias = match norm {
+            Some(_) => None,
+            None => Some(init.param([out_channels], Distribution::Constant(0.0))),
+        };
+        Conv2d {
+            weight,
+            bias,
+            norm,
+            stride,
+            padding: kernel / 2,
+        }
+    }
+}
+
+impl Conv2d {
+    /// Convolves and normalises.
+    ///
+    /// # Shapes
+    /// - `x`: `[N, C_in, H, W]`
+    /// - output: `[N, C_out, ⌈H / stride⌉, ⌈W / stride⌉]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let params = Conv2dParams::square(self.stride, self.padding);
+        let weight = self.weight.val();
+        let bias = self.bias.as_ref().map(|b| b.val());
+        let Some(norm) = &self.norm else {
+            return conv2d(x, weight, bias, params);
+        };
+        match (norm.kind, norm.as_affine()) {
+            // A stored norm is a factor on the kernel: no pass over the image.
+            (_, Some([scale, shift])) => {
+                let [c_out, ..] = weight.dims();
+                conv2d(x, weight * scale.reshape([c_out, 1, 1, 1]), Some(shift), params)
+            }
+            (NormKind::Group { num_groups }, None) => {
+                norm.group_norm(conv2d(x, weight, None, params), num_groups)
+            }
+            _ => conv2d(x, weight, None, params),
+        }
+    }
+}
+
+/// A fully connected layer.
+#[derive(Module, Debug)]
+pub struct Linear {
+    /// Weight, `[out, in]`.
+    pub weight: Param<Tensor<2>>,
+    /// Bias, `[out]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+impl Linear {
+    /// Draws the parameters; the bias is zero.
+    pub fn init(
+        in_features: usize,
+        out_features: usize,
+        distribution: Distribution,
+        init: &mut Initializer,
+    ) -> Self {
+        Self {
+            weight: init.param([out_features, in_features], distribution),
+            bias: init.param([out_features], Distribution::Constant(0.0)),
+        }
+    }
+
+    /// Multiplies and adds.
+    ///
+    /// # Shapes
+    /// - `x`: `[N, in]`
+    /// - output: `[N, out]`
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        x.matmul(self.weight.val().transpose()) + self.bias.val().unsqueeze()
+    }
+}
+
+/// A transposed convolution with kernel 4, stride 2, padding 1: doubles height and width.
+#[derive(Module, Debug)]
+pub struct ConvTranspose2x {
+    /// Kernel, `[C_in, C_out, 4, 4]`.
+    pub weight: Param<Tensor<4>>,
+    /// Bias, `[C_out]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+impl ConvTranspose2x {
+    /// Draws the parameters; the bias is zero.
+    pub fn init(in_channels: usize, out_channels: usize, init: &mut Initializer) -> Self {
+        // PyTorch counts the fan of a transposed convolution along its first axis.
+        let distribution = Distribution::he_normal(in_channels * 16);
+        Self {
+            weight: init.param([in_channels, out_channels, 4, 4], distribution),
+            bias: init.param([out_channels], Distribution::Constant(0.0)),
+        }
+    }
+
+    /// Convolves, transposed.
+    ///
+    /// # Shapes
+    /// - `x`: `[N, C_in, H, W]`
+    /// - output: `[N, C_out, 2H, 2W]`
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let params = Conv2dParams::square(2, 1);
+        sdg_kernels::conv_transpose2d(x, self.weight.val(), Some(self.bias.val()), params)
+    }
+}
+
+/// Doubles height and width by repeating each cell.
+///
+/// # Shapes
+/// - `x`: `[N, C, H, W]`
+/// - output: `[N, C, 2H, 2W]`
+pub fn upsample_nearest_2x(x: Tensor<4>) -> Tensor<4> {
+    let [n, c, h, w] = x.dims();
+    x.reshape([n, c, h, 1, w, 1])
+        .expand([n, c, h, 2, w, 2])
+        .reshape([n, c, 2 * h, 2 * w])
+}
+
+/// Doubles height and width of square maps by linear interpolation along each axis, edges
+/// repeated: PyTorch's bilinear interpolation with `align_corners=False`.
+///
+/// # Shapes
+/// - `x`: `[N, C, S, S]`
+/// - output: `[N, C, 2S, 2S]`
+pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
+    let [n, c, s, width] = x.dims();
+    assert_eq!(s, width, "maps are square");
+    let mut weights = vec![0f32; s * 2 * s];
+    for output in 0..2 * s {
+        let at = ((output as f32 + 0.5) / 2.0 - 0.5).max(0.0);
+        let first = at as usize;
+        let second = (first + 1).min(s - 1);
+        weights[first * 2 * s + output] += 1.0 - (at - first as f32);
+        weights[second * 2 * s + output] += at - first as f32;
+    }
+    let stretch = Tensor::<1>::from_floats(weights.as_slice(), &x.device()).reshape([s, 2 * s]);
+    // Both axes by a matrix product over the last: [N·C·S, S] x [S, 2S], then the rows alike.
+    let wide: Tensor<3> = x
+        .reshape([n * c * s, s])
+        .matmul(stretch.clone())
+        .reshape([n * c, s, 2 * s]);
+    wide.swap_dims(1, 2)
+        .reshape([n * c * 2 * s, s])
+        .matmul(stretch)
+        .reshape([n * c, 2 * s, 2 * s])
+        .swap_dims(1, 2)
+        .reshape([n, c, 2 * s, 2 * s])
+}
+
+/// Rectifies: `max(x, 0)`.
+pub fn relu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    activation::relu(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::tensor::{Device, Tolerance};
+
+    fn tensor<const D: usize>(values: &[f32], dims: [usize; D]) -> Tensor<D> {
+        Tensor::<1>::from_floats(values, &Device::flex()).reshape(dims)
+    }
+
+    #[test]
+    fn nearest_upsampling_repeats() {
+        let x = tensor(&[1.0, 2.0, 3.0, 4.0], [1, 1, 2, 2]);
+        let expected = [1, 1, 2, 2, 1, 1, 2, 2, 3, 3, 4, 4, 3, 3, 4, 4].map(|v| v as f32);
+        assert_eq!(
+            upsample_nearest_2x(x).into_data().try_to_vec_as::<f32>().unwrap(),
+            expected
+        );
+    }
+
+    #[test]
+    fn bilinear_upsampling_by_hand() {
+        // Rows [0, 4] become [0, 1, 3, 4]; columns 0 and 8 apart likewise.
+        let x = tensor(&[0.0, 4.0, 8.0, 12.0], [1, 1, 2, 2]);
+        let expected = [
+            0.0, 1.0, 3.0, 4.0, 2.0, 3.0, 5.0, 6.0, 6.0, 7.0, 9.0, 10.0, 8.0, 9.0, 11.0, 12.0,
+        ];
+        assert_eq!(
+            upsample_bilinear_2x(x).into_data().try_to_vec_as::<f32>().unwrap(),
+            expected
+        );
+    }
+
+    #[test]
+    fn group_norm_standardises_each_group() {
+        let mut init = Initializer::new(&Device::flex(), 1);
+        let norm = Norm::init(NormKind::Group { num_groups: 2 }, 4, &mut init).unwrap();
+        // Group 1 holds 1, 3 (mean 2, deviation 1), group 2 holds 10, 30 (mean 20, deviation 10).
+        let x = tensor(&[1.0, 3.0, 10.0, 30.0], [1, 4, 1, 1]);
+        let expected = tensor(&[-1.0, 1.0, -1.0, 1.0], [1, 4, 1, 1]);
+        norm.group_norm(x, 2)
+            .into_data()
+            .assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
+    }
+
+    #[test]
+    fn frozen_batch_norm_by_hand() {
+        let mut init = Initializer::new(&Device::flex(), 1);
+        let kind = NormKind::FrozenBatch { eps: 0.0 };
+        let mut conv = Conv2dShape::new(1, 1, 1).init(Distribution::Constant(1.0), kind, &mut init);
+        let norm = conv.norm.as_mut().unwrap();
+        norm.weight = init.frozen([1], 3.0);
+        norm.bias = init.frozen([1], 5.0);
+        norm.running_mean = Some(init.frozen([1], 7.0));
+        norm.running_var = Some(init.frozen([1], 4.0));
+        // (9 - 7) / √4 · 3 + 5 = 8.
+        let y: f32 = conv.forward(tensor(&[9.0], [1, 1, 1, 1])).into_scalar();
+        assert!((y - 8.0).abs() < 1e-5);
+    }
+}

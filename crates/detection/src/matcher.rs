@@ -1,0 +1,122 @@
+//! Which ground-truth box each anchor or proposal stands for.
+
+use crate::boxes::{Corners, iou};
+use crate::config::{LowQualityMatches, MatcherConfig};
+
+/// What an anchor or proposal is, after matching.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Match {
+    /// Background.
+    Negative,
+    /// Too near to be background, too far to be an object: takes no part in the losses.
+    Ignored,
+    /// The object with this index.
+    Positive(usize),
+}
+
+/// Matches every candidate to the ground-truth box it overlaps most.
+///
+/// Without ground truth every candidate is negative. With [`LowQualityMatches::Allowed`], the
+/// candidates that overlap a ground-truth box most of all candidates are positive whatever their
+/// IoU; each then stands for the box it overlaps most itself, which need not be that one
+/// (Detectron2 and torchvision agree in this).
+pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &MatcherConfig) -> Vec<Match> {
+    if gt_boxes.is_empty() {
+        return vec![Match::Negative; candidates.len()];
+    }
+    let mut matched_idxs = vec![0usize; candidates.len()];
+    let mut best_iou = vec![-1f32; candidates.len()];
+    let mut best_of_gt = vec![0f32; gt_boxes.len()];
+    for (gt_idx, gt) in gt_boxes.iter().enumerate() {
+        for (idx, candidate) in candidates.iter().enumerate() {
+            let overlap = iou(gt, candidate);
+            if overlap > best_iou[idx] {
+                best_iou[idx] = overlap;
+                matched_idxs[idx] = gt_idx;
+            }
+            best_of_gt[gt_idx] = best_of_gt[gt_idx].max(overlap);
+        }
+    }
+    let mut matches: Vec<Match> = best_iou
+        .iter()
+        .zip(&matched_idxs)
+        .map(|(overlap, gt_idx)| {
+            if f64::from(*overlap) >= config.positive_from {
+                Match::Positive(*gt_idx)
+            } else if f64::from(*overlap) < config.negative_below {
+                Match::Negative
+            } else {
+                Match::Ignored
+            }
+        })
+        .collect();
+    if config.low_quality == LowQualityMatches::Allowed {
+        for (gt, best) in gt_boxes.iter().zip(&best_of_gt) {
+            // An object outside every candidate has best overlap 0 with all of them.
+            if *best <= 0.0 {
+                continue;
+            }
+            for (idx, candidate) in candidates.iter().enumerate() {
+                if iou(gt, candidate) == *best {
+                    matches[idx] = Match::Positive(matched_idxs[idx]);
+                }
+            }
+        }
+    }
+    matches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(low_quality: LowQualityMatches) -> MatcherConfig {
+        MatcherConfig {
+            negative_below: 0.3,
+            positive_from: 0.7,
+            low_quality,
+        }
+    }
+
+    // A 10 px high ground truth of width 10; a candidate of width w inside it overlaps w / 10.
+    const GT: Corners = [0.0, 0.0, 10.0, 10.0];
+    fn inside(width: f32) -> Corners {
+        [0.0, 0.0, width, 10.0]
+    }
+
+    #[test]
+    fn thresholds_split_in_three() {
+        let matches = match_boxes(
+            &[inside(2.0), inside(5.0), inside(8.0)],
+            &[GT],
+            &config(LowQualityMatches::Forbidden),
+        );
+        assert_eq!(matches, [Match::Negative, Match::Ignored, Match::Positive(0)]);
+    }
+
+    #[test]
+    fn an_unreached_object_takes_its_best_boxes() {
+        let candidates = [inside(1.0), inside(2.0), inside(2.0)];
+        assert_eq!(
+            match_boxes(&candidates, &[GT], &config(LowQualityMatches::Allowed)),
+            [Match::Negative, Match::Positive(0), Match::Positive(0)]
+        );
+        assert_eq!(
+            match_boxes(&candidates, &[GT], &config(LowQualityMatches::Forbidden)),
+            [Match::Negative; 3]
+        );
+    }
+
+    #[test]
+    fn an_object_that_touches_nothing_takes_nothing() {
+        let far = [500.0, 500.0, 510.0, 510.0];
+        let matches = match_boxes(&[inside(8.0)], &[far], &config(LowQualityMatches::Allowed));
+        assert_eq!(matches, [Match::Negative]);
+    }
+
+    #[test]
+    fn no_object_makes_all_negative() {
+        let matches = match_boxes(&[GT], &[], &config(LowQualityMatches::Allowed));
+        assert_eq!(matches, [Match::Negative]);
+    }
+}

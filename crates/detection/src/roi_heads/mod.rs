@@ -1,0 +1,234 @@
+//! The second stage: what each proposal is, and where exactly.
+//!
+//! ```text
+//! proposals ─ sample (training) ─ box_head ─┬─ losses             (training)
+//!                                           └─ detections ─ NMS   (inference)
+//!             positive ones / detections ─ keypoint_head ─ losses / keypoints
+//! ```
+//!
+//! A mask head stands beside the keypoint head once there is one: it takes the same sampled
+//! proposals and the same detections.
+
+pub mod box_head;
+pub mod heatmap;
+pub mod keypoint_head;
+
+use burn::module::Module;
+use burn::tensor::Tensor;
+use rand_pcg::Pcg64Mcg;
+use sdg_geometry::Keypoint;
+
+use crate::boxes::Corners;
+use crate::config::{FpnConfig, RoiHeadsConfig};
+use crate::initialization::Initializer;
+use crate::matcher::{Match, match_boxes};
+use crate::roi_pooler::Roi;
+use crate::rpn::{ImageSize, Proposals};
+use crate::sampler::{draw, sample};
+
+use box_head::{BoxHead, BoxPredictor, RoiClass};
+use heatmap::ReadKeypoint;
+use keypoint_head::KeypointHead;
+
+/// The second stage.
+#[derive(Module, Debug)]
+pub struct RoiHeads {
+    /// Two fully connected layers.
+    pub box_head: BoxHead,
+    /// Classes and boxes.
+    pub box_predictor: BoxPredictor,
+    /// Keypoints.
+    pub keypoint_head: Option<KeypointHead>,
+    #[module(skip)]
+    config: RoiHeadsConfig,
+}
+
+/// The objects of one image, in pixels of the resized image.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ResizedTarget {
+    /// Boxes.
+    pub boxes: Vec<Corners>,
+    /// Class of each box.
+    pub labels: Vec<usize>,
+    /// Keypoints of each box; empty where the detector has no keypoint head.
+    pub keypoints: Vec<Vec<Keypoint>>,
+}
+
+/// A proposal that takes part in the losses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledRoi {
+    /// Box and image.
+    pub roi: Roi,
+    /// Background, or the class and the index of the object in its image.
+    pub class: RoiClass,
+}
+
+/// A detection in pixels of the resized image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoiDetection {
+    /// Box.
+    pub corners: Corners,
+    /// Probability of the class.
+    pub score: f32,
+    /// Class.
+    pub class_idx: usize,
+    /// Keypoints, empty without a keypoint head.
+    pub keypoints: Vec<ReadKeypoint>,
+}
+
+/// Losses of the second stage.
+#[derive(Debug, Clone)]
+pub struct RoiLosses {
+    /// Classes.
+    pub cls: Tensor<1>,
+    /// Box deltas.
+    pub box_reg: Tensor<1>,
+    /// Heatmaps.
+    pub keypoint: Option<Tensor<1>>,
+}
+
+impl RoiHeads {
+    /// Draws the parameters.
+    pub fn init(config: &RoiHeadsConfig, fpn: &FpnConfig, init: &mut Initializer) -> Self {
+        Self {
+            box_head: BoxHead::init(&config.box_head, fpn.channels, init),
+            box_predictor: BoxPredictor::init(&config.box_head, config.num_classes, init),
+            keypoint_head: config
+                .keypoint_head
+                .as_ref()
+                .map(|head| KeypointHead::init(head, fpn.channels, init)),
+            config: config.clone(),
+        }
+    }
+
+    /// Matches proposals and objects, and draws those that take part in the losses.
+    ///
+    /// The objects' own boxes are among the candidates, so that there are positives from the start.
+    pub fn sample_rois(
+        &self,
+        proposals: &[Proposals],
+        targets: &[ResizedTarget],
+        rngs: &mut [Pcg64Mcg],
+    ) -> Vec<SampledRoi> {
+        let mut rois = Vec::new();
+        for (image_idx, ((proposals, target), rng)) in
+            proposals.iter().zip(targets).zip(rngs).enumerate()
+        {
+            let candidates: Vec<Corners> =
+                proposals.boxes.iter().chain(&target.boxes).copied().collect();
+            let matches = match_boxes(&candidates, &target.boxes, &self.config.matcher);
+            let sampled = sample(&matches, &self.config.sampler, rng);
+            rois.extend(sampled.positive.iter().chain(&sampled.negative).map(|idx| {
+                SampledRoi {
+                    roi: Roi {
+                        image_idx,
+                        corners: candidates[*idx],
+                    },
+                    class: match matches[*idx] {
+                        Match::Positive(gt_idx) => RoiClass::Object {
+                            class_idx: target.labels[gt_idx],
+                            gt_idx,
+                        },
+                        _ => RoiClass::Background,
+                    },
+                }
+            }));
+        }
+        rois
+    }
+
+    /// Gives the losses of the drawn proposals.
+    pub fn losses(
+        &self,
+        features: &[Tensor<4>; 5],
+        rois: &[SampledRoi],
+        targets: &[ResizedTarget],
+        rngs: &mut [Pcg64Mcg],
+    ) -> RoiLosses {
+        let device = features[0].device();
+        let zero = || Tensor::zeros([1], &device);
+        let [cls, box_reg] = if rois.is_empty() {
+            [zero(), zero()]
+        } else {
+            let boxes: Vec<Roi> = rois.iter().map(|sampled| sampled.roi).collect();
+            let hidden = self.box_head.forward(features, &boxes);
+            self.box_predictor.losses(hidden, rois, targets)
+        };
+        let keypoint = self.keypoint_head.as_ref().map(|head| {
+            let chosen = choose_keypoint_rois(head, rois, targets, rngs);
+            match chosen.is_empty() {
+                true => zero(),
+                false => head.loss(features, &chosen, targets),
+            }
+        });
+        RoiLosses {
+            cls,
+            box_reg,
+            keypoint,
+        }
+    }
+
+    /// Gives the detections of each image, best first.
+    pub fn detect(
+        &self,
+        features: &[Tensor<4>; 5],
+        proposals: &[Proposals],
+        image_sizes: &[ImageSize],
+    ) -> Vec<Vec<RoiDetection>> {
+        let rois: Vec<Roi> = proposals
+            .iter()
+            .enumerate()
+            .flat_map(|(image_idx, proposals)| {
+                proposals.boxes.iter().map(move |corners| Roi {
+                    image_idx,
+                    corners: *corners,
+                })
+            })
+            .collect();
+        if rois.is_empty() {
+            return vec![Vec::new(); proposals.len()];
+        }
+        let hidden = self.box_head.forward(features, &rois);
+        let mut detections = self.box_predictor.detect(hidden, &rois, image_sizes);
+        if let Some(head) = &self.keypoint_head {
+            head.read_keypoints(features, &mut detections);
+        }
+        detections
+    }
+}
+
+/// The positive proposals that go through the keypoint head: those with a labelled keypoint
+/// inside, at most the configured number an image.
+fn choose_keypoint_rois(
+    head: &KeypointHead,
+    rois: &[SampledRoi],
+    targets: &[ResizedTarget],
+    rngs: &mut [Pcg64Mcg],
+) -> Vec<SampledRoi> {
+    let mut chosen = Vec::new();
+    for (image_idx, (target, rng)) in targets.iter().zip(rngs).enumerate() {
+        let mut idxs: Vec<usize> = (0..rois.len())
+            .filter(|idx| {
+                let sampled = &rois[*idx];
+                let RoiClass::Object { gt_idx, .. } = sampled.class else {
+                    return false;
+                };
+                let keypoints = &target.keypoints;
+                sampled.roi.image_idx == image_idx
+                    && keypoints[gt_idx].iter().any(|k| is_inside(k, &sampled.roi.corners))
+            })
+            .collect();
+        if let Some(max) = head.max_train_rois_per_image() {
+            draw(&mut idxs, max, rng);
+        }
+        chosen.extend(idxs.into_iter().map(|idx| rois[idx]));
+    }
+    chosen
+}
+
+fn is_inside(keypoint: &Keypoint, corners: &Corners) -> bool {
+    let (x, y) = (keypoint.x as f32, keypoint.y as f32);
+    keypoint.is_labelled()
+        && (corners[0]..=corners[2]).contains(&x)
+        && (corners[1]..=corners[3]).contains(&y)
+}
