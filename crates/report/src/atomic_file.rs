@@ -1,0 +1,185 @@
+//! Files that are there whole or not at all.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::error::ReportError;
+
+/// Names within one process must differ, however many threads write the same file at once.
+static NEXT_TEMPORARY: AtomicU64 = AtomicU64::new(0);
+
+/// Writes `bytes` to `path` so that a reader sees the old contents or the new ones, never a part.
+///
+/// The bytes go to a hidden temporary file in the same folder, are flushed to the disk, and take the
+/// name `path` in one step. A symbolic link at `path` is followed, so that the link survives. The
+/// folder must exist.
+///
+/// # Errors
+/// [`ReportError::NotAFile`] when `path` cannot name a file, [`ReportError::Write`] when the folder
+/// is missing or read-only, the disk is full or the rename is refused. In each case the temporary
+/// file is removed and whatever stood at `path` before is unchanged.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+    let not_a_file = |found| ReportError::NotAFile { path: path.to_owned(), found };
+    if path.file_name().is_none() {
+        return Err(not_a_file("no file name"));
+    }
+    if path.is_dir() {
+        return Err(not_a_file("a folder"));
+    }
+    // A link that leads nowhere cannot be resolved; it is replaced.
+    let target =
+        if path.is_symlink() { fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
+    if target.exists() && !target.is_file() {
+        return Err(not_a_file("a device or a pipe"));
+    }
+    let failed = |step| move |source| ReportError::Write { path: path.to_owned(), step, source };
+
+    let temporary = TemporaryFile::beside(&target);
+    let mut file = temporary.create().map_err(failed("creating a temporary file in its folder"))?;
+    file.write_all(bytes).map_err(failed("writing"))?;
+    file.sync_all().map_err(failed("flushing to the disk"))?;
+    drop(file);
+    temporary.rename_to(&target).map_err(failed("renaming the temporary file"))?;
+    sync_folder_of(&target);
+    Ok(())
+}
+
+/// A temporary path that is deleted when it goes out of scope before the rename.
+struct TemporaryFile {
+    path: PathBuf,
+    renamed: bool,
+}
+
+impl TemporaryFile {
+    fn beside(target: &Path) -> Self {
+        let mut name = std::ffi::OsString::from(".");
+        // Long names are cut: with the suffix they could pass the file system's limit of 255 bytes.
+        let stem: String = target.file_name().unwrap_or_default().to_string_lossy().chars().take(40).collect();
+        name.push(stem);
+        let serial = NEXT_TEMPORARY.fetch_add(1, Ordering::Relaxed);
+        name.push(format!(".{}-{serial}.tmp", std::process::id()));
+        Self { path: target.with_file_name(name), renamed: false }
+    }
+
+    fn create(&self) -> io::Result<File> {
+        OpenOptions::new().write(true).create_new(true).open(&self.path)
+    }
+
+    fn rename_to(mut self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        self.renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for TemporaryFile {
+    fn drop(&mut self) {
+        if !self.renamed {
+            // Nothing is left to do when even this fails, and the first error is the one to report.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Makes the rename itself survive a power cut. The file is complete either way, so a file system
+/// that cannot sync a folder is no error.
+fn sync_folder_of(target: &Path) {
+    let folder = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn names_in(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn writes_and_overwrites_and_leaves_only_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_atomically(&path, b"first and long").unwrap();
+        write_atomically(&path, b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(names_in(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_and_not_created() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("missing").join("a.txt");
+        let message = write_atomically(&path, b"x").unwrap_err().to_string();
+        assert!(message.contains("missing") && message.contains("creating"), "{message}");
+        assert!(names_in(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_folder_in_the_way_stays_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("taken");
+        fs::create_dir(&path).unwrap();
+        let error = write_atomically(&path, b"x").unwrap_err();
+        assert!(matches!(error, ReportError::NotAFile { found: "a folder", .. }), "{error}");
+        assert_eq!(names_in(folder.path()), ["taken"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_is_refused_and_a_link_is_followed() {
+        let error = write_atomically(Path::new("/dev/null"), b"x").unwrap_err();
+        assert!(matches!(error, ReportError::NotAFile { .. }), "{error}");
+
+        let folder = tempfile::tempdir().unwrap();
+        let (real, link) = (folder.path().join("real"), folder.path().join("link"));
+        fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_atomically(&link, b"new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+    }
+
+    /// Runs only as the child of [`a_write_cut_short_leaves_the_old_file_and_nothing_else`], where no
+    /// file may grow past a limit: the kernel cuts the write as it does on a full disk.
+    #[cfg(unix)]
+    #[test]
+    #[ignore = "needs a limited file size; another test runs it in a child process"]
+    fn child_that_may_not_write_much() {
+        let path = std::env::var_os("SDG_REPORT_LIMITED_FILE").unwrap();
+        let error = write_atomically(Path::new(&path), &vec![7; 1 << 20]).unwrap_err();
+        assert!(matches!(error, ReportError::Write { step: "writing", .. }), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_write_cut_short_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("model");
+        fs::write(&path, b"old").unwrap();
+        let output = std::process::Command::new("sh")
+            .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
+            .arg(std::env::current_exe().unwrap())
+            .args(["--ignored", "--exact", "atomic_file::tests::child_that_may_not_write_much"])
+            .env("SDG_REPORT_LIMITED_FILE", &path)
+            .output()
+            .unwrap();
+        let printed = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && printed.contains("1 passed"), "{printed}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names_in(folder.path()), ["model"]);
+    }
+}

@@ -1,0 +1,198 @@
+//! Grasp attempts as a table and in numbers.
+
+use crate::table::{Cell, Column, Table, Tone};
+
+/// The steps of an attempt, in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Step {
+    /// Finding the part from the look-out pose.
+    Detect,
+    /// Moving over the part and finding it again.
+    Hover,
+    /// Going down to it.
+    Approach,
+    /// Closing the fingers.
+    Close,
+    /// Lifting.
+    Lift,
+    /// Holding for a second.
+    Hold,
+}
+
+impl Step {
+    /// All steps in their order.
+    pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
+
+    /// The name used in tables and in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Detect => "detect",
+            Self::Hover => "hover",
+            Self::Approach => "approach",
+            Self::Close => "close",
+            Self::Lift => "lift",
+            Self::Hold => "hold",
+        }
+    }
+
+    /// The step of a name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|step| step.name() == name)
+    }
+}
+
+/// How far a detection was from the truth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DetectionError {
+    /// Distance of the centres on the table, in millimetres.
+    pub distance_mm: f64,
+    /// Difference of the angles, in degrees.
+    pub angle_deg: f64,
+}
+
+/// One attempt to grasp.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attempt {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Where the part lay in the robot's base frame, x and y in millimetres.
+    pub object_mm: [f64; 2],
+    /// How the part was turned, in degrees.
+    pub object_angle_deg: f64,
+    /// The detection's error, where there was a detection.
+    pub detection_error: Option<DetectionError>,
+    /// The step at which it ended: [`Step::Hold`] when all went well.
+    pub step: Step,
+    /// Whether the part was held at the end.
+    pub success: bool,
+    /// Why it failed; empty on success.
+    pub why: String,
+    /// How long it took, in seconds.
+    pub duration_secs: f64,
+}
+
+/// The table of attempts, with medians below.
+///
+/// Outcome and step come before the numbers, so that a phone shows them without scrolling.
+#[must_use]
+pub fn attempts_table(attempts: &[Attempt]) -> Table {
+    let mut table = Table::new(vec![
+        Column::number("#"),
+        Column::text("outcome"),
+        Column::text("reached"),
+        Column::number("x").unit("mm").group("part lay at"),
+        Column::number("y").unit("mm").group("part lay at"),
+        Column::number("angle").unit("°").group("part lay at"),
+        Column::number("place").unit("mm").group("detection error"),
+        Column::number("angle").unit("°").group("detection error"),
+        Column::number("time").unit("s"),
+    ]);
+    for attempt in attempts {
+        let verdict = if attempt.success { (Tone::Good, "held") } else { (Tone::Bad, "failed") };
+        let why = attempt.why.trim();
+        let error = |pick: fn(&DetectionError) -> f64| {
+            attempt.detection_error.as_ref().map_or(Cell::missing(), |error| Cell::number(pick(error), 1))
+        };
+        table = table.row(vec![
+            Cell::number(attempt.number as f64, 0),
+            Cell::Verdict {
+                tone: verdict.0,
+                text: verdict.1.to_owned(),
+                note: (!why.is_empty()).then(|| why.to_owned()),
+            },
+            Cell::Progress {
+                done: if attempt.success { Step::ALL.len() } else { attempt.step as usize },
+                total: Step::ALL.len(),
+                label: attempt.step.name().to_owned(),
+            },
+            Cell::number(attempt.object_mm[0], 0),
+            Cell::number(attempt.object_mm[1], 0),
+            Cell::number(attempt.object_angle_deg, 0),
+            error(|e| e.distance_mm),
+            error(|e| e.angle_deg),
+            Cell::number(attempt.duration_secs, 1),
+        ]);
+    }
+    if attempts.len() < 2 {
+        return table;
+    }
+    let held = attempts.iter().filter(|attempt| attempt.success).count();
+    let errors = |pick: fn(&DetectionError) -> f64| {
+        let values = attempts.iter().filter_map(|attempt| attempt.detection_error.as_ref().map(pick));
+        median(values).map_or(Cell::missing(), |value| Cell::number(value, 1))
+    };
+    table.summary(vec![
+        Cell::text(""),
+        Cell::text(format!("{held} of {} held", attempts.len())),
+        Cell::text(""),
+        Cell::text(""),
+        Cell::text(""),
+        Cell::text("median"),
+        errors(|e| e.distance_mm),
+        errors(|e| e.angle_deg),
+        median(attempts.iter().map(|a| a.duration_secs)).map_or(Cell::missing(), |value| Cell::number(value, 1)),
+    ])
+}
+
+/// The median of the finite values; the mean of the middle two when they are even in number.
+#[must_use]
+pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let (upper, lower) = (sorted.len() / 2, sorted.len().checked_sub(1)? / 2);
+    Some(sorted[lower] / 2.0 + sorted[upper] / 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::html_checker::assert_well_formed;
+
+    fn attempt(number: usize, step: Step, success: bool, why: &str) -> Attempt {
+        Attempt {
+            number,
+            object_mm: [512.0, -34.0],
+            object_angle_deg: 127.0,
+            detection_error: (step > Step::Detect)
+                .then_some(DetectionError { distance_mm: number as f64, angle_deg: 0.5 }),
+            step,
+            success,
+            why: why.to_owned(),
+            duration_secs: 9.5,
+        }
+    }
+
+    #[test]
+    fn medians_of_odd_even_and_none() {
+        assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median([4.0, 1.0, f64::NAN, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median([]), None);
+    }
+
+    #[test]
+    fn the_table_tells_what_happened() {
+        let html = attempts_table(&[
+            attempt(1, Step::Hold, true, ""),
+            attempt(2, Step::Lift, false, "slipped <out>"),
+            attempt(3, Step::Detect, false, "nothing found"),
+        ])
+        .to_html();
+        assert_well_formed(&html);
+        assert!(html.contains("1 of 3 held") && html.contains("slipped &lt;out&gt;"));
+        // Six steps of the first, four of the second (detect to close), none of the third.
+        assert_eq!(html.matches("<i class=\"on\"></i>").count(), 10);
+        // The median of 1 and 2 mm; the third has no detection.
+        assert!(html.contains("<td class=\"number\">1.5</td>"), "{html}");
+    }
+
+    #[test]
+    fn names_lead_back_to_steps() {
+        for step in Step::ALL {
+            assert_eq!(Step::from_name(step.name()), Some(step));
+        }
+        assert_eq!(Step::from_name("dance"), None);
+        assert_well_formed(&attempts_table(&[]).to_html());
+    }
+}

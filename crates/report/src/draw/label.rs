@@ -1,0 +1,83 @@
+//! Small tags with text.
+
+use image::RgbImage;
+use nalgebra::Point2;
+
+use super::font::{CAP_HEIGHT, DESCENT, text_polylines, text_width};
+use super::layer::{Layer, stroke};
+use super::{Color, Pen};
+
+/// Draws a tag with one line of text; `height_px` is the height of its capitals.
+///
+/// `at` is the tag's lower left corner. A tag that would leave the picture is moved inside, so that a label
+/// above a box at the upper edge remains readable. The text is dark on light colours and light on dark ones.
+pub fn draw_label(image: &mut RgbImage, at: Point2<f64>, text: &str, color: Color, height_px: f64) {
+    if !(at.x.is_finite() && at.y.is_finite() && height_px.is_finite() && height_px > 0.0) || text.is_empty() {
+        return;
+    }
+    let unit = height_px / CAP_HEIGHT;
+    let padding = (0.45 * height_px).max(2.0);
+    let tag_width = text_width(text) * unit + 2.0 * padding;
+    let tag_height = (CAP_HEIGHT + 0.4 * DESCENT) * unit + 2.0 * padding;
+    let left = at.x.min(f64::from(image.width()) - tag_width).max(0.0);
+    let top = (at.y - tag_height).min(f64::from(image.height()) - tag_height).max(0.0);
+
+    let p = Point2::new;
+    let (right, bottom) = (left + tag_width, top + tag_height);
+    let corners = [p(left, top), p(right, top), p(right, bottom), p(left, bottom)];
+    if let Some(mut layer) = Layer::around(image, corners, 0.0) {
+        layer.add_convex(&corners);
+        layer.paint(image, color, 1.0);
+    }
+    let ink = if color.lightness() > 0.45 { Color([16, 18, 22]) } else { Color([255, 255, 255]) };
+    let polylines: Vec<Vec<Point2<f64>>> = text_polylines(text)
+        .into_iter()
+        .map(|line| line.into_iter().map(|q| p(left + padding + q.x * unit, top + padding + q.y * unit)).collect())
+        .collect();
+    stroke(image, &polylines, &Pen::new(ink).width((0.15 * height_px).max(1.1)).without_halo());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PAPER: Color = Color([255, 255, 255]);
+
+    fn dark_pixels(image: &RgbImage) -> usize {
+        image.pixels().filter(|p| p.0.iter().all(|&c| c < 90)).count()
+    }
+
+    #[test]
+    fn ink_stands_on_the_tag_and_nowhere_else() {
+        let mut image = RgbImage::from_pixel(120, 40, image::Rgb([200, 0, 0]));
+        draw_label(&mut image, Point2::new(10.0, 30.0), "0.97", PAPER, 10.0);
+        let dark = dark_pixels(&image);
+        assert!((40..400).contains(&dark), "{dark} dark pixels for four characters");
+        assert_eq!(image.get_pixel(11, 29).0, [255, 255, 255], "lower left corner of the tag");
+        assert_eq!(image.get_pixel(8, 29).0, [200, 0, 0]);
+        assert_eq!(image.get_pixel(11, 31).0, [200, 0, 0]);
+    }
+
+    #[test]
+    fn a_tag_beyond_an_edge_is_moved_inside() {
+        for at in [Point2::new(-50.0, -50.0), Point2::new(500.0, 500.0)] {
+            let mut image = RgbImage::from_pixel(120, 40, image::Rgb([200, 0, 0]));
+            draw_label(&mut image, at, "0.97", PAPER, 10.0);
+            assert!(dark_pixels(&image) > 40, "at {at}");
+        }
+    }
+
+    #[test]
+    fn text_is_light_on_a_dark_tag() {
+        let mut image = RgbImage::from_pixel(120, 40, image::Rgb([200, 0, 0]));
+        draw_label(&mut image, Point2::new(10.0, 30.0), "0.97", Color([10, 20, 60]), 10.0);
+        assert!(image.pixels().any(|p| p.0 == [255, 255, 255]));
+    }
+
+    #[test]
+    fn a_tag_wider_than_the_picture_is_cut() {
+        let mut image = RgbImage::from_pixel(20, 20, image::Rgb([200, 0, 0]));
+        draw_label(&mut image, Point2::new(0.0, 20.0), "much too long a text for this", PAPER, 10.0);
+        assert!(dark_pixels(&image) > 0);
+    }
+}

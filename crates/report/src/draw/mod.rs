@@ -1,0 +1,84 @@
+//! Marks on pictures: boxes, outlines, keypoints, grasps, labels, contact sheets.
+//!
+//! Coordinates are pixels, x right, y down, the centre of the first pixel at (0.5, 0.5). Lines are antialiased
+//! and carry a dark halo, so that they show on bright and on dark ground alike. What lies outside the picture or
+//! is not finite is left out.
+
+mod contact_sheet;
+mod font;
+mod label;
+mod layer;
+mod marks;
+mod shapes;
+
+pub use contact_sheet::contact_sheet;
+pub use label::draw_label;
+pub use marks::{DetectionMark, Verdict, draw_demonstration, draw_detection};
+pub use shapes::{draw_box, draw_grasp_jaws, draw_keypoints, draw_line, draw_polygon, shade_polygon};
+
+/// An sRGB colour, red first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Color(pub [u8; 3]);
+
+impl Color {
+    /// The grasp: what the whole page is about.
+    pub const GRASP: Self = Self([255, 122, 41]);
+    /// Boxes.
+    pub const BOX: Self = Self([124, 196, 255]);
+    /// Outlines of the part.
+    pub const OUTLINE: Self = Self([255, 224, 102]);
+    /// What passed a check.
+    pub const VERIFIED: Self = Self([64, 214, 170]);
+    /// What was refused. Differs from [`Color::VERIFIED`] in lightness as well as in hue.
+    pub const REFUSED: Self = Self([255, 92, 104]);
+    /// Neither passed nor refused.
+    pub const NEUTRAL: Self = Self([235, 235, 230]);
+
+    /// Relative luminance, 0 (black) to 1 (white), by the sRGB weights on the coded values.
+    fn lightness(self) -> f64 {
+        let [r, g, b] = self.0.map(f64::from);
+        (0.2126 * r + 0.7152 * g + 0.0722 * b) / 255.0
+    }
+}
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pen {
+    /// Colour of the line.
+    pub color: Color,
+    /// Width in pixels.
+    pub width: f64,
+    /// Whether a dark rim surrounds the line.
+    pub halo: bool,
+    /// Lengths of dash and gap in pixels; `None` for a continuous line.
+    pub dash: Option<(f64, f64)>,
+}
+
+impl Pen {
+    /// A continuous line, two pixels wide, with a halo.
+    #[must_use]
+    pub fn new(color: Color) -> Self {
+        Self { color, width: 2.0, halo: true, dash: None }
+    }
+
+    /// The same pen with another width in pixels.
+    #[must_use]
+    pub fn width(mut self, width: f64) -> Self {
+        self.width = width;
+        self
+    }
+
+    /// The same pen, dashed; lengths of dash and gap in pixels.
+    #[must_use]
+    pub fn dashed(mut self, dash: f64, gap: f64) -> Self {
+        self.dash = Some((dash, gap));
+        self
+    }
+
+    /// The same pen without the dark rim.
+    #[must_use]
+    pub fn without_halo(mut self) -> Self {
+        self.halo = false;
+        self
+    }
+}

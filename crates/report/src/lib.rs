@@ -1,0 +1,63 @@
+//! What a run has to show: pictures with marks on them, curves, tables and animations on one self-contained page.
+//!
+//! ```text
+//! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐
+//! frames   ─ AnimationRecorder ─ Animation ───── Figure ──┤
+//! numbers  ─ Chart, Table, attempts_table, KeyFigure ─────┼─ Section ─ Report ─ write_atomically ─ DIR/index.html
+//! ```
+//!
+//! The page is one file that fetches nothing and runs no script: pictures stand in it as base64, charts as inline
+//! SVG. It follows the reader's light or dark theme, folds to a phone's width, and prints.
+//!
+//! What is deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the
+//! crate compiles in seconds and whoever has numbers can report them. [`write_atomically`] is exported for every
+//! file that must be there whole or not at all.
+//!
+//! ```
+//! use image::RgbImage;
+//! use sdg_report::{Axis, Chart, Figure, KeyFigure, Report, Section, Series, Tone};
+//!
+//! # fn main() -> Result<(), sdg_report::ReportError> {
+//! # let folder = std::env::temp_dir().join(format!("sdg-report-example-{}", std::process::id()));
+//! let loss = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
+//!     .series(Series::new("total", vec![(0.0, 4.2), (100.0, 0.9), (200.0, 0.4)]).noisy());
+//! let path = Report::new("Pendulum, taught from one photo")
+//!     .key_figure(KeyFigure::new("142", "s", "to teach"))
+//!     .key_figure(KeyFigure::new("10", "of 10", "grasped").tone(Tone::Good))
+//!     .section(Section::new("Demonstration").figure(Figure::photo(RgbImage::new(64, 48)).caption("As photographed.")))
+//!     .section(Section::new("Teaching").charts(vec![loss]))
+//!     .write(&folder)?;
+//! assert!(path.ends_with("index.html"));
+//! # std::fs::remove_dir_all(&folder).ok();
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod animation;
+mod atomic_file;
+mod attempts;
+mod chart;
+mod draw;
+mod error;
+mod figure;
+mod html;
+#[cfg(test)]
+mod html_checker;
+mod page;
+mod table;
+
+pub use animation::{Animation, AnimationOptions, AnimationRecorder};
+pub use atomic_file::write_atomically;
+pub use attempts::{Attempt, DetectionError, Step, attempts_table, median};
+pub use chart::{Axis, Chart, Scale, Series};
+pub use draw::{
+    Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detection, draw_grasp_jaws,
+    draw_keypoints, draw_label, draw_line, draw_polygon, shade_polygon,
+};
+pub use error::ReportError;
+pub use figure::Figure;
+pub use html::{escape, format_number};
+pub use page::{GallerySize, KeyFigure, Report, Section};
+pub use table::{Cell, Column, Table, Tone};

@@ -1,0 +1,487 @@
+//! The page: what the caller has to show, in sections, written as one file.
+
+use std::path::{Path, PathBuf};
+
+use crate::atomic_file::write_atomically;
+use crate::chart::Chart;
+use crate::error::ReportError;
+use crate::figure::{Figure, PhotoQuality};
+use crate::html::{escape, slug};
+use crate::table::{Table, Tone};
+
+/// The page's size that photographs are made to fit, in bytes.
+const PAGE_BYTES: usize = 4_000_000;
+
+/// Tried in turn until the page fits; the last is taken whatever comes of it.
+const QUALITIES: [PhotoQuality; 4] = [
+    PhotoQuality { jpeg: 86, max_width: 1280 },
+    PhotoQuality { jpeg: 76, max_width: 1280 },
+    PhotoQuality { jpeg: 66, max_width: 960 },
+    PhotoQuality { jpeg: 52, max_width: 640 },
+];
+
+/// A number that the reader should see first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyFigure {
+    value: String,
+    unit: String,
+    label: String,
+    tone: Tone,
+}
+
+impl KeyFigure {
+    /// A number, its unit (or `of 10`), and what it says: `142`, `s`, `to teach`.
+    #[must_use]
+    pub fn new(value: impl Into<String>, unit: impl Into<String>, label: impl Into<String>) -> Self {
+        Self { value: value.into(), unit: unit.into(), label: label.into(), tone: Tone::Plain }
+    }
+
+    /// The same number, coloured.
+    #[must_use]
+    pub fn tone(mut self, tone: Tone) -> Self {
+        self.tone = tone;
+        self
+    }
+
+    fn to_html(&self) -> String {
+        format!(
+            "<div class=\"{}\"><dd><b>{}</b> <span>{}</span></dd><dt>{}</dt></div>",
+            self.tone.class(),
+            escape(&self.value),
+            escape(&self.unit),
+            escape(&self.label)
+        )
+    }
+}
+
+/// How wide the pictures of a gallery are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GallerySize {
+    /// Many to a row: samples to glance at.
+    Small,
+    /// Three or so to a row: detections to look at.
+    Medium,
+    /// Two to a row.
+    Large,
+}
+
+#[derive(Debug, Clone)]
+enum Block {
+    Paragraph(String),
+    Notice(Tone, String),
+    Figure(Figure),
+    Gallery(GallerySize, Vec<Figure>, Option<String>),
+    Charts(Vec<Chart>),
+    Table(Table),
+    Facts(Vec<(String, String)>),
+    Command(String),
+}
+
+/// A part of the page under a heading of its own.
+#[derive(Debug, Clone)]
+pub struct Section {
+    title: String,
+    lead: Option<String>,
+    blocks: Vec<Block>,
+}
+
+impl Section {
+    /// An empty section.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), lead: None, blocks: Vec::new() }
+    }
+
+    /// A sentence or two beside the heading: what is to be seen here.
+    #[must_use]
+    pub fn lead(mut self, lead: impl Into<String>) -> Self {
+        self.lead = Some(lead.into());
+        self
+    }
+
+    /// Adds a paragraph.
+    #[must_use]
+    pub fn paragraph(self, text: impl Into<String>) -> Self {
+        self.with(Block::Paragraph(text.into()))
+    }
+
+    /// Adds a paragraph that stands out.
+    #[must_use]
+    pub fn notice(self, tone: Tone, text: impl Into<String>) -> Self {
+        self.with(Block::Notice(tone, text.into()))
+    }
+
+    /// Adds a picture over the whole width.
+    #[must_use]
+    pub fn figure(self, figure: Figure) -> Self {
+        self.with(Block::Figure(figure))
+    }
+
+    /// Adds pictures side by side; they fold to the screen's width.
+    #[must_use]
+    pub fn gallery(self, size: GallerySize, figures: Vec<Figure>) -> Self {
+        self.with(Block::Gallery(size, figures, None))
+    }
+
+    /// Adds pictures side by side with one caption for all.
+    #[must_use]
+    pub fn captioned_gallery(self, size: GallerySize, figures: Vec<Figure>, caption: impl Into<String>) -> Self {
+        self.with(Block::Gallery(size, figures, Some(caption.into())))
+    }
+
+    /// Adds charts, two to a row where there is room.
+    #[must_use]
+    pub fn charts(self, charts: Vec<Chart>) -> Self {
+        self.with(Block::Charts(charts))
+    }
+
+    /// Adds a table.
+    #[must_use]
+    pub fn table(self, table: Table) -> Self {
+        self.with(Block::Table(table))
+    }
+
+    /// Adds facts, each a name and a value: seed, preset, machine, versions.
+    #[must_use]
+    pub fn facts<K: Into<String>, V: Into<String>>(self, facts: impl IntoIterator<Item = (K, V)>) -> Self {
+        self.with(Block::Facts(facts.into_iter().map(|(name, value)| (name.into(), value.into())).collect()))
+    }
+
+    /// Adds a command line, to be copied.
+    #[must_use]
+    pub fn command(self, command: impl Into<String>) -> Self {
+        self.with(Block::Command(command.into()))
+    }
+
+    fn with(mut self, block: Block) -> Self {
+        self.blocks.push(block);
+        self
+    }
+
+    fn to_html(&self, id: &str, quality: PhotoQuality) -> Result<String, ReportError> {
+        let mut html = format!("<section id=\"{id}\"><header><h2>{}</h2>", escape(&self.title));
+        if let Some(lead) = &self.lead {
+            html += &format!("<p>{}</p>", escape(lead));
+        }
+        html += "</header><div class=\"content\">";
+        for block in &self.blocks {
+            html += &block.to_html(quality)?;
+        }
+        Ok(html + "</div></section>")
+    }
+}
+
+impl Block {
+    fn to_html(&self, quality: PhotoQuality) -> Result<String, ReportError> {
+        Ok(match self {
+            Self::Paragraph(text) => format!("<p>{}</p>", escape(text)),
+            Self::Notice(tone, text) => format!("<p class=\"notice {}\">{}</p>", tone.class(), escape(text)),
+            Self::Figure(figure) => figure.to_html(quality)?,
+            Self::Gallery(size, figures, caption) => {
+                let (class, max_width) = match size {
+                    GallerySize::Small => ("small", 360),
+                    GallerySize::Medium => ("medium", 640),
+                    GallerySize::Large => ("large", 900),
+                };
+                let quality = PhotoQuality { max_width: quality.max_width.min(max_width), ..quality };
+                let mut html = format!("<div class=\"gallery {class}\">");
+                for figure in figures {
+                    html += &figure.to_html(quality)?;
+                }
+                html += "</div>";
+                if let Some(caption) = caption {
+                    html += &format!("<p class=\"caption\">{}</p>", escape(caption));
+                }
+                html
+            }
+            Self::Charts(charts) => {
+                let class = if charts.len() == 1 { "charts one" } else { "charts" };
+                let charts: String = charts.iter().map(Chart::to_html).collect();
+                format!("<div class=\"{class}\">{charts}</div>")
+            }
+            Self::Table(table) => table.to_html(),
+            Self::Facts(facts) => {
+                let facts: String = facts
+                    .iter()
+                    .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value)))
+                    .collect();
+                format!("<dl class=\"facts\">{facts}</dl>")
+            }
+            Self::Command(command) => {
+                format!("<pre tabindex=\"0\"><code>{}</code></pre>", escape(command))
+            }
+        })
+    }
+
+    fn has_photo(&self) -> bool {
+        match self {
+            Self::Figure(figure) => figure.is_photo(),
+            Self::Gallery(_, figures, _) => figures.iter().any(Figure::is_photo),
+            _ => false,
+        }
+    }
+}
+
+/// A report: title, key figures, sections.
+#[derive(Debug, Clone)]
+pub struct Report {
+    title: String,
+    kicker: Option<String>,
+    lead: Option<String>,
+    key_figures: Vec<KeyFigure>,
+    cover: Option<Figure>,
+    sections: Vec<Section>,
+    footer: Option<String>,
+}
+
+impl Report {
+    /// An empty report.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            kicker: None,
+            lead: None,
+            key_figures: Vec::new(),
+            cover: None,
+            sections: Vec::new(),
+            footer: None,
+        }
+    }
+
+    /// A few words over the title: what kind of run this was.
+    #[must_use]
+    pub fn kicker(mut self, kicker: impl Into<String>) -> Self {
+        self.kicker = Some(kicker.into());
+        self
+    }
+
+    /// A sentence or two under the title: what happened.
+    #[must_use]
+    pub fn lead(mut self, lead: impl Into<String>) -> Self {
+        self.lead = Some(lead.into());
+        self
+    }
+
+    /// Adds a number to see at a glance; three to five make a good row.
+    #[must_use]
+    pub fn key_figure(mut self, key_figure: KeyFigure) -> Self {
+        self.key_figures.push(key_figure);
+        self
+    }
+
+    /// A picture beside the title.
+    #[must_use]
+    pub fn cover(mut self, cover: Figure) -> Self {
+        self.cover = Some(cover);
+        self
+    }
+
+    /// Adds a section.
+    #[must_use]
+    pub fn section(mut self, section: Section) -> Self {
+        self.sections.push(section);
+        self
+    }
+
+    /// Small print at the end.
+    #[must_use]
+    pub fn footer(mut self, footer: impl Into<String>) -> Self {
+        self.footer = Some(footer.into());
+        self
+    }
+
+    /// The page as HTML. The same report gives the same bytes.
+    ///
+    /// Photographs are stored at a quality that keeps the page under about 4 MB where that can be done.
+    ///
+    /// # Errors
+    /// [`ReportError::PictureSize`] and [`ReportError::Jpeg`] when a picture cannot be encoded.
+    pub fn to_html(&self) -> Result<String, ReportError> {
+        let has_photo = self.cover.as_ref().is_some_and(Figure::is_photo)
+            || self.sections.iter().flat_map(|section| &section.blocks).any(Block::has_photo);
+        let mut html = self.render(QUALITIES[0])?;
+        for quality in QUALITIES.into_iter().skip(1) {
+            if html.len() <= PAGE_BYTES || !has_photo {
+                break;
+            }
+            html = self.render(quality)?;
+        }
+        Ok(html)
+    }
+
+    /// Writes the page to `folder/index.html` and returns that path; a missing folder is created.
+    ///
+    /// A previous page stands until the new one is complete.
+    ///
+    /// # Errors
+    /// Those of [`Report::to_html`], and [`ReportError::Folder`], [`ReportError::Write`] and
+    /// [`ReportError::NotAFile`] when the folder or the file cannot be made.
+    pub fn write(&self, folder: &Path) -> Result<PathBuf, ReportError> {
+        let html = self.to_html()?;
+        std::fs::create_dir_all(folder).map_err(|source| ReportError::Folder { path: folder.to_owned(), source })?;
+        let path = folder.join("index.html");
+        write_atomically(&path, html.as_bytes())?;
+        Ok(path)
+    }
+
+    fn render(&self, quality: PhotoQuality) -> Result<String, ReportError> {
+        let ids = self.section_ids();
+        let mut html = format!("{HEAD_START}<title>{}</title><style>{STYLE}</style></head><body>", escape(&self.title));
+        html += "<header class=\"top\"><div class=\"intro\">";
+        if let Some(kicker) = &self.kicker {
+            html += &format!("<p class=\"kicker\">{GRIPPER}{}</p>", escape(kicker));
+        }
+        html += &format!("<h1>{}</h1>", escape(&self.title));
+        if let Some(lead) = &self.lead {
+            html += &format!("<p class=\"lead\">{}</p>", escape(lead));
+        }
+        html += "</div>";
+        if let Some(cover) = &self.cover {
+            html += &format!("<div class=\"cover\">{}</div>", cover.to_html(quality)?);
+        }
+        if !self.key_figures.is_empty() {
+            let figures: String = self.key_figures.iter().map(KeyFigure::to_html).collect();
+            html += &format!("<dl class=\"glance\" aria-label=\"At a glance\">{figures}</dl>");
+        }
+        html += "</header>";
+        if self.sections.len() > 2 {
+            let links: String = self
+                .sections
+                .iter()
+                .zip(&ids)
+                .map(|(section, id)| format!("<a href=\"#{id}\">{}</a>", escape(&section.title)))
+                .collect();
+            html += &format!("<nav aria-label=\"Sections\">{links}</nav>");
+        }
+        html += "<main>";
+        for (section, id) in self.sections.iter().zip(&ids) {
+            html += &section.to_html(id, quality)?;
+        }
+        html += "</main>";
+        if let Some(footer) = &self.footer {
+            html += &format!("<footer><p>{}</p></footer>", escape(footer));
+        }
+        Ok(html + "</body></html>\n")
+    }
+
+    /// An anchor for each section, made of its title; the number in front keeps equal titles apart.
+    fn section_ids(&self) -> Vec<String> {
+        self.sections.iter().zip(1..).map(|(section, number)| format!("s{number}-{}", slug(&section.title))).collect()
+    }
+}
+
+/// The policy forbids the browser to fetch anything at all, whatever may slip into the page.
+const HEAD_START: &str = "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\
+<meta name=\"color-scheme\" content=\"light dark\"><link rel=\"icon\" href=\"data:,\">";
+
+/// Two jaws and what they hold.
+const GRIPPER: &str = "<svg class=\"gripper\" viewBox=\"0 0 24 24\" aria-hidden=\"true\">\
+<path d=\"M3 5h3v14H3zM18 5h3v14h-3z\"/><path class=\"part\" d=\"M9 12h6\"/></svg>";
+
+const STYLE: &str = include_str!("page.css");
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::chart::{Axis, Series};
+    use crate::html_checker::assert_well_formed;
+    use crate::table::{Cell, Column};
+    use image::RgbImage;
+
+    const HOSTILE: &str = "<script src=\"x\">alert('&')</script>";
+
+    fn full_report(text: &str) -> Report {
+        let photo = || Figure::photo(RgbImage::new(32, 24)).caption(text).alt(text);
+        let chart = Chart::new(text, Axis::new(text), Axis::new(text)).series(Series::new(text, vec![(0.0, 1.0)]));
+        let section = Section::new(text)
+            .lead(text)
+            .paragraph(text)
+            .notice(Tone::Warning, text)
+            .figure(photo())
+            .gallery(GallerySize::Medium, vec![photo()])
+            .captioned_gallery(GallerySize::Small, vec![photo(), photo()], text)
+            .charts(vec![chart])
+            .table(Table::new(vec![Column::text(text)]).row(vec![Cell::text(text)]).caption(text))
+            .facts([(text, text)])
+            .command(text);
+        Report::new(text)
+            .kicker(text)
+            .lead(text)
+            .key_figure(KeyFigure::new(text, text, text).tone(Tone::Good))
+            .cover(photo())
+            .section(section.clone())
+            .section(section.clone())
+            .section(section)
+            .footer(text)
+    }
+
+    #[test]
+    fn every_text_is_escaped_and_the_page_well_formed() {
+        let html = full_report(HOSTILE).to_html().unwrap();
+        assert_well_formed(&html);
+        assert!(!html.contains("<script"));
+        assert!(html.matches("&lt;script").count() > 40);
+        assert_well_formed(&Report::new("").to_html().unwrap());
+    }
+
+    #[test]
+    fn nothing_is_fetched_from_anywhere() {
+        let html = full_report("text").to_html().unwrap();
+        // Base64 may hold anything that looks like an address; what is left of the page may not.
+        let mut parts = html.split("base64,");
+        let mut text = parts.next().unwrap().to_owned();
+        text.extend(parts.map(|part| part.split_once('"').unwrap().1));
+        for forbidden in ["http:", "https:", "//", "@import", "url(", "<script", "<iframe", "<object"] {
+            assert!(!text.contains(forbidden), "{forbidden}");
+        }
+        for (at, _) in html.match_indices("src=\"").chain(html.match_indices("srcset=\"")) {
+            assert!(html[at..].contains("=\"data:image/"), "{}", &html[at..at + 40]);
+        }
+    }
+
+    #[test]
+    fn the_same_report_gives_the_same_bytes() {
+        assert_eq!(full_report("a").to_html().unwrap(), full_report("a").to_html().unwrap());
+    }
+
+    #[test]
+    fn photos_give_way_to_keep_the_page_small() {
+        let noise = |seed: u32| {
+            RgbImage::from_fn(1280, 960, |x, y| {
+                let hash = (x ^ (y << 11) ^ (seed << 22)).wrapping_mul(2_654_435_761).rotate_left(13);
+                image::Rgb([(hash >> 3) as u8, (hash >> 11) as u8, (hash >> 19) as u8])
+            })
+        };
+        let report = Report::new("noise")
+            .section(Section::new("all").figure(Figure::photo(noise(1))).figure(Figure::photo(noise(2))));
+        let unlimited = report.render(QUALITIES[0]).unwrap().len();
+        let html = report.to_html().unwrap();
+        assert!(unlimited > PAGE_BYTES && html.len() <= PAGE_BYTES, "{unlimited} to {} bytes", html.len());
+    }
+
+    #[test]
+    fn writing_creates_the_folder_and_replaces_the_page() {
+        let folder = tempfile::tempdir().unwrap();
+        let nested = folder.path().join("a/b");
+        let path = Report::new("first").write(&nested).unwrap();
+        assert_eq!(path, nested.join("index.html"));
+        Report::new("second").write(&nested).unwrap();
+        let html = std::fs::read_to_string(&path).unwrap();
+        assert!(html.contains("<title>second</title>"));
+        assert_eq!(std::fs::read_dir(&nested).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_an_error_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, b"here first").unwrap();
+        let error = Report::new("x").write(&file.join("report")).unwrap_err();
+        assert!(matches!(error, ReportError::Folder { .. }), "{error}");
+        assert_eq!(std::fs::read(&file).unwrap(), b"here first");
+    }
+}

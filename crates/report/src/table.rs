@@ -1,0 +1,286 @@
+//! Tables with aligned figures.
+
+use crate::html::{escape, format_number};
+
+/// Whether something is well, wrong, or neither.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Tone {
+    /// Nothing to say.
+    #[default]
+    Plain,
+    /// As it should be.
+    Good,
+    /// Worth a look.
+    Warning,
+    /// Not as it should be.
+    Bad,
+}
+
+impl Tone {
+    pub(crate) fn class(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Good => "good",
+            Self::Warning => "warning",
+            Self::Bad => "bad",
+        }
+    }
+}
+
+/// What one cell holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Cell {
+    /// Words.
+    Text(String),
+    /// A number with fixed decimals; a dash when it is not finite.
+    Number {
+        /// The number.
+        value: f64,
+        /// Digits after the point.
+        decimals: usize,
+    },
+    /// A verdict in a word or two, with the reason under it.
+    Verdict {
+        /// How it is coloured.
+        tone: Tone,
+        /// The verdict.
+        text: String,
+        /// The reason, if there is one to give.
+        note: Option<String>,
+    },
+    /// How far something came.
+    Progress {
+        /// Steps done.
+        done: usize,
+        /// Steps in all.
+        total: usize,
+        /// The last step's name.
+        label: String,
+    },
+}
+
+impl Cell {
+    /// Words.
+    #[must_use]
+    pub fn text(text: impl Into<String>) -> Self {
+        Self::Text(text.into())
+    }
+
+    /// A number with fixed decimals.
+    #[must_use]
+    pub fn number(value: f64, decimals: usize) -> Self {
+        Self::Number { value, decimals }
+    }
+
+    /// A dash: there is no such number.
+    #[must_use]
+    pub fn missing() -> Self {
+        Self::Number { value: f64::NAN, decimals: 0 }
+    }
+
+    fn to_html(&self) -> String {
+        match self {
+            Self::Text(text) => escape(text),
+            Self::Number { value, decimals } => format_number(*value, *decimals),
+            Self::Verdict { tone, text, note } => {
+                let mut html = format!("<span class=\"badge {}\">{}</span>", tone.class(), escape(text));
+                if let Some(note) = note {
+                    html += &format!("<span class=\"note\">{}</span>", escape(note));
+                }
+                html
+            }
+            Self::Progress { done, total, label } => {
+                let dots: String =
+                    (0..*total).map(|step| if step < *done { "<i class=\"on\"></i>" } else { "<i></i>" }).collect();
+                format!("<span class=\"steps\">{dots}</span> <span class=\"step\">{}</span>", escape(label))
+            }
+        }
+    }
+}
+
+/// A column: its heading, its unit, and the heading it shares with its neighbours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    heading: String,
+    unit: Option<String>,
+    group: Option<String>,
+    numeric: bool,
+}
+
+impl Column {
+    /// A column of words, set to the left.
+    #[must_use]
+    pub fn text(heading: impl Into<String>) -> Self {
+        Self { heading: heading.into(), unit: None, group: None, numeric: false }
+    }
+
+    /// A column of numbers, set to the right.
+    #[must_use]
+    pub fn number(heading: impl Into<String>) -> Self {
+        Self { numeric: true, ..Self::text(heading) }
+    }
+
+    /// The same column with a unit beside its heading.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<String>) -> Self {
+        self.unit = Some(unit.into());
+        self
+    }
+
+    /// The same column under a common heading; neighbours with the same group share it.
+    #[must_use]
+    pub fn group(mut self, group: impl Into<String>) -> Self {
+        self.group = Some(group.into());
+        self
+    }
+
+    fn class(&self) -> &'static str {
+        if self.numeric { " class=\"number\"" } else { "" }
+    }
+}
+
+/// Rows under headed columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    caption: Option<String>,
+    columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+    summary: Option<Vec<Cell>>,
+}
+
+impl Table {
+    /// A table without rows.
+    #[must_use]
+    pub fn new(columns: Vec<Column>) -> Self {
+        Self { caption: None, columns, rows: Vec::new(), summary: None }
+    }
+
+    /// Text under the table.
+    #[must_use]
+    pub fn caption(mut self, caption: impl Into<String>) -> Self {
+        self.caption = Some(caption.into());
+        self
+    }
+
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// When the row has not one cell for each column.
+    #[must_use]
+    pub fn row(mut self, cells: Vec<Cell>) -> Self {
+        self.check(&cells);
+        self.rows.push(cells);
+        self
+    }
+
+    /// Sets the last row, apart from the others: medians, totals.
+    ///
+    /// # Panics
+    /// When the row has not one cell for each column.
+    #[must_use]
+    pub fn summary(mut self, cells: Vec<Cell>) -> Self {
+        self.check(&cells);
+        self.summary = Some(cells);
+        self
+    }
+
+    fn check(&self, cells: &[Cell]) {
+        assert_eq!(cells.len(), self.columns.len(), "a row has one cell for each column");
+    }
+
+    pub(crate) fn to_html(&self) -> String {
+        // The box scrolls sideways on a small screen; tabindex lets a keyboard scroll it.
+        let mut html = String::from("<figure class=\"table\"><div class=\"scroll\" tabindex=\"0\"><table><thead>");
+        if self.columns.iter().any(|column| column.group.is_some()) {
+            html += "<tr class=\"groups\">";
+            for run in self.columns.chunk_by(|a, b| a.group.is_some() && a.group == b.group) {
+                match &run[0].group {
+                    Some(group) => {
+                        html += &format!("<th colspan=\"{}\" scope=\"colgroup\">{}</th>", run.len(), escape(group));
+                    }
+                    None => html += "<td></td>",
+                }
+            }
+            html += "</tr>";
+        }
+        html += "<tr>";
+        for column in &self.columns {
+            html += &format!("<th scope=\"col\"{}>{}", column.class(), escape(&column.heading));
+            if let Some(unit) = &column.unit {
+                html += &format!(" <span class=\"unit\">{}</span>", escape(unit));
+            }
+            html += "</th>";
+        }
+        html += "</tr></thead><tbody>";
+        for row in &self.rows {
+            html += &self.row_to_html(row);
+        }
+        html += "</tbody>";
+        if let Some(summary) = &self.summary {
+            html += &format!("<tfoot>{}</tfoot>", self.row_to_html(summary));
+        }
+        html += "</table></div>";
+        if let Some(caption) = &self.caption {
+            html += &format!("<figcaption>{}</figcaption>", escape(caption));
+        }
+        html + "</figure>"
+    }
+
+    fn row_to_html(&self, cells: &[Cell]) -> String {
+        let cells: String = cells
+            .iter()
+            .zip(&self.columns)
+            .map(|(cell, column)| format!("<td{}>{}</td>", column.class(), cell.to_html()))
+            .collect();
+        format!("<tr>{cells}</tr>")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::html_checker::assert_well_formed;
+
+    fn table() -> Table {
+        Table::new(vec![
+            Column::text("part"),
+            Column::number("x").unit("mm").group("pose"),
+            Column::number("y").unit("mm").group("pose"),
+            Column::text("outcome"),
+        ])
+    }
+
+    #[test]
+    fn neighbours_share_a_group_heading() {
+        let html = table().to_html();
+        assert_well_formed(&html);
+        assert!(
+            html.contains("<tr class=\"groups\"><td></td><th colspan=\"2\" scope=\"colgroup\">pose</th><td></td></tr>")
+        );
+    }
+
+    #[test]
+    fn cells_are_formatted_and_escaped() {
+        let verdict = Cell::Verdict { tone: Tone::Bad, text: "<lost>".into(), note: Some("a & b".into()) };
+        let html = table()
+            .row(vec![Cell::text("<i>"), Cell::number(-1.5, 2), Cell::missing(), verdict])
+            .summary(vec![
+                Cell::Progress { done: 2, total: 3, label: "hover".into() },
+                Cell::number(1.0, 1),
+                Cell::number(2.0, 0),
+                Cell::text(""),
+            ])
+            .caption("<all>")
+            .to_html();
+        assert_well_formed(&html);
+        assert!(html.contains("&lt;i&gt;") && html.contains("\u{2212}1.50") && html.contains(">–<"));
+        assert!(html.contains("badge bad\">&lt;lost&gt;") && html.contains("a &amp; b"));
+        assert_eq!(html.matches("<i class=\"on\"></i>").count(), 2);
+    }
+
+    #[test]
+    #[should_panic(expected = "one cell for each column")]
+    fn a_short_row_is_a_mistake() {
+        let _ = table().row(vec![Cell::text("a")]);
+    }
+}
