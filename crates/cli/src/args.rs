@@ -1,0 +1,187 @@
+//! The arguments: what each command takes, with its help.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, Parser, Subcommand};
+
+/// Teach a robot a grasp from one photo, on an ordinary computer.
+#[derive(Debug, Parser)]
+#[command(name = "sdg", version, propagate_version = true, arg_required_else_help = true)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The main job on shipped input: teach one object from one photo, then grasp it in simulation
+    Demo(DemoArgs),
+    /// Demonstrations to a grasp model in one file
+    Teach(TeachArgs),
+    /// Planar grasps in images
+    Detect(DetectArgs),
+    /// Grasp attempts in MuJoCo
+    Rehearse(RehearseArgs),
+    /// Augmented samples as pictures and COCO JSON, to look at
+    Augment(AugmentArgs),
+}
+
+/// `sdg demo`
+#[derive(Debug, ClapArgs)]
+pub struct DemoArgs {
+    /// The object: one of those shipped under datasets/
+    #[arg(long, default_value = "pendulum", value_name = "NAME")]
+    pub object: String,
+    /// Grasp attempts
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub attempts: u32,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Seconds that the network's training may take at most
+    #[arg(long, value_name = "SECS", value_parser = seconds)]
+    pub time_budget: Option<f64>,
+    /// Folder for the report
+    #[arg(long, default_value = "report", value_name = "DIR")]
+    pub out: PathBuf,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg teach`
+#[derive(Debug, ClapArgs)]
+pub struct TeachArgs {
+    /// The grasp model: C (keypoints)
+    #[arg(long, default_value = "C", value_name = "LETTER")]
+    pub model: String,
+    /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    pub demonstrations: Vec<String>,
+    /// The file to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Network, training and augmentation
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Seconds that the network's training may take at most
+    #[arg(long, value_name = "SECS", value_parser = seconds)]
+    pub time_budget: Option<f64>,
+    /// Optimiser steps instead of the preset's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub steps: Option<u32>,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg detect`
+#[derive(Debug, ClapArgs)]
+pub struct DetectArgs {
+    /// A grasp model that `sdg teach` wrote
+    #[arg(long, value_name = "FILE")]
+    pub grasp_model: PathBuf,
+    /// Leave out the check against the demonstration: the network alone decides and places
+    #[arg(long)]
+    pub no_verify: bool,
+    /// Also list detections scored below 0.5
+    #[arg(long)]
+    pub all: bool,
+    /// A JSON line for each image
+    #[arg(long)]
+    pub json: bool,
+    /// Write each image with its grasps drawn on it into this folder
+    #[arg(long, value_name = "DIR")]
+    pub draw: Option<PathBuf>,
+    /// PNG or JPEG images
+    #[arg(required = true, value_name = "IMAGE")]
+    pub images: Vec<PathBuf>,
+}
+
+/// `sdg rehearse`
+#[derive(Debug, ClapArgs)]
+pub struct RehearseArgs {
+    /// A grasp model that `sdg teach` wrote
+    #[arg(long, value_name = "FILE")]
+    pub grasp_model: PathBuf,
+    /// The object on the table: one of those shipped under datasets/
+    #[arg(long, value_name = "NAME")]
+    pub object: String,
+    /// Grasp attempts
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub attempts: u32,
+    /// Decides object poses, robot starts, lights and table
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Leave out the check against the demonstration
+    #[arg(long)]
+    pub no_verify: bool,
+    /// Folder for the report
+    #[arg(long, default_value = "report", value_name = "DIR")]
+    pub out: PathBuf,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg augment`
+#[derive(Debug, ClapArgs)]
+pub struct AugmentArgs {
+    /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    pub demonstrations: Vec<String>,
+    /// Samples to write
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub count: u32,
+    /// Folder to write into; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The augmentation: edge (what teaching uses), or paper (the original's)
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A positive, finite number of seconds.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(secs) if secs.is_finite() && secs > 0.0 => Ok(secs),
+        _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn the_contract_s_calls_parse() {
+        for line in [
+            "sdg demo",
+            "sdg demo --json",
+            "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --seed 3 --time-budget 60",
+            "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
+            "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
+            "sdg augment --demo a.png:a.json --count 5 --out samples",
+        ] {
+            assert!(Args::try_parse_from(line.split(' ')).is_ok(), "{line}");
+        }
+        assert!(Args::try_parse_from(["sdg", "teach", "--demo", "a:b", "--out", "m", "--time-budget", "-1"]).is_err());
+    }
+}

@@ -1,0 +1,66 @@
+//! `sdg augment`: augmented samples as pictures and COCO JSON, to look at.
+
+use std::io::Cursor;
+
+use anyhow::{Result, bail};
+use image::ImageFormat;
+use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter, CocoFile};
+use sdg_geometry::GraspLine;
+use sdg_report::write_atomically;
+use serde_json::json;
+
+use crate::args::AugmentArgs;
+use crate::demonstrations;
+use crate::exit::Outcome;
+use crate::files;
+
+/// The file that lists every sample's marks.
+const ANNOTATIONS: &str = "annotations.json";
+
+/// Pictures first, the list of them last: a run that breaks off leaves no list of pictures that are not there.
+pub fn run(args: &AugmentArgs) -> Result<Outcome> {
+    let config = match args.preset.as_str() {
+        "edge" => AugmentationConfig::default(),
+        "paper" => AugmentationConfig::paper(),
+        other => bail!("expected a preset out of edge, paper, found \"{other}\""),
+    };
+    let demonstrations = demonstrations::read_all(&args.demonstrations)?;
+    let label = demonstrations[0].annotation.label.clone();
+    let augmenter = Augmenter::new(demonstrations, config, args.seed)?;
+    files::prepare_folder(&args.out)?;
+
+    let mut coco = CocoFile::new();
+    let mut with_part = 0;
+    for i in 0..u64::from(args.count) {
+        let sample = augmenter.sample(i);
+        let name = format!("{i:06}.png");
+        let mut png = Cursor::new(Vec::new());
+        sample.image.write_to(&mut png, ImageFormat::Png)?;
+        write_atomically(&args.out.join(&name), &png.into_inner())?;
+
+        let objects: Vec<Annotation> = sample
+            .objects
+            .iter()
+            .map(|object| {
+                let ends = object.keypoints.first().zip(object.keypoints.last());
+                Annotation {
+                    label: label.clone(),
+                    bbox: object.bbox,
+                    grasp: ends.map(|(start, end)| GraspLine::new(start.point(), end.point())),
+                    outline: object.outline.clone(),
+                }
+            })
+            .collect();
+        with_part += usize::from(!objects.is_empty());
+        coco.push_image(&name, sample.image.width(), sample.image.height(), &objects);
+    }
+    write_atomically(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
+
+    let out = args.out.display();
+    if args.json {
+        println!("{}", json!({"out": out.to_string(), "samples": args.count, "with_part": with_part, "label": label}));
+    } else {
+        println!("wrote {} samples, {with_part} of them with \"{label}\", and {ANNOTATIONS} to {out}", args.count);
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,7 @@
+//! One file for each verb.
+
+pub mod augment;
+pub mod demo;
+pub mod detect;
+pub mod rehearse;
+pub mod teach;

@@ -1,0 +1,67 @@
+//! `sdg teach`: demonstrations to a grasp model in one file.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use sdg_grasp::{Ending, TeachOptions, teach};
+use sdg_report::write_atomically;
+use serde_json::json;
+
+use crate::args::TeachArgs;
+use crate::demonstrations;
+use crate::exit::Outcome;
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::teaching_progress::TeachingProgress;
+
+/// Checks everything that can be wrong before it starts to take minutes.
+pub fn run(args: &TeachArgs) -> Result<Outcome> {
+    let options = TeachOptions {
+        kind: args.model.parse()?,
+        preset: args.preset.parse()?,
+        time_budget: args.time_budget.map(Duration::from_secs_f64),
+        steps: args.steps.map(|steps| steps as usize),
+        ..TeachOptions::new(args.seed)
+    };
+    let demonstrations = demonstrations::read_all(&args.demonstrations)?;
+    files::check_writable(&args.out)?;
+
+    let mut progress = TeachingProgress::new(Interrupt::watch());
+    let taught = teach(&demonstrations, &options, &mut |event| progress.show(event));
+    progress.finish();
+    let taught = taught?;
+    let bytes = taught.model.to_bytes()?;
+    write_atomically(&args.out, &bytes)?;
+
+    let facts = taught.model.facts();
+    if args.json {
+        let line = json!({
+            "model": taught.model.kind(),
+            "object": taught.model.object(),
+            "preset": taught.model.preset(),
+            "out": args.out.display().to_string(),
+            "bytes": bytes.len(),
+            "teach_seconds": facts.seconds,
+            "teaching": facts,
+        });
+        println!("{line}");
+    } else {
+        let ending = match taught.history.ending {
+            Ending::Completed => "",
+            Ending::EarlyStop => ", stopped early: good enough",
+            Ending::TimeBudget => ", stopped by the time budget",
+            Ending::Interrupted => ", interrupted",
+        };
+        println!(
+            "taught \"{}\" in {:.0} s ({} steps{ending}): finds {:.0} % of held-back samples, median {:.1} px and {:.1}°",
+            taught.model.object(),
+            facts.seconds,
+            facts.steps,
+            100.0 * facts.validation_hit_rate,
+            facts.validation_error_px,
+            facts.validation_error_degrees,
+        );
+        println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
+    }
+    Ok(Outcome::Done)
+}

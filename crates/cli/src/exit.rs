@@ -1,0 +1,75 @@
+//! Exit codes, and an error as one line.
+
+use std::fmt;
+use std::io;
+use std::process::ExitCode;
+
+/// How a command ended that did not fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// 0.
+    Done,
+    /// 3: it ran, but found nothing to grasp.
+    NothingToGrasp,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        match outcome {
+            Outcome::Done => Self::SUCCESS,
+            Outcome::NothingToGrasp => Self::from(3),
+        }
+    }
+}
+
+/// Arguments that clap lets pass and that make no sense all the same: exit code 2, as for any wrong usage.
+#[derive(Debug)]
+pub struct Usage(pub String);
+
+impl fmt::Display for Usage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Usage {}
+
+/// 2 for wrong usage, 1 for everything else.
+pub fn code_of(error: &anyhow::Error) -> ExitCode {
+    if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+}
+
+/// Whether the reader of our output went away, as `head` does; no failure of ours.
+pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.downcast_ref::<io::Error>().is_some_and(|io_error| io_error.kind() == io::ErrorKind::BrokenPipe)
+    })
+}
+
+/// The error and its causes on one line, each cause once: messages often quote the cause that they carry.
+pub fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        if line.is_empty() {
+            line = text;
+        } else if !line.contains(&text) {
+            line = format!("{line}: {text}");
+        }
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn causes_follow_each_other_once() {
+        let cause: anyhow::Result<()> = Err(io::Error::other("disk\nfull")).context("model.sdg: cannot write");
+        assert_eq!(one_line(&cause.unwrap_err()), "model.sdg: cannot write: disk full");
+        let quoted: anyhow::Result<()> = Err(io::Error::other("full")).context("cannot write: full");
+        assert_eq!(one_line(&quoted.unwrap_err()), "cannot write: full");
+    }
+}

@@ -1,0 +1,109 @@
+//! What can be wrong with a grasp model, its file or its grasps.
+
+/// Why a model could not be taught, read or used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GraspError {
+    /// A letter that names no model of this version.
+    #[error("expected a grasp model out of {}, found \"{found}\"", .known.join(", "))]
+    UnknownModel {
+        /// The letters that this version has.
+        known: Vec<&'static str>,
+        /// What was asked for.
+        found: String,
+    },
+    /// A preset that this version lacks.
+    #[error("expected a preset out of {}, found \"{found}\"", .known.join(", "))]
+    UnknownPreset {
+        /// The presets that this version has.
+        known: Vec<&'static str>,
+        /// What was asked for.
+        found: String,
+    },
+    /// Bytes that are no grasp model.
+    #[error("expected a grasp model file of this project, found {found}")]
+    NotAModel {
+        /// What the bytes are, as far as can be told.
+        found: String,
+    },
+    /// A grasp model file of another version.
+    #[error("expected a grasp model of format version {expected}, found version {found}: it was written by another sdg")]
+    OtherVersion {
+        /// The version read here.
+        expected: u32,
+        /// The version found.
+        found: String,
+    },
+    /// A grasp model file that contradicts itself or was cut short.
+    #[error("the grasp model file is damaged: expected {expected}, found {found}")]
+    Damaged {
+        /// What ought to be there.
+        expected: String,
+        /// What is.
+        found: String,
+    },
+    /// An image that holds nothing to look at.
+    #[error("expected an image of at least {least} × {least} pixels, found {width} × {height}")]
+    ImageTooSmall {
+        /// The least side.
+        least: u32,
+        /// Width found.
+        width: u32,
+        /// Height found.
+        height: u32,
+    },
+    /// A grasp whose ray misses the grasp plane.
+    #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at a height of {height_m} m")]
+    OffPlane {
+        /// Pixels to the right.
+        x: f64,
+        /// Pixels down.
+        y: f64,
+        /// Height of the plane, in metres.
+        height_m: f64,
+    },
+    /// A part that the gripper cannot take.
+    #[error(
+        "the part is {:.0} mm wide where it is to be grasped, and the gripper opens {:.0} mm",
+        .width_m * 1e3, .max_opening_m * 1e3
+    )]
+    TooWide {
+        /// Width of the part between the jaws, in metres.
+        width_m: f64,
+        /// Stroke of the gripper, in metres.
+        max_opening_m: f64,
+    },
+    /// Nothing to teach from.
+    #[error("expected at least one demonstration, found none")]
+    NoDemonstration,
+    /// A demonstration that the model cannot be taught from.
+    #[error(transparent)]
+    Demonstration(#[from] sdg_demonstration::Error),
+    /// A demonstration in which there is no shape to compare.
+    #[error("the demonstration cannot be laid over images: {0}")]
+    Shape(#[from] sdg_shape::ShapeError),
+    /// The network refused its input.
+    #[error(transparent)]
+    Detection(#[from] sdg_detection::DetectionError),
+    /// Teaching ended without a model.
+    #[cfg(feature = "teach")]
+    #[error(transparent)]
+    Training(#[from] sdg_training::TrainingError),
+    /// Teaching ended with a network that does not find the part.
+    #[cfg(feature = "teach")]
+    #[error(
+        "the network finds the part in {hits} of {positives} held-back samples after {steps} steps: too few to keep; \
+         give it more time, or a demonstration with a clearer outline"
+    )]
+    NotLearnt {
+        /// Samples in which the part was found near enough.
+        hits: usize,
+        /// Samples with the part.
+        positives: usize,
+        /// Steps done.
+        steps: usize,
+    },
+}
+
+/// The result of this crate's functions.
+pub type Result<T> = std::result::Result<T, GraspError>;

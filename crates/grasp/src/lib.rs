@@ -1,0 +1,62 @@
+//! Grasp models: taught from one annotated photo, they find planar grasps in images.
+//!
+//! ```text
+//! Demonstration ─ teach ─ GraspModel ─ detect ─ GraspDetection ─ PlanarGrasp ─ GraspPose (base_from_tcp)
+//!                             │
+//!                    to_bytes / from_bytes: one self-describing file
+//! ```
+//!
+//! Model C of the paper: Keypoint R-CNN finds twelve keypoints along the marked line; their mean is the grasp's centre
+//! and the least-squares line through them its angle. The network proposes, the demonstration disposes: every
+//! detection is refined and scored by laying the demonstration over the image ([`Verification`]).
+//!
+//! What is deliberately absent: files, clocks in detection, threads (bytes in, bytes out, so that the same code runs in
+//! a browser), the robot and the simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
+//! compiled.
+//!
+//! ```no_run
+//! use burn::tensor::Device;
+//! use sdg_grasp::{GraspModel, Verification};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let model = GraspModel::from_bytes(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
+//! let image = image::open("table.png")?.to_rgb8();
+//! for detection in model.detect(&image, Verification::ByShape)? {
+//!     println!("{:?} with score {:.2}", detection.grasp, detection.score);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod calibration;
+mod error;
+mod facts;
+mod model;
+mod model_file;
+mod pose;
+mod reading;
+mod safetensors_file;
+mod taught;
+#[cfg(feature = "teach")]
+mod teach;
+
+pub use burn::tensor::Device;
+pub use calibration::Calibration;
+pub use error::{GraspError, Result};
+pub use facts::{ModelKind, TeachingFacts};
+pub use model::{GraspDetection, GraspModel, Verification};
+pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
+pub use pose::{GraspPlane, GraspPose};
+pub use taught::{TaughtDemonstration, TaughtMarks};
+#[cfg(feature = "teach")]
+pub use sdg_training::{Ending, Event, History, StepRecord, Validation, ValidationRecord};
+#[cfg(feature = "teach")]
+pub use teach::{Preset, Taught, TeachOptions, teach};
+
+/// Keypoints on the grasp line: the two marked points and ten between them.
+///
+/// # Source
+/// OpenDR single_demo_grasp.
+pub const NUM_KEYPOINTS: usize = 12;

@@ -1,0 +1,156 @@
+//! A demonstration as a model keeps it: cut to the part, with everything that later images are compared with.
+
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use sdg_demonstration::{Annotation, Demonstration};
+use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
+use sdg_shape::{GradientField, Refinement, ShapeConfig, ShapeTemplate};
+use serde::{Deserialize, Serialize};
+
+use crate::{GraspError, NUM_KEYPOINTS};
+
+/// Pixels kept around the part, so that gradients at the outline have both their sides.
+const MARGIN_PX: f64 = 16.0;
+
+/// The marks, in pixels of the kept cut-out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaughtMarks {
+    /// The object's name.
+    pub label: String,
+    /// The box around the part.
+    pub bbox: BoundingBox,
+    /// The grasp.
+    pub grasp: GraspLine,
+    /// The outline, if it was drawn.
+    pub outline: Option<Polygon>,
+    /// The part's width between the jaws, measured across the outline.
+    pub width_px: f64,
+}
+
+/// The cut-out, its marks, and the template that is laid over images.
+#[derive(Debug, Clone)]
+pub struct TaughtDemonstration {
+    /// The photo, cut to the part and a margin.
+    pub cutout: RgbImage,
+    /// The marks on it.
+    pub marks: TaughtMarks,
+    template: ShapeTemplate,
+}
+
+impl TaughtDemonstration {
+    /// Cuts a demonstration to its part.
+    ///
+    /// # Errors
+    /// No grasp marked, or nothing in the outline to compare.
+    pub fn new(demonstration: &Demonstration) -> Result<Self, GraspError> {
+        let Annotation { label, bbox, outline, .. } = &demonstration.annotation;
+        let grasp = *demonstration.annotation.require_grasp()?;
+        let (width, height) = demonstration.image.dimensions();
+        let cut = BoundingBox {
+            x1: bbox.x1.min(grasp.start.x).min(grasp.end.x) - MARGIN_PX,
+            y1: bbox.y1.min(grasp.start.y).min(grasp.end.y) - MARGIN_PX,
+            x2: bbox.x2.max(grasp.start.x).max(grasp.end.x) + MARGIN_PX,
+            y2: bbox.y2.max(grasp.start.y).max(grasp.end.y) + MARGIN_PX,
+        }
+        .clip(f64::from(width), f64::from(height));
+        let (left, top) = (cut.x1.floor(), cut.y1.floor());
+        let (right, bottom) = (cut.x2.ceil(), cut.y2.ceil());
+        let cutout = image::imageops::crop_imm(
+            &demonstration.image,
+            left as u32,
+            top as u32,
+            (right - left) as u32,
+            (bottom - top) as u32,
+        )
+        .to_image();
+
+        let to_cutout = Vector2::new(-left, -top);
+        let moved = |p: &Point2<f64>| p + to_cutout;
+        let corners = bbox.corners();
+        let (upper_left, lower_right) = (moved(&corners[0]), moved(&corners[2]));
+        let bbox = BoundingBox { x1: upper_left.x, y1: upper_left.y, x2: lower_right.x, y2: lower_right.y };
+        let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
+        let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
+        let width_px = width_across(&grasp, outline.as_ref(), &bbox);
+        Self::from_parts(cutout, TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px })
+    }
+
+    /// Puts a kept demonstration together again.
+    ///
+    /// # Errors
+    /// Nothing in the outline to compare.
+    pub fn from_parts(cutout: RgbImage, marks: TaughtMarks) -> Result<Self, GraspError> {
+        let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
+        let template = ShapeTemplate::new(&cutout, &outline, &ShapeConfig::default())?;
+        Ok(Self { cutout, marks, template })
+    }
+
+    /// The twelve keypoints, in pixels of the cut-out.
+    pub fn keypoints(&self) -> Vec<Keypoint> {
+        self.marks.grasp.keypoints(NUM_KEYPOINTS)
+    }
+
+    /// The grasp, where the cut-out lies in an image.
+    pub fn grasp(&self, image_from_cutout: &PlanarSimilarity) -> PlanarGrasp {
+        let line = self.marks.grasp.transformed(image_from_cutout);
+        PlanarGrasp::from_line(&line, self.marks.width_px * image_from_cutout.scale)
+    }
+
+    /// The outline, where the cut-out lies in an image; the box's corners when no outline was drawn.
+    pub fn outline(&self, image_from_cutout: &PlanarSimilarity) -> Polygon {
+        match &self.marks.outline {
+            Some(outline) => outline.transformed(image_from_cutout),
+            None => Polygon::from_box(&self.marks.bbox).transformed(image_from_cutout),
+        }
+    }
+
+    /// Lays the cut-out over an image near `initial` and lets it climb to where it agrees best.
+    pub fn refine(&self, field: &GradientField, initial: &PlanarSimilarity) -> Refinement {
+        self.template.refine(field, initial)
+    }
+}
+
+/// How wide the part is across the grasp line, at its middle: from the outermost crossings of the outline. Without an
+/// outline, across the box, which overestimates: the gripper then opens wider than it must.
+fn width_across(grasp: &GraspLine, outline: Option<&Polygon>, bbox: &BoundingBox) -> f64 {
+    let from_box = Polygon::from_box(bbox);
+    let polygon = outline.unwrap_or(&from_box);
+    let center = grasp.center();
+    let along = (grasp.end - grasp.start).normalize();
+    let across = Vector2::new(-along.y, along.x);
+    let (mut least, mut most) = (0.0f64, 0.0f64);
+    for (a, b) in polygon.edges() {
+        let (side_a, side_b) = (along.dot(&(a - center)), along.dot(&(b - center)));
+        if (side_a > 0.0) != (side_b > 0.0) {
+            let crossing = a + (b - a) * (side_a / (side_a - side_b));
+            let offset = across.dot(&(crossing - center));
+            least = least.min(offset);
+            most = most.max(offset);
+        }
+    }
+    // The gripper closes symmetrically about the marked middle, so the wider half counts twice.
+    2.0 * most.max(-least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bar() -> Polygon {
+        Polygon::from_box(&BoundingBox { x1: 10.0, y1: 20.0, x2: 110.0, y2: 40.0 })
+    }
+
+    #[test]
+    fn a_bar_grasped_across_its_middle_is_as_wide_as_it_is() {
+        let line = GraspLine::new(Point2::new(40.0, 30.0), Point2::new(60.0, 30.0));
+        assert!((width_across(&line, Some(&bar()), &bar().bounds()) - 20.0).abs() < 1e-12);
+        let lengthwise = GraspLine::new(Point2::new(60.0, 25.0), Point2::new(60.0, 35.0));
+        assert!((width_across(&lengthwise, Some(&bar()), &bar().bounds()) - 100.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn off_the_middle_the_wider_half_counts_twice() {
+        let line = GraspLine::new(Point2::new(40.0, 25.0), Point2::new(60.0, 25.0));
+        assert!((width_across(&line, Some(&bar()), &bar().bounds()) - 30.0).abs() < 1e-12);
+    }
+}

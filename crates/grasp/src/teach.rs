@@ -1,0 +1,301 @@
+//! From demonstrations to a grasp model.
+//!
+//! ```text
+//! demonstrations ─ Augmenter ─ train ─ network ─┐
+//!                     │                         ├─ calibrate on held-back samples ─ GraspModel
+//!                     └─ held-back samples ─────┘
+//! ```
+
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use burn::module::Module;
+use burn::tensor::Device;
+use sdg_demonstration::{Augmenter, AugmentationConfig, Demonstration, Sample};
+use sdg_detection::{GeneralizedRcnn, RcnnConfig, presets};
+use sdg_geometry::PlanarGrasp;
+use sdg_shape::GradientField;
+use sdg_training::{Event, History, Outcome, TrainingConfig, TrainingError, median, train};
+
+use crate::calibration::Calibration;
+use crate::error::{GraspError, Result};
+use crate::facts::{ModelKind, TeachingFacts};
+use crate::model::GraspModel;
+use crate::model_file::Calibrations;
+use crate::reading;
+use crate::taught::TaughtDemonstration;
+
+/// A network, its training and its augmentation under one name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// Made for two cores: minutes from photo to grasp.
+    #[default]
+    Edge,
+}
+
+impl Preset {
+    /// Every preset of this version.
+    pub const ALL: [Self; 1] = [Self::Edge];
+
+    /// The name on the command line and in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+        }
+    }
+
+    fn network(self) -> RcnnConfig {
+        match self {
+            Self::Edge => presets::edge(crate::NUM_KEYPOINTS),
+        }
+    }
+
+    /// Width and height of the training samples: the network's input, so that nothing is computed to be thrown away.
+    fn sample_size(self) -> [u32; 2] {
+        match self {
+            Self::Edge => [320, 240],
+        }
+    }
+
+    fn training(self, seed: u64) -> TrainingConfig {
+        match self {
+            Self::Edge => TrainingConfig::edge(seed),
+        }
+    }
+}
+
+impl FromStr for Preset {
+    type Err = GraspError;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == text).ok_or_else(|| GraspError::UnknownPreset {
+            known: Self::ALL.map(Self::name).to_vec(),
+            found: text.to_owned(),
+        })
+    }
+}
+
+/// How to teach.
+#[derive(Debug, Clone)]
+pub struct TeachOptions {
+    /// Which model.
+    pub kind: ModelKind,
+    /// Which network and training.
+    pub preset: Preset,
+    /// Decides every random choice.
+    pub seed: u64,
+    /// Wall-clock time for the training.
+    pub time_budget: Option<Duration>,
+    /// Steps other than the preset's; for tests and trials.
+    pub steps: Option<usize>,
+    /// Where to compute; without gradients.
+    pub device: Device,
+}
+
+impl TeachOptions {
+    /// Model C with the default preset on the default device.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            kind: ModelKind::C,
+            preset: Preset::default(),
+            seed,
+            time_budget: None,
+            steps: None,
+            device: Device::flex(),
+        }
+    }
+}
+
+/// A model and the run that made it.
+#[derive(Debug, Clone)]
+pub struct Taught {
+    /// The model, ready to detect.
+    pub model: GraspModel,
+    /// Losses and validations.
+    pub history: History,
+}
+
+/// Least share of parts that a network must find to be kept.
+const LEAST_HIT_RATE: f64 = 0.5;
+
+/// Teaches a grasp model. `observe` hears of every step and validation and may end the teaching, which then keeps the
+/// best network so far, if it is any good.
+///
+/// # Errors
+/// No demonstration, one that lacks what the model needs, or a training that led to nothing usable.
+pub fn teach(
+    demonstrations: &[Demonstration],
+    options: &TeachOptions,
+    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+) -> Result<Taught> {
+    let start = Instant::now();
+    if demonstrations.is_empty() {
+        return Err(GraspError::NoDemonstration);
+    }
+    let taught = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
+    let mut training = options.preset.training(options.seed);
+    training.time_budget = options.time_budget;
+    training.steps = options.steps.unwrap_or(training.steps);
+    training.validation.first = training.validation.first.min(training.steps);
+
+    let [width, height] = options.preset.sample_size();
+    let at_input_size = AugmentationConfig::default().with_output_size(width, height);
+    let samples = Augmenter::new(demonstrations.to_vec(), at_input_size, options.seed)?;
+    // Held back at the photo's own size, so that verification is calibrated on what it will see.
+    let held_back = Augmenter::new(demonstrations.to_vec(), AugmentationConfig::default(), options.seed)?;
+    let held_back: Vec<Sample> =
+        (0..training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
+
+    let mut model = GraspModel {
+        kind: options.kind,
+        preset: options.preset.name().to_owned(),
+        network: options.preset.network().init(&options.device.clone().autodiff(), options.seed)?,
+        demonstrations: taught,
+        calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: Calibration::NEUTRAL },
+        facts: TeachingFacts {
+            seed: options.seed,
+            samples: 0,
+            steps: 0,
+            seconds: 0.0,
+            validation_hit_rate: 0.0,
+            validation_error_px: f64::INFINITY,
+            validation_error_degrees: f64::INFINITY,
+            base_weights_sha256: None,
+        },
+    };
+    let network = model.network.clone();
+    let examined = RefCell::new(&mut model);
+    let trained = train(
+        network,
+        &training,
+        &|i| samples.sample(i),
+        &mut |detector: &GeneralizedRcnn| {
+            let mut model = examined.borrow_mut();
+            model.network = detector.clone();
+            model.examine(&held_back)
+        },
+        observe,
+    )?;
+    let best = trained.history.best.validation;
+    if best.hit_rate() < LEAST_HIT_RATE {
+        return Err(GraspError::NotLearnt {
+            hits: best.hits,
+            positives: best.positives,
+            steps: trained.history.steps.len(),
+        });
+    }
+    model.network = trained.detector;
+    let (error_px, error_degrees) = model.calibrate(&held_back)?;
+    model.facts = TeachingFacts {
+        samples: trained.history.steps.len() * training.batch_size,
+        steps: trained.history.steps.len(),
+        seconds: start.elapsed().as_secs_f64(),
+        validation_hit_rate: best.hit_rate(),
+        validation_error_px: error_px,
+        validation_error_degrees: error_degrees,
+        ..model.facts
+    };
+    Ok(Taught { model, history: trained.history })
+}
+
+impl GraspModel {
+    /// What the network alone says of held-back samples.
+    fn examine(&self, held_back: &[Sample]) -> std::result::Result<Vec<Outcome>, TrainingError> {
+        held_back
+            .iter()
+            .map(|sample| {
+                let detections = self.look(&sample.image).map_err(|error| match error {
+                    GraspError::Detection(error) => TrainingError::Detection(error),
+                    other => panic!("looking at a sample can only fail in the network: {other}"),
+                })?;
+                let best = reading::candidates(&detections, &self.demonstrations).into_iter().next();
+                Ok(match (best, sample.objects.first()) {
+                    (Some(candidate), Some(object)) => {
+                        let scale = object.image_from_demonstration.scale;
+                        Outcome::found(&candidate.grasp, &truth(object), candidate.network_score, 1.0 / scale)
+                    }
+                    (None, Some(_)) => Outcome::Missed,
+                    (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
+                })
+            })
+            .collect()
+    }
+
+    /// Sets both calibrations from held-back samples; returns the median errors after verification, in pixels of the
+    /// demonstration and degrees.
+    fn calibrate(&mut self, held_back: &[Sample]) -> Result<(f64, f64)> {
+        let mut scores = Scores::default();
+        let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
+        for sample in held_back {
+            let detections = self.look(&sample.image)?;
+            let field = GradientField::new(&sample.image);
+            let mut network_best = [0.0f64; 2];
+            for candidate in reading::candidates(&detections, &self.demonstrations) {
+                let demonstration = &self.demonstrations[candidate.demonstration_idx];
+                let (pose, agreement) = reading::verify(demonstration, &candidate, &field);
+                let right = sample.objects.first().is_some_and(|object| {
+                    let scale = 1.0 / object.image_from_demonstration.scale;
+                    let outcome = Outcome::found(&demonstration.grasp(&pose), &truth(object), 1.0, scale);
+                    if let (true, Outcome::Found { error_px, error_degrees, .. }) = (outcome.is_hit(), outcome) {
+                        errors_px.push(error_px);
+                        errors_degrees.push(error_degrees);
+                    }
+                    outcome.is_hit()
+                });
+                let best = &mut network_best[usize::from(right)];
+                *best = best.max(candidate.network_score);
+                scores.agreement(right).push(agreement);
+            }
+            if network_best[1] > 0.0 {
+                scores.network(true).push(network_best[1]);
+            }
+            if sample.objects.is_empty() {
+                scores.network(false).push(network_best[0]);
+            }
+        }
+        self.calibrations = scores.calibrations();
+        Ok((
+            median(&mut errors_px).unwrap_or(f64::INFINITY),
+            median(&mut errors_degrees).unwrap_or(f64::INFINITY),
+        ))
+    }
+}
+
+/// Raw scores of right and wrong detections.
+#[derive(Default)]
+struct Scores {
+    /// Of the network: wrong, right.
+    network: [Vec<f64>; 2],
+    /// Agreements: wrong, right.
+    agreement: [Vec<f64>; 2],
+}
+
+impl Scores {
+    /// What `--no-verify` has to decide by is also what verification must not lose by: with the demonstration to
+    /// dispose, the network need not be sure.
+    fn network(&mut self, right: bool) -> &mut Vec<f64> {
+        &mut self.network[usize::from(right)]
+    }
+
+    fn agreement(&mut self, right: bool) -> &mut Vec<f64> {
+        &mut self.agreement[usize::from(right)]
+    }
+
+    fn calibrations(&self) -> Calibrations {
+        /// Highest raw score of a wrong detection where the held-back samples gave none.
+        const NO_WRONG: f64 = 0.1;
+        let fit = |[wrong, right]: &[Vec<f64>; 2]| Calibration::fit(right, wrong, NO_WRONG);
+        Calibrations {
+            network: fit(&self.network).unwrap_or(Calibration::NEUTRAL),
+            agreement: fit(&self.agreement).unwrap_or(Calibration::NEUTRAL),
+        }
+    }
+}
+
+/// The true grasp of an object in a sample; its width plays no part.
+fn truth(object: &sdg_demonstration::SampleObject) -> PlanarGrasp {
+    let on_line: Vec<_> = object.keypoints.iter().map(|k| sdg_geometry::Keypoint::visible(k.point())).collect();
+    PlanarGrasp::from_keypoints(&on_line, 0.0).unwrap_or_else(|| panic!("a grasp line has a length"))
+}

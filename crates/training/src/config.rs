@@ -1,0 +1,143 @@
+//! The settings of a run.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::TrainingError;
+use crate::schedule::OneCycle;
+use crate::validation::Validation;
+
+/// How a detector is trained.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrainingConfig {
+    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    pub steps: usize,
+    /// Images a step.
+    pub batch_size: usize,
+    /// Learning rate over the run.
+    pub schedule: OneCycle,
+    /// AdamW's decoupled weight decay.
+    pub weight_decay: f64,
+    /// The gradient's norm is cut to this.
+    pub max_gradient_norm: f32,
+    /// When and on how much to validate.
+    pub validation: ValidationConfig,
+    /// When a run is good enough to end before its last step.
+    pub early_stop: Option<EarlyStop>,
+    /// Wall-clock time for the whole run. The learning rate then follows whichever is further on, steps or time, so
+    /// that a run cut short still ends with a low one. Runs that it cuts short depend on the machine's speed.
+    pub time_budget: Option<Duration>,
+    /// Decides the samples, their order and every random choice of the losses.
+    pub seed: u64,
+}
+
+/// When and on how much to validate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ValidationConfig {
+    /// Steps between validations.
+    pub every: usize,
+    /// No validation before this step: the network has not learnt to say anything yet.
+    pub first: usize,
+    /// Held-back samples, with and without the part.
+    pub samples: usize,
+}
+
+/// What is good enough. When a validation reaches it, the learning rate is brought down within `cool_down` steps and
+/// the run ends.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct EarlyStop {
+    /// Share of parts found near enough to grasp.
+    pub hit_rate: f64,
+    /// Median error, in demonstration pixels.
+    pub median_error_px: f64,
+    /// Median error, in degrees.
+    pub median_error_degrees: f64,
+    /// False alarms over negatives.
+    pub false_alarm_rate: f64,
+    /// Steps from the validation that was good enough to the end.
+    pub cool_down: usize,
+}
+
+impl EarlyStop {
+    /// Whether a validation is good enough.
+    pub fn is_reached(&self, validation: &Validation) -> bool {
+        validation.hit_rate() >= self.hit_rate
+            && validation.median_error_px <= self.median_error_px
+            && validation.median_error_degrees <= self.median_error_degrees
+            && validation.false_alarms as f64 <= self.false_alarm_rate * validation.negatives as f64
+    }
+}
+
+impl TrainingConfig {
+    /// The default for the `edge` network on two cores: three to four minutes from one photo.
+    pub fn edge(seed: u64) -> Self {
+        Self {
+            steps: 360,
+            batch_size: 4,
+            schedule: OneCycle { peak: 1e-3, warm_up: 0.2 },
+            weight_decay: 1e-4,
+            max_gradient_norm: 10.0,
+            validation: ValidationConfig { every: 40, first: 120, samples: 48 },
+            early_stop: Some(EarlyStop {
+                hit_rate: 0.97,
+                median_error_px: 3.0,
+                median_error_degrees: 1.5,
+                false_alarm_rate: 0.0,
+                cool_down: 40,
+            }),
+            time_budget: None,
+            seed,
+        }
+    }
+
+    /// Refuses settings that no run can have.
+    pub(crate) fn check(&self) -> Result<(), TrainingError> {
+        let refuse = |setting, expected, found: String| Err(TrainingError::BadSetting { setting, expected, found });
+        if self.steps == 0 {
+            return refuse("steps", "at least 1", self.steps.to_string());
+        }
+        if self.batch_size == 0 {
+            return refuse("batch size", "at least 1", self.batch_size.to_string());
+        }
+        if self.validation.every == 0 || self.validation.samples == 0 {
+            let found = format!("every {} steps on {} samples", self.validation.every, self.validation.samples);
+            return refuse("validation", "at least every step on one sample", found);
+        }
+        if !(self.schedule.peak > 0.0 && self.schedule.peak.is_finite()) {
+            return refuse("learning rate", "a positive number", self.schedule.peak.to_string());
+        }
+        if !(self.schedule.warm_up > 0.0 && self.schedule.warm_up < 1.0) {
+            return refuse("warm-up", "a share between 0 and 1", self.schedule.warm_up.to_string());
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_steps_is_refused() {
+        let config = TrainingConfig { steps: 0, ..TrainingConfig::edge(1) };
+        assert!(config.check().unwrap_err().to_string().contains("steps: expected at least 1, found 0"));
+        assert!(TrainingConfig::edge(1).check().is_ok());
+    }
+
+    #[test]
+    fn one_false_alarm_is_not_good_enough() {
+        let stop = TrainingConfig::edge(1).early_stop.unwrap();
+        let good = Validation {
+            positives: 40,
+            hits: 40,
+            median_error_px: 1.0,
+            median_error_degrees: 0.5,
+            negatives: 12,
+            false_alarms: 0,
+        };
+        assert!(stop.is_reached(&good));
+        assert!(!stop.is_reached(&Validation { false_alarms: 1, ..good }));
+        assert!(!stop.is_reached(&Validation { hits: 38, ..good }));
+    }
+}

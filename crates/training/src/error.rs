@@ -1,0 +1,36 @@
+//! Why a training run ended without a detector.
+
+/// What went wrong.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrainingError {
+    /// A setting that no run can have.
+    #[error("{setting}: expected {expected}, found {found}")]
+    BadSetting {
+        /// The setting's name.
+        setting: &'static str,
+        /// What it must be.
+        expected: &'static str,
+        /// What it was.
+        found: String,
+    },
+    /// A loss that is NaN or infinite.
+    #[error("the loss became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
+    Diverged {
+        /// The step, from zero.
+        step: usize,
+        /// The loss.
+        loss: f64,
+        /// The learning rate of that step.
+        learning_rate: f64,
+    },
+    /// The observer asked to stop before there was anything to keep.
+    #[error("stopped at step {step}, before the first validation: there is no model to keep")]
+    StoppedTooEarly {
+        /// The step, from zero.
+        step: usize,
+    },
+    /// The network refused a batch.
+    #[error(transparent)]
+    Detection(#[from] sdg_detection::DetectionError),
+}

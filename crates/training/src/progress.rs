@@ -1,0 +1,93 @@
+//! What a run tells while it goes on, and keeps of itself afterwards.
+
+use serde::{Deserialize, Serialize};
+
+use crate::validation::Validation;
+
+/// The losses of one step, summed over their weights' batch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LossValues {
+    /// Objectness of anchors.
+    pub rpn_cls: f64,
+    /// Deltas of anchors.
+    pub rpn_loc: f64,
+    /// Class of proposals.
+    pub cls: f64,
+    /// Deltas of proposals.
+    pub box_reg: f64,
+    /// Places of keypoints; zero for a detector without.
+    pub keypoint: f64,
+}
+
+impl LossValues {
+    /// Their sum: what the step descends.
+    pub fn total(&self) -> f64 {
+        self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint
+    }
+}
+
+/// One optimiser step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// From zero.
+    pub step: usize,
+    /// Learning rate of this step.
+    pub learning_rate: f64,
+    /// Losses before the update.
+    pub losses: LossValues,
+}
+
+/// One validation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ValidationRecord {
+    /// Steps done before it.
+    pub steps_done: usize,
+    /// Since the start of the run.
+    pub elapsed_secs: f64,
+    /// The figures.
+    pub validation: Validation,
+}
+
+/// What is told while a run goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// A step was done.
+    Step {
+        /// The step.
+        record: StepRecord,
+        /// Steps that the run will have, as known now.
+        planned_steps: usize,
+        /// Since the start of the run.
+        elapsed_secs: f64,
+    },
+    /// A validation was done.
+    Validated(ValidationRecord),
+}
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Ending {
+    /// All steps were done.
+    Completed,
+    /// A validation was good enough.
+    EarlyStop,
+    /// The time budget was used up.
+    TimeBudget,
+    /// The observer asked to stop.
+    Interrupted,
+}
+
+/// The whole run in figures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct History {
+    /// Every step.
+    pub steps: Vec<StepRecord>,
+    /// Every validation.
+    pub validations: Vec<ValidationRecord>,
+    /// The validation of the detector that was kept.
+    pub best: ValidationRecord,
+    /// Why it ended.
+    pub ending: Ending,
+    /// Wall-clock time of the run.
+    pub elapsed_secs: f64,
+}
