@@ -34,25 +34,14 @@ pub(crate) fn check_joints(what: &'static str, q: &JointVector) -> Result<(), Ki
 
 pub(crate) fn check_options(options: &IkOptions) -> Result<(), KinematicsError> {
     check_joints("posture", &options.posture)?;
-    let non_negative = "a finite number of at least 0";
-    let positive = "a finite number above 0";
-    let checks = [
-        ("seed_weight", options.seed_weight, false),
-        ("posture_weight", options.posture_weight, false),
-        ("limit_weight", options.limit_weight, false),
-        ("required_margin_rad", options.required_margin_rad, false),
-        ("comfortable_margin_rad", options.comfortable_margin_rad, true),
-        ("position_tolerance_m", options.position_tolerance_m, true),
-        ("angle_tolerance_rad", options.angle_tolerance_rad, true),
-        ("metres_per_rad", options.metres_per_rad, true),
-    ];
-    for (option, found, must_be_positive) in checks {
-        let is_valid = found.is_finite() && found >= 0.0 && !(must_be_positive && found == 0.0);
-        if !is_valid {
-            let expected = if must_be_positive { positive } else { non_negative };
-            return Err(KinematicsError::InvalidOption { option, expected, found });
-        }
-    }
+    check_not_negative("seed_weight", options.seed_weight)?;
+    check_not_negative("posture_weight", options.posture_weight)?;
+    check_not_negative("limit_weight", options.limit_weight)?;
+    check_not_negative("required_margin_rad", options.required_margin_rad)?;
+    check_positive("comfortable_margin_rad", options.comfortable_margin_rad)?;
+    check_positive("position_tolerance_m", options.position_tolerance_m)?;
+    check_positive("angle_tolerance_rad", options.angle_tolerance_rad)?;
+    check_positive("metres_per_rad", options.metres_per_rad)?;
     if options.required_margin_rad > 1.0 {
         return Err(KinematicsError::InvalidOption {
             option: "required_margin_rad",
@@ -68,4 +57,18 @@ pub(crate) fn check_options(options: &IkOptions) -> Result<(), KinematicsError> 
         });
     }
     Ok(())
+}
+
+pub(crate) fn check_positive(option: &'static str, found: f64) -> Result<(), KinematicsError> {
+    if found.is_finite() && found > 0.0 {
+        return Ok(());
+    }
+    Err(KinematicsError::InvalidOption { option, expected: "a finite number above 0", found })
+}
+
+pub(crate) fn check_not_negative(option: &'static str, found: f64) -> Result<(), KinematicsError> {
+    if found.is_finite() && found >= 0.0 {
+        return Ok(());
+    }
+    Err(KinematicsError::InvalidOption { option, expected: "a finite number of at least 0", found })
 }

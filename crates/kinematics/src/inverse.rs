@@ -131,6 +131,7 @@ impl Panda {
 #[derive(Debug, Clone, Copy)]
 struct Branch {
     branch_idx: usize,
+    grid_idx: usize,
     q: JointVector,
     cost: f64,
 }
@@ -142,6 +143,8 @@ struct Search<'a> {
     seed: JointVector,
     limits: JointLimits,
     options: &'a IkOptions,
+    /// Angles of joint 7 that are tried, ascending.
+    grid: Vec<f64>,
 }
 
 /// Violations this small are rounding, and are clamped away.
@@ -149,6 +152,7 @@ const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 /// Weight of geometric infeasibility against radians beyond limits when the least bad candidate is sought.
 const INFEASIBILITY_RAD: f64 = 10.0;
 const NUM_REFINEMENTS: usize = 24;
+const NUM_BISECTIONS: usize = 12;
 /// Branches tried when nothing on the grid is feasible.
 const NUM_RESCUES: usize = 8;
 
@@ -166,6 +170,13 @@ impl<'a> Search<'a> {
         let mut limits = panda.limits.clone();
         limits.position_min += margin;
         limits.position_max -= margin;
+        let (low, high) = (limits.position_min[6], limits.position_max[6]);
+        let num = options.num_redundancy_samples;
+        let mut grid: Vec<f64> = (0..num)
+            .map(|i| low + (high - low) * i as f64 / (num - 1) as f64)
+            .chain([seed[6].clamp(low, high), options.posture[6].clamp(low, high)])
+            .collect();
+        grid.sort_by(f64::total_cmp);
         Ok(Self {
             panda,
             base_from_tcp,
@@ -173,17 +184,8 @@ impl<'a> Search<'a> {
             seed: *seed,
             limits,
             options,
+            grid,
         })
-    }
-
-    fn grid(&self) -> impl Iterator<Item = f64> + '_ {
-        let (low, high) = (self.limits.position_min[6], self.limits.position_max[6]);
-        let num = self.options.num_redundancy_samples;
-        (0..num).map(move |i| low + (high - low) * i as f64 / (num - 1) as f64)
-    }
-
-    fn grid_step(&self) -> f64 {
-        (self.limits.position_max[6] - self.limits.position_min[6]) / (self.options.num_redundancy_samples - 1) as f64
     }
 
     fn candidates(&self, q7: f64) -> [Option<Candidate>; NUM_BRANCHES] {
@@ -194,12 +196,12 @@ impl<'a> Search<'a> {
     fn branches(&self) -> Vec<Branch> {
         let mut open: [Option<Branch>; NUM_BRANCHES] = [None; NUM_BRANCHES];
         let mut closed = Vec::new();
-        for q7 in self.grid() {
-            for (branch_idx, candidate) in self.candidates(q7).iter().enumerate() {
+        for (grid_idx, q7) in self.grid.iter().enumerate() {
+            for (branch_idx, candidate) in self.candidates(*q7).iter().enumerate() {
                 match self.feasible_cost(candidate) {
                     Some((q, cost)) => {
                         if open[branch_idx].is_none_or(|b| cost < b.cost) {
-                            open[branch_idx] = Some(Branch { branch_idx, q, cost });
+                            open[branch_idx] = Some(Branch { branch_idx, grid_idx, q, cost });
                         }
                     }
                     None => closed.extend(open[branch_idx].take()),
@@ -232,19 +234,35 @@ impl<'a> Search<'a> {
             + options.limit_weight * crowding
     }
 
-    /// Lowers a branch's cost over q7 within a grid step to either side.
+    /// Lowers a branch's cost over q7 between the neighbouring grid points, as far as the branch is feasible.
     fn refine(&self, branch: Branch) -> JointVector {
-        let cost_at = |q7: f64| {
-            self.feasible_cost(&self.candidates(q7)[branch.branch_idx])
-                .map_or((branch.q, f64::INFINITY), |(q, cost)| (q, cost))
-        };
-        let step = self.grid_step();
-        let (q, cost) = golden_section(
-            (branch.q[6] - step).max(self.limits.position_min[6]),
-            (branch.q[6] + step).min(self.limits.position_max[6]),
-            cost_at,
-        );
+        let cost_at =
+            |q7: f64| self.feasible_cost(&self.candidates(q7)[branch.branch_idx]).unwrap_or((branch.q, f64::INFINITY));
+        let q7 = branch.q[6];
+        let (low, high) = self.neighbours(branch.grid_idx);
+        let [low, high] = [low, high].map(|end| {
+            let (mut feasible, mut end) = (q7, end);
+            if cost_at(end).1.is_infinite() {
+                for _ in 0..NUM_BISECTIONS {
+                    let middle = 0.5 * (feasible + end);
+                    if cost_at(middle).1.is_finite() {
+                        feasible = middle;
+                    } else {
+                        end = middle;
+                    }
+                }
+                end = feasible;
+            }
+            end
+        });
+        let (q, cost) = golden_section(low, high, cost_at);
         if cost < branch.cost { q } else { branch.q }
+    }
+
+    /// The grid points to either side of one, or itself at the ends of the grid.
+    fn neighbours(&self, grid_idx: usize) -> (f64, f64) {
+        let last = self.grid.len() - 1;
+        (self.grid[grid_idx.saturating_sub(1)], self.grid[(grid_idx + 1).min(last)])
     }
 
     fn solution(&self, q: &JointVector) -> IkSolution {
@@ -324,19 +342,17 @@ impl<'a> Search<'a> {
 
     /// The local minima over q7 of each branch's badness, refined, least bad first.
     fn least_bad_branches(&self) -> Vec<Candidate> {
-        let q7: Vec<f64> = self.grid().collect();
-        let on_grid: Vec<_> = q7.iter().map(|q7| self.candidates(*q7)).collect();
-        let step = self.grid_step();
+        let on_grid: Vec<_> = self.grid.iter().map(|q7| self.candidates(*q7)).collect();
         let mut minima = Vec::new();
         for branch_idx in 0..NUM_BRANCHES {
             let badness_on_grid: Vec<f64> =
                 on_grid.iter().map(|c| c[branch_idx].as_ref().map_or(f64::INFINITY, |c| self.badness(c))).collect();
-            for i in 0..q7.len() {
+            for i in 0..self.grid.len() {
                 let here = badness_on_grid[i];
                 let before = if i > 0 { badness_on_grid[i - 1] } else { f64::INFINITY };
                 let after = badness_on_grid.get(i + 1).copied().unwrap_or(f64::INFINITY);
                 if here.is_finite() && here <= before && here <= after {
-                    minima.push((here, branch_idx, q7[i]));
+                    minima.push((here, branch_idx, i));
                 }
             }
         }
@@ -345,16 +361,13 @@ impl<'a> Search<'a> {
 
         let mut refined: Vec<Candidate> = minima
             .into_iter()
-            .filter_map(|(_, branch_idx, q7)| {
+            .filter_map(|(_, branch_idx, grid_idx)| {
                 let badness_at = |q7: f64| {
                     let candidate = self.candidates(q7)[branch_idx];
                     (candidate, candidate.map_or(f64::INFINITY, |c| self.badness(&c)))
                 };
-                let (candidate, _) = golden_section(
-                    (q7 - step).max(self.limits.position_min[6]),
-                    (q7 + step).min(self.limits.position_max[6]),
-                    badness_at,
-                );
+                let (low, high) = self.neighbours(grid_idx);
+                let (candidate, _) = golden_section(low, high, badness_at);
                 candidate
             })
             .collect();

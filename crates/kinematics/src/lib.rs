@@ -24,13 +24,19 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod analytic;
+mod approach;
 mod check;
+mod clearance;
 mod error;
 mod inverse;
 mod limits;
 mod nearest;
 mod panda;
+mod path;
+mod trajectory;
 
+pub use approach::{Approach, GraspSymmetry, with_fingers_exchanged};
+pub use clearance::{ArmPart, Clearance};
 pub use error::KinematicsError;
 pub use inverse::{IkOptions, IkSolution};
 pub use limits::{
@@ -41,3 +47,5 @@ pub use panda::{
     DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, Frames, HAND_OPENING_MAX_M, HAND_TURN_RAD, Jacobian, Panda,
     TCP_OFFSET_M,
 };
+pub use path::{JointPath, LineOptions, PathPoint};
+pub use trajectory::Trajectory;

@@ -79,7 +79,183 @@ fn top_grasps_over_the_table_are_reached_unless_descent_cannot_either() {
             Err(_) => {}
         }
     }
-    println!("reached {num_reached}, refused {num_refused}, missed {num_missed}");
     assert_eq!(num_missed, 0);
     assert!(num_reached > 900, "{num_reached}");
+}
+
+#[test]
+fn a_pose_already_taken_keeps_its_configuration() {
+    let panda = Panda::new();
+    let options = IkOptions { posture_weight: 0.0, limit_weight: 0.0, ..IkOptions::default() };
+    let mut rng = Pcg64Mcg::seed_from_u64(13);
+    for _ in 0..200 {
+        let q = random_configuration(&mut rng);
+        let solution = panda.inverse(&panda.forward(&q), &q, &options).unwrap();
+        assert!((solution.q - q).norm() < 1e-2, "{} for {q}", solution.q);
+    }
+}
+
+#[test]
+fn the_search_mostly_finds_the_cheapest_of_a_dense_scan() {
+    let panda = Panda::new();
+    let coarse = IkOptions::default();
+    let dense = IkOptions { num_redundancy_samples: 1500, ..coarse.clone() };
+    let mut rng = Pcg64Mcg::seed_from_u64(14);
+    let mut num_worse = 0;
+    for _ in 0..200 {
+        let target = panda.forward(&random_configuration(&mut rng));
+        let found = panda.inverse(&target, &ready_pose(), &coarse).unwrap();
+        let best = panda.inverse(&target, &ready_pose(), &dense).unwrap();
+        assert!(best.cost < found.cost + 1e-3);
+        num_worse += usize::from(found.cost > best.cost * 1.01);
+    }
+    // What the coarse grid misses are stretches of q7 narrower than its step, and passages of the upright upper arm.
+    assert!(num_worse <= 16, "{num_worse} of 200");
+}
+
+#[test]
+fn all_ways_reach_and_come_best_first() {
+    let panda = Panda::new();
+    let options = IkOptions::default();
+    let target = top_grasp(0.5, 0.1, 0.2, 0.3);
+    let all = panda.inverse_all(&target, &ready_pose(), &options).unwrap();
+    let best = panda.inverse(&target, &ready_pose(), &options).unwrap();
+    assert_eq!(all[0], best);
+    assert!(all.len() >= 2, "{}", all.len());
+    for pair in all.windows(2) {
+        assert!(pair[0].cost <= pair[1].cost);
+        assert!((pair[0].q - pair[1].q).norm() > 0.1);
+    }
+    for solution in &all {
+        assert_reaches(&panda, &target, solution);
+    }
+}
+
+#[test]
+fn a_margin_asked_for_is_kept() {
+    let panda = Panda::new();
+    let options = IkOptions { required_margin_rad: 0.2, ..IkOptions::default() };
+    let mut rng = Pcg64Mcg::seed_from_u64(15);
+    for _ in 0..100 {
+        let target = top_grasp(rng.random_range(0.35..0.6), rng.random_range(-0.2..0.2), 0.2, 0.0);
+        let solution = panda.inverse(&target, &ready_pose(), &options).unwrap();
+        assert!(solution.limit_margin_rad >= 0.2 - 1e-9);
+    }
+}
+
+#[test]
+fn out_of_reach_names_the_distance() {
+    let panda = Panda::new();
+    // Arm stretched level at shoulder height: the wrist centre reaches 0.7193 m (both triangle sides), hand and wrist in line
+    // at most hypot(0.088, 0.107 + 0.1034) further. 3 m away, whatever the hand does, at least 2.05 m are missing.
+    let target = top_grasp(3.0, 0.0, 0.333, 0.0);
+    let error = panda.inverse(&target, &ready_pose(), &IkOptions::default()).unwrap_err();
+    let KinematicsError::OutOfReach { target_m, nearest, .. } = &error else {
+        panic!("{error}");
+    };
+    assert_eq!(*target_m, [3.0, 0.0, 0.333]);
+    let furthest = 0.316f64.hypot(0.0825) + 0.384f64.hypot(0.0825) + 0.088f64.hypot(0.2104);
+    assert!(nearest.position_residual_m >= 3.0 - furthest - 1e-9);
+    assert!(nearest.position_residual_m < 2.3, "{}", nearest.position_residual_m);
+    assert_eq!(panda.limits().worst_violation(&nearest.q, 0.0), None);
+    assert!(error.to_string().contains("out of reach"), "{error}");
+}
+
+#[test]
+fn a_limit_that_forbids_a_pose_is_named() {
+    let panda = Panda::new();
+    // So close to the base the elbow would have to fold beyond its 3.0718 rad.
+    let error = panda.inverse(&top_grasp(0.1, 0.0, 0.1, 0.0), &ready_pose(), &IkOptions::default()).unwrap_err();
+    let KinematicsError::JointLimit { violation, nearest } = &error else {
+        panic!("{error}");
+    };
+    assert_eq!(violation.joint, 4);
+    assert!(violation.found_rad < violation.min_rad && violation.excess_rad() < 0.2);
+    assert!(nearest.position_residual_m + nearest.angle_residual_rad > 1e-3);
+    assert_eq!(panda.limits().worst_violation(&nearest.q, 0.0), None);
+}
+
+#[test]
+fn the_nearest_pose_is_no_further_than_descent_finds() {
+    let panda = Panda::new();
+    let options = IkOptions::default();
+    let mut rng = Pcg64Mcg::seed_from_u64(16);
+    for _ in 0..20 {
+        let target = top_grasp(rng.random_range(0.85..1.1), rng.random_range(-0.3..0.3), 0.3, 0.0);
+        let error = panda.inverse(&target, &ready_pose(), &options).unwrap_err();
+        let (KinematicsError::OutOfReach { nearest, .. } | KinematicsError::JointLimit { nearest, .. }) = error else {
+            panic!("{error}");
+        };
+        let miss = |q: &JointVector| {
+            let error = pose_error(&panda.forward(q), &target);
+            error.fixed_rows::<3>(0).norm().hypot(0.3 * error.fixed_rows::<3>(3).norm())
+        };
+        let best = (0..20)
+            .map(|_| miss(&descend(&panda, panda.limits(), &target, &random_configuration(&mut rng), 0.3)))
+            .fold(f64::INFINITY, f64::min);
+        assert!(miss(&nearest.q) <= best * 1.05 + 1e-3, "{} {best}", miss(&nearest.q));
+    }
+}
+
+#[test]
+fn the_same_question_has_the_same_bits_in_its_answer() {
+    let target = top_grasp(0.42, -0.2, 0.13, 2.0);
+    let solve = || Panda::new().inverse(&target, &ready_pose(), &IkOptions::default()).unwrap();
+    assert_eq!(solve(), solve());
+}
+
+#[test]
+fn singular_configurations_are_reached_too() {
+    let panda = Panda::new();
+    // Upper arm upright (q1 and q3 share an axis); wrist with z6 in line with the arm; elbow as straight as it gets.
+    let mut upright = ready_pose();
+    upright[1] = 0.0;
+    let mut straight = ready_pose();
+    straight[3] = -0.0698;
+    let mut at_limits = panda.limits().position_max;
+    at_limits[1] = 0.5;
+    for q in [
+        upright,
+        straight,
+        at_limits,
+        panda.limits().position_min,
+        JointVector::repeat(-0.0175).map_with_location(|i, _, x| if i == 3 { -0.0698 } else { x }),
+    ] {
+        let target = panda.forward(&q);
+        let solution = panda.inverse(&target, &ready_pose(), &IkOptions::default()).unwrap();
+        assert_reaches(&panda, &target, &solution);
+    }
+}
+
+#[test]
+fn bad_input_is_an_error() {
+    let panda = Panda::new();
+    let options = IkOptions::default();
+    let good = top_grasp(0.5, 0.0, 0.2, 0.0);
+    let mut bad_seed = ready_pose();
+    bad_seed[0] = f64::NAN;
+    assert!(matches!(panda.inverse(&good, &bad_seed, &options), Err(KinematicsError::NotFinite { what: "seed", .. })));
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut pose = good;
+        pose.translation.y = bad;
+        assert!(matches!(
+            panda.inverse(&pose, &ready_pose(), &options),
+            Err(KinematicsError::NotFinite { what: "base_from_tcp", .. })
+        ));
+        let mut pose = good;
+        pose.rotation.as_mut_unchecked().coords.x = bad;
+        assert!(panda.inverse(&pose, &ready_pose(), &options).is_err());
+    }
+    let mut stretched = good;
+    stretched.rotation.as_mut_unchecked().coords *= 2.0;
+    assert!(matches!(panda.inverse(&stretched, &ready_pose(), &options), Err(KinematicsError::NotARotation { .. })));
+    for options in [
+        IkOptions { num_redundancy_samples: 1, ..options.clone() },
+        IkOptions { seed_weight: -1.0, ..options.clone() },
+        IkOptions { comfortable_margin_rad: 0.0, ..options.clone() },
+        IkOptions { required_margin_rad: 2.0, ..options.clone() },
+        IkOptions { position_tolerance_m: f64::NAN, ..options.clone() },
+    ] {
+        assert!(matches!(panda.inverse(&good, &ready_pose(), &options), Err(KinematicsError::InvalidOption { .. })));
+    }
 }

@@ -1,0 +1,149 @@
+//! How far the hand stays above the table.
+
+use nalgebra::{Isometry3, Point3};
+
+use crate::limits::JointVector;
+use crate::panda::{HAND_OPENING_MAX_M, Panda};
+use crate::trajectory::Trajectory;
+
+/// A part of the robot that could touch the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArmPart {
+    /// The ends of the fingers, opened wide, and the tcp between them.
+    FingerTips,
+    /// The hand's body.
+    Hand,
+    /// Links 5 to 7, around the wrist centre and joint 7.
+    Wrist,
+    /// Links 3 and 4, around the elbow.
+    Elbow,
+}
+
+/// Where an arm comes nearest to a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clearance {
+    /// Height of the lowest point above the table, m; negative below.
+    pub lowest_m: f64,
+    /// What is lowest.
+    pub part: ArmPart,
+    /// When, s; 0 for a single configuration.
+    pub time_secs: f64,
+}
+
+/// Half the width of the hand's body along the fingers' motion, m.
+const HAND_HALF_WIDTH_M: f64 = 0.102;
+/// Half the depth of the hand's body, m.
+const HAND_HALF_DEPTH_M: f64 = 0.033;
+/// Length of the hand's body from the flange, m.
+const HAND_LENGTH_M: f64 = 0.066;
+/// Half the width of a finger across its motion, m.
+const FINGER_HALF_WIDTH_M: f64 = 0.011;
+/// Thickness of a finger along its motion, m.
+const FINGER_THICKNESS_M: f64 = 0.015;
+/// Radius of a ball around link 6's and link 7's origins that holds the wrist, m.
+const WRIST_RADIUS_M: f64 = 0.075;
+/// Radius of a ball around link 4's origin that holds the elbow, m.
+const ELBOW_RADIUS_M: f64 = 0.09;
+/// Time between two looks, s: at most 5 mm of travel at 2 m/s.
+const LOOK_SECS: f64 = 0.0025;
+
+impl Panda {
+    /// The lowest point of hand, wrist and elbow above a level table at `table_height_m` in the base frame.
+    ///
+    /// The hand is a box with open fingers, wrist and elbow are balls; the balls are somewhat larger than the links.
+    pub fn clearance(&self, q: &JointVector, table_height_m: f64) -> Clearance {
+        let frames = self.frames(q);
+        let mut lowest = Clearance { lowest_m: f64::INFINITY, part: ArmPart::FingerTips, time_secs: 0.0 };
+        let mut consider = |part, height: f64| {
+            let lowest_m = height - table_height_m;
+            if lowest_m < lowest.lowest_m {
+                lowest = Clearance { lowest_m, part, time_secs: 0.0 };
+            }
+        };
+        let finger_reach = HAND_OPENING_MAX_M * 0.5 + FINGER_THICKNESS_M;
+        for height in box_heights(&frames.base_from_tcp, FINGER_HALF_WIDTH_M, finger_reach, 0.0, 0.0) {
+            consider(ArmPart::FingerTips, height);
+        }
+        for height in box_heights(&frames.base_from_hand, HAND_HALF_DEPTH_M, HAND_HALF_WIDTH_M, 0.0, HAND_LENGTH_M) {
+            consider(ArmPart::Hand, height);
+        }
+        let height_of_link = |number: usize| frames.base_from_link[number - 1].translation.z;
+        consider(ArmPart::Wrist, height_of_link(6) - WRIST_RADIUS_M);
+        consider(ArmPart::Wrist, height_of_link(7) - WRIST_RADIUS_M);
+        consider(ArmPart::Elbow, height_of_link(4) - ELBOW_RADIUS_M);
+        lowest
+    }
+}
+
+impl Trajectory {
+    /// Where the motion comes nearest to a level table at `table_height_m` in the base frame; see [`Panda::clearance`].
+    pub fn clearance(&self, panda: &Panda, table_height_m: f64) -> Clearance {
+        let num_looks = (self.duration_secs() / LOOK_SECS).ceil().max(1.0) as usize;
+        (0..=num_looks)
+            .map(|i| {
+                let time_secs = self.duration_secs() * i as f64 / num_looks as f64;
+                let (q, _, _) = self.sample(time_secs);
+                Clearance { time_secs, ..panda.clearance(&q, table_height_m) }
+            })
+            .min_by(|a, b| a.lowest_m.total_cmp(&b.lowest_m))
+            .expect("there are at least two looks")
+    }
+}
+
+/// Heights of the corners of a box in a frame, from `z_from` to `z_to` along its z.
+fn box_heights(
+    base_from_frame: &Isometry3<f64>,
+    half_x: f64,
+    half_y: f64,
+    z_from: f64,
+    z_to: f64,
+) -> impl Iterator<Item = f64> {
+    [-half_x, half_x].into_iter().flat_map(move |x| {
+        [-half_y, half_y]
+            .into_iter()
+            .flat_map(move |y| [z_from, z_to].into_iter().map(move |z| (base_from_frame * Point3::new(x, y, z)).z))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::{JointLimits, ready_pose};
+
+    #[test]
+    fn in_the_ready_pose_the_finger_tips_are_lowest() {
+        // The tcp is at 0.4869 m with the hand level, see the forward kinematics.
+        let clearance = Panda::new().clearance(&ready_pose(), 0.1);
+        assert_eq!(clearance.part, ArmPart::FingerTips);
+        assert!((clearance.lowest_m - 0.3869).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_hand_lying_on_its_side_touches_with_its_body() {
+        // Joint 6 at 0: the hand points back, level, at 0.697 - 0.088 above the ground, see the forward kinematics; a quarter
+        // turn of joint 7 from the ready pose makes the hand's width of 0.204 m vertical.
+        let mut q = ready_pose();
+        q[5] = 0.0;
+        q[6] += std::f64::consts::FRAC_PI_2;
+        let clearance = Panda::new().clearance(&q, 0.0);
+        assert_eq!(clearance.part, ArmPart::Hand);
+        assert!((clearance.lowest_m - (0.6973 - 0.088 - 0.102)).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_motion_through_the_table_is_seen_in_the_middle() {
+        // Joint 6 swings the hand from back to front about the wrist centre at 0.6973 m. Lowest is an edge of the finger tips,
+        // 0.088 + 0.011 across and 0.107 + 0.1034 along from the wrist centre, when it is straight below.
+        let panda = Panda::new();
+        let (mut start, mut end) = (ready_pose(), ready_pose());
+        start[5] = 0.3;
+        end[5] = 2.9;
+        let trajectory = Trajectory::point_to_point(&start, &end, &JointLimits::franka()).unwrap();
+        let clearance = trajectory.clearance(&panda, 0.4);
+        assert_eq!(clearance.part, ArmPart::FingerTips);
+        assert!((clearance.lowest_m - (0.6973 - 0.099f64.hypot(0.2104) - 0.4)).abs() < 1e-4);
+        assert!(clearance.time_secs > 0.0 && clearance.time_secs < trajectory.duration_secs());
+        let at_ends = [start, end].map(|q| panda.clearance(&q, 0.4).lowest_m);
+        assert!(at_ends[0] > clearance.lowest_m + 0.05 && at_ends[1] > clearance.lowest_m + 0.05);
+    }
+}

@@ -1,0 +1,385 @@
+//! Motions in time: joint positions, velocities and accelerations within the robot's limits.
+//!
+//! - Point to point from rest: all joints in proportion along a straight line in joint space, so the path does not depend on
+//!   the speed, and a clearance found for it holds at any.
+//! - Point to point from a state in motion: each joint on its own profile, all ending at the same time (rsruckig).
+//! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom) stretched in time
+//!   by the smallest factor that keeps every joint's and the tcp's velocity, acceleration and jerk inside their limits.
+
+use rsruckig::prelude::{InputParameter, Ruckig, Synchronization, ThrowErrorHandler};
+
+use crate::check::check_joints;
+use crate::error::KinematicsError;
+use crate::limits::{CartesianLimits, JointLimits, JointVector, NUM_JOINTS};
+use crate::path::JointPath;
+
+/// A motion in time that ends at rest.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    motion: Motion,
+    duration_secs: f64,
+    start: State,
+    end: JointVector,
+}
+
+/// Joint positions (rad), velocities (rad/s) and accelerations (rad/s²).
+type State = (JointVector, JointVector, JointVector);
+
+#[derive(Debug, Clone)]
+enum Motion {
+    Still,
+    /// `q = start + direction · s`.
+    StraightInJointSpace {
+        direction: JointVector,
+        profile: Box<Profile>,
+    },
+    EachJoint(Box<rsruckig::trajectory::Trajectory<NUM_JOINTS>>),
+    AlongPath(Box<TimedPath>),
+}
+
+#[derive(Debug, Clone)]
+struct TimedPath {
+    path: JointPath,
+    profile: Profile,
+    /// Trajectory time over profile time.
+    stretch: f64,
+}
+
+/// A jerk-limited `s(t)` from rest to rest.
+#[derive(Debug, Clone)]
+struct Profile(rsruckig::trajectory::Trajectory<1>);
+
+/// `s` and its derivatives by time.
+#[derive(Debug, Clone, Copy)]
+struct Progress {
+    s: f64,
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+}
+
+impl Trajectory {
+    /// The quickest straight motion in joint space from rest at `start` to rest at `end`.
+    ///
+    /// # Errors
+    /// [`KinematicsError::NotFinite`], or [`KinematicsError::JointOutOfRange`] for an end outside `limits`.
+    pub fn point_to_point(
+        start: &JointVector,
+        end: &JointVector,
+        limits: &JointLimits,
+    ) -> Result<Self, KinematicsError> {
+        check_in_range("start", start, limits)?;
+        check_in_range("end", end, limits)?;
+        let distance = (end - start).amax();
+        if distance < MIN_DISTANCE_RAD {
+            return Ok(Self { motion: Motion::Still, duration_secs: 0.0, start: at_rest(start), end: *end });
+        }
+        // The joint that moves furthest has |direction| = 1; one that hardly moves bounds nothing.
+        let direction = (end - start) / distance;
+        let steepness = direction.abs().add_scalar(f64::MIN_POSITIVE);
+        let bound = |limit: &JointVector| limit.component_div(&steepness).min();
+        let profile = Profile::new(
+            distance,
+            bound(&limits.velocity_max),
+            bound(&limits.acceleration_max),
+            bound(&limits.jerk_max),
+        )?;
+        Ok(Self {
+            duration_secs: profile.duration(),
+            motion: Motion::StraightInJointSpace { direction, profile: Box::new(profile) },
+            start: at_rest(start),
+            end: *end,
+        })
+    }
+
+    /// The quickest motion from a state in motion to rest at `end`, each joint on its own profile, all ending together.
+    ///
+    /// # Units and frames
+    /// rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
+    ///
+    /// # Errors
+    /// As [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] where the state cannot be brought to rest inside
+    /// the position limits.
+    pub fn from_motion(
+        start: &JointVector,
+        start_velocity: &JointVector,
+        start_acceleration: &JointVector,
+        end: &JointVector,
+        limits: &JointLimits,
+    ) -> Result<Self, KinematicsError> {
+        check_in_range("start", start, limits)?;
+        check_in_range("end", end, limits)?;
+        check_joints("start_velocity", start_velocity)?;
+        check_joints("start_acceleration", start_acceleration)?;
+        let mut input = InputParameter::<NUM_JOINTS>::new(None);
+        input.synchronization = Synchronization::Time;
+        for joint_idx in 0..NUM_JOINTS {
+            input.current_position[joint_idx] = start[joint_idx];
+            input.current_velocity[joint_idx] = start_velocity[joint_idx];
+            input.current_acceleration[joint_idx] = start_acceleration[joint_idx];
+            input.target_position[joint_idx] = end[joint_idx];
+            input.max_velocity[joint_idx] = limits.velocity_max[joint_idx];
+            input.max_acceleration[joint_idx] = limits.acceleration_max[joint_idx];
+            input.max_jerk[joint_idx] = limits.jerk_max[joint_idx];
+        }
+        let mut profiles = calculate(&input)?;
+        for (joint_idx, extrema) in profiles.get_position_extrema().iter().enumerate() {
+            for found_rad in [extrema.min, extrema.max] {
+                let mut q = *start;
+                q[joint_idx] = found_rad;
+                if limits.margins(&q)[joint_idx] < -LIMIT_ROUNDING_RAD {
+                    return Err(KinematicsError::JointOutOfRange {
+                        what: "the motion on its way",
+                        violation: limits.violation_at(&q, joint_idx),
+                    });
+                }
+            }
+        }
+        Ok(Self {
+            duration_secs: profiles.duration,
+            motion: Motion::EachJoint(Box::new(profiles)),
+            start: (*start, *start_velocity, *start_acceleration),
+            end: *end,
+        })
+    }
+
+    /// A quick motion from rest to rest along a straight Cartesian path.
+    ///
+    /// Of a few cruising speeds the one with the shortest time is taken; it is not the time optimum, which would brake and
+    /// accelerate along the way.
+    ///
+    /// # Errors
+    /// [`KinematicsError::Trajectory`] where the generator fails.
+    pub fn along_path(
+        path: JointPath,
+        limits: &JointLimits,
+        cartesian_limits: &CartesianLimits,
+    ) -> Result<Self, KinematicsError> {
+        if path.length_m() == 0.0 {
+            let q = *path.start();
+            return Self::point_to_point(&q, &q, limits);
+        }
+        let bounds = Bounds::new(&path, limits, cartesian_limits);
+        let fastest = bounds.fastest(&path);
+        let mut best: Option<(Profile, f64)> = None;
+        for speed_share in CRUISING_SPEED_SHARES {
+            let profile =
+                Profile::new(path.length_m(), fastest.velocity * speed_share, fastest.acceleration, fastest.jerk)?;
+            let stretch = bounds.stretch(&path, &profile);
+            let is_better = best.as_ref().is_none_or(|(p, s)| profile.duration() * stretch < p.duration() * s);
+            if is_better {
+                best = Some((profile, stretch));
+            }
+        }
+        let (profile, stretch) = best.expect("there is at least one cruising speed");
+        Ok(Self {
+            duration_secs: profile.duration() * stretch,
+            start: at_rest(path.start()),
+            end: *path.end(),
+            motion: Motion::AlongPath(Box::new(TimedPath { path, profile, stretch })),
+        })
+    }
+
+    /// How long the motion takes, s.
+    pub fn duration_secs(&self) -> f64 {
+        self.duration_secs
+    }
+
+    /// Where the motion starts.
+    pub fn start(&self) -> &JointVector {
+        &self.start.0
+    }
+
+    /// Where the motion ends.
+    pub fn end(&self) -> &JointVector {
+        &self.end
+    }
+
+    /// Joint positions (rad), velocities (rad/s) and accelerations (rad/s²) at `time_secs`.
+    ///
+    /// Until the start the arm is in its start state, after the end it rests. A time that is not a number reads as the start.
+    pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
+        if time_secs.is_nan() || time_secs <= 0.0 {
+            return self.start;
+        }
+        if time_secs >= self.duration_secs {
+            return at_rest(&self.end);
+        }
+        match &self.motion {
+            Motion::Still => self.start,
+            Motion::StraightInJointSpace { direction, profile } => {
+                let progress = profile.at(time_secs);
+                (
+                    self.start.0 + direction * progress.s,
+                    direction * progress.velocity,
+                    direction * progress.acceleration,
+                )
+            }
+            Motion::EachJoint(profiles) => sample_profiles(profiles, time_secs),
+            Motion::AlongPath(timed) => {
+                let progress = timed.profile.at(time_secs / timed.stretch);
+                let point = timed.path.at(progress.s);
+                let velocity = progress.velocity / timed.stretch;
+                let acceleration = progress.acceleration / timed.stretch.powi(2);
+                (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
+            }
+        }
+    }
+}
+
+fn at_rest(q: &JointVector) -> State {
+    (*q, JointVector::zeros(), JointVector::zeros())
+}
+
+fn check_in_range(what: &'static str, q: &JointVector, limits: &JointLimits) -> Result<(), KinematicsError> {
+    check_joints(what, q)?;
+    match limits.worst_violation(q, LIMIT_ROUNDING_RAD) {
+        None => Ok(()),
+        Some(violation) => Err(KinematicsError::JointOutOfRange { what, violation }),
+    }
+}
+
+/// Shorter motions stand still.
+const MIN_DISTANCE_RAD: f64 = 1e-12;
+/// Positions this far beyond a limit are rounding.
+const LIMIT_ROUNDING_RAD: f64 = 1e-9;
+/// Cruising speeds tried on a path, as shares of what its steepest joint allows.
+const CRUISING_SPEED_SHARES: [f64; 4] = [1.0, 0.75, 0.55, 0.4];
+/// Room between the sampled maximum and the limit, for what lies between samples.
+const HEADROOM: f64 = 1.002;
+const SAMPLES_PER_PHASE: usize = 160;
+
+fn calculate<const DOF: usize>(
+    input: &InputParameter<DOF>,
+) -> Result<rsruckig::trajectory::Trajectory<DOF>, KinematicsError> {
+    // The control cycle only matters for online use.
+    const CYCLE_SECS: f64 = 0.001;
+    let mut trajectory = rsruckig::trajectory::Trajectory::<DOF>::new(None);
+    Ruckig::<DOF, ThrowErrorHandler>::new(None, CYCLE_SECS)
+        .calculate(input, &mut trajectory)
+        .map_err(|error| KinematicsError::Trajectory { reason: error.to_string() })?;
+    Ok(trajectory)
+}
+
+fn sample_profiles(
+    profiles: &rsruckig::trajectory::Trajectory<NUM_JOINTS>,
+    time_secs: f64,
+) -> (JointVector, JointVector, JointVector) {
+    let mut q = JointVector::zeros();
+    let mut qd = JointVector::zeros();
+    let mut qdd = JointVector::zeros();
+    profiles.state_to_integrate_from(time_secs, &mut 0, |joint_idx, t, position, velocity, acceleration, jerk| {
+        let (p, v, a) = rsruckig::util::integrate(t, position, velocity, acceleration, jerk);
+        (q[joint_idx], qd[joint_idx], qdd[joint_idx]) = (p, v, a);
+    });
+    (q, qd, qdd)
+}
+
+impl Profile {
+    fn new(length_m: f64, velocity: f64, acceleration: f64, jerk: f64) -> Result<Self, KinematicsError> {
+        let mut input = InputParameter::<1>::new(None);
+        input.target_position[0] = length_m;
+        input.max_velocity[0] = velocity;
+        input.max_acceleration[0] = acceleration;
+        input.max_jerk[0] = jerk;
+        calculate(&input).map(Self)
+    }
+
+    fn duration(&self) -> f64 {
+        self.0.duration
+    }
+
+    fn at(&self, time: f64) -> Progress {
+        let mut progress = Progress { s: 0.0, velocity: 0.0, acceleration: 0.0, jerk: 0.0 };
+        self.0.state_to_integrate_from(time, &mut 0, |_, t, position, velocity, acceleration, jerk| {
+            let (s, v, a) = rsruckig::util::integrate(t, position, velocity, acceleration, jerk);
+            progress = Progress { s, velocity: v, acceleration: a, jerk };
+        });
+        progress
+    }
+
+    /// Evenly spaced states in each phase of constant jerk, its two ends included: the short phases at the full jerk must
+    /// not fall between samples.
+    fn states(&self) -> impl Iterator<Item = Progress> + '_ {
+        let phases = &self.0.profiles[0][0];
+        (0..phases.t.len()).filter(|i| phases.t[*i] > 0.0).flat_map(move |i| {
+            (0..=SAMPLES_PER_PHASE).map(move |k| {
+                let time = phases.t[i] * k as f64 / SAMPLES_PER_PHASE as f64;
+                let (s, velocity, acceleration) =
+                    rsruckig::util::integrate(time, phases.p[i], phases.v[i], phases.a[i], phases.j[i]);
+                Progress { s, velocity, acceleration, jerk: phases.j[i] }
+            })
+        })
+    }
+}
+
+/// Velocity, acceleration and jerk limits along a path: of the joints and, as two more "joints" that are linear in `s`, of the
+/// tcp's position and orientation.
+struct Bounds<'a> {
+    limits: &'a JointLimits,
+    /// Of `s` itself, from the Cartesian limits.
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+}
+
+impl<'a> Bounds<'a> {
+    fn new(path: &JointPath, limits: &'a JointLimits, cartesian: &CartesianLimits) -> Self {
+        let linear = path.length_m() / path.distance_m();
+        let angular = path.length_m() / path.angle_rad();
+        // A line without translation or without turning divides by zero, and infinity is the right bound.
+        Self {
+            limits,
+            velocity: (cartesian.velocity_m_s * linear).min(cartesian.angular_velocity_rad_s * angular),
+            acceleration: (cartesian.acceleration_m_s2 * linear).min(cartesian.angular_acceleration_rad_s2 * angular),
+            jerk: (cartesian.jerk_m_s3 * linear).min(cartesian.angular_jerk_rad_s3 * angular),
+        }
+    }
+
+    /// What the path would allow if it were straight in joint space too.
+    fn fastest(&self, path: &JointPath) -> Progress {
+        let mut steepest = JointVector::repeat(f64::MIN_POSITIVE);
+        let num_samples = 2 * path.waypoints().len();
+        for i in 0..=num_samples {
+            let point = path.at(path.length_m() * i as f64 / num_samples as f64);
+            steepest = steepest.sup(&point.dq.abs());
+        }
+        Progress {
+            s: 0.0,
+            velocity: self.limits.velocity_max.component_div(&steepest).min().min(self.velocity),
+            acceleration: self.limits.acceleration_max.component_div(&steepest).min().min(self.acceleration),
+            jerk: self.limits.jerk_max.component_div(&steepest).min().min(self.jerk),
+        }
+    }
+
+    /// The factor by which the profile must be stretched in time so that every limit holds, and just holds.
+    ///
+    /// Stretching by k divides velocities by k, accelerations by k², jerks by k³.
+    fn stretch(&self, path: &JointPath, profile: &Profile) -> f64 {
+        let mut velocity: f64 = 0.0;
+        let mut acceleration: f64 = 0.0;
+        let mut jerk: f64 = 0.0;
+        for at in profile.states() {
+            let point = path.at(at.s);
+            let qd = point.dq * at.velocity;
+            let qdd = point.dq * at.acceleration + point.ddq * at.velocity.powi(2);
+            let qddd = point.dq * at.jerk
+                + point.ddq * (3.0 * at.velocity * at.acceleration)
+                + point.dddq * at.velocity.powi(3);
+            velocity = velocity.max(share(&qd, &self.limits.velocity_max)).max(at.velocity.abs() / self.velocity);
+            acceleration = acceleration
+                .max(share(&qdd, &self.limits.acceleration_max))
+                .max(at.acceleration.abs() / self.acceleration);
+            jerk = jerk.max(share(&qddd, &self.limits.jerk_max)).max(at.jerk.abs() / self.jerk);
+        }
+        velocity.max(acceleration.sqrt()).max(jerk.cbrt()) * HEADROOM
+    }
+}
+
+/// The largest share of its limit that a joint takes.
+fn share(values: &JointVector, limits: &JointVector) -> f64 {
+    values.abs().component_div(limits).max()
+}
+
+#[cfg(test)]
+mod tests;
