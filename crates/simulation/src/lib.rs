@@ -28,21 +28,29 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod camera;
+mod controller;
 mod data;
 mod egl;
 mod error;
+mod extent;
+mod gripper;
 mod guard;
 mod model;
 pub mod objects;
 mod panda;
+mod perception;
 mod render;
 pub mod scene;
 
 pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
+pub use controller::{ArmController, ArmReference};
 pub use data::{Contact, Data};
 pub use error::{Result, SimulationError};
+pub use extent::lowest_point_m;
+pub use gripper::{Gripper, MAX_FINGER_FORCE_N};
 pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };
+pub use perception::{GraspTarget, Perception};
 pub use render::{RenderConfig, Renderer, Segmentation};

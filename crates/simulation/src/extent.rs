@@ -1,0 +1,95 @@
+//! How low a body reaches.
+
+use nalgebra::Vector3;
+use sdg_mujoco_sys as mj;
+
+use crate::data::Data;
+use crate::model::{Body, Geom, Id};
+
+/// Height of the lowest point of a body's solid shapes in the world, in metres.
+///
+/// Solid are the shapes that can touch something; what is only seen does not count. Bodies without
+/// any have their origin's height.
+pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
+    let model = data.model();
+    let raw = model.raw();
+    model
+        .ids::<Geom>()
+        .filter(|&geom| model.body_of(geom) == body)
+        .filter(|geom| {
+            // SAFETY: both arrays have `ngeom` entries.
+            unsafe { *raw.geom_contype.add(geom.index()) != 0 || *raw.geom_conaffinity.add(geom.index()) != 0 }
+        })
+        .map(|geom| {
+            let pose = data.world_from_geom(geom);
+            // Downwards as seen from the geom.
+            let down = pose.rotation.inverse() * -Vector3::z();
+            pose.translation.z - reach(raw, geom.index(), &down)
+        })
+        .reduce(f64::min)
+        .unwrap_or_else(|| data.world_from_body(body).translation.z)
+}
+
+/// How far a geom reaches from its centre in a direction of its own frame (its support function).
+fn reach(raw: &mj::mjModel, geom: usize, direction: &Vector3<f64>) -> f64 {
+    // SAFETY: `geom_type` and `geom_dataid` have `ngeom` entries, `geom_size` three times as many.
+    let (kind, size, mesh) = unsafe {
+        (
+            *raw.geom_type.add(geom) as u32,
+            *raw.geom_size.add(3 * geom).cast::<[f64; 3]>(),
+            *raw.geom_dataid.add(geom),
+        )
+    };
+    let across = direction.x.hypot(direction.y);
+    match kind {
+        mj::mjGEOM_SPHERE => size[0],
+        mj::mjGEOM_CAPSULE => size[0] + size[1] * direction.z.abs(),
+        mj::mjGEOM_CYLINDER => size[0] * across + size[1] * direction.z.abs(),
+        mj::mjGEOM_BOX => direction.abs().dot(&Vector3::from(size)),
+        mj::mjGEOM_ELLIPSOID => direction.component_mul(&Vector3::from(size)).norm(),
+        mj::mjGEOM_MESH if mesh >= 0 => {
+            // SAFETY: the mesh's vertices are `mesh_vertnum` triples from `mesh_vertadr` on.
+            let vertices = unsafe {
+                let first = *raw.mesh_vertadr.add(mesh as usize) as usize;
+                let count = *raw.mesh_vertnum.add(mesh as usize) as usize;
+                std::slice::from_raw_parts(raw.mesh_vert.add(3 * first), 3 * count)
+            };
+            vertices
+                .chunks_exact(3)
+                .map(|v| direction.x * f64::from(v[0]) + direction.y * f64::from(v[1]) + direction.z * f64::from(v[2]))
+                .fold(0.0, f64::max)
+        }
+        // Planes and height fields do not move; no part has one.
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::model::Model;
+
+    fn lowest(geom: &str) -> f64 {
+        let xml = format!("<mujoco><compiler angle='degree'/><worldbody><body name='b' pos='0 0 1'>{geom}</body></worldbody></mujoco>");
+        let data = Data::new(Arc::new(Model::from_xml(&xml, &[]).unwrap())).unwrap();
+        lowest_point_m(&data, data.model().id("b").unwrap())
+    }
+
+    #[test]
+    fn solids_reach_as_low_as_geometry_says() {
+        let half = 0.5_f64.sqrt();
+        for (geom, expected) in [
+            ("<geom type='sphere' size='.1' pos='0 0 .2'/>", 1.1),
+            ("<geom type='box' size='.1 .2 .3' euler='45 0 0'/>", 1.0 - 0.5 * half),
+            ("<geom type='cylinder' size='.1 .2' euler='90 0 0'/>", 0.9),
+            ("<geom type='capsule' size='.1 .2' euler='45 0 0'/>", 1.0 - 0.1 - 0.2 * half),
+            ("<geom type='ellipsoid' size='.1 .2 .3' euler='90 0 0'/>", 0.8),
+            ("<geom type='sphere' size='.3' contype='0' conaffinity='0'/><geom type='sphere' size='.1'/>", 0.9),
+            ("", 1.0),
+        ] {
+            assert!((lowest(geom) - expected).abs() < 1e-9, "{geom}: {} is not {expected}", lowest(geom));
+        }
+    }
+}
