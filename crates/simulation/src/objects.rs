@@ -1,0 +1,375 @@
+//! The parts that are grasped: what they weigh, where they are marked and held, and their MJCF.
+//!
+//! A part is a folder with `object.json` (numbers and marks, see [`ObjectSpec`]), `object.xml` (MJCF with one body
+//! named `object` and its free joint `object_joint`) and the meshes and textures that the MJCF names. The parts of
+//! `datasets/objects` are compiled in; any other folder can be read by [`ObjectSpec::from_folder`].
+//!
+//! The **object frame** has z up as the part rests on the table. The **marks** `grasp_start` and `grasp_end` lie
+//! along the part's axis where the gripper holds it: the jaws close across the line between them, and the tool
+//! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+
+use crate::error::{Result, SimulationError};
+use crate::model::Asset;
+use crate::scene::MjcfFragment;
+use crate::scene::pose_attributes;
+
+/// Version of `object.json` that this reader understands.
+pub const OBJECT_FORMAT: u32 = 1;
+
+/// The widest part that the Panda's hand can take, in metres.
+pub const LARGEST_JAW_WIDTH_M: f64 = 0.08;
+
+/// The body tag that every `object.xml` has once; the part's pose is written into it.
+const BODY_TAG: &str = "<body name=\"object\">";
+
+/// One part: its numbers in metres and kilograms, its marks in the object frame, its MJCF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObjectSpec {
+    /// Name at the command line, such as `fuel_line`.
+    pub name: String,
+    /// Name for people, such as "Fuel line".
+    pub title: String,
+    /// What the part is.
+    pub description: String,
+    /// Mass in kilograms.
+    pub mass_kg: f64,
+    /// Coefficient of sliding friction of its surface.
+    pub friction: f64,
+    /// First mark, in the object frame.
+    pub grasp_start: Point3<f64>,
+    /// Second mark, in the object frame.
+    pub grasp_end: Point3<f64>,
+    /// Width of the part between the jaws.
+    pub jaw_width_m: f64,
+    /// Height of the tool centre point over the table when the part is held.
+    pub grasp_height_m: f64,
+    /// Height of the marks over the table: the plane on which marks in a picture are to be placed.
+    ///
+    /// For a round bar this is the height of its axis, since its outline in a picture stays centred on the axis
+    /// from wherever above it is seen.
+    pub mark_height_m: f64,
+    /// Height of the object frame's origin over the table as the part rests.
+    pub rest_height_m: f64,
+    /// Which turns about z leave the part looking the same.
+    pub symmetry: Symmetry,
+    /// The convex hull of the part from above, counter-clockwise, in the object frame.
+    pub footprint: Vec<Point2<f64>>,
+    mjcf: String,
+    files: Vec<Asset>,
+}
+
+/// Turns about the vertical that cannot be seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Symmetry {
+    /// Every direction looks different.
+    None,
+}
+
+/// `object.json` as it is written.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Metadata {
+    format: u32,
+    name: String,
+    title: String,
+    description: String,
+    mass_kg: f64,
+    friction: f64,
+    grasp_start: [f64; 3],
+    grasp_end: [f64; 3],
+    jaw_width_m: f64,
+    grasp_height_m: f64,
+    mark_height_m: f64,
+    rest_height_m: f64,
+    symmetry: Symmetry,
+    footprint: Vec<[f64; 2]>,
+    mjcf: String,
+}
+
+macro_rules! embedded {
+    ($($name:literal: [$($file:literal),* $(,)?]),* $(,)?) => {
+        &[$(($name, &[$((
+            $file,
+            include_bytes!(concat!("../../../datasets/objects/", $name, "/", $file)),
+        )),*])),*]
+    };
+}
+
+/// A file's name and bytes, compiled in.
+type EmbeddedFile = (&'static str, &'static [u8]);
+
+/// Name and files of every part that is compiled in.
+const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
+    "pendulum": [
+        "object.json", "object.xml",
+        "pendulum_body.obj", "pendulum_raised.obj", "pendulum_bushing.obj", "pendulum_slug.obj",
+        "pendulum_printed.png", "pendulum_steel.png", "pendulum_brass.png",
+    ],
+    "fuel_line": [
+        "object.json", "object.xml",
+        "fuel_line_tube.obj", "fuel_line_nuts.obj", "fuel_line_ends.obj", "fuel_line_clip.obj",
+        "fuel_line_tube.png", "fuel_line_zinc.png", "fuel_line_steel.png", "fuel_line_plastic.png",
+    ],
+    "rod_end": [
+        "object.json", "object.xml",
+        "rod_end_housing.obj", "rod_end_liner.obj", "rod_end_ball.obj",
+        "rod_end_neck.obj", "rod_end_screw.obj", "rod_end_plated.obj",
+        "rod_end_forged.png", "rod_end_bronze.png", "rod_end_polished.png",
+        "rod_end_rolled.png", "rod_end_plated.png",
+    ],
+};
+
+impl ObjectSpec {
+    /// The names of the parts that are compiled in.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        EMBEDDED.iter().map(|(name, _)| *name)
+    }
+
+    /// One of the parts that are compiled in.
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`] with the names that exist.
+    pub fn by_name(name: &str) -> Result<Self> {
+        let Some((_, files)) = EMBEDDED.iter().find(|(known, _)| *known == name) else {
+            return Err(SimulationError::UnknownName {
+                kind: "part",
+                name: name.to_owned(),
+                existing: Self::names().map(str::to_owned).collect(),
+            });
+        };
+        Self::read(Path::new(name), |file| {
+            files
+                .iter()
+                .find(|(known, _)| *known == file)
+                .map(|(_, bytes)| Cow::Borrowed(*bytes))
+                .ok_or_else(|| "not compiled in".to_owned())
+        })
+    }
+
+    /// A part of one's own, from its folder.
+    ///
+    /// # Errors
+    /// [`SimulationError::File`] when a file is missing, cannot be read or does not say what it must.
+    pub fn from_folder(folder: &Path) -> Result<Self> {
+        Self::read(folder, |file| {
+            std::fs::read(folder.join(file)).map(Cow::Owned).map_err(|error| error.to_string())
+        })
+    }
+
+    fn read<'a>(folder: &Path, read: impl Fn(&str) -> std::result::Result<Cow<'a, [u8]>, String>) -> Result<Self> {
+        let fail = |file: &str, reason: String| SimulationError::File { path: folder.join(file), reason };
+        let load = |file: &str| read(file).map_err(|reason| fail(file, reason));
+
+        let metadata: Metadata =
+            serde_json::from_slice(&load("object.json")?).map_err(|error| fail("object.json", error.to_string()))?;
+        metadata.check().map_err(|reason| fail("object.json", reason))?;
+
+        let mjcf_name = metadata.mjcf.as_str();
+        let text = String::from_utf8(load(mjcf_name)?.into_owned()).map_err(|error| fail(mjcf_name, error.to_string()))?;
+        let mjcf = sections_of(&text).map_err(|reason| fail(mjcf_name, reason))?;
+        let mut files = Vec::new();
+        for name in files_named_in(mjcf) {
+            if name.is_empty() || name.contains(['/', '\\']) {
+                return Err(fail(mjcf_name, format!("file {name:?}: expected a plain file name beside the MJCF")));
+            }
+            if !files.iter().any(|asset: &Asset| asset.name == name) {
+                files.push(Asset { name: name.to_owned(), bytes: load(name)?.into_owned() });
+            }
+        }
+        let mjcf = mjcf.to_owned();
+        Ok(Self {
+            name: metadata.name,
+            title: metadata.title,
+            description: metadata.description,
+            mass_kg: metadata.mass_kg,
+            friction: metadata.friction,
+            grasp_start: metadata.grasp_start.into(),
+            grasp_end: metadata.grasp_end.into(),
+            jaw_width_m: metadata.jaw_width_m,
+            grasp_height_m: metadata.grasp_height_m,
+            mark_height_m: metadata.mark_height_m,
+            rest_height_m: metadata.rest_height_m,
+            symmetry: metadata.symmetry,
+            footprint: metadata.footprint.into_iter().map(Point2::from).collect(),
+            mjcf,
+            files,
+        })
+    }
+
+    /// The pose in which the part rests on the table (z = 0) with its origin over (x, y) and turned by `yaw_rad`.
+    pub fn base_from_object(&self, x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::new(x, y, self.rest_height_m),
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad),
+        )
+    }
+
+    /// The two marks in the base frame.
+    pub fn marks_in_base(&self, base_from_object: &Isometry3<f64>) -> [Point3<f64>; 2] {
+        [base_from_object * self.grasp_start, base_from_object * self.grasp_end]
+    }
+
+    /// Where the tool centre point goes for a part at rest, and the direction of the marked line in the base frame
+    /// (radians about z from x); the jaws close across that direction.
+    pub fn grasp_in_base(&self, base_from_object: &Isometry3<f64>) -> (Point3<f64>, f64) {
+        let [start, end] = self.marks_in_base(base_from_object);
+        let middle = nalgebra::center(&start, &end);
+        let along = end - start;
+        (Point3::new(middle.x, middle.y, self.grasp_height_m), along.y.atan2(along.x))
+    }
+
+    /// The part's MJCF at a pose: body `object`, joint `object_joint`, geoms `object_visual_*` and `object_collision_*`.
+    pub fn fragment(&self, base_from_object: &Isometry3<f64>) -> MjcfFragment {
+        let placed = format!("<body name=\"object\" {}>", pose_attributes(base_from_object));
+        MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }
+    }
+}
+
+impl Metadata {
+    /// Checks what the types leave open; the error names the field, what was expected and what was found.
+    fn check(&self) -> std::result::Result<(), String> {
+        if self.format != OBJECT_FORMAT {
+            return Err(format!("format: expected {OBJECT_FORMAT}, found {}", self.format));
+        }
+        let ranges = [
+            ("mass_kg", self.mass_kg, 1e-4, 3.0),
+            ("friction", self.friction, 0.01, 5.0),
+            ("jaw_width_m", self.jaw_width_m, 1e-3, LARGEST_JAW_WIDTH_M),
+            ("grasp_height_m", self.grasp_height_m, 0.0, 0.5),
+            ("mark_height_m", self.mark_height_m, 0.0, 0.5),
+            ("rest_height_m", self.rest_height_m, -0.5, 0.5),
+        ];
+        for (field, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(format!("{field}: expected {low} to {high}, found {value}"));
+            }
+        }
+        let (start, end) = (Point3::from(self.grasp_start), Point3::from(self.grasp_end));
+        let length = (end.xy() - start.xy()).norm();
+        if !(length >= 1e-3) {
+            return Err(format!("grasp_start, grasp_end: expected marks at least 0.001 m apart, found {length} m"));
+        }
+        if self.footprint.len() < 3 || self.footprint.iter().flatten().any(|value| !value.is_finite()) {
+            return Err(format!("footprint: expected three or more finite points, found {:?}", self.footprint));
+        }
+        Ok(())
+    }
+}
+
+/// What stands inside the `<mujoco>` element.
+fn sections_of(text: &str) -> std::result::Result<&str, String> {
+    let inside = text
+        .find("<mujoco")
+        .and_then(|open| Some(open + text[open..].find('>')? + 1))
+        .zip(text.rfind("</mujoco>"))
+        .filter(|(from, to)| from <= to)
+        .map(|(from, to)| &text[from..to])
+        .ok_or("expected a <mujoco> element")?;
+    let bodies = inside.matches(BODY_TAG).count();
+    if bodies != 1 {
+        return Err(format!("expected {BODY_TAG} once, found it {bodies} times"));
+    }
+    if !inside.contains("name=\"object_joint\"") {
+        return Err("expected a free joint named object_joint in the body".to_owned());
+    }
+    Ok(inside)
+}
+
+/// The values of all `file="…"` attributes.
+fn files_named_in(mjcf: &str) -> impl Iterator<Item = &str> {
+    mjcf.split(" file=\"").skip(1).filter_map(|rest| rest.split('"').next())
+}
+
+/// The folder of this repository that holds the parts, for tools that write there.
+pub fn source_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/objects")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    #[test]
+    fn every_part_compiled_in_reads_and_equals_its_folder() {
+        assert_eq!(ObjectSpec::names().collect::<Vec<_>>(), ["pendulum", "fuel_line", "rod_end"]);
+        for name in ObjectSpec::names() {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            assert_eq!(spec.name, name);
+            assert!(spec.mass_kg < 1.0 && spec.jaw_width_m < 0.03);
+            assert_eq!(spec, ObjectSpec::from_folder(&source_folder().join(name)).unwrap());
+        }
+    }
+
+    #[test]
+    fn grasp_turns_with_the_part() {
+        let spec = ObjectSpec::by_name("pendulum").unwrap();
+        let base_from_object = spec.base_from_object(0.5, -0.1, std::f64::consts::FRAC_PI_2);
+        let (tcp, direction) = spec.grasp_in_base(&base_from_object);
+        assert_relative_eq!(tcp, Point3::new(0.5, -0.1, spec.grasp_height_m), epsilon = 1e-12);
+        assert_relative_eq!(direction, std::f64::consts::FRAC_PI_2, epsilon = 1e-12);
+        let [start, end] = spec.marks_in_base(&base_from_object);
+        assert!(start.y < end.y && (start.z - spec.mark_height_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_part_looks_the_same_after_half_a_turn() {
+        for name in ObjectSpec::names() {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            // The outline reaches clearly further on one side of the grasp than the half-turned outline does.
+            let reach = |direction: f64| {
+                let (sin, cos) = direction.sin_cos();
+                spec.footprint.iter().map(|p| p.x * cos + p.y * sin).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let widest = (0..180)
+                .map(|degrees| f64::from(degrees).to_radians())
+                .map(|angle| (reach(angle) - reach(angle + std::f64::consts::PI)).abs())
+                .fold(0.0, f64::max);
+            assert!(widest > 0.004, "{name}: outline differs by {widest} m only");
+        }
+    }
+
+    #[test]
+    fn unknown_name_lists_the_parts() {
+        let message = ObjectSpec::by_name("piston").unwrap_err().to_string();
+        assert!(message.contains("piston") && message.contains("rod_end"), "{message}");
+    }
+
+    #[test]
+    fn bad_metadata_names_the_field() {
+        let good = std::fs::read_to_string(source_folder().join("pendulum/object.json")).unwrap();
+        for (from, to, expected) in [
+            ("\"format\": 1", "\"format\": 7", "format: expected 1, found 7"),
+            ("\"jaw_width_m\": 0.016", "\"jaw_width_m\": 0.09", "jaw_width_m: expected 0.001 to 0.08, found 0.09"),
+            ("\"symmetry\": \"none\"", "\"symmetry\": \"some\"", "some"),
+            ("\"mass_kg\"", "\"mass\"", "mass"),
+            ("\"object.xml\"", "\"absent.xml\"", "absent.xml"),
+        ] {
+            assert!(good.contains(from), "{from}");
+            let folder = std::env::temp_dir().join(format!("sdg-object-{}-{}", std::process::id(), to.len()));
+            std::fs::create_dir_all(&folder).unwrap();
+            std::fs::write(folder.join("object.json"), good.replace(from, to)).unwrap();
+            let message = ObjectSpec::from_folder(&folder).unwrap_err().to_string();
+            std::fs::remove_dir_all(&folder).unwrap();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn bad_mjcf_is_refused() {
+        let body = "<body name=\"object\"><freejoint name=\"object_joint\"/></body>";
+        assert!(sections_of(&format!("<mujoco model=\"a\">{body}</mujoco>")).is_ok());
+        assert!(sections_of(&format!("<mujoco>{body}{body}</mujoco>")).unwrap_err().contains("2 times"));
+        assert!(sections_of("<mujoco><body name=\"object\"/></mujoco>").is_err());
+        assert!(sections_of(body).is_err());
+        assert!(sections_of("</mujoco><mujoco").is_err());
+    }
+}

@@ -1,0 +1,77 @@
+//! What a thing covers on the table: convex outlines seen from above, and whether two of them keep apart.
+
+use nalgebra::{Isometry2, Point2, Vector2};
+
+/// The convex hull of points, counter-clockwise, without points on its edges (Andrew's monotone chain).
+pub fn convex_hull(points: impl IntoIterator<Item = Point2<f64>>) -> Vec<Point2<f64>> {
+    let mut points: Vec<Point2<f64>> = points.into_iter().collect();
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let turns_left = |a: Point2<f64>, b: Point2<f64>, c: Point2<f64>| (b - a).perp(&(c - a)) > 1e-12;
+    let half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
+        let mut chain: Vec<Point2<f64>> = Vec::new();
+        for point in points {
+            while chain.len() >= 2 && !turns_left(chain[chain.len() - 2], chain[chain.len() - 1], point) {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop();
+        chain
+    };
+    let mut hull = half(&mut points.iter().copied());
+    hull.extend(half(&mut points.iter().rev().copied()));
+    hull
+}
+
+/// Moves an outline to its place on the table.
+pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> Vec<Point2<f64>> {
+    outline.iter().map(|point| table_from_outline * point).collect()
+}
+
+/// The widest gap between two convex outlines along any of their edges' normals; negative when they overlap.
+///
+/// It is the true distance for outlines that face each other with an edge, and less than it otherwise.
+pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
+    let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
+        points.iter().map(|point| normal.dot(&point.coords)).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+            (low.min(at), high.max(at))
+        })
+    };
+    let gaps = |from: &[Point2<f64>], to: &[Point2<f64>]| {
+        (0..from.len())
+            .map(|idx| {
+                let edge = from[(idx + 1) % from.len()] - from[idx];
+                let normal = Vector2::new(edge.y, -edge.x).normalize();
+                along(&normal, to).0 - along(&normal, from).1
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    gaps(a, b).max(gaps(b, a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn square(x: f64, y: f64) -> Vec<Point2<f64>> {
+        convex_hull([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5), (0.5, 0.0)].map(|(u, v)| Point2::new(x + u, y + v)))
+    }
+
+    #[test]
+    fn hull_keeps_the_corners_only() {
+        assert_eq!(square(0.0, 0.0), [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Point2::new(x, y)));
+    }
+
+    #[test]
+    fn squares_are_as_far_apart_as_they_look() {
+        assert_relative_eq!(separation(&square(0.0, 0.0), &square(1.25, 0.3)), 0.25);
+        assert_relative_eq!(separation(&square(0.0, 0.0), &square(0.75, 0.9)), -0.1);
+        let turned = placed(&square(-0.5, -0.5), &Isometry2::new(Vector2::new(2.0, 0.5), std::f64::consts::FRAC_PI_4));
+        assert_relative_eq!(separation(&square(0.0, 0.0), &turned), 1.0 - 0.5 * 2f64.sqrt(), epsilon = 1e-12);
+    }
+}

@@ -1,0 +1,134 @@
+//! How the workcell is lit.
+
+use nalgebra::{Point3, Vector3};
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+
+use super::fragment::MjcfFragment;
+use super::texture::Colour;
+
+/// The middle of the table's part that the camera sees, which lamps are aimed at (metres, base frame).
+const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
+
+/// A lamp above the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lamp {
+    /// Where it hangs, in metres in the base frame.
+    pub position: Point3<f64>,
+    /// Where it points.
+    pub target: Point3<f64>,
+    /// Its colour times its strength, each channel from 0 to 1.
+    pub diffuse: Colour,
+    /// Strength of the highlights that it makes.
+    pub specular: f64,
+    /// Half of its cone's angle in degrees.
+    pub cutoff_deg: f64,
+    /// Whether it casts shadows.
+    pub casts_shadows: bool,
+}
+
+/// All light of a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lighting {
+    /// Light from everywhere.
+    pub ambient: Colour,
+    /// Light from the camera's own direction: the diffuse light of a bright hall.
+    pub from_camera: Colour,
+    /// The lamps.
+    pub lamps: Vec<Lamp>,
+}
+
+impl Lighting {
+    /// The even light under which parts are shown to the system.
+    pub fn nominal() -> Self {
+        let lamp = |x: f64, y: f64, strength: f64, casts_shadows: bool| Lamp {
+            position: Point3::new(x, y, 1.5),
+            target: AIM,
+            diffuse: [strength; 3],
+            specular: 0.5,
+            cutoff_deg: 50.0,
+            casts_shadows,
+        };
+        Self {
+            ambient: [0.32; 3],
+            from_camera: [0.16; 3],
+            lamps: vec![lamp(0.1, 0.7, 0.42, true), lamp(0.9, -0.6, 0.16, false)],
+        }
+    }
+
+    /// One to three lamps anywhere above, of warm to cold white, strong or weak, and more or less light from around.
+    pub fn sample(rng: &mut Pcg64Mcg) -> Self {
+        let tint = |rng: &mut Pcg64Mcg| {
+            let warmth = rng.random_range(-1.0..1.0);
+            [1.0 + 0.08 * warmth, 1.0, 1.0 - 0.10 * warmth]
+        };
+        let scaled = |colour: Colour, strength: f64| colour.map(|channel| (channel * strength).clamp(0.0, 1.0));
+        // The light of lamps and surroundings together stays within what a camera's exposure would take in.
+        let total = rng.random_range(0.62..1.10);
+        let surrounding = rng.random_range(0.32..0.62);
+        let num_lamps = rng.random_range(1..=3);
+        let shares: Vec<f64> = (0..num_lamps).map(|_| rng.random_range(0.3..1.0)).collect();
+        let sum: f64 = shares.iter().sum();
+        let tint_of_hall = tint(rng);
+        let lamps = shares
+            .iter()
+            .enumerate()
+            .map(|(idx, share)| {
+                let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
+                let elevation: f64 = rng.random_range(40f64..80.0).to_radians();
+                let distance = rng.random_range(1.1..1.9);
+                let direction = Vector3::new(
+                    azimuth.cos() * elevation.cos(),
+                    azimuth.sin() * elevation.cos(),
+                    elevation.sin(),
+                );
+                let aside = Vector3::new(rng.random_range(-0.12..0.12), rng.random_range(-0.12..0.12), 0.0);
+                Lamp {
+                    position: AIM + direction * distance,
+                    target: AIM + aside,
+                    diffuse: scaled(tint(rng), total * (1.0 - surrounding) * share / sum / elevation.sin()),
+                    specular: rng.random_range(0.2..0.9) * share,
+                    cutoff_deg: rng.random_range(40.0..60.0),
+                    // Two shadows at most: a third cannot be told from them and costs another pass.
+                    casts_shadows: idx < 2,
+                }
+            })
+            .collect();
+        Self {
+            ambient: scaled(tint_of_hall, total * surrounding * 0.7),
+            from_camera: scaled(tint_of_hall, total * surrounding * 0.3),
+            lamps,
+        }
+    }
+
+    pub(super) fn fragment(&self) -> MjcfFragment {
+        let rgb = |colour: Colour| format!("{:.4} {:.4} {:.4}", colour[0], colour[1], colour[2]);
+        let mut fragment = MjcfFragment::default();
+        fragment.write(format_args!(
+            "<visual><headlight ambient=\"{}\" diffuse=\"{}\" specular=\"0.05 0.05 0.05\"/>\
+             <quality shadowsize=\"2048\" numquads=\"24\" offsamples=\"4\"/>\
+             <map znear=\"0.005\" shadowscale=\"0.8\"/></visual>",
+            rgb(self.ambient),
+            rgb(self.from_camera)
+        ));
+        for (idx, lamp) in self.lamps.iter().enumerate() {
+            let (p, d) = (lamp.position, (lamp.target - lamp.position).normalize());
+            fragment.write(format_args!(
+                "<worldbody><light name=\"lamp_{idx}\" pos=\"{:.4} {:.4} {:.4}\" dir=\"{:.5} {:.5} {:.5}\" \
+                 diffuse=\"{}\" specular=\"{}\" ambient=\"0 0 0\" cutoff=\"{:.2}\" exponent=\"1\" \
+                 castshadow=\"{}\"/></worldbody>",
+                p.x,
+                p.y,
+                p.z,
+                d.x,
+                d.y,
+                d.z,
+                rgb(lamp.diffuse),
+                rgb([lamp.specular; 3]),
+                lamp.cutoff_deg,
+                lamp.casts_shadows
+            ));
+        }
+        fragment
+    }
+}

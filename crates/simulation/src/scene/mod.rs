@@ -1,0 +1,237 @@
+//! What stands on the table and how it is lit, varied by seed.
+//!
+//! ```text
+//! seed ─> SceneVariation { object at a pose, Lighting, Table, distractors } ─> MjcfFragment ─> Workcell
+//!              shapes: solids ─> mesh            surfaces: texture
+//! ```
+//!
+//! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene draws from a stream of its
+//! own: another number of distractors leaves the lamps as they were. The same seed gives the same scene to the bit.
+
+mod distractor;
+pub mod footprint;
+mod fragment;
+mod light;
+pub mod mesh;
+pub mod solids;
+mod table;
+pub mod texture;
+
+use std::ops::{Range, RangeInclusive};
+
+use nalgebra::{Isometry2, Isometry3, Point2, Vector2};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::objects::ObjectSpec;
+
+pub use distractor::{Distractor, DistractorKind};
+pub use fragment::{MjcfFragment, pose_attributes};
+pub use light::{Lamp, Lighting};
+pub use table::{Table, TableSurface};
+
+/// Within what a scene is varied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VariationConfig {
+    /// Where the object's grasp may lie, along the base's x, in metres.
+    pub object_x_m: Range<f64>,
+    /// Where the object's grasp may lie, along the base's y, in metres.
+    pub object_y_m: Range<f64>,
+    /// How many distractors there are.
+    pub distractors: RangeInclusive<usize>,
+    /// Least distance between any two things on the table, in metres.
+    pub clearance_m: f64,
+    /// Whether lamps, table and their colours change too, or stay nominal.
+    pub appearance: bool,
+}
+
+impl Default for VariationConfig {
+    fn default() -> Self {
+        Self {
+            object_x_m: 0.38..0.62,
+            object_y_m: -0.18..0.18,
+            distractors: 0..=6,
+            clearance_m: 0.006,
+            appearance: true,
+        }
+    }
+}
+
+/// The object at its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacedObject {
+    /// Which part.
+    pub spec: ObjectSpec,
+    /// Where it rests, in the robot's base frame.
+    pub base_from_object: Isometry3<f64>,
+}
+
+/// All that can change about a scene, apart from the robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneVariation {
+    /// The part to grasp; `None` for a table without it.
+    pub object: Option<PlacedObject>,
+    /// The light.
+    pub lighting: Lighting,
+    /// The table.
+    pub table: Table,
+    /// Other parts.
+    pub distractors: Vec<Distractor>,
+}
+
+/// Independent streams of random numbers, one for each aspect.
+#[derive(Clone, Copy)]
+enum Stream {
+    Object = 1,
+    Light = 2,
+    Table = 3,
+    Distractors = 4,
+}
+
+impl Stream {
+    fn rng(self, seed: u64) -> Pcg64Mcg {
+        // An odd multiplier spreads neighbouring seeds; the stream's number then keeps the aspects apart.
+        Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(self as u64))
+    }
+}
+
+impl SceneVariation {
+    /// The scene in which parts are shown to the system: even light, light table, nothing else.
+    pub fn nominal(object: Option<(&ObjectSpec, Isometry3<f64>)>) -> Self {
+        Self {
+            object: object.map(|(spec, base_from_object)| PlacedObject { spec: spec.clone(), base_from_object }),
+            lighting: Lighting::nominal(),
+            table: Table::nominal(),
+            distractors: Vec::new(),
+        }
+    }
+
+    /// A scene of its seed: the object, if given, at any place and turn; light, table and distractors at random.
+    pub fn sample(object: Option<&ObjectSpec>, config: &VariationConfig, seed: u64) -> Self {
+        let rng = &mut Stream::Object.rng(seed);
+        let object = object.map(|spec| {
+            let (x, y) = (rng.random_range(config.object_x_m.clone()), rng.random_range(config.object_y_m.clone()));
+            let yaw = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
+            PlacedObject { spec: spec.clone(), base_from_object: spec.base_from_object(x, y, yaw) }
+        });
+        let (lighting, table) = if config.appearance {
+            (Lighting::sample(&mut Stream::Light.rng(seed)), Table::sample(&mut Stream::Table.rng(seed)))
+        } else {
+            (Lighting::nominal(), Table::nominal())
+        };
+        let distractors = sample_distractors(object.as_ref(), config, &mut Stream::Distractors.rng(seed));
+        Self { object, lighting, table, distractors }
+    }
+
+    /// The scene as MJCF sections and the files that they name.
+    pub fn fragment(&self) -> MjcfFragment {
+        let mut fragment = self.lighting.fragment();
+        fragment.append(self.table.fragment());
+        if let Some(object) = &self.object {
+            fragment.append(object.spec.fragment(&object.base_from_object));
+        }
+        for (index, distractor) in self.distractors.iter().enumerate() {
+            fragment.append(distractor.fragment(index));
+        }
+        fragment
+    }
+}
+
+impl PlacedObject {
+    /// The part's convex outline from above, in the base frame.
+    pub fn footprint(&self) -> Vec<Point2<f64>> {
+        footprint::placed(&self.spec.footprint, &self.table_from_object())
+    }
+
+    /// What the open gripper covers when it comes down on the marks.
+    pub fn gripper_footprint(&self) -> Vec<Point2<f64>> {
+        let (centre, direction) = self.spec.grasp_in_base(&self.base_from_object);
+        let table_from_gripper = Isometry2::new(centre.xy().coords, direction);
+        footprint::placed(&GRIPPER_FOOTPRINT.map(Point2::from), &table_from_gripper)
+    }
+
+    fn table_from_object(&self) -> Isometry2<f64> {
+        let x_axis = self.base_from_object.rotation * nalgebra::Vector3::x();
+        Isometry2::new(self.base_from_object.translation.vector.xy(), x_axis.y.atan2(x_axis.x))
+    }
+}
+
+/// Room for two fingers opened to 0.08 m and their thickness: x along the marks, y along which the jaws close.
+const GRIPPER_FOOTPRINT: [[f64; 2]; 4] = [[-0.016, -0.062], [0.016, -0.062], [0.016, 0.062], [-0.016, 0.062]];
+
+/// Attempts to find a free place for one distractor before the table counts as full.
+const PLACEMENT_TRIES: usize = 40;
+
+/// How far distractors spread beyond where the object may lie, in metres.
+const DISTRACTOR_MARGIN_M: f64 = 0.05;
+
+fn sample_distractors(object: Option<&PlacedObject>, config: &VariationConfig, rng: &mut Pcg64Mcg) -> Vec<Distractor> {
+    let mut taken: Vec<Vec<Point2<f64>>> =
+        object.map(|object| vec![object.footprint(), object.gripper_footprint()]).unwrap_or_default();
+    let spread = |range: &Range<f64>| range.start - DISTRACTOR_MARGIN_M..range.end + DISTRACTOR_MARGIN_M;
+    let (x_range, y_range) = (spread(&config.object_x_m), spread(&config.object_y_m));
+    let wanted = rng.random_range(config.distractors.clone());
+    let mut distractors = Vec::with_capacity(wanted);
+    for _ in 0..wanted {
+        let kind = DistractorKind::ALL[rng.random_range(0..DistractorKind::ALL.len())];
+        let seed = rng.random();
+        for _ in 0..PLACEMENT_TRIES {
+            let place = Vector2::new(rng.random_range(x_range.clone()), rng.random_range(y_range.clone()));
+            let turn = rng.random_range(-std::f64::consts::PI..std::f64::consts::PI);
+            let distractor = Distractor::new(kind, &Isometry2::new(place, turn), seed);
+            if taken.iter().all(|other| footprint::separation(&distractor.footprint, other) >= config.clearance_m) {
+                taken.push(distractor.footprint.clone());
+                distractors.push(distractor);
+                break;
+            }
+        }
+    }
+    distractors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_seed_gives_one_scene_and_another_seed_another() {
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        let sample = |seed| SceneVariation::sample(Some(&spec), &VariationConfig::default(), seed);
+        assert_eq!(sample(7), sample(7));
+        assert_eq!(sample(7).fragment(), sample(7).fragment());
+        assert_ne!(sample(7), sample(8));
+    }
+
+    #[test]
+    fn leaving_the_object_out_changes_neither_light_nor_table() {
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        let config = VariationConfig::default();
+        let (with, without) =
+            (SceneVariation::sample(Some(&spec), &config, 3), SceneVariation::sample(None, &config, 3));
+        assert_eq!((with.lighting, with.table), (without.lighting, without.table));
+        assert!(without.object.is_none());
+    }
+
+    #[test]
+    fn things_keep_their_distance() {
+        let config = VariationConfig { distractors: 6..=6, ..VariationConfig::default() };
+        let mut placed = 0;
+        for name in ObjectSpec::names() {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            for seed in 0..8 {
+                let scene = SceneVariation::sample(Some(&spec), &config, seed);
+                let object = scene.object.unwrap();
+                placed += scene.distractors.len();
+                for (idx, distractor) in scene.distractors.iter().enumerate() {
+                    let gap = footprint::separation(&distractor.footprint, &object.footprint());
+                    assert!(gap >= config.clearance_m, "{name} {seed}: {gap}");
+                    for other in &scene.distractors[..idx] {
+                        assert!(footprint::separation(&distractor.footprint, &other.footprint) >= config.clearance_m);
+                    }
+                }
+            }
+        }
+        // Room is found for nearly all.
+        assert!(placed >= 3 * 8 * 5, "{placed} of 144");
+    }
+}
