@@ -1,0 +1,202 @@
+//! The pose on which most edge points agree to a fraction of a pixel.
+//!
+//! Beside the part's own edge an image often shows another of the same direction: the edge of its
+//! shadow, its chamfer, a board it lies along. Least squares on the nearest edges settles between them.
+//! Here each edge point keeps all crests of the gradient near it along its normal, and the pose is
+//! sought whose points nearly all have *one* of their crests within a pixel: the shadow lies on one
+//! side only, so following it there breaks the other sides.
+//!
+//! Legend: `row` is how far a point moves along its normal per unit of (x, y, angle, ln scale), units
+//! that move edges by about a level pixel; a crest at distance `d` asks for `row · step = d`.
+
+use nalgebra::{Matrix4, Vector4};
+
+use crate::edge_points::parabola_peak;
+use crate::pose::Pose;
+use crate::refinement::{CaptureRange, step_units};
+use crate::template::{Overlay, TemplateLevel};
+
+/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds.
+const FIRST_REACH: usize = 6;
+const LATER_REACH: usize = 3;
+/// Most crests kept for a point.
+const MAX_CRESTS: usize = 3;
+/// Least alignment of a crest's direction, noise floor included.
+const LEAST_TRUST: f32 = 0.2;
+/// Width of "on the edge" in level pixels, from the first look to the last.
+const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
+/// Starts of the first round, in level pixels of edge movement by shift and by scale.
+const START_STEP: f64 = 3.0;
+/// Rounds of gathering crests anew, and the movement (level pixels) below which they stop.
+const MAX_ROUNDS: usize = 5;
+const STILL: f64 = 0.01;
+
+/// A pose and how many of the points found a crest there.
+pub(crate) struct Snapped {
+    pub(crate) pose: Pose,
+    /// Weighted share of the points that lie on a crest of their direction, in `[0, 1]`.
+    pub(crate) score: f64,
+    pub(crate) num_rounds: usize,
+}
+
+/// Moves `from` to the consensus nearby.
+pub(crate) fn snap(level: &TemplateLevel, overlay: &Overlay<'_>, range: &CaptureRange, from: Pose) -> Snapped {
+    let is_free = [0, 1, 2, 3].map(|k| range.limits[k] > 0.0);
+    let mut best = Snapped { pose: from, score: 0.0, num_rounds: 0 };
+    for round in 1..=MAX_ROUNDS {
+        let reach = if round == 1 { FIRST_REACH } else { LATER_REACH };
+        let sightings = gather(level, overlay, &best.pose, reach);
+        let (step, score) = if round == 1 {
+            starts(is_free)
+                .into_iter()
+                .map(|start| settle(&sightings, is_free, start, &WIDTHS))
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .unwrap_or((Vector4::zeros(), 0.0))
+        } else {
+            settle(&sightings, is_free, Vector4::zeros(), &WIDTHS[2..])
+        };
+        let units = step_units(level, overlay, &best.pose);
+        let moved = best.pose.moved([0, 1, 2, 3].map(|k| step[k] * units[k]));
+        best = Snapped { pose: range.clamped(&moved), score, num_rounds: round };
+        if step.amax() < STILL {
+            break;
+        }
+    }
+    best
+}
+
+/// What one edge point sees along its normal.
+struct Sighting {
+    row: Vector4<f64>,
+    weight: f64,
+    /// (distance, trust) of each crest.
+    crests: [(f64, f64); MAX_CRESTS],
+    num_crests: usize,
+}
+
+fn gather(level: &TemplateLevel, overlay: &Overlay<'_>, pose: &Pose, reach: usize) -> Vec<Sighting> {
+    let map = pose.level_map(overlay.image_pixel_size);
+    let radius = (level.radius_px * pose.log_scale.exp() / overlay.image_pixel_size).max(1.0) as f32;
+    let [center_x, center_y] = map.apply([0.0, 0.0]);
+    let mut sightings = Vec::with_capacity(level.points.len());
+    for point in &level.points {
+        let [x, y] = map.apply(point.offset);
+        let [nx, ny] = map.turn(point.normal);
+        let (rx, ry) = ((x - center_x) / radius, (y - center_y) / radius);
+        let mut sighting = Sighting {
+            row: Vector4::new(nx, ny, ny * rx - nx * ry, nx * rx + ny * ry).map(f64::from),
+            weight: f64::from(point.weight),
+            crests: [(0.0, 0.0); MAX_CRESTS],
+            num_crests: 0,
+        };
+        sighting.look(overlay, [x, y], [nx, ny], map.turn_double(point.double), reach);
+        if sighting.num_crests > 0 {
+            sightings.push(sighting);
+        }
+    }
+    sightings
+}
+
+impl Sighting {
+    /// Finds the crests of the gradient's part along `normal`, the nearest first kept.
+    fn look(&mut self, overlay: &Overlay<'_>, at: [f32; 2], normal: [f32; 2], double: [f32; 2], reach: usize) {
+        const MAX_LEN: usize = 2 * FIRST_REACH + 3;
+        let len = 2 * reach + 3;
+        let middle = (reach + 1) as f32;
+        let floor = overlay.image_level.floor();
+        let mut strengths = [0.0f32; MAX_LEN];
+        let mut trusts = [0.0f32; MAX_LEN];
+        for k in 0..len {
+            let t = k as f32 - middle;
+            // Beyond the border there is no crest.
+            if let Some([dx, dy, energy]) = overlay.image_level.bilinear(at[0] + t * normal[0], at[1] + t * normal[1]) {
+                trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
+                strengths[k] = (trusts[k] * (energy + floor)).sqrt();
+            }
+        }
+        for k in 1..len - 1 {
+            let (before, here, after) = (strengths[k - 1], strengths[k], strengths[k + 1]);
+            if here < before || here <= after || trusts[k] < LEAST_TRUST {
+                continue;
+            }
+            let distance = f64::from(k as f32 - middle + parabola_peak(before, here, after));
+            let crest = (distance, f64::from(trusts[k]));
+            if self.num_crests < MAX_CRESTS {
+                self.crests[self.num_crests] = crest;
+                self.num_crests += 1;
+            } else if let Some(furthest) = self.crests.iter_mut().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
+                if distance.abs() < furthest.0.abs() {
+                    *furthest = crest;
+                }
+            }
+        }
+    }
+
+    /// Residual, and the share in the consensus, of the crest that fits `step` best.
+    #[inline]
+    fn best_crest(&self, step: &Vector4<f64>, width: f64) -> (f64, f64) {
+        let moved = self.row.dot(step);
+        let mut best = (0.0, 0.0);
+        for &(distance, trust) in &self.crests[..self.num_crests] {
+            let share = trust * kernel((distance - moved) / width);
+            if share > best.1 {
+                best = (distance, share);
+            }
+        }
+        best
+    }
+}
+
+/// Tukey's biweight, 1 at 0 and 0 beyond 3 widths: no exponential, no far influence.
+#[inline]
+fn kernel(x: f64) -> f64 {
+    let rest = (1.0 - x * x / 9.0).max(0.0);
+    rest * rest
+}
+
+/// No movement, and one step each way by shift and by scale.
+fn starts(is_free: [bool; 4]) -> Vec<Vector4<f64>> {
+    let mut starts = vec![Vector4::zeros()];
+    for k in [0, 1, 3] {
+        if is_free[k] {
+            for sign in [1.0, -1.0] {
+                let mut start = Vector4::zeros();
+                start[k] = sign * START_STEP;
+                starts.push(start);
+            }
+        }
+    }
+    starts
+}
+
+/// Iteratively re-weighted least squares from `start`, narrowing; the step and its consensus.
+fn settle(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, widths: &[f64]) -> (Vector4<f64>, f64) {
+    let mut step = start;
+    for &width in widths {
+        for _ in 0..2 {
+            let mut normal_matrix = Matrix4::<f64>::zeros();
+            let mut right = Vector4::<f64>::zeros();
+            for sighting in sightings {
+                let (distance, share) = sighting.best_crest(&step, width);
+                let w = sighting.weight * share;
+                if w > 0.0 {
+                    let weighted = sighting.row * w;
+                    normal_matrix += weighted * sighting.row.transpose();
+                    right += weighted * (distance - sighting.row.dot(&step));
+                }
+            }
+            // Directions that no edge holds (the angle of a ring) stay where they are.
+            normal_matrix += Matrix4::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
+            for k in 0..4 {
+                if !is_free[k] {
+                    normal_matrix[(k, k)] += 1e9;
+                }
+            }
+            let Some(cholesky) = normal_matrix.cholesky() else { break };
+            step += cholesky.solve(&right);
+        }
+    }
+    let width = WIDTHS[WIDTHS.len() - 1];
+    let score = sightings.iter().map(|s| s.weight * s.best_crest(&step, width).1).sum();
+    (step, score)
+}

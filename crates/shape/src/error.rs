@@ -1,0 +1,49 @@
+//! What can go wrong when a template is made.
+
+/// Why a [`crate::ShapeTemplate`] could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeError {
+    /// The outline is not an area: too few vertices, or a coordinate that is not a number.
+    #[error("expected an outline of at least 3 finite vertices, found {found}")]
+    OutlineDegenerate {
+        /// What the outline held instead.
+        found: String,
+    },
+    /// The outline and the image have too little in common.
+    #[error(
+        "expected an outline at least {expected_px} px wide and high inside the {width}x{height} image, found {found_width_px:.1} x {found_height_px:.1} px"
+    )]
+    OutlineTooSmall {
+        /// Smallest extent accepted, in pixels.
+        expected_px: f64,
+        /// Image width in pixels.
+        width: u32,
+        /// Image height in pixels.
+        height: u32,
+        /// Width of the outline's part inside the image, in pixels.
+        found_width_px: f64,
+        /// Height of the outline's part inside the image, in pixels.
+        found_height_px: f64,
+    },
+    /// The part shows too few edges to be recognised by.
+    #[error(
+        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness"
+    )]
+    TooFewEdges {
+        /// Fewest edge points accepted.
+        expected: usize,
+        /// Edge points found.
+        found: usize,
+    },
+    /// A configuration value lies outside its range.
+    #[error("expected {name} {expected}, found {found}")]
+    InvalidConfig {
+        /// Field of [`crate::ShapeConfig`].
+        name: &'static str,
+        /// The accepted range, in words.
+        expected: &'static str,
+        /// The value given.
+        found: f64,
+    },
+}

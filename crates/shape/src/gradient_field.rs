@@ -1,0 +1,346 @@
+//! The gradients of one image, as every template reads them: directions without sign, on a pyramid.
+//!
+//! Per level `m` (its pixel is `2^m` image pixels), at each pixel:
+//! - `tr`: energy of the gradient, `gx² + gy²` averaged over the three channels and over a 3×3
+//!   binomial window, in (grey levels / level pixel)²;
+//! - `v = (gx² − gy², 2 gx gy)`, averaged alike: the gradient's direction at twice its angle, so
+//!   that a gradient and its negative are the same and neighbours of one direction add up;
+//! - `d = v / (tr + floor)`, the direction that is kept: length near 1 on a clean edge, near 0 where
+//!   directions are mixed (corners, clutter) or where there is nothing above the noise.
+//!
+//! Averaging the structure tensor over channels (Di Zenzo, 1986) sees edges that have the same
+//! brightness on both sides but another colour.
+
+use image::RgbImage;
+
+/// Gradient below which a direction is not trusted even in a noiseless image, in grey levels per
+/// level pixel. A step of 5 grey levels has about this gradient after smoothing.
+const SMALLEST_GRADIENT: f32 = 1.5;
+/// The quiet quarter of the pixels tells the noise; an edge must exceed it this many times.
+const NOISE_FACTOR: f32 = 3.0;
+/// Levels are added while both sides keep this many pixels.
+const SMALLEST_LEVEL_SIDE: usize = 24;
+/// Level 6 makes one pixel of 64: no part needs more.
+const MAX_LEVELS: usize = 7;
+
+/// Gradient directions of one image on a pyramid, computed once and read by any number of templates.
+///
+/// # Shapes
+/// Level `m` has `width >> m` by `height >> m` pixels; a point `p` of the image stands at
+/// `p / 2^m` there.
+#[derive(Debug, Clone)]
+pub struct GradientField {
+    levels: Vec<GradientLevel>,
+}
+
+impl GradientField {
+    /// Computes the field of `image`. Images of any size are accepted; an empty one has no gradients.
+    pub fn new(image: &RgbImage) -> Self {
+        let mut planes = Planes::from_image(image);
+        let mut levels = vec![GradientLevel::new(&planes)];
+        while levels.len() < MAX_LEVELS && planes.width.min(planes.height) / 2 >= SMALLEST_LEVEL_SIDE {
+            planes = planes.halved();
+            levels.push(GradientLevel::new(&planes));
+        }
+        Self { levels }
+    }
+
+    /// Width of the image in pixels.
+    pub fn width(&self) -> usize {
+        self.levels[0].width
+    }
+
+    /// Height of the image in pixels.
+    pub fn height(&self) -> usize {
+        self.levels[0].height
+    }
+
+    /// Number of pyramid levels, at least one.
+    pub fn num_levels(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// The level whose pixel is nearest to `pixel_size` image pixels.
+    pub(crate) fn level_idx_for(&self, pixel_size: f64) -> usize {
+        let idx = pixel_size.max(1.0).log2().round() as usize;
+        idx.min(self.levels.len() - 1)
+    }
+
+    pub(crate) fn level(&self, idx: usize) -> &GradientLevel {
+        &self.levels[idx]
+    }
+}
+
+/// What one pixel keeps: `[d.x, d.y, tr]` (see the module's legend).
+pub(crate) type DirectionSample = [f32; 3];
+
+/// One level of a [`GradientField`].
+#[derive(Debug, Clone)]
+pub(crate) struct GradientLevel {
+    width: usize,
+    height: usize,
+    samples: Vec<DirectionSample>,
+    floor: f32,
+}
+
+impl GradientLevel {
+    fn new(planes: &Planes) -> Self {
+        let (width, height) = (planes.width, planes.height);
+        let mut samples = structure_tensors(planes);
+        let floor = SMALLEST_GRADIENT.powi(2) + NOISE_FACTOR * quiet_energy(&samples);
+        for sample in &mut samples {
+            let [tr, vx, vy] = *sample;
+            let scale = 1.0 / (tr + floor);
+            *sample = [vx * scale, vy * scale, tr];
+        }
+        Self { width, height, samples, floor }
+    }
+
+    pub(crate) fn width(&self) -> usize {
+        self.width
+    }
+
+    pub(crate) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Energy that an edge must exceed to be trusted, in (grey levels / level pixel)².
+    pub(crate) fn floor(&self) -> f32 {
+        self.floor
+    }
+
+    /// Sample of the pixel that holds `(x, y)` in level pixels, `None` outside.
+    #[inline]
+    pub(crate) fn nearest(&self, x: f32, y: f32) -> Option<DirectionSample> {
+        if x >= 0.0 && y >= 0.0 {
+            let (col, row) = (x as usize, y as usize);
+            if col < self.width && row < self.height {
+                return Some(self.samples[row * self.width + col]);
+            }
+        }
+        None
+    }
+
+    /// Bilinear sample at `(x, y)` in level pixels, `None` outside the image.
+    #[inline]
+    pub(crate) fn bilinear(&self, x: f32, y: f32) -> Option<DirectionSample> {
+        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f32 && y <= self.height as f32) {
+            return None;
+        }
+        // Within half a pixel of the border the border pixel's value is repeated.
+        let u = (x - 0.5).clamp(0.0, (self.width - 1) as f32);
+        let v = (y - 0.5).clamp(0.0, (self.height - 1) as f32);
+        let col = (u as usize).min(self.width.saturating_sub(2));
+        let row = (v as usize).min(self.height.saturating_sub(2));
+        let (fx, fy) = (u - col as f32, v - row as f32);
+        let right = usize::from(self.width > 1);
+        let below = if self.height > 1 { self.width } else { 0 };
+        let at = row * self.width + col;
+        let (a, b) = (self.samples[at], self.samples[at + right]);
+        let (c, d) = (self.samples[at + below], self.samples[at + below + right]);
+        let mut out = [0.0; 3];
+        for k in 0..3 {
+            let top = a[k] + fx * (b[k] - a[k]);
+            let bottom = c[k] + fx * (d[k] - c[k]);
+            out[k] = top + fy * (bottom - top);
+        }
+        Some(out)
+    }
+}
+
+/// Energy of the pixels of the quiet quarter, read from at most a few thousand of them.
+fn quiet_energy(samples: &[DirectionSample]) -> f32 {
+    // A prime stride does not fall in step with rows or with a periodic texture.
+    let stride = (samples.len() / 4096).max(1) | 1;
+    let mut energies: Vec<f32> = samples.iter().step_by(stride).map(|s| s[0]).collect();
+    if energies.is_empty() {
+        return 0.0;
+    }
+    let quarter = energies.len() / 4;
+    *energies.select_nth_unstable_by(quarter, f32::total_cmp).1
+}
+
+/// The three channels of an image, one after the other.
+struct Planes {
+    width: usize,
+    height: usize,
+    channels: [Vec<u8>; 3],
+}
+
+impl Planes {
+    fn from_image(image: &RgbImage) -> Self {
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        let mut channels = [(); 3].map(|()| vec![0; width * height]);
+        for (idx, pixel) in image.as_raw().chunks_exact(3).enumerate() {
+            for (channel, &value) in channels.iter_mut().zip(pixel) {
+                channel[idx] = value;
+            }
+        }
+        Self { width, height, channels }
+    }
+
+    /// Mean of 2×2 pixels; an odd last row or column is left out.
+    fn halved(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let channels = [0, 1, 2].map(|c| {
+            let mut out = Vec::with_capacity(width * height);
+            for row in 0..height {
+                let top = &self.channels[c][2 * row * self.width..][..2 * width];
+                let bottom = &self.channels[c][(2 * row + 1) * self.width..][..2 * width];
+                out.extend(top.chunks_exact(2).zip(bottom.chunks_exact(2)).map(|(a, b)| {
+                    let sum = u16::from(a[0]) + u16::from(a[1]) + u16::from(b[0]) + u16::from(b[1]);
+                    ((sum + 2) / 4) as u8
+                }));
+            }
+            out
+        });
+        Self { width, height, channels }
+    }
+}
+
+/// Pixels repeated at each end of a row, so that the filters need no case for the border.
+const PAD: usize = 2;
+/// The 5-tap binomial filter in both directions multiplies by this much.
+const BLUR_GAIN: f32 = 256.0;
+
+/// `[tr, v.x, v.y]` of every pixel, row by row through rings of three rows that stay in the cache.
+fn structure_tensors(planes: &Planes) -> Vec<DirectionSample> {
+    let (width, height) = (planes.width, planes.height);
+    let mut samples = Vec::with_capacity(width * height);
+    if width == 0 || height == 0 {
+        return samples;
+    }
+    let mut blurred = BlurredRows::new(width);
+    let mut tensors = [(); 3].map(|()| TensorRow::new(width));
+    let mut vertical = TensorRow::new(width);
+    let rows = height as isize;
+    blurred.compute(planes, 0);
+    for row in 0..rows {
+        blurred.compute(planes, (row + 1).min(rows - 1));
+        tensors[(row % 3) as usize].compute(&blurred, row, rows);
+        if row == 0 {
+            continue;
+        }
+        emit_smoothed(&tensors, row - 1, rows, &mut vertical, &mut samples);
+    }
+    emit_smoothed(&tensors, rows - 1, rows, &mut vertical, &mut samples);
+    samples
+}
+
+/// Ring of rows smoothed with the binomial 1-4-6-4-1 in both directions, per channel.
+struct BlurredRows {
+    width: usize,
+    rows: [[Vec<u16>; 3]; 3],
+    vertical: Vec<u16>,
+}
+
+impl BlurredRows {
+    fn new(width: usize) -> Self {
+        Self {
+            width,
+            rows: [(); 3].map(|()| [(); 3].map(|()| vec![0; width + 2 * PAD])),
+            vertical: vec![0; width + 2 * PAD],
+        }
+    }
+
+    fn compute(&mut self, planes: &Planes, row: isize) {
+        let (width, last) = (self.width, planes.height as isize - 1);
+        for channel in 0..3 {
+            let line = |offset: isize| {
+                let y = (row + offset).clamp(0, last) as usize;
+                &planes.channels[channel][y * width..][..width]
+            };
+            let (a, b, c, d, e) = (line(-2), line(-1), line(0), line(1), line(2));
+            let inner = &mut self.vertical[PAD..PAD + width];
+            for x in 0..width {
+                inner[x] =
+                    u16::from(a[x]) + u16::from(e[x]) + 4 * (u16::from(b[x]) + u16::from(d[x])) + 6 * u16::from(c[x]);
+            }
+            pad(&mut self.vertical, width);
+            let out = &mut self.rows[row as usize % 3][channel];
+            let source = &self.vertical;
+            let (a, b, c) = (&source[..width], &source[1..][..width], &source[2..][..width]);
+            let (d, e) = (&source[3..][..width], &source[4..][..width]);
+            // 255 · 16 · 16 = 65280 still fits in 16 bits.
+            for (x, out) in out[PAD..PAD + width].iter_mut().enumerate() {
+                *out = a[x] + e[x] + 4 * (b[x] + d[x]) + 6 * c[x];
+            }
+            pad(out, width);
+        }
+    }
+}
+
+fn pad<T: Copy>(row: &mut [T], width: usize) {
+    for k in 0..PAD {
+        row[k] = row[PAD];
+        row[PAD + width + k] = row[PAD + width - 1];
+    }
+}
+
+/// One row of structure tensors, padded.
+struct TensorRow {
+    tr: Vec<f32>,
+    vx: Vec<f32>,
+    vy: Vec<f32>,
+}
+
+impl TensorRow {
+    fn new(width: usize) -> Self {
+        let zeros = vec![0.0; width + 2 * PAD];
+        Self { tr: zeros.clone(), vx: zeros.clone(), vy: zeros }
+    }
+
+    /// Sums the three channels' tensors; one-sided differences at the upper and lower border count
+    /// half, which only weakens gradients there.
+    fn compute(&mut self, blurred: &BlurredRows, row: isize, rows: isize) {
+        let width = blurred.width;
+        // Central difference, the blur's gain, and the mean over three channels.
+        let gain = (0.5 / BLUR_GAIN).powi(2) / 3.0;
+        let ring = |y: isize| &blurred.rows[y.clamp(0, rows - 1) as usize % 3];
+        let (above, here, below) = (ring(row - 1), ring(row), ring(row + 1));
+        for channel in 0..3 {
+            let left = &here[channel][PAD - 1..][..width];
+            let right = &here[channel][PAD + 1..][..width];
+            let up = &above[channel][PAD..][..width];
+            let down = &below[channel][PAD..][..width];
+            let tr = &mut self.tr[PAD..][..width];
+            let vx = &mut self.vx[PAD..][..width];
+            let vy = &mut self.vy[PAD..][..width];
+            let keep = if channel == 0 { 0.0 } else { 1.0 };
+            for x in 0..width {
+                let gx = (i32::from(right[x]) - i32::from(left[x])) as f32;
+                let gy = (i32::from(down[x]) - i32::from(up[x])) as f32;
+                let (xx, yy) = (gx * gx * gain, gy * gy * gain);
+                tr[x] = keep * tr[x] + (xx + yy);
+                vx[x] = keep * vx[x] + (xx - yy);
+                vy[x] = keep * vy[x] + 2.0 * gain * gx * gy;
+            }
+        }
+    }
+}
+
+/// Smooths the tensors of `row` with the binomial 1-2-1 in both directions and appends them.
+fn emit_smoothed(
+    ring: &[TensorRow; 3],
+    row: isize,
+    rows: isize,
+    vertical: &mut TensorRow,
+    samples: &mut Vec<DirectionSample>,
+) {
+    let line = |y: isize| &ring[(y.clamp(0, rows - 1) % 3) as usize];
+    let (above, here, below) = (line(row - 1), line(row), line(row + 1));
+    let width = here.tr.len() - 2 * PAD;
+    let smooth = |out: &mut Vec<f32>, a: &[f32], b: &[f32], c: &[f32]| {
+        for x in PAD..PAD + width {
+            out[x] = 0.25 * (a[x] + c[x]) + 0.5 * b[x];
+        }
+        pad(out, width);
+    };
+    smooth(&mut vertical.tr, &above.tr, &here.tr, &below.tr);
+    smooth(&mut vertical.vx, &above.vx, &here.vx, &below.vx);
+    smooth(&mut vertical.vy, &above.vy, &here.vy, &below.vy);
+    let across = |v: &[f32], x: usize| 0.25 * (v[x - 1] + v[x + 1]) + 0.5 * v[x];
+    samples.extend(
+        (PAD..PAD + width).map(|x| [across(&vertical.tr, x), across(&vertical.vx, x), across(&vertical.vy, x)]),
+    );
+}

@@ -1,0 +1,59 @@
+//! The demonstration laid over an image: is the part there, and where to a fraction of a pixel?
+//!
+//! A detector taught from one photo fires on other parts too, and its poses are off by some pixels.
+//! Laying the demonstration over the image decides both. The part's edges are read from the
+//! demonstration once; at a predicted pose their directions are compared with the directions of the
+//! image's gradients (sign ignored, since the background changes), and the pose climbs from there in
+//! x, y, angle and scale.
+//!
+//! ```text
+//! demonstration, outline ──► ShapeTemplate   edge points per pyramid level, weighted
+//!                                 │
+//! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
+//!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
+//! ```
+//!
+//! What this crate leaves out: it proposes no poses (detectors do), knows no grasp and no camera, and a
+//! part lies flat: poses are turns, shifts and scales in the image plane.
+//!
+//! # Example
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use nalgebra::Point2;
+//! use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity, Polygon};
+//! use sdg_shape::{GradientField, ShapeConfig, ShapeTemplate};
+//!
+//! // A dark 80 × 40 plate in the demonstration, and the same plate 5 px further to the right.
+//! let plate_at = |x: u32| {
+//!     RgbImage::from_fn(200, 150, |col, row| {
+//!         let on_plate = (x..x + 80).contains(&col) && (50..90).contains(&row);
+//!         Rgb(if on_plate { [60, 60, 70] } else { [200, 190, 180] })
+//!     })
+//! };
+//! let outline = Polygon::from_box(&BoundingBox { x1: 50.0, y1: 50.0, x2: 130.0, y2: 90.0 });
+//! let config = ShapeConfig { capture_shift: 0.04, ..ShapeConfig::default() };
+//! let template = ShapeTemplate::new(&plate_at(50), &outline, &config)?;
+//!
+//! let field = GradientField::new(&plate_at(55));
+//! let refinement = template.refine(&field, &PlanarSimilarity::IDENTITY);
+//! assert!((refinement.image_from_demonstration.apply(&Point2::new(90.0, 70.0)).x - 95.0).abs() < 0.2);
+//! assert!(refinement.agreement > 0.9);
+//! # Ok::<(), sdg_shape::ShapeError>(())
+//! ```
+
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod consensus;
+mod edge_points;
+mod error;
+mod gradient_field;
+mod pose;
+mod refinement;
+mod template;
+
+pub use error::ShapeError;
+pub use gradient_field::GradientField;
+pub use refinement::Refinement;
+pub use template::{ScaleRange, ShapeConfig, ShapeTemplate};

@@ -1,0 +1,246 @@
+//! A demonstration made ready to be laid over images.
+
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_geometry::{PlanarSimilarity, Polygon};
+
+use crate::edge_points::{EdgePoint, EdgeSelection, rms_radius, select_edge_points};
+use crate::error::ShapeError;
+use crate::gradient_field::{GradientField, GradientLevel};
+use crate::pose::Pose;
+
+/// How a template is made and how far it is moved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShapeConfig {
+    /// Most edge points kept at each pyramid level.
+    pub max_points: usize,
+    /// Weight of an edge on the outline relative to one inside, where shading moves with the light.
+    pub outline_weight: f64,
+    /// How far an initial pose may be off in x and in y, as a share of the image's width.
+    pub capture_shift: f64,
+    /// How far an initial pose may be turned, in radians.
+    pub capture_angle_rad: f64,
+    /// How far an initial pose's scale may be off.
+    pub scale: ScaleRange,
+}
+
+impl Default for ShapeConfig {
+    fn default() -> Self {
+        Self {
+            max_points: 300,
+            outline_weight: 2.0,
+            capture_shift: 0.02,
+            capture_angle_rad: 14f64.to_radians(),
+            scale: ScaleRange::Within(0.12),
+        }
+    }
+}
+
+/// What a refinement may do to the scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ScaleRange {
+    /// Keep the initial pose's scale: the camera's height over the table is known.
+    Fixed,
+    /// Stay within this share of the initial pose's scale, up and down: 0.1 is 1/1.1 to 1.1.
+    Within(f64),
+}
+
+impl ScaleRange {
+    /// Largest change of ln scale.
+    pub(crate) fn max_log(self) -> f64 {
+        match self {
+            Self::Fixed => 0.0,
+            Self::Within(share) => share.ln_1p(),
+        }
+    }
+}
+
+/// Fewer edge points than this recognise nothing.
+const MIN_POINTS: usize = 20;
+/// Smallest extent of an outline, in demonstration pixels.
+const MIN_EXTENT_PX: f64 = 12.0;
+/// The finest level shows the part no larger than this, the coarsest no smaller, in level pixels.
+const FINEST_EXTENT: f64 = 400.0;
+const COARSEST_EXTENT: f64 = 32.0;
+/// Extent at which the agreement is measured, in level pixels. Coarser than the finest, so that a
+/// pixel of parallax or of lens distortion does not count as another shape.
+const AGREEMENT_EXTENT: f64 = 64.0;
+/// Less than this share of the template inside the image is judged as if it were this much.
+const MIN_VISIBLE: f64 = 0.6;
+
+/// The edges of one demonstrated part, ready to be compared with images.
+#[derive(Debug, Clone)]
+pub struct ShapeTemplate {
+    pub(crate) config: ShapeConfig,
+    /// Pivot of all poses, in demonstration pixels.
+    pub(crate) center: Point2<f64>,
+    /// Finest first.
+    pub(crate) levels: Vec<TemplateLevel>,
+    agreement_level_idx: usize,
+}
+
+/// The edge points seen at one pyramid level of the demonstration.
+#[derive(Debug, Clone)]
+pub(crate) struct TemplateLevel {
+    /// Demonstration pixels per level pixel, a power of two.
+    pub(crate) pixel_size: f64,
+    /// Root mean square distance of the points from the centre, in demonstration pixels.
+    pub(crate) radius_px: f64,
+    pub(crate) points: Vec<EdgePoint>,
+}
+
+impl ShapeTemplate {
+    /// Reads the part's edges from the demonstration.
+    ///
+    /// # Units and frames
+    /// `outline` is in pixels of `image`. A box is an outline too, only a poorer one: the background's
+    /// edges inside it count as the part's.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for an outline that is no area or outside the image, for a part without edges,
+    /// and for a configuration out of range.
+    pub fn new(image: &RgbImage, outline: &Polygon, config: &ShapeConfig) -> Result<Self, ShapeError> {
+        check_config(config)?;
+        let outline = checked_outline(image, outline)?;
+        let bounds = outline.bounds();
+        let extent = bounds.width().max(bounds.height());
+        let center = bounds.center();
+        let field = GradientField::new(image);
+        let levels_to = |extent_in_level: f64| (extent / extent_in_level).log2().floor().max(0.0) as usize;
+        let last = field.num_levels() - 1;
+        let finest = levels_to(FINEST_EXTENT).min(last);
+        let coarsest = levels_to(COARSEST_EXTENT).clamp(finest, last);
+
+        let mut levels = Vec::new();
+        for idx in finest..=coarsest {
+            let pixel_size = (1u32 << idx) as f64;
+            let selection = EdgeSelection {
+                outline: &outline,
+                center,
+                max_points: if idx == coarsest && idx > finest {
+                    config.max_points.div_ceil(3)
+                } else {
+                    config.max_points
+                },
+                outline_weight: config.outline_weight,
+            };
+            let points = select_edge_points(field.level(idx), pixel_size, &selection);
+            if points.len() < MIN_POINTS {
+                if levels.is_empty() {
+                    return Err(ShapeError::TooFewEdges { expected: MIN_POINTS, found: points.len() });
+                }
+                // Coarser levels only help to start from further away.
+                break;
+            }
+            levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), points });
+        }
+        let agreement_level_idx = levels_to(AGREEMENT_EXTENT).saturating_sub(finest).min(levels.len() - 1);
+        Ok(Self { config: config.clone(), center, levels, agreement_level_idx })
+    }
+
+    /// How well the part's edges at this pose agree with the image's, in `[0, 1]`.
+    ///
+    /// 1: every edge of the demonstration lies on an edge of the same direction. Random directions give
+    /// 0, as do areas without edges. Points outside the image do not count, unless they are too many.
+    ///
+    /// # Units and frames
+    /// The pose maps demonstration pixels to pixels of the image the field was computed from.
+    pub fn agreement(&self, field: &GradientField, image_from_demonstration: &PlanarSimilarity) -> f64 {
+        let pose = Pose::from_similarity(image_from_demonstration, self.center);
+        self.agreement_at(field, &pose)
+    }
+
+    pub(crate) fn agreement_at(&self, field: &GradientField, pose: &Pose) -> f64 {
+        let level = &self.levels[self.agreement_level_idx];
+        level.overlay(field, pose).mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
+    }
+}
+
+/// How a level is read: fast while searching, exact while climbing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum LevelSampling {
+    Nearest,
+    Bilinear,
+}
+
+/// One template level over the image level that shows edges at the same size.
+pub(crate) struct Overlay<'a> {
+    pub(crate) image_level: &'a GradientLevel,
+    /// Image pixels per pixel of `image_level`.
+    pub(crate) image_pixel_size: f64,
+}
+
+impl TemplateLevel {
+    pub(crate) fn overlay<'a>(&self, field: &'a GradientField, pose: &Pose) -> Overlay<'a> {
+        let idx = field.level_idx_for(self.pixel_size * pose.log_scale.exp());
+        Overlay { image_level: field.level(idx), image_pixel_size: (1u32 << idx) as f64 }
+    }
+}
+
+impl Overlay<'_> {
+    /// Weighted mean of cos 2(difference of directions), image gradients below the noise counting as 0;
+    /// in `[-1, 1]`.
+    pub(crate) fn mean_alignment(&self, level: &TemplateLevel, pose: &Pose, sampling: LevelSampling) -> f64 {
+        let map = pose.level_map(self.image_pixel_size);
+        let (mut sum, mut visible) = (0.0f32, 0.0f32);
+        for point in &level.points {
+            let [x, y] = map.apply(point.offset);
+            let sample = match sampling {
+                LevelSampling::Nearest => self.image_level.nearest(x, y),
+                LevelSampling::Bilinear => self.image_level.bilinear(x, y),
+            };
+            if let Some([dx, dy, _]) = sample {
+                let [ex, ey] = map.turn_double(point.double);
+                sum += point.weight * (dx * ex + dy * ey);
+                visible += point.weight;
+            }
+        }
+        f64::from(sum) / f64::from(visible).max(MIN_VISIBLE)
+    }
+}
+
+fn check_config(config: &ShapeConfig) -> Result<(), ShapeError> {
+    let scale = match config.scale {
+        ScaleRange::Fixed => 0.0,
+        ScaleRange::Within(share) => share,
+    };
+    let checks = [
+        ("max_points", "at least 20", config.max_points as f64, config.max_points >= MIN_POINTS),
+        (
+            "outline_weight",
+            "in (0, 100]",
+            config.outline_weight,
+            config.outline_weight > 0.0 && config.outline_weight <= 100.0,
+        ),
+        ("capture_shift", "in [0, 0.2]", config.capture_shift, (0.0..=0.2).contains(&config.capture_shift)),
+        ("capture_angle_rad", "in [0, 0.8]", config.capture_angle_rad, (0.0..=0.8).contains(&config.capture_angle_rad)),
+        ("scale", "within [0, 0.5]", scale, (0.0..=0.5).contains(&scale)),
+    ];
+    for (name, expected, found, ok) in checks {
+        if !ok {
+            return Err(ShapeError::InvalidConfig { name, expected, found });
+        }
+    }
+    Ok(())
+}
+
+/// The outline, or why it cannot be used.
+fn checked_outline(image: &RgbImage, outline: &Polygon) -> Result<Polygon, ShapeError> {
+    if outline.vertices.len() < 3 {
+        return Err(ShapeError::OutlineDegenerate { found: format!("{} vertices", outline.vertices.len()) });
+    }
+    if let Some(v) = outline.vertices.iter().find(|v| !(v.x.is_finite() && v.y.is_finite())) {
+        return Err(ShapeError::OutlineDegenerate { found: format!("a vertex at ({}, {})", v.x, v.y) });
+    }
+    let inside = outline.bounds().clip(f64::from(image.width()), f64::from(image.height()));
+    if inside.width() < MIN_EXTENT_PX || inside.height().max(inside.width()) < MIN_EXTENT_PX {
+        return Err(ShapeError::OutlineTooSmall {
+            expected_px: MIN_EXTENT_PX,
+            width: image.width(),
+            height: image.height(),
+            found_width_px: inside.width(),
+            found_height_px: inside.height(),
+        });
+    }
+    Ok(outline.clip(f64::from(image.width()), f64::from(image.height())))
+}
