@@ -65,6 +65,11 @@ impl Annotation {
         }
     }
 
+    /// The outline, or the box where none was drawn.
+    pub fn region(&self) -> Polygon {
+        self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
+    }
+
     /// The grasp line, or an error that says who needs it.
     ///
     /// # Errors

@@ -1,15 +1,54 @@
-//! A demonstration.
+//! A demonstration: one photo of a part and what a person marked on it, read, checked and multiplied.
+//!
+//! ```text
+//! photo bytes ── decode_image ─────┐
+//!                                  ├─ Demonstration ── Augmenter ── sample(i) ── Sample {image, objects}
+//! COCO or LabelMe ── Annotation ───┘                                                 │
+//!                                                              CocoFile ── bytes ────┘
+//! ```
+//!
+//! Everything from outside is checked here, once: [`decode_image`] reads the size before it takes memory,
+//! [`Annotation::read`] says what was expected, what was found and where. [`Augmenter`] then makes any number of
+//! samples by random access: sample *i* of a seed is the same whoever asks.
+//!
+//! What is deliberately absent: files, threads and clocks (bytes in, bytes out; the crate runs in a browser), tensors
+//! and training targets (`sdg-training`), and mirror images, which would be other parts.
+//!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter, Demonstration, ImageFacts};
+//!
+//! let photo = RgbImage::from_fn(320, 240, |x, y| Rgb([(x / 2) as u8, y as u8, 90]));
+//! let labelme = r#"{"imageWidth": 320, "imageHeight": 240, "shapes": [
+//!     {"label": "rod", "shape_type": "polygon", "points": [[100, 100], [200, 110], [200, 130], [100, 125]]},
+//!     {"label": "grasp_start", "shape_type": "point", "points": [[120, 112]]},
+//!     {"label": "grasp_end", "shape_type": "point", "points": [[180, 118]]}]}"#;
+//! let facts = ImageFacts { width: 320, height: 240, file_name: None };
+//! let annotation = Annotation::read(labelme.as_bytes(), &facts)?.remove(0);
+//!
+//! let demonstration = Demonstration { image: photo, annotation };
+//! let augmenter = Augmenter::new(&[demonstration], AugmentationConfig::default(), 7)?;
+//! let sample = augmenter.sample(3);
+//! assert_eq!(sample, augmenter.sample(3));
+//! # Ok::<(), sdg_demonstration::Error>(())
+//! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod annotation;
+mod augmentation;
 mod coco;
 mod decode;
+mod demonstration;
 mod error;
 mod json;
 mod labelme;
 
 pub use annotation::{Annotation, ImageFacts};
+pub use augmentation::{
+    AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle,
+};
 pub use coco::CocoFile;
 pub use decode::{ImageLimits, decode_image};
+pub use demonstration::{Demonstration, NUM_KEYPOINTS};
 pub use error::{Error, Result};

@@ -115,9 +115,9 @@ mod tests {
 
     #[test]
     fn rows_agree_with_points() {
-        let similarity =
-            PlanarSimilarity { scale: 0.7, angle: Angle::from_degrees(33.0), tx: 40.0, ty: -3.0 };
-        let map = Homography::from_similarity(&similarity).compose(&Homography::tilt(Vector2::new(0.6, 0.8), 0.1, 1e-4));
+        let similarity = PlanarSimilarity { scale: 0.7, angle: Angle::from_degrees(33.0), tx: 40.0, ty: -3.0 };
+        let map =
+            Homography::from_similarity(&similarity).compose(&Homography::tilt(Vector2::new(0.6, 0.8), 0.1, 1e-4));
         let (x, y) = map.row(17).at(29);
         let exact = map.apply(&Point2::new(29.5, 17.5));
         assert!((f64::from(x) - exact.x).abs() < 1e-3 && (f64::from(y) - exact.y).abs() < 1e-3);

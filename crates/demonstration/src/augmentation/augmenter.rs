@@ -1,0 +1,174 @@
+//! Samples by number.
+
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_geometry::{Angle, BoundingBox, GraspLine, Keypoint, PlanarSimilarity, Polygon, Visibility};
+
+use super::background::NoiseBank;
+use super::config::{AugmentationConfig, AugmentationStyle};
+use super::homography::Homography;
+use super::noise::NormalTable;
+use super::paper::PaperDraw;
+use super::prepared::Prepared;
+use super::random::{Stream, index_below, sample_rng};
+use super::scene::Studio;
+use crate::{Annotation, Demonstration, Error, Result};
+
+/// A picture to learn from, and what is on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// The picture.
+    pub image: RgbImage,
+    /// The parts on it; empty for a scene without the part.
+    pub objects: Vec<SampleObject>,
+}
+
+/// One part on a [`Sample`], in pixels of the sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampleObject {
+    /// The box, cut off at the image's border: tight around the outline, or, without one, around the turned box.
+    pub bbox: BoundingBox,
+    /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled where they
+    /// are outside the image, occluded where something covers them. Empty where no grasp is marked.
+    pub keypoints: Vec<Keypoint>,
+    /// The outline, not cut off; `None` where none was drawn.
+    pub outline: Option<Polygon>,
+    /// Where the demonstration lies in the sample: the similarity nearest to the warp, which also tilts a little.
+    pub image_from_demonstration: PlanarSimilarity,
+    /// Which demonstration it is.
+    pub demonstration_idx: usize,
+}
+
+impl SampleObject {
+    pub(crate) fn new(part: &Prepared, pose: &Homography, size: [u32; 2], demonstration_idx: usize) -> Self {
+        let [width, height] = size.map(f64::from);
+        let warped = Polygon { vertices: part.region.vertices.iter().map(|vertex| pose.apply(vertex)).collect() };
+        let seen = warped.clip(width, height);
+        // The clipped polygon's box, since the box's own clip would keep what only hidden vertices reach.
+        let bbox = if seen.vertices.is_empty() { warped.bounds().clip(width, height) } else { seen.bounds() };
+        let image = BoundingBox { x1: 0.0, y1: 0.0, x2: width, y2: height };
+        let keypoints = part
+            .keypoints
+            .iter()
+            .map(|keypoint| {
+                let place = pose.apply(&keypoint.point());
+                let visibility = if image.contains(&place) { Visibility::Visible } else { Visibility::Unlabelled };
+                Keypoint { x: place.x, y: place.y, visibility }
+            })
+            .collect();
+        let moved: Vec<Point2<f64>> = part.area_points.iter().map(|point| pose.apply(point)).collect();
+        let image_from_demonstration = PlanarSimilarity::fit(&part.area_points, &moved).unwrap_or_else(|| {
+            PlanarSimilarity::about(part.center, pose.apply(&part.center), Angle::ZERO, part.nominal_scale)
+        });
+        Self {
+            bbox,
+            keypoints,
+            outline: part.has_outline.then_some(warped),
+            image_from_demonstration,
+            demonstration_idx,
+        }
+    }
+
+    /// The object as an annotation of the sample, for writing it down.
+    ///
+    /// The outline is cut off at the border, as the box is; a grasp line that leaves the image is left out.
+    pub fn annotation(&self, label: &str, sample: &RgbImage) -> Annotation {
+        let (width, height) = (f64::from(sample.width()), f64::from(sample.height()));
+        let ends = [self.keypoints.first(), self.keypoints.last()];
+        let grasp = match ends {
+            [Some(start), Some(end)] if start.is_labelled() && end.is_labelled() => {
+                Some(GraspLine::new(start.point(), end.point()))
+            }
+            _ => None,
+        };
+        let outline = self.outline.as_ref().map(|outline| outline.clip(width, height));
+        Annotation {
+            label: label.into(),
+            bbox: self.bbox,
+            grasp,
+            outline: outline.filter(|outline| outline.vertices.len() >= 3),
+        }
+    }
+}
+
+/// Makes samples from demonstrations: sample *i* of seed *s* is always the same, whoever asks and in whatever order.
+///
+/// Everything that does not depend on the sample is worked out by [`new`](Self::new); a sample then takes `&self`
+/// alone, so that any number of threads may ask.
+pub struct Augmenter {
+    parts: Vec<Prepared>,
+    config: AugmentationConfig,
+    size: [u32; 2],
+    seed: u64,
+    noises: NoiseBank,
+    normal: NormalTable,
+}
+
+impl Augmenter {
+    /// Prepares the demonstrations.
+    ///
+    /// # Errors
+    /// No demonstration, settings without sense, or an annotation that does not lie on its image.
+    pub fn new(demonstrations: &[Demonstration], config: AugmentationConfig, seed: u64) -> Result<Self> {
+        config.check()?;
+        let Some(first) = demonstrations.first() else {
+            return Err(Error::Setting {
+                setting: "demonstrations",
+                expected: "at least one".into(),
+                found: "none".into(),
+            });
+        };
+        demonstrations.iter().try_for_each(Demonstration::check)?;
+        let size = config.output_size.unwrap_or([first.image.width(), first.image.height()]);
+        let mut rng = sample_rng(seed, Stream::Preparation, 0);
+        let parts = demonstrations.iter().map(|one| Prepared::new(one, size, &mut rng)).collect();
+        let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));
+        Ok(Self { parts, config, size, seed, noises, normal })
+    }
+
+    /// Sample `index` of the training stream.
+    pub fn sample(&self, index: u64) -> Sample {
+        self.draw(Stream::Training, index)
+    }
+
+    /// Sample `index` of a stream that [`sample`](Self::sample) never touches, for validation.
+    pub fn held_out(&self, index: u64) -> Sample {
+        self.draw(Stream::HeldOut, index)
+    }
+
+    /// Width and height of the samples, in pixels.
+    pub fn output_size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &AugmentationConfig {
+        &self.config
+    }
+
+    fn draw(&self, stream: Stream, index: u64) -> Sample {
+        let mut rng = sample_rng(self.seed, stream, index);
+        match &self.config.style {
+            AugmentationStyle::Paper(style) => {
+                let demonstration_idx = index_below(&mut rng, self.parts.len());
+                let part = &self.parts[demonstration_idx];
+                let draw = PaperDraw::draw(style, &mut rng);
+                let [width, height] = self.size;
+                let pose = draw.image_from_photo(part, width, height);
+                let object = SampleObject {
+                    image_from_demonstration: pose,
+                    ..SampleObject::new(part, &Homography::from_similarity(&pose), self.size, demonstration_idx)
+                };
+                // The original's boxes are hulls of the turned box, whatever the outline.
+                let hull = BoundingBox::around(part.drawn_box.corners().iter().map(|corner| pose.apply(corner)));
+                let bbox = hull.map_or(object.bbox, |hull| hull.clip(f64::from(width), f64::from(height)));
+                Sample { image: draw.paint(part, width, height), objects: vec![SampleObject { bbox, ..object }] }
+            }
+            AugmentationStyle::Scenes(style) => {
+                let studio =
+                    Studio { parts: &self.parts, style, noises: &self.noises, normal: &self.normal, size: self.size };
+                studio.compose(&mut rng)
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! What the augmented samples look like.
+
+use crate::{Error, Result};
+
+/// Settings of an [`Augmenter`](crate::Augmenter).
+#[derive(Debug, Clone, PartialEq)]
+pub struct AugmentationConfig {
+    /// Width and height of the samples in pixels; `None` for the first demonstration's own size. Demonstrations of
+    /// other sizes are fitted inside.
+    pub output_size: Option<[u32; 2]>,
+    /// Which scenes are made.
+    pub style: AugmentationStyle,
+}
+
+/// The two families of samples.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum AugmentationStyle {
+    /// The paper's: the photo turned, tinted, shifted and scaled.
+    Paper(PaperStyle),
+    /// Composed scenes, with and without the part.
+    Scenes(SceneStyle),
+}
+
+/// The paper's augmentation, in this order; see facts.md of the project for its origin.
+///
+/// # Source
+/// OpenDR, `control/single_demo_grasp`: imgaug's `Affine(rotate)`, `Multiply(per_channel=0.99)`,
+/// `Affine(translate_px)`, `Affine(scale)`, each cutting off what leaves the image and filling with black.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperStyle {
+    /// Turned by a whole number of degrees in `[-max, max]`.
+    pub max_rotation_deg: i32,
+    /// Colour channels are multiplied by a number between these.
+    pub channel_gain: [f32; 2],
+    /// Probability that each channel has a number of its own, and not all the same one.
+    pub per_channel_probability: f32,
+    /// Shifted by a whole number of the photo's pixels in `[-max, max]` along each axis.
+    pub max_shift_px: i32,
+    /// Scaled about the centre by a number between these.
+    pub scale: [f32; 2],
+}
+
+impl Default for PaperStyle {
+    fn default() -> Self {
+        Self {
+            max_rotation_deg: 180,
+            channel_gain: [0.4, 1.5],
+            per_channel_probability: 0.99,
+            max_shift_px: 30,
+            scale: [0.75, 1.3],
+        }
+    }
+}
+
+/// The composed scenes; probabilities are per sample.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneStyle {
+    /// Share of scenes that hold the part.
+    pub positive_share: f32,
+    /// Share of the scenes with the part that keep the photo's own background.
+    pub photo_background_share: f32,
+    /// The part's size against its size in the photo (fitted to the output), between these.
+    pub scale: [f32; 2],
+    /// Greatest foreshortening, as when the camera looks at the part from the side; 0.08 is 23 degrees.
+    pub max_foreshortening: f32,
+    /// Greatest change of scale across the part by perspective.
+    pub max_perspective: f32,
+    /// Least share of the part inside the image.
+    pub least_inside: f32,
+    /// Most distractors in a scene; scenes without the part have at least one.
+    pub max_distractors: usize,
+    /// Share of the distractors that are made from pieces of the part itself.
+    pub mutant_share: f32,
+    /// Probability that something lies over the part.
+    pub occlusion_probability: f32,
+    /// Greatest share of the part that may be covered.
+    pub max_occluded: f32,
+    /// Probability of a blurred image.
+    pub blur_probability: f32,
+    /// Greatest standard deviation of sensor noise, in grey values of 255.
+    pub max_noise: f32,
+    /// Probability of compression artefacts.
+    pub jpeg_probability: f32,
+}
+
+impl Default for SceneStyle {
+    fn default() -> Self {
+        Self {
+            positive_share: 0.75,
+            photo_background_share: 0.5,
+            scale: [0.83, 1.2],
+            max_foreshortening: 0.08,
+            max_perspective: 0.06,
+            least_inside: 0.75,
+            max_distractors: 5,
+            mutant_share: 0.3,
+            occlusion_probability: 0.3,
+            max_occluded: 0.25,
+            blur_probability: 0.45,
+            max_noise: 7.0,
+            jpeg_probability: 0.12,
+        }
+    }
+}
+
+impl Default for AugmentationConfig {
+    /// Composed scenes in the first demonstration's own size.
+    fn default() -> Self {
+        Self { output_size: None, style: AugmentationStyle::Scenes(SceneStyle::default()) }
+    }
+}
+
+impl AugmentationConfig {
+    /// The paper's augmentation in the first demonstration's own size.
+    pub fn paper() -> Self {
+        Self { output_size: None, style: AugmentationStyle::Paper(PaperStyle::default()) }
+    }
+
+    /// The same with samples of `width` × `height` pixels.
+    pub fn with_output_size(self, width: u32, height: u32) -> Self {
+        Self { output_size: Some([width, height]), ..self }
+    }
+
+    /// Refuses settings that make no sense.
+    pub(crate) fn check(&self) -> Result<()> {
+        if let Some([width, height]) = self.output_size {
+            let side = 16..=8192;
+            if !side.contains(&width) || !side.contains(&height) {
+                return refuse("output_size", "16 to 8192 pixels a side", format!("{width}×{height}"));
+            }
+        }
+        match &self.style {
+            AugmentationStyle::Paper(paper) => {
+                check_share("per_channel_probability", paper.per_channel_probability)?;
+                check_range("channel_gain", paper.channel_gain, [0.0, 10.0])?;
+                check_range("scale", paper.scale, [0.1, 10.0])?;
+                check_value("max_rotation_deg", paper.max_rotation_deg as f32, [0.0, 180.0])?;
+                check_value("max_shift_px", paper.max_shift_px as f32, [0.0, 10_000.0])
+            }
+            AugmentationStyle::Scenes(scenes) => {
+                let shares = [
+                    ("positive_share", scenes.positive_share),
+                    ("photo_background_share", scenes.photo_background_share),
+                    ("least_inside", scenes.least_inside),
+                    ("mutant_share", scenes.mutant_share),
+                    ("occlusion_probability", scenes.occlusion_probability),
+                    ("max_occluded", scenes.max_occluded),
+                    ("blur_probability", scenes.blur_probability),
+                    ("jpeg_probability", scenes.jpeg_probability),
+                ];
+                shares.into_iter().try_for_each(|(name, value)| check_share(name, value))?;
+                check_range("scale", scenes.scale, [0.1, 10.0])?;
+                check_value("max_foreshortening", scenes.max_foreshortening, [0.0, 0.5])?;
+                check_value("max_perspective", scenes.max_perspective, [0.0, 0.5])?;
+                check_value("max_noise", scenes.max_noise, [0.0, 100.0])?;
+                check_value("max_distractors", scenes.max_distractors as f32, [1.0, 50.0])
+            }
+        }
+    }
+}
+
+fn refuse(setting: &'static str, expected: impl Into<String>, found: String) -> Result<()> {
+    Err(Error::Setting { setting, expected: expected.into(), found })
+}
+
+fn check_share(setting: &'static str, value: f32) -> Result<()> {
+    check_value(setting, value, [0.0, 1.0])
+}
+
+fn check_value(setting: &'static str, value: f32, [low, high]: [f32; 2]) -> Result<()> {
+    if (low..=high).contains(&value) { Ok(()) } else { refuse(setting, format!("{low} to {high}"), value.to_string()) }
+}
+
+fn check_range(setting: &'static str, range: [f32; 2], [low, high]: [f32; 2]) -> Result<()> {
+    if low <= range[0] && range[0] <= range[1] && range[1] <= high && range[1] > 0.0 {
+        Ok(())
+    } else {
+        refuse(setting, format!("two rising numbers between {low} and {high}"), format!("{range:?}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_without_sense_are_named() {
+        assert!(AugmentationConfig::default().check().is_ok() && AugmentationConfig::paper().check().is_ok());
+        let bad = AugmentationConfig {
+            style: AugmentationStyle::Scenes(SceneStyle { positive_share: f32::NAN, ..SceneStyle::default() }),
+            ..AugmentationConfig::default()
+        };
+        assert!(bad.check().unwrap_err().to_string().contains("positive_share: expected 0 to 1, found NaN"));
+        assert!(AugmentationConfig::paper().with_output_size(0, 240).check().is_err());
+    }
+}

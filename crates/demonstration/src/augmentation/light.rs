@@ -1,0 +1,58 @@
+//! The picture under another light and another camera's colours.
+
+use super::random::{SampleRng, chance, direction, uniform};
+use super::raster::{Raster, smoothstep};
+
+/// Steps of a tone curve; fine enough that a step is below half a grey value.
+const CURVE_STEPS: usize = 1024;
+/// Brightest value that a curve tells apart.
+const CURVE_TOP: f32 = 2.0;
+
+/// Multiplies a lighting gradient over the canvas, at times with the edge of a large shadow, then maps every channel
+/// through a tone curve of gain, gamma, contrast and cast.
+pub(crate) fn relight(canvas: &mut Raster, rng: &mut SampleRng) {
+    let (width, height) = (canvas.width as f32, canvas.height as f32);
+    let slope = direction(rng);
+    let strength = uniform(rng, 0.0, 0.35) / (0.5 * width.hypot(height));
+    let shaded = chance(rng, 0.2).then(|| {
+        let edge = [uniform(rng, 0.1, 0.9) * width, uniform(rng, 0.1, 0.9) * height];
+        (edge, direction(rng), uniform(rng, 2.0, 0.15 * width), uniform(rng, 0.15, 0.5))
+    });
+    let curves = draw_curves(rng);
+
+    for y in 0..canvas.height {
+        let dy = y as f32 - 0.5 * height;
+        for x in 0..canvas.width {
+            let dx = x as f32 - 0.5 * width;
+            let mut light = 1.0 + strength * (dx * slope[0] + dy * slope[1]);
+            if let Some((edge, normal, soft, dark)) = shaded {
+                let along = (x as f32 - edge[0]) * normal[0] + (y as f32 - edge[1]) * normal[1];
+                light *= 1.0 - dark * smoothstep(-soft, soft, along);
+            }
+            let pixel = &mut canvas.pixels[y * canvas.width + x];
+            let scale = light * (CURVE_STEPS as f32 / CURVE_TOP);
+            for k in 0..3 {
+                let step = (pixel[k] * scale).max(0.0) as usize;
+                pixel[k] = curves[k][step.min(CURVE_STEPS - 1)];
+            }
+        }
+    }
+}
+
+fn draw_curves(rng: &mut SampleRng) -> [Vec<f32>; 3] {
+    let gain = uniform(rng, -0.55, 0.45).exp();
+    let gamma = uniform(rng, -0.3, 0.3).exp();
+    let contrast = uniform(rng, 0.75, 1.25);
+    // Bright lamps and dark corners: at times a lifted black.
+    let lift = uniform(rng, -0.03, 0.08);
+    std::array::from_fn(|_| {
+        let cast = uniform(rng, -0.12, 0.12).exp();
+        (0..CURVE_STEPS)
+            .map(|step| {
+                let value = (step as f32 + 0.5) * CURVE_TOP / CURVE_STEPS as f32;
+                let toned = (value * gain * cast).powf(gamma);
+                ((toned - 0.5) * contrast + 0.5 + lift).clamp(0.0, 1.0)
+            })
+            .collect()
+    })
+}

@@ -1,0 +1,36 @@
+//! Many pictures from one, each with its truth.
+//!
+//! ```text
+//! Demonstration ── prepared: reduced photo, distance to the outline, background without the part, mutants
+//!                      │
+//! (seed, stream, index) ── generator ── pose ── table ── distractors ── shadow, part ── cover
+//!                                                                                         │
+//!                                            Sample ── sensor ── lens ── light ───────────┘
+//! ```
+//!
+//! Two frames: *photo* pixels, in which annotations and truths are kept, and *prepared* pixels of the reduced photo.
+//! The canvas is the output itself, so a warp is read once and its truth is exact.
+
+mod augmenter;
+mod background;
+mod config;
+mod distance;
+mod distractor;
+mod erase;
+mod figure;
+mod homography;
+mod light;
+mod mutant;
+mod noise;
+mod paper;
+mod pose;
+mod prepared;
+mod random;
+mod raster;
+mod scene;
+mod sensor;
+
+pub use augmenter::{Augmenter, Sample, SampleObject};
+pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle};
+
+pub(crate) use erase::erase_parts;

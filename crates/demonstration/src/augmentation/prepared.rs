@@ -1,0 +1,161 @@
+//! What is worked out once for each demonstration, so that a sample is only warps and paint.
+
+use image::imageops::{self, FilterType};
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, Keypoint, Polygon};
+
+use super::distance::signed_distance;
+use super::erase::fill;
+use super::homography::Homography;
+use super::mutant::Mutant;
+use super::random::{SampleRng, index_below};
+use super::raster::Raster;
+use crate::{Demonstration, NUM_KEYPOINTS};
+
+/// The photo is kept at this many times the resolution it is usually shown at: sharp when shown larger, and not much
+/// to be averaged when shown smaller.
+const OVERSAMPLING: f64 = 1.25;
+
+/// Rasters are in *prepared* pixels, points in pixels of the demonstration's photo.
+pub(crate) struct Prepared {
+    /// Prepared pixels from photo pixels.
+    pub prepared_from_photo: f64,
+    /// Output pixels from photo pixels where the photo is fitted into the output.
+    pub nominal_scale: f64,
+    /// Width and height of the photo.
+    pub photo_size: [f64; 2],
+    /// The photo; the fourth float is the signed distance to the part's outline, in prepared pixels, positive inside.
+    pub photo: Raster,
+    /// The photo without the part.
+    pub background: Raster,
+    /// The outline, or the box.
+    pub region: Polygon,
+    pub has_outline: bool,
+    /// The box, in photo pixels.
+    pub drawn_box: BoundingBox,
+    /// The centre of the region.
+    pub center: Point2<f64>,
+    /// Distance from the centre to the farthest vertex, in photo pixels.
+    pub radius: f64,
+    /// Points spread evenly over the region.
+    pub area_points: Vec<Point2<f64>>,
+    /// The keypoints on the grasp line; empty where no grasp is marked.
+    pub keypoints: Vec<Keypoint>,
+    /// Colours of the part.
+    pub colours: Vec<[f32; 3]>,
+    /// Ways to make something of the part's pieces that is not the part.
+    pub mutants: Vec<Mutant>,
+}
+
+impl Prepared {
+    pub fn new(demonstration: &Demonstration, output: [u32; 2], rng: &mut SampleRng) -> Self {
+        let image = &demonstration.image;
+        let photo_size = [f64::from(image.width()), f64::from(image.height())];
+        let nominal_scale = (f64::from(output[0]) / photo_size[0]).min(f64::from(output[1]) / photo_size[1]);
+        let wanted = (nominal_scale * OVERSAMPLING).min(1.0);
+        let mut photo = if wanted < 1.0 {
+            let side = |length: f64| ((length * wanted).round() as u32).max(1);
+            // Triangle widens with the reduction, so that fine structure is averaged and not skipped.
+            Raster::from_image(&imageops::resize(image, side(photo_size[0]), side(photo_size[1]), FilterType::Triangle))
+        } else {
+            Raster::from_image(image)
+        };
+        // One factor for both axes; the rounding of the shorter side is below half a pixel over the whole photo.
+        let prepared_from_photo = photo.width as f64 / photo_size[0];
+
+        let annotation = &demonstration.annotation;
+        let region = annotation.region();
+        let prepared_region = region.scaled(prepared_from_photo, prepared_from_photo);
+        let distance = signed_distance(&prepared_region, photo.width, photo.height);
+        for (pixel, &distance) in photo.pixels.iter_mut().zip(&distance) {
+            pixel[3] = distance;
+        }
+        let area_points = spread(&region);
+        let center = Point2::from(
+            area_points.iter().fold(nalgebra::Vector2::zeros(), |sum, p| sum + p.coords) / area_points.len() as f64,
+        );
+        let radius = region.vertices.iter().map(|v| (v - center).norm()).fold(1.0, f64::max);
+
+        // Outlines are drawn a little inside as often as outside, and the part throws a shadow.
+        let margin = (0.06 * radius * prepared_from_photo).clamp(2.0, 12.0) as f32;
+        let hole: Vec<bool> = distance.iter().map(|&d| d > -margin).collect();
+        let background = fill(&photo, &hole);
+
+        let colours = (0..24)
+            .map(|_| {
+                let p = area_points[index_below(rng, area_points.len())] * prepared_from_photo;
+                let [r, g, b, _] = photo.nearest(p.x as f32, p.y as f32);
+                [r, g, b]
+            })
+            .collect();
+        let keypoints = annotation.grasp.as_ref().map(|line| line.keypoints(NUM_KEYPOINTS)).unwrap_or_default();
+        let mutants = Mutant::bank(&region, center, &area_points, rng);
+        Self {
+            prepared_from_photo,
+            nominal_scale,
+            photo_size,
+            photo,
+            background,
+            region,
+            has_outline: annotation.outline.is_some(),
+            drawn_box: annotation.bbox,
+            center,
+            radius,
+            area_points,
+            keypoints,
+            colours,
+            mutants,
+        }
+    }
+
+    /// Prepared pixels from output pixels, for the warp of the rasters.
+    pub fn prepared_from_image(&self, image_from_photo: &Homography) -> Homography {
+        Homography::scaling(self.prepared_from_photo).compose(&image_from_photo.inverse())
+    }
+}
+
+/// About 200 points evenly spread over the inside of a polygon.
+fn spread(region: &Polygon) -> Vec<Point2<f64>> {
+    const WANTED: f64 = 200.0;
+    let bounds = region.bounds();
+    let mut step = (region.area() / WANTED).sqrt();
+    loop {
+        let mut points = Vec::new();
+        let mut y = bounds.y1 + 0.5 * step;
+        while y < bounds.y2 {
+            let mut x = bounds.x1 + 0.5 * step;
+            while x < bounds.x2 {
+                let point = Point2::new(x, y);
+                if region.contains(&point) {
+                    points.push(point);
+                }
+                x += step;
+            }
+            y += step;
+        }
+        // A sliver may slip through the grid.
+        if points.len() >= 20 {
+            return points;
+        }
+        if step < 1e-3 {
+            return region.vertices.clone();
+        }
+        step *= 0.5;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_are_spread_over_a_thin_sliver_too() {
+        let corners = [(10.0, 10.0), (200.0, 30.0), (200.0, 31.0)];
+        let sliver = Polygon::new(corners.map(|(x, y)| Point2::new(x, y)).to_vec()).unwrap();
+        let points = spread(&sliver);
+        assert!(points.len() >= 20 && points.iter().all(|p| sliver.contains(p)));
+        let square =
+            Polygon::new([(0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)].map(|(x, y)| Point2::new(x, y)).to_vec());
+        assert!((150..250).contains(&spread(&square.unwrap()).len()));
+    }
+}

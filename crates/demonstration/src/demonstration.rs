@@ -1,0 +1,88 @@
+//! A demonstration: one photo and one part marked on it.
+
+use image::RgbImage;
+use sdg_geometry::{Keypoint, Polygon};
+
+use crate::annotation::Draft;
+use crate::augmentation::erase_parts;
+use crate::{Annotation, Error, ImageFacts, ImageLimits, Result, decode_image};
+
+/// How many keypoints stand for a grasp line: the two clicked points and ten evenly spaced between them.
+pub const NUM_KEYPOINTS: usize = 12;
+
+/// One photo and what is marked on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Demonstration {
+    /// The photo, upright.
+    pub image: RgbImage,
+    /// The part on it, in pixels of the photo.
+    pub annotation: Annotation,
+}
+
+impl Demonstration {
+    /// Reads a photo and its annotation, which must mark one object.
+    ///
+    /// `file_name` is the photo's, by which a COCO file of several images is searched.
+    ///
+    /// # Errors
+    /// Whatever [`decode_image`] and [`Annotation::read`] refuse, and several objects.
+    pub fn decode(image: &[u8], annotation: &[u8], file_name: Option<&str>) -> Result<Self> {
+        let mut all = Self::decode_all(image, annotation, file_name)?;
+        match (all.pop(), all.len()) {
+            (Some(only), 0) => Ok(only),
+            (_, others) => Err(Error::SeveralObjects { found: others + 1 }),
+        }
+    }
+
+    /// Reads a photo of several marked objects as one demonstration each; from each photo the other objects are
+    /// removed, so that none of them is taught as background.
+    ///
+    /// # Errors
+    /// Whatever [`decode_image`] and [`Annotation::read`] refuse.
+    pub fn decode_all(image: &[u8], annotation: &[u8], file_name: Option<&str>) -> Result<Vec<Self>> {
+        let image = decode_image(image, &ImageLimits::default())?;
+        let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
+        let annotations = Annotation::read(annotation, &facts)?;
+        Ok(annotations
+            .iter()
+            .enumerate()
+            .map(|(i, annotation)| {
+                let others: Vec<Polygon> =
+                    annotations.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, other)| other.region()).collect();
+                let image = if others.is_empty() {
+                    image.clone()
+                } else {
+                    erase_parts(&image, &others, Some(&annotation.region()))
+                };
+                Self { image, annotation: annotation.clone() }
+            })
+            .collect())
+    }
+
+    /// Checks a demonstration that was put together by hand.
+    ///
+    /// # Errors
+    /// An annotation outside the image, without extent, not finite.
+    pub fn check(&self) -> Result<()> {
+        let Annotation { label, bbox, grasp, outline } = &self.annotation;
+        let place = |what: &str| format!("{what} of `{label}`");
+        let draft = Draft {
+            label: Some(label.clone()),
+            place: place("annotation"),
+            corners: Some((bbox.corners().to_vec(), place("box"))),
+            grasp_start: grasp.map(|line| (line.start, place("grasp"))),
+            grasp_end: grasp.map(|line| (line.end, place("grasp"))),
+            outline: outline.as_ref().map(|outline| (outline.vertices.clone(), place("outline"))),
+        };
+        let facts = ImageFacts { width: self.image.width(), height: self.image.height(), file_name: None };
+        draft.finish(&facts).map(drop)
+    }
+
+    /// `count` keypoints evenly spaced on the grasp line, both ends included; [`NUM_KEYPOINTS`] by custom.
+    ///
+    /// # Errors
+    /// [`Error::Lacking`] where no grasp is marked.
+    pub fn keypoints(&self, count: usize) -> Result<Vec<Keypoint>> {
+        Ok(self.annotation.require_grasp()?.keypoints(count))
+    }
+}
