@@ -9,11 +9,70 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Flex};
 
 use crate::composed;
+use crate::conv::Conv2dParams;
+use crate::conv::kernel::{self as conv, ConvShape};
+use crate::conv::weight_gradient::weight_gradient;
 use crate::extension::KernelBackend;
 use crate::flex::{all_f32, shape4, tensor, values};
 use crate::roi_align::{self, RoiAlignParams};
+use crate::simd::Isa;
 
 impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
+    fn kernel_conv2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([x.primitive(), weight.primitive(), bias.primitive()]) {
+            return composed::conv2d::<Self>(x, weight, bias, params);
+        }
+        let shape = ConvShape::forward(shape4(x.primitive()), shape4(weight.primitive()), params);
+        let prepared = Conv2dBackward
+            .prepare::<C>([x.node(), weight.node(), bias.node()])
+            .compute_bound()
+            .stateful();
+        let kept = Operands::keep::<C>(&x, &weight);
+        let output = Flex::kernel_conv2d(
+            x.into_primitive(),
+            weight.into_primitive(),
+            bias.into_primitive(),
+            params,
+        );
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_conv_transpose2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([x.primitive(), weight.primitive(), bias.primitive()]) {
+            return composed::conv_transpose2d::<Self>(x, weight, bias, params);
+        }
+        let shape =
+            ConvShape::transposed(shape4(x.primitive()), shape4(weight.primitive()), params);
+        let prepared = ConvTranspose2dBackward
+            .prepare::<C>([x.node(), weight.node(), bias.node()])
+            .compute_bound()
+            .stateful();
+        let kept = Operands::keep::<C>(&x, &weight);
+        let output = Flex::kernel_conv_transpose2d(
+            x.into_primitive(),
+            weight.into_primitive(),
+            bias.into_primitive(),
+            params,
+        );
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
     fn kernel_roi_align(
         features: FloatTensor<Self>,
         rois: FloatTensor<Self>,
@@ -33,6 +92,83 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((rois, shape, params), crops),
             OpsKind::UnTracked(prep) => prep.finish(crops),
+        }
+    }
+}
+
+/// What a convolution's gradients need: each operand only where the other's gradient is wanted.
+#[derive(Clone, Debug)]
+struct Operands {
+    x: Option<FlexTensor>,
+    weight: Option<FlexTensor>,
+}
+
+impl Operands {
+    fn keep<C: CheckpointStrategy>(x: &FloatTensor<Autodiff<Flex, C>>, weight: &FloatTensor<Autodiff<Flex, C>>) -> Self {
+        Self {
+            x: weight.is_tracked().then(|| x.primitive().clone()),
+            weight: x.is_tracked().then(|| weight.primitive().clone()),
+        }
+    }
+}
+
+const KEPT: &str = "an operand is kept where the other is tracked";
+
+#[derive(Debug)]
+struct Conv2dBackward;
+
+impl Backward<Flex, 3> for Conv2dBackward {
+    type State = (Operands, ConvShape);
+
+    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let (kept, shape) = ops.state;
+        let output_grad = values(&output_grad);
+        let [x, weight, bias] = ops.parents;
+        if let Some(x) = x {
+            let weight = kept.weight.expect(KEPT).to_contiguous();
+            let grad =
+                conv::input_gradient(Isa::detect(), output_grad, values(&weight), None, &shape);
+            grads.register::<Flex>(x.id, tensor(grad, shape.input()));
+        }
+        if let Some(weight) = weight {
+            let x = kept.x.expect(KEPT).to_contiguous();
+            let grad = weight_gradient(Isa::detect(), values(&x), output_grad, &shape);
+            grads.register::<Flex>(weight.id, tensor(grad, shape.weight()));
+        }
+        if let Some(bias) = bias {
+            let grad = conv::channel_sums(output_grad, shape.num_images, shape.out_channels);
+            grads.register::<Flex>(bias.id, tensor(grad, [shape.out_channels]));
+        }
+    }
+}
+
+/// A transposed convolution's output has the place of the convolution's input, so the gradients change
+/// places too.
+#[derive(Debug)]
+struct ConvTranspose2dBackward;
+
+impl Backward<Flex, 3> for ConvTranspose2dBackward {
+    type State = (Operands, ConvShape);
+
+    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let (kept, shape) = ops.state;
+        let output_grad = values(&output_grad);
+        let [x, weight, bias] = ops.parents;
+        if let Some(x) = x {
+            let weight = kept.weight.expect(KEPT).to_contiguous();
+            let grad = conv::forward(Isa::detect(), output_grad, values(&weight), None, &shape);
+            grads.register::<Flex>(x.id, tensor(grad, shape.output()));
+        }
+        if let Some(weight) = weight {
+            let x = kept.x.expect(KEPT).to_contiguous();
+            let grad = weight_gradient(Isa::detect(), output_grad, values(&x), &shape);
+            grads.register::<Flex>(weight.id, tensor(grad, shape.weight()));
+        }
+        if let Some(bias) = bias {
+            let grad = conv::channel_sums(output_grad, shape.num_images, shape.in_channels);
+            grads.register::<Flex>(bias.id, tensor(grad, [shape.in_channels]));
         }
     }
 }

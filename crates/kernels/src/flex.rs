@@ -6,10 +6,56 @@ use burn::backend::{Flex, TensorMetadata};
 use burn::tensor::{Bytes, DType, Shape};
 
 use crate::composed;
+use crate::conv::Conv2dParams;
+use crate::conv::kernel::{self as conv, ConvShape};
 use crate::extension::KernelBackend;
 use crate::roi_align::{self, RoiAlignParams};
+use crate::simd::Isa;
 
 impl KernelBackend for Flex {
+    fn kernel_conv2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&x, &weight, &bias]) {
+            return composed::conv2d::<Self>(x, weight, bias, params);
+        }
+        let shape = ConvShape::forward(shape4(&x), shape4(&weight), params);
+        let [x, weight, bias] = [x, weight, bias].map(|tensor| tensor.to_contiguous());
+        let output = conv::forward(
+            Isa::detect(),
+            values(&x),
+            values(&weight),
+            Some(values(&bias)),
+            &shape,
+        );
+        tensor(output, shape.output())
+    }
+
+    fn kernel_conv_transpose2d(
+        x: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
+        params: Conv2dParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&x, &weight, &bias]) {
+            return composed::conv_transpose2d::<Self>(x, weight, bias, params);
+        }
+        // A transposed convolution is what carries a convolution's gradient back to its input.
+        let shape = ConvShape::transposed(shape4(&x), shape4(&weight), params);
+        let [x, weight, bias] = [x, weight, bias].map(|tensor| tensor.to_contiguous());
+        let output = conv::input_gradient(
+            Isa::detect(),
+            values(&x),
+            values(&weight),
+            Some(values(&bias)),
+            &shape,
+        );
+        tensor(output, shape.input())
+    }
+
     fn kernel_roi_align(
         features: FloatTensor<Self>,
         rois: FloatTensor<Self>,

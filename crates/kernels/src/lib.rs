@@ -45,6 +45,8 @@ mod flex;
 mod nms;
 mod parallel;
 mod roi_align;
+mod scratch;
+mod simd;
 
 pub use conv::{Conv2dParams, conv_transpose2d, conv2d};
 pub use extension::KernelBackend;

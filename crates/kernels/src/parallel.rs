@@ -3,13 +3,18 @@
 //! Every unit writes what no other unit writes, and how work is cut into units depends on shapes alone, so
 //! that results are the same bits for any number of threads.
 
+use std::marker::PhantomData;
+
 /// Calls `unit` with every index below `num_units`, in any order, perhaps at the same time.
 pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send) {
     #[cfg(all(feature = "parallel", not(target_arch = "wasm32")))]
     {
         use rayon::prelude::*;
         if num_units > 1 {
-            (0..num_units).into_par_iter().with_max_len(1).for_each(unit);
+            (0..num_units)
+                .into_par_iter()
+                .with_max_len(1)
+                .for_each(unit);
             return;
         }
     }
@@ -20,7 +25,7 @@ pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send
 pub(crate) struct SharedSlice<'a> {
     start: *mut f32,
     len: usize,
-    slice: std::marker::PhantomData<&'a mut [f32]>,
+    slice: PhantomData<&'a mut [f32]>,
 }
 
 // SAFETY: the only access is through `range`, whose callers promise disjoint parts.
@@ -34,7 +39,7 @@ impl<'a> SharedSlice<'a> {
         Self {
             start: slice.as_mut_ptr(),
             len: slice.len(),
-            slice: std::marker::PhantomData,
+            slice: PhantomData,
         }
     }
 
@@ -51,5 +56,65 @@ impl<'a> SharedSlice<'a> {
         );
         // SAFETY: in bounds by the assertion, borrowed for 'a, and disjoint by the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(start), len) }
+    }
+}
+
+/// A vector being filled by several units at once, without being zeroed first.
+pub(crate) struct Output {
+    values: Vec<f32>,
+    start: *mut f32,
+    len: usize,
+}
+
+// SAFETY: the only access is through `write`, whose callers promise disjoint parts.
+unsafe impl Sync for Output {}
+
+impl Output {
+    /// Room for `len` values.
+    pub(crate) fn new(len: usize) -> Self {
+        let mut values = Vec::with_capacity(len);
+        Self {
+            start: values.as_mut_ptr(),
+            values,
+            len,
+        }
+    }
+
+    /// Copies `run` to `at`, and every `stride` from there.
+    ///
+    /// # Safety
+    /// No two threads write the same element.
+    #[inline]
+    pub(crate) unsafe fn write(&self, at: usize, stride: usize, run: &[f32]) {
+        let Some(last) = run.len().checked_sub(1) else {
+            return;
+        };
+        assert!(
+            at + last * stride < self.len,
+            "write past the end of {}",
+            self.len
+        );
+        // SAFETY: in bounds by the assertion; not written elsewhere by the caller's promise; `run` is a
+        // borrowed slice and cannot be this vector, which nothing can borrow yet.
+        unsafe {
+            let target = self.start.add(at);
+            if stride == 1 {
+                std::ptr::copy_nonoverlapping(run.as_ptr(), target, run.len());
+            } else {
+                for (idx, value) in run.iter().enumerate() {
+                    target.add(idx * stride).write(*value);
+                }
+            }
+        }
+    }
+
+    /// The filled vector.
+    ///
+    /// # Safety
+    /// Every element was written.
+    pub(crate) unsafe fn into_vec(mut self) -> Vec<f32> {
+        // SAFETY: `len` elements were allocated, and written by the caller's promise.
+        unsafe { self.values.set_len(self.len) };
+        self.values
     }
 }
