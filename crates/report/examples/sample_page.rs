@@ -33,7 +33,7 @@ fn report() -> Result<Report, sdg_report::ReportError> {
             "One photograph, one marked grasp, 142 seconds of teaching on two cores. \
              The robot then looked for the part, went to it and lifted it, ten times from poses it had not seen.",
         )
-        .cover(Figure::animation(animation()?).alt("The wrist camera comes down on the pendulum and the jaws close."))
+        .cover(Figure::animation(animation()?).alt("The wrist camera comes down on the pendulum and the jaws close.").caption("Attempt 1 from the wrist camera, at twice its speed: look, hover, approach, close, lift."))
         .key_figure(KeyFigure::new("142", "s", "to teach, from one photo"))
         .key_figure(KeyFigure::new(held.to_string(), "of 10", "grasped and held").tone(Tone::Good))
         .key_figure(KeyFigure::new(error_mm, "mm", "median error of detection"))
@@ -41,11 +41,6 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         .section(demonstration())
         .section(teaching())
         .section(detections())
-        .section(
-            Section::new("One grasp")
-                .lead("Attempt 1, from the wrist camera, at twice its speed.")
-                .figure(Figure::animation(animation()?).caption("Look, hover, approach, close, lift, hold. Simulated.")),
-        )
         .section(
             Section::new("Attempts")
                 .lead("Random poses and start configurations. Held means: at least 10 cm above the table between both fingers, one second after lifting.")

@@ -196,7 +196,11 @@ impl Table {
             for run in self.columns.chunk_by(|a, b| a.group.is_some() && a.group == b.group) {
                 match &run[0].group {
                     Some(group) => {
-                        html += &format!("<th colspan=\"{}\" scope=\"colgroup\">{}</th>", run.len(), escape(group));
+                        html += &format!(
+                            "<th colspan=\"{}\" scope=\"colgroup\"><span>{}</span></th>",
+                            run.len(),
+                            escape(group)
+                        );
                     }
                     None => html += "<td></td>",
                 }
@@ -254,9 +258,9 @@ mod tests {
     fn neighbours_share_a_group_heading() {
         let html = table().to_html();
         assert_well_formed(&html);
-        assert!(
-            html.contains("<tr class=\"groups\"><td></td><th colspan=\"2\" scope=\"colgroup\">pose</th><td></td></tr>")
-        );
+        assert!(html.contains(
+            "<tr class=\"groups\"><td></td><th colspan=\"2\" scope=\"colgroup\"><span>pose</span></th><td></td></tr>"
+        ));
     }
 
     #[test]

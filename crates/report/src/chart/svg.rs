@@ -1,6 +1,6 @@
 //! A chart as inline SVG.
 //!
-//! Each chart is drawn twice, narrow and wide, and the page's style shows the one that fits: scaling one drawing
+//! Each chart is drawn in three widths, and the page's style shows the one that fits: scaling one drawing
 //! would make its text too small on a phone or too large on a desk. Colours are the page's own variables, so that
 //! the chart follows the theme.
 
@@ -9,12 +9,14 @@ use super::{Axis, Chart, Scale};
 use crate::html::{escape, format_number};
 
 /// Width and height of a drawing and the class that the style sheet selects it by.
-const SIZES: [(f64, f64, &str); 2] = [(340.0, 230.0, "narrow"), (520.0, 290.0, "wide")];
+const SIZES: [(f64, f64, &str); 3] = [(320.0, 220.0, "narrow"), (430.0, 260.0, "medium"), (680.0, 330.0, "wide")];
 const TOP: f64 = 30.0;
-const BOTTOM: f64 = 40.0;
+const BOTTOM: f64 = 38.0;
 const RIGHT: f64 = 14.0;
 /// Width of a digit at the size of tick labels.
 const DIGIT_WIDTH: f64 = 7.0;
+/// Mean width of a letter in notes.
+const LETTER_WIDTH: f64 = 6.2;
 /// Colours of curves in the style sheet.
 const NUM_COLORS: usize = 4;
 
@@ -23,7 +25,8 @@ impl Chart {
     pub(crate) fn to_html(&self) -> String {
         let mut html = String::from("<figure class=\"chart\">");
         html += &format!("<h3>{}</h3>", escape(&self.title));
-        if self.series.len() > 1 || self.series.iter().any(|s| s.noisy) {
+        // Even one curve is named: neighbouring charts then keep their plots on one line.
+        if !self.series.is_empty() {
             html += "<ul class=\"legend\">";
             for (order, series) in self.series.iter().enumerate() {
                 let color = order % NUM_COLORS + 1;
@@ -141,11 +144,17 @@ impl Chart {
     fn references(&self, plot: &Plot) -> String {
         let mut svg = String::new();
         if let Some((y, label)) = self.limit.as_ref().and_then(|(y, label)| Some((plot.y(*y)?, label))) {
+            // The label stands at the right end, or left of the moment's line when that would cross it.
+            let label_width = LETTER_WIDTH * label.chars().count() as f64;
+            let moment = self.moment.as_ref().and_then(|(x, _)| plot.x(*x));
+            let right = match moment {
+                Some(x) if x > plot.right - label_width - 6.0 && x - 6.0 - label_width > plot.left => x - 6.0,
+                _ => plot.right,
+            };
             svg += &format!(
                 "<path class=\"limit\" d=\"M{:.1} {y:.1}H{:.1}\"/>\
-                 <text class=\"note\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                 <text class=\"note\" x=\"{right:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
                 plot.left,
-                plot.right,
                 plot.right,
                 y - 6.0,
                 escape(label)
@@ -327,9 +336,9 @@ mod tests {
 
     #[test]
     fn a_curve_starts_and_ends_at_the_corners_of_its_plot() {
-        let svg = chart(vec![(0.0, 0.0), (10.0, 10.0)]).to_svg(340.0, 230.0, "narrow");
-        // Labels of two digits: the plot spans x 28 to 326, y 190 to 30.
-        assert!(svg.contains("d=\"M28.0 190.0L326.0 30.0\""), "{svg}");
+        let svg = chart(vec![(0.0, 0.0), (10.0, 10.0)]).to_svg(320.0, 220.0, "narrow");
+        // Labels of two digits: the plot spans x 28 to 306, y 182 to 30.
+        assert!(svg.contains("d=\"M28.0 182.0L306.0 30.0\""), "{svg}");
     }
 
     #[test]

@@ -110,12 +110,21 @@ impl Layer {
     }
 }
 
-/// Strokes polylines with a pen.
+/// Strokes polylines with a pen, its halo first.
 pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen) {
+    if pen.halo {
+        let rim = Pen { color: HALO_COLOR, width: pen.width + 2.0 * HALO_WIDTH, ..*pen };
+        stroke_translucent(image, polylines, &rim, HALO_OPACITY);
+    }
+    stroke_translucent(image, polylines, pen, 1.0);
+}
+
+/// Strokes polylines with a pen and an opacity, without a halo.
+pub(super) fn stroke_translucent(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: &Pen, opacity: f64) {
     if !(pen.width.is_finite() && pen.width > 0.0) {
         return;
     }
-    let reach = 0.5 * pen.width + HALO_WIDTH + 1.0;
+    let reach = 0.5 * pen.width + 1.0;
     let (high_x, high_y) = (f64::from(image.width()) + reach, f64::from(image.height()) + reach);
     let mut segments = Vec::new();
     for polyline in polylines {
@@ -127,27 +136,18 @@ pub(super) fn stroke(image: &mut RgbImage, polylines: &[Vec<Point2<f64>>], pen: 
             travelled += (pair[1] - pair[0]).norm();
         }
     }
-    let Some(empty) = Layer::around(image, segments.iter().flat_map(|&(a, b)| [a, b]), reach) else {
-        return;
-    };
-    let covered = |mut layer: Layer, width: f64| {
+    if let Some(mut layer) = Layer::around(image, segments.iter().flat_map(|&(a, b)| [a, b]), reach) {
         for &(a, b) in &segments {
-            layer.add_segment(a, b, width);
+            layer.add_segment(a, b, pen.width);
         }
-        layer
-    };
-    if pen.halo
-        && let Some(rim) = Layer::around(image, segments.iter().flat_map(|&(a, b)| [a, b]), reach)
-    {
-        covered(rim, pen.width + 2.0 * HALO_WIDTH).paint(image, HALO_COLOR, HALO_OPACITY);
+        layer.paint(image, pen.color, opacity);
     }
-    covered(empty, pen.width).paint(image, pen.color, 1.0);
 }
 
 /// Width of the dark rim on each side of a line, in pixels.
-pub(super) const HALO_WIDTH: f64 = 1.2;
+pub(super) const HALO_WIDTH: f64 = 1.0;
 pub(super) const HALO_COLOR: Color = Color([12, 14, 18]);
-pub(super) const HALO_OPACITY: f64 = 0.55;
+pub(super) const HALO_OPACITY: f64 = 0.45;
 
 pub(super) fn is_finite(point: &Point2<f64>) -> bool {
     point.x.is_finite() && point.y.is_finite()

@@ -57,9 +57,10 @@ pub struct DetectionMark<'a> {
     pub verdict: Verdict,
 }
 
-/// Line width that suits a picture's size: 2 pixels at 640 columns.
+/// Line width that suits a picture's size: 3 pixels at 640 columns, so that marks and tags can still be read
+/// when three pictures share a row of the page.
 fn line_width(image: &RgbImage) -> f64 {
-    (f64::from(image.width().max(image.height())) / 320.0).clamp(1.0, 6.0)
+    (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0)
 }
 
 /// Draws a demonstration: its box, its outline, the marked line, and the grasp as two jaws.
@@ -73,13 +74,13 @@ pub fn draw_demonstration(
     let width = line_width(image);
     if let Some(outline) = outline {
         shade_polygon(image, outline, Color::OUTLINE, 0.14);
-        draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.7 * width));
+        draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.6 * width));
     }
     draw_box(image, bounds, &Pen::new(Color::BOX).width(0.8 * width));
     if let Some(line) = line {
-        let pen = Pen::new(Color::NEUTRAL).width(0.7 * width);
+        let pen = Pen::new(Color::NEUTRAL).width(0.6 * width);
         draw_line(image, line.start, line.end, &pen.dashed(3.0 * width, 2.5 * width));
-        draw_keypoints(image, &line.keypoints(2), &pen.width(1.4 * width));
+        draw_keypoints(image, &line.keypoints(2), &pen.width(1.2 * width));
     }
     if let Some(grasp) = grasp {
         draw_grasp_jaws(image, grasp, &Pen::new(Color::GRASP).width(width));
@@ -94,23 +95,23 @@ pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
     let color = mark.verdict.color();
     let refused = mark.verdict == Verdict::Refused;
     if let Some(outline) = mark.outline {
-        draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.6 * width));
+        draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
     }
     if let Some(bounds) = &mark.bounds {
         let pen = Pen::new(color).width(0.8 * width);
         draw_box(image, bounds, &if refused { pen.dashed(4.0 * width, 3.0 * width) } else { pen });
     }
-    draw_keypoints(image, mark.keypoints, &Pen::new(Color::NEUTRAL).width(0.9 * width));
+    draw_keypoints(image, mark.keypoints, &Pen::new(Color::NEUTRAL).width(0.7 * width));
     if let Some(grasp) = mark.grasp.filter(|_| !refused) {
         draw_grasp_jaws(image, &grasp, &Pen::new(Color::GRASP).width(width));
     }
     let anchor = match (&mark.bounds, mark.grasp) {
-        (Some(bounds), _) => Point2::new(bounds.x1 - 0.4 * width, bounds.y1 - 1.4 * width),
+        (Some(bounds), _) => Point2::new(bounds.x1 - 0.4 * width, bounds.y1 - 0.9 * width),
         (None, Some(grasp)) => grasp.center(),
         (None, None) => return,
     };
     let text = format!("{} {}", format_number(mark.score, 2), mark.verdict.word());
-    draw_label(image, anchor, &text, color, 5.0 * width);
+    draw_label(image, anchor, &text, color, 5.6 * width);
 }
 
 #[cfg(test)]

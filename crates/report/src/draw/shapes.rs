@@ -4,7 +4,7 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{BoundingBox, Keypoint, PlanarGrasp, Polygon, Visibility};
 
-use super::layer::{HALO_COLOR, HALO_OPACITY, HALO_WIDTH, Layer, is_finite, stroke};
+use super::layer::{HALO_COLOR, HALO_OPACITY, HALO_WIDTH, Layer, is_finite, stroke, stroke_translucent};
 use super::{Color, Pen};
 
 /// Draws a straight line.
@@ -56,9 +56,10 @@ pub fn draw_keypoints(image: &mut RgbImage, keypoints: &[Keypoint], pen: &Pen) {
     }
 }
 
-/// Draws a grasp as a gripper seen from above: two jaws, their closing direction, a ring at the centre.
+/// Draws a grasp as a gripper seen from above: two jaws, arrows that show how they close, a dot at the centre.
 ///
-/// The jaws' inner faces stand where [`PlanarGrasp::jaws`] puts them, across the marked line.
+/// The jaws' inner faces stand where [`PlanarGrasp::jaws`] puts them, across the marked line. The arrows stand
+/// outside, so that what lies between the jaws stays visible.
 pub fn draw_grasp_jaws(image: &mut RgbImage, grasp: &PlanarGrasp, pen: &Pen) {
     let center = grasp.center();
     let faces = grasp.jaws();
@@ -68,48 +69,35 @@ pub fn draw_grasp_jaws(image: &mut RgbImage, grasp: &PlanarGrasp, pen: &Pen) {
     let (sin, cos) = grasp.angle.radians().sin_cos();
     let along = Vector2::new(cos, sin);
     let outward = Vector2::new(-sin, cos);
-    let thickness = 3.0 * pen.width;
-    let half_length = (0.42 * grasp.width.abs()).clamp(5.0 * pen.width, 16.0 * pen.width);
+    let thickness = 2.4 * pen.width;
+    let half_length = (0.42 * grasp.width.abs()).clamp(5.0 * pen.width, 14.0 * pen.width);
+    let solid = Pen { dash: None, ..*pen };
 
     for (face, side) in faces.into_iter().zip([-1.0, 1.0]) {
         let away = outward * side;
-        let corners = |rim: f64| {
-            let (near, far) = (face - away * rim, face + away * (thickness + rim));
-            let reach = along * (half_length + rim);
-            [near - reach, near + reach, far + reach, far - reach]
-        };
-        for (rim, color, opacity) in [(HALO_WIDTH, HALO_COLOR, HALO_OPACITY), (0.0, pen.color, 1.0)] {
-            if rim > 0.0 && !pen.halo {
-                continue;
-            }
-            let corners = corners(rim);
-            if let Some(mut layer) = Layer::around(image, corners, 1.0) {
-                layer.add_convex(&corners);
-                layer.paint(image, color, opacity);
-            }
-        }
-        closing_arrow(image, face, -away, along, 0.5 * grasp.width.abs(), pen);
+        let back = face + away * thickness;
+        let tail = back + away * (6.5 * pen.width);
+        stroke(image, &[vec![back, tail]], &solid);
+        let barb = |turn: f64| back + away * (3.2 * pen.width) + along * (turn * 2.6 * pen.width);
+        fill_convex(image, &[back + away * (0.4 * pen.width), barb(1.0), barb(-1.0)], pen);
+        let reach = along * half_length;
+        fill_convex(image, &[face - reach, face + reach, back + reach, back - reach], pen);
     }
-    ring(image, center, 1.8 * pen.width, &pen.width(0.8 * pen.width));
+    stroke(image, &[vec![center, center]], &solid.width(3.0 * pen.width));
 }
 
-/// Draws an arrow from a jaw's face towards the centre, when there is room for one.
-fn closing_arrow(
-    image: &mut RgbImage,
-    face: Point2<f64>,
-    inward: Vector2<f64>,
-    along: Vector2<f64>,
-    room: f64,
-    pen: &Pen,
-) {
-    let head = 2.6 * pen.width;
-    if room < 4.0 * head {
-        return;
+/// Fills a convex polygon in the pen's colour, with its halo.
+fn fill_convex(image: &mut RgbImage, corners: &[Point2<f64>], pen: &Pen) {
+    if pen.halo {
+        let mut closed = corners.to_vec();
+        closed.push(corners[0]);
+        let rim = Pen { color: HALO_COLOR, width: 2.0 * HALO_WIDTH, halo: false, dash: None };
+        stroke_translucent(image, &[closed], &rim, HALO_OPACITY);
     }
-    let tip = face + inward * (room - 2.0 * head);
-    let barb = |side: f64| tip - inward * head + along * (side * head);
-    let thin = Pen { width: 0.75 * pen.width, dash: None, ..*pen };
-    stroke(image, &[vec![face, tip], vec![barb(-1.0), tip, barb(1.0)]], &thin);
+    if let Some(mut layer) = Layer::around(image, corners.iter().copied(), 1.0) {
+        layer.add_convex(corners);
+        layer.paint(image, pen.color, 1.0);
+    }
 }
 
 fn ring(image: &mut RgbImage, center: Point2<f64>, radius: f64, pen: &Pen) {
@@ -191,10 +179,13 @@ mod tests {
         let mut image = RgbImage::from_pixel(100, 100, GREY);
         let grasp = PlanarGrasp { x: 50.0, y: 50.0, angle: Angle::ZERO, width: 40.0 };
         draw_grasp_jaws(&mut image, &grasp, &Pen::new(RED).width(1.0).without_halo());
-        // Faces at y = 30 and 70, three pixels thick outwards.
-        assert_eq!(image.get_pixel(50, 28).0, [255, 0, 0]);
-        assert_eq!(image.get_pixel(50, 71).0, [255, 0, 0]);
-        assert_eq!(*image.get_pixel(50, 25), GREY);
+        // Faces at y = 30 and 70, 2.4 pixels thick outwards, 14 long to each side; arrows as far as 10 outside.
+        for (x, y) in [(50, 28), (50, 71), (60, 28), (60, 71), (50, 23)] {
+            assert_eq!(image.get_pixel(x, y).0, [255, 0, 0], "({x}, {y})");
+        }
+        for (x, y) in [(66, 28), (60, 25), (50, 18), (50, 40)] {
+            assert_eq!(*image.get_pixel(x, y), GREY, "({x}, {y})");
+        }
         assert_eq!(*image.get_pixel(28, 50), GREY, "nothing at the ends of the line");
 
         let mut turned = RgbImage::from_pixel(100, 100, GREY);
