@@ -338,7 +338,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let length = rng.random_range(0.035..0.06);
             let around: Vec<Point3<f64>> = (0..=28)
                 .map(|step| {
-                    let angle = TAU * f64::from(step) / 28.0;
+                    let angle = TAU * f64::from(step % 28) / 28.0;
                     Point3::new((outer - thick / 2.0) * angle.cos(), (outer - thick / 2.0) * angle.sin(), 0.0)
                 })
                 .collect();
@@ -434,6 +434,25 @@ mod tests {
                     .fold(f64::INFINITY, f64::min);
                 assert!(lowest.abs() < 1e-9, "{kind:?} {seed}: lowest point at {lowest} m");
                 assert!(distractor.footprint.len() >= 3);
+            }
+        }
+    }
+
+    /// MuJoCo refuses a mesh in which two faces run along an edge in the same direction.
+    #[test]
+    fn no_edge_is_walked_twice_in_one_direction() {
+        for kind in DistractorKind::ALL {
+            for seed in 0..12 {
+                for piece in pieces(kind, seed) {
+                    let obj = piece.mesh.to_obj();
+                    let mut edges = std::collections::HashSet::new();
+                    for line in obj.lines().filter(|line| line.starts_with("f ")) {
+                        let face: Vec<&str> = line.split([' ', '/']).skip(1).step_by(3).collect();
+                        for corner in 0..3 {
+                            assert!(edges.insert((face[corner].to_owned(), face[(corner + 1) % 3].to_owned())), "{kind:?} {seed}: {line}");
+                        }
+                    }
+                }
             }
         }
     }

@@ -267,11 +267,19 @@ pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<P
     path
 }
 
-/// A round bar of `radius` metres along a path, flat at both ends; texture u runs round it (0 and 1 below, 0.5 on top).
+/// A round bar of `radius` metres along a path, flat at both ends, or closed in itself when the path lies in a plane
+/// and ends where it starts. Texture u runs round the bar (0 and 1 below, 0.5 on top).
 pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh {
     let count = path.len();
-    let tangents: Vec<Vector3<f64>> =
-        (0..count).map(|idx| (path[(idx + 1).min(count - 1)] - path[idx.saturating_sub(1)]).normalize()).collect();
+    let closed = path[0] == path[count - 1];
+    let tangents: Vec<Vector3<f64>> = (0..count)
+        .map(|idx| match idx {
+            _ if closed && (idx == 0 || idx == count - 1) => path[1] - path[count - 2],
+            0 => path[1] - path[0],
+            _ => path[(idx + 1).min(count - 1)] - path[idx - 1],
+        })
+        .map(|tangent| tangent.normalize())
+        .collect();
     // Carried along by the smallest turn, so that the bar does not twist.
     let mut up = vec![perpendicular(&tangents[0])];
     for pair in tangents.windows(2) {
@@ -283,12 +291,14 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         along.push(along[along.len() - 1] + (pair[1] - pair[0]).norm());
     }
     let mut mesh = TriangleMesh::default();
-    mesh.push_grid(count + 2, segments + 1, |row, col| {
-        let idx = row.clamp(1, count) - 1;
+    let caps = if closed { 0 } else { 1 };
+    mesh.push_grid(count + 2 * caps, segments + 1, |row, col| {
+        let idx = (row + 1 - caps).clamp(1, count) - 1;
         let around = (col % segments) as f64 / segments as f64;
         let angle = PI + TAU * around;
         let side = tangents[idx].cross(&up[idx]);
-        let offset = if row == 0 || row == count + 1 { 0.0 } else { radius };
+        let capping = caps == 1 && (row == 0 || row == count + 1);
+        let offset = if capping { 0.0 } else { radius };
         // `up`, then `side = tangent × up`: increasing angle turns about the tangent, so that faces look outwards.
         let position = path[idx] + (up[idx] * angle.cos() + side * angle.sin()) * offset;
         MeshVertex {
