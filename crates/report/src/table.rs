@@ -92,7 +92,7 @@ impl Cell {
             Self::Progress { done, total, label } => {
                 let dots: String =
                     (0..*total).map(|step| if step < *done { "<i class=\"on\"></i>" } else { "<i></i>" }).collect();
-                format!("<span class=\"steps\">{dots}</span> <span class=\"step\">{}</span>", escape(label))
+                format!("<span class=\"steps\">{dots}<b>{}</b></span>", escape(label))
             }
         }
     }

@@ -98,7 +98,7 @@ pub fn draw_detection(image: &mut RgbImage, mark: &DetectionMark<'_>) {
         draw_polygon(image, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
     }
     if let Some(bounds) = &mark.bounds {
-        let pen = Pen::new(color).width(0.8 * width);
+        let pen = Pen::new(color).width(width);
         draw_box(image, bounds, &if refused { pen.dashed(4.0 * width, 3.0 * width) } else { pen });
     }
     draw_keypoints(image, mark.keypoints, &Pen::new(Color::NEUTRAL).width(0.7 * width));

@@ -177,22 +177,21 @@ mod tests {
     #[test]
     fn jaws_stand_outside_the_part_and_across_the_line() {
         let mut image = RgbImage::from_pixel(100, 100, GREY);
-        let grasp = PlanarGrasp { x: 50.0, y: 50.0, angle: Angle::ZERO, width: 40.0 };
+        let grasp = PlanarGrasp { x: 50.5, y: 50.5, angle: Angle::ZERO, width: 40.0 };
         draw_grasp_jaws(&mut image, &grasp, &Pen::new(RED).width(1.0).without_halo());
-        // Faces at y = 30 and 70, 2.4 pixels thick outwards, 14 long to each side; arrows as far as 10 outside.
-        for (x, y) in [(50, 28), (50, 71), (60, 28), (60, 71), (50, 23)] {
+        // Faces at y = 30.5 and 70.5, 2.4 pixels thick outwards, 14 long to each side; arrows as far as 9 outside.
+        for (x, y) in [(50, 29), (50, 71), (60, 29), (60, 71), (50, 23)] {
             assert_eq!(image.get_pixel(x, y).0, [255, 0, 0], "({x}, {y})");
         }
-        for (x, y) in [(66, 28), (60, 25), (50, 18), (50, 40)] {
+        for (x, y) in [(66, 29), (60, 25), (50, 18), (50, 40), (29, 50)] {
             assert_eq!(*image.get_pixel(x, y), GREY, "({x}, {y})");
         }
-        assert_eq!(*image.get_pixel(28, 50), GREY, "nothing at the ends of the line");
 
         let mut turned = RgbImage::from_pixel(100, 100, GREY);
         let grasp = PlanarGrasp { angle: Angle::from_degrees(90.0), ..grasp };
         draw_grasp_jaws(&mut turned, &grasp, &Pen::new(RED).width(1.0).without_halo());
-        assert_eq!(turned.get_pixel(28, 50).0, [255, 0, 0]);
-        assert_eq!(*turned.get_pixel(50, 28), GREY);
+        assert_eq!(turned.get_pixel(29, 50).0, [255, 0, 0]);
+        assert_eq!(*turned.get_pixel(50, 29), GREY);
     }
 
     #[test]
