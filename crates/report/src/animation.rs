@@ -432,9 +432,9 @@ mod tests {
 
     #[test]
     fn a_limit_is_kept_by_giving_up_frames_and_pixels() {
-        let noisy: Vec<RgbImage> = (0..20u32)
+        let noisy: Vec<RgbImage> = (0..12u32)
             .map(|t| {
-                RgbImage::from_fn(160, 120, |x, y| {
+                RgbImage::from_fn(64, 48, |x, y| {
                     let hash = (x * 7919 + y * 104_729 + t * 1_299_709).wrapping_mul(2_654_435_761);
                     Rgb([(hash >> 24) as u8, (hash >> 16) as u8, (hash >> 8) as u8])
                 })
