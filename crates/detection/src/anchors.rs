@@ -98,25 +98,14 @@ mod tests {
 
     #[test]
     fn anchors_run_along_rows_first() {
-        let grids = [(2, 3), (1, 2), (1, 1), (1, 1), (1, 1)]
-            .map(|(height, width)| GridSize { height, width });
-        let nominal = grid_anchors(
-            &config(AnchorRounding::Rounded, AnchorStride::Nominal),
-            &grids,
-            8,
-            12,
-        );
+        let grids = [(2, 3), (1, 2), (1, 1), (1, 1), (1, 1)].map(|(height, width)| GridSize { height, width });
+        let nominal = grid_anchors(&config(AnchorRounding::Rounded, AnchorStride::Nominal), &grids, 8, 12);
         assert_eq!(nominal[0].len(), 2 * 3 * 3);
         assert_eq!(nominal[0][1], [-16.0, -16.0, 16.0, 16.0]);
         assert_eq!(nominal[0][4], [-12.0, -16.0, 20.0, 16.0]);
         assert_eq!(nominal[0][10], [-16.0, -12.0, 16.0, 20.0]);
         // 13 pixels over 2 cells are 6 a cell, where the nominal stride of p3 is 8.
-        let over_grid = grid_anchors(
-            &config(AnchorRounding::Rounded, AnchorStride::ImageOverGrid),
-            &grids,
-            8,
-            13,
-        );
+        let over_grid = grid_anchors(&config(AnchorRounding::Rounded, AnchorStride::ImageOverGrid), &grids, 8, 13);
         assert_eq!(over_grid[1][4], [-26.0, -32.0, 38.0, 32.0]);
     }
 }

@@ -21,9 +21,7 @@ pub struct BoxCoder {
 impl BoxCoder {
     /// A coder with the configured weights.
     pub fn new(config: &BoxCoderConfig) -> Self {
-        Self {
-            weights: config.weights.map(|w| w as f32),
-        }
+        Self { weights: config.weights.map(|w| w as f32) }
     }
 
     /// Gives the deltas that lead from `reference` to `target`.
@@ -33,12 +31,7 @@ impl BoxCoder {
         let [ax, ay] = [reference[0] + 0.5 * aw, reference[1] + 0.5 * ah];
         let [gx, gy] = [target[0] + 0.5 * gw, target[1] + 0.5 * gh];
         let [wx, wy, ww, wh] = self.weights;
-        [
-            wx * (gx - ax) / aw,
-            wy * (gy - ay) / ah,
-            ww * (gw / aw).ln(),
-            wh * (gh / ah).ln(),
-        ]
+        [wx * (gx - ax) / aw, wy * (gy - ay) / ah, ww * (gw / aw).ln(), wh * (gh / ah).ln()]
     }
 
     /// Gives the box that `deltas` lead to from `reference`.
@@ -50,12 +43,7 @@ impl BoxCoder {
         let height = (deltas[3] / wh).min(SCALE_CLAMP).exp() * ah;
         let x = deltas[0] / wx * aw + ax;
         let y = deltas[1] / wy * ah + ay;
-        [
-            x - 0.5 * width,
-            y - 0.5 * height,
-            x + 0.5 * width,
-            y + 0.5 * height,
-        ]
+        [x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height]
     }
 }
 
@@ -64,9 +52,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const ROI: BoxCoderConfig = BoxCoderConfig {
-        weights: [10.0, 10.0, 5.0, 5.0],
-    };
+    const ROI: BoxCoderConfig = BoxCoderConfig { weights: [10.0, 10.0, 5.0, 5.0] };
 
     #[test]
     fn encodes_by_hand() {

@@ -19,12 +19,7 @@ pub fn iou(a: &Corners, b: &Corners) -> f32 {
 
 /// The part of a box inside an image of `width` by `height` pixels.
 pub fn clip(b: &Corners, width: f32, height: f32) -> Corners {
-    [
-        b[0].clamp(0.0, width),
-        b[1].clamp(0.0, height),
-        b[2].clamp(0.0, width),
-        b[3].clamp(0.0, height),
-    ]
+    [b[0].clamp(0.0, width), b[1].clamp(0.0, height), b[2].clamp(0.0, width), b[3].clamp(0.0, height)]
 }
 
 /// Whether both sides exceed `min_size` and no coordinate is infinite or not a number.
@@ -54,8 +49,7 @@ mod tests {
     }
 
     fn corners() -> impl Strategy<Value = Corners> {
-        (0f32..100.0, 0f32..100.0, 0.1f32..50.0, 0.1f32..50.0)
-            .prop_map(|(x, y, w, h)| [x, y, x + w, y + h])
+        (0f32..100.0, 0f32..100.0, 0.1f32..50.0, 0.1f32..50.0).prop_map(|(x, y, w, h)| [x, y, x + w, y + h])
     }
 
     proptest! {

@@ -466,11 +466,7 @@ fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString)
     if holds {
         return Ok(());
     }
-    Err(DetectionError::Config {
-        field,
-        expected: expected.to_owned(),
-        found: found.to_string(),
-    })
+    Err(DetectionError::Config { field, expected: expected.to_owned(), found: found.to_string() })
 }
 
 impl RcnnConfig {
@@ -480,15 +476,8 @@ impl RcnnConfig {
     /// [`DetectionError::Config`] names the first field that is not.
     pub fn validate(&self) -> Result<()> {
         let (w, h) = match self.input.resize {
-            ResizeRule::ShortSide {
-                short_px,
-                max_long_px,
-                ..
-            } => (short_px, max_long_px),
-            ResizeRule::FitWithin {
-                width_px,
-                height_px,
-            } => (width_px, height_px),
+            ResizeRule::ShortSide { short_px, max_long_px, .. } => (short_px, max_long_px),
+            ResizeRule::FitWithin { width_px, height_px } => (width_px, height_px),
         };
         check(
             (1..=8192).contains(&w) && (1..=8192).contains(&h),
@@ -529,8 +518,7 @@ impl RcnnConfig {
             format!("{:?}", self.backbone.num_blocks),
         )?;
         check(
-            !self.anchors.aspect_ratios.is_empty()
-                && self.anchors.aspect_ratios.iter().all(|r| *r > 0.0),
+            !self.anchors.aspect_ratios.is_empty() && self.anchors.aspect_ratios.iter().all(|r| *r > 0.0),
             "anchors.aspect_ratios",
             "one or more positive numbers",
             format!("{:?}", self.anchors.aspect_ratios),
@@ -541,10 +529,7 @@ impl RcnnConfig {
             "positive",
             format!("{:?}", self.anchors.sizes_px),
         )?;
-        for (field, matcher) in [
-            ("rpn.matcher", &self.rpn.matcher),
-            ("roi_heads.matcher", &self.roi_heads.matcher),
-        ] {
+        for (field, matcher) in [("rpn.matcher", &self.rpn.matcher), ("roi_heads.matcher", &self.roi_heads.matcher)] {
             check(
                 0.0 <= matcher.negative_below
                     && matcher.negative_below <= matcher.positive_from
@@ -554,34 +539,17 @@ impl RcnnConfig {
                 format!("{} and {}", matcher.negative_below, matcher.positive_from),
             )?;
         }
-        for (field, sampler) in [
-            ("rpn.sampler", &self.rpn.sampler),
-            ("roi_heads.sampler", &self.roi_heads.sampler),
-        ] {
+        for (field, sampler) in [("rpn.sampler", &self.rpn.sampler), ("roi_heads.sampler", &self.roi_heads.sampler)] {
             check(
-                sampler.batch_size_per_image > 0
-                    && (0.0..=1.0).contains(&sampler.positive_fraction),
+                sampler.batch_size_per_image > 0 && (0.0..=1.0).contains(&sampler.positive_fraction),
                 field,
                 "at least one sample, and a fraction from 0 to 1",
-                format!(
-                    "{}, {}",
-                    sampler.batch_size_per_image, sampler.positive_fraction
-                ),
+                format!("{}, {}", sampler.batch_size_per_image, sampler.positive_fraction),
             )?;
         }
-        check(
-            self.roi_heads.num_classes > 0,
-            "roi_heads.num_classes",
-            "at least 1",
-            self.roi_heads.num_classes,
-        )?;
+        check(self.roi_heads.num_classes > 0, "roi_heads.num_classes", "at least 1", self.roi_heads.num_classes)?;
         if let Some(head) = &self.roi_heads.keypoint_head {
-            check(
-                head.num_keypoints > 0,
-                "roi_heads.keypoint_head.num_keypoints",
-                "at least 1",
-                head.num_keypoints,
-            )?;
+            check(head.num_keypoints > 0, "roi_heads.keypoint_head.num_keypoints", "at least 1", head.num_keypoints)?;
             check(
                 !head.conv_channels.is_empty(),
                 "roi_heads.keypoint_head.conv_channels",

@@ -99,12 +99,7 @@ impl RcnnConfig {
                 bottom_up: ResNet::init(&self.backbone, &mut init),
                 fpn: Fpn::init(&self.fpn, stage_channels, &mut init),
             },
-            proposal_generator: RegionProposalNetwork::init(
-                &self.rpn,
-                &self.anchors,
-                self.fpn.channels,
-                &mut init,
-            ),
+            proposal_generator: RegionProposalNetwork::init(&self.rpn, &self.anchors, self.fpn.channels, &mut init),
             roi_heads: RoiHeads::init(&self.roi_heads, &self.fpn, &mut init),
             config: self.clone(),
         })
@@ -141,12 +136,7 @@ impl GeneralizedRcnn {
     ///
     /// # Errors
     /// Where images and targets differ in number, or a target contradicts the configuration.
-    pub fn losses(
-        &self,
-        images: &[TransformedImage],
-        targets: &[Target],
-        seed: u64,
-    ) -> Result<Losses> {
+    pub fn losses(&self, images: &[TransformedImage], targets: &[Target], seed: u64) -> Result<Losses> {
         let targets = self.resized_targets(images, targets)?;
         Ok(self.losses_of_resized(images, &targets, seed))
     }
@@ -161,9 +151,7 @@ impl GeneralizedRcnn {
         // A stream for each image and purpose: what one image draws does not move the others.
         let rngs = |purpose: u128| -> Vec<Pcg64Mcg> {
             let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
-            (0..images.len())
-                .map(|idx| Pcg64Mcg::from_seed((state(idx) << 1 | 1).to_le_bytes()))
-                .collect()
+            (0..images.len()).map(|idx| Pcg64Mcg::from_seed((state(idx) << 1 | 1).to_le_bytes())).collect()
         };
         let (tensor, sizes) = self.batch(images);
         let [_, _, height, width] = tensor.dims();
@@ -171,17 +159,10 @@ impl GeneralizedRcnn {
         let predictions = self.proposal_generator.predict(&features, [height, width]);
         let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Train);
         let gt_boxes: Vec<_> = targets.iter().map(|target| target.boxes.clone()).collect();
-        let [rpn_cls, rpn_loc] =
-            self.proposal_generator.losses(predictions, &gt_boxes, &mut rngs(1));
+        let [rpn_cls, rpn_loc] = self.proposal_generator.losses(predictions, &gt_boxes, &mut rngs(1));
         let rois = self.roi_heads.sample_rois(&proposals, targets, &mut rngs(2));
         let roi = self.roi_heads.losses(&features, &rois, targets, &mut rngs(3));
-        Losses {
-            rpn_cls,
-            rpn_loc,
-            cls: roi.cls,
-            box_reg: roi.box_reg,
-            keypoint: roi.keypoint,
-        }
+        Losses { rpn_cls, rpn_loc, cls: roi.cls, box_reg: roi.box_reg, keypoint: roi.keypoint }
     }
 
     /// Finds the objects in each image.
@@ -197,26 +178,15 @@ impl GeneralizedRcnn {
         let predictions = self.proposal_generator.predict(&features, [height, width]);
         let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Test);
         let found = self.roi_heads.detect(&features, &proposals, &sizes);
-        images
-            .iter()
-            .zip(found)
-            .map(|(image, found)| original_detections(image, &found))
-            .collect()
+        images.iter().zip(found).map(|(image, found)| original_detections(image, &found)).collect()
     }
 
-    fn resized_targets(
-        &self,
-        images: &[TransformedImage],
-        targets: &[Target],
-    ) -> Result<Vec<ResizedTarget>> {
+    fn resized_targets(&self, images: &[TransformedImage], targets: &[Target]) -> Result<Vec<ResizedTarget>> {
         if images.is_empty() {
             return Err(DetectionError::EmptyBatch);
         }
         if images.len() != targets.len() {
-            return Err(DetectionError::BatchSize {
-                expected: images.len(),
-                found: targets.len(),
-            });
+            return Err(DetectionError::BatchSize { expected: images.len(), found: targets.len() });
         }
         targets
             .iter()
@@ -229,14 +199,8 @@ impl GeneralizedRcnn {
     }
 
     fn check_target(&self, image_idx: usize, target: &Target) -> Result<()> {
-        let fail = |field, expected: String, found: String| {
-            Err(DetectionError::Target {
-                image_idx,
-                field,
-                expected,
-                found,
-            })
-        };
+        let fail =
+            |field, expected: String, found: String| Err(DetectionError::Target { image_idx, field, expected, found });
         let heads = &self.config.roi_heads;
         let count = target.boxes.len();
         if target.labels.len() != count {
@@ -278,19 +242,12 @@ impl GeneralizedRcnn {
 
 fn resized_target(image: &TransformedImage, target: &Target) -> ResizedTarget {
     let [sx, sy] = image.resized_from_original();
-    let scaled = |keypoint: &Keypoint| Keypoint {
-        x: keypoint.x * sx,
-        y: keypoint.y * sy,
-        visibility: keypoint.visibility,
-    };
+    let scaled =
+        |keypoint: &Keypoint| Keypoint { x: keypoint.x * sx, y: keypoint.y * sy, visibility: keypoint.visibility };
     ResizedTarget {
         boxes: target.boxes.iter().map(|b| image.resized_box(b)).collect(),
         labels: target.labels.clone(),
-        keypoints: target
-            .keypoints
-            .iter()
-            .map(|list| list.iter().map(scaled).collect())
-            .collect(),
+        keypoints: target.keypoints.iter().map(|list| list.iter().map(scaled).collect()).collect(),
     }
 }
 

@@ -8,9 +8,7 @@ use image::RgbImage;
 use sdg_geometry::BoundingBox;
 
 use crate::boxes::Corners;
-use crate::config::{
-    ChannelOrder, ImageTransformConfig, PixelRange, ResizeFilter, ResizeRule, SizeRounding,
-};
+use crate::config::{ChannelOrder, ImageTransformConfig, PixelRange, ResizeFilter, ResizeRule, SizeRounding};
 use crate::error::{DetectionError, Result};
 use crate::resample;
 
@@ -38,9 +36,7 @@ pub struct TransformedImage {
 impl ImageTransform {
     /// A transform as configured.
     pub fn new(config: &ImageTransformConfig) -> Self {
-        Self {
-            config: config.clone(),
-        }
+        Self { config: config.clone() }
     }
 
     /// Resizes, orders the channels and normalises.
@@ -50,17 +46,13 @@ impl ImageTransform {
     pub fn apply(&self, image: &RgbImage) -> Result<TransformedImage> {
         let (original_width, original_height) = image.dimensions();
         if original_width == 0 || original_height == 0 {
-            return Err(DetectionError::EmptyImage {
-                width: original_width,
-                height: original_height,
-            });
+            return Err(DetectionError::EmptyImage { width: original_width, height: original_height });
         }
         let (width, height) = resized_size(self.config.resize, original_width, original_height);
         let resized: Vec<f32> = match self.config.filter {
-            ResizeFilter::AntialiasedBytes => resample::antialiased_bytes(image, width, height)
-                .into_iter()
-                .map(f32::from)
-                .collect(),
+            ResizeFilter::AntialiasedBytes => {
+                resample::antialiased_bytes(image, width, height).into_iter().map(f32::from).collect()
+            }
             ResizeFilter::Bilinear => resample::bilinear(image, width, height),
         };
         let range = match self.config.pixel_range {
@@ -93,21 +85,12 @@ impl ImageTransform {
 pub fn resized_size(rule: ResizeRule, width: u32, height: u32) -> (usize, usize) {
     let (w, h) = (f64::from(width), f64::from(height));
     let (scale, rounding) = match rule {
-        ResizeRule::ShortSide {
-            short_px,
-            max_long_px,
-            rounding,
-        } => (
-            (f64::from(short_px) / w.min(h)).min(f64::from(max_long_px) / w.max(h)),
-            rounding,
-        ),
-        ResizeRule::FitWithin {
-            width_px,
-            height_px,
-        } => (
-            (f64::from(width_px) / w).min(f64::from(height_px) / h),
-            SizeRounding::Nearest,
-        ),
+        ResizeRule::ShortSide { short_px, max_long_px, rounding } => {
+            ((f64::from(short_px) / w.min(h)).min(f64::from(max_long_px) / w.max(h)), rounding)
+        }
+        ResizeRule::FitWithin { width_px, height_px } => {
+            ((f64::from(width_px) / w).min(f64::from(height_px) / h), SizeRounding::Nearest)
+        }
     };
     let round = |exact: f64| {
         let whole = match rounding {
@@ -122,34 +105,21 @@ pub fn resized_size(rule: ResizeRule, width: u32, height: u32) -> (usize, usize)
 impl TransformedImage {
     /// Factors from original to resized pixels, along x and y.
     pub fn resized_from_original(&self) -> [f64; 2] {
-        [
-            self.width as f64 / self.original_width as f64,
-            self.height as f64 / self.original_height as f64,
-        ]
+        [self.width as f64 / self.original_width as f64, self.height as f64 / self.original_height as f64]
     }
 
     /// A box of the original image in resized pixels.
     pub fn resized_box(&self, original: &BoundingBox) -> Corners {
         let [sx, sy] = self.resized_from_original();
-        [
-            (original.x1 * sx) as f32,
-            (original.y1 * sy) as f32,
-            (original.x2 * sx) as f32,
-            (original.y2 * sy) as f32,
-        ]
+        [(original.x1 * sx) as f32, (original.y1 * sy) as f32, (original.x2 * sx) as f32, (original.y2 * sy) as f32]
     }
 
     /// A box of the resized image in original pixels, clipped to the original image.
     pub fn original_box(&self, resized: &Corners) -> BoundingBox {
         let [sx, sy] = self.resized_from_original();
         let [x1, y1, x2, y2] = resized.map(f64::from);
-        BoundingBox {
-            x1: x1 / sx,
-            y1: y1 / sy,
-            x2: x2 / sx,
-            y2: y2 / sy,
-        }
-        .clip(self.original_width as f64, self.original_height as f64)
+        BoundingBox { x1: x1 / sx, y1: y1 / sy, x2: x2 / sx, y2: y2 / sy }
+            .clip(self.original_width as f64, self.original_height as f64)
     }
 }
 
@@ -191,11 +161,7 @@ mod tests {
 
     #[test]
     fn short_side_rule_by_hand() {
-        let rule = |rounding| ResizeRule::ShortSide {
-            short_px: 800,
-            max_long_px: 1333,
-            rounding,
-        };
+        let rule = |rounding| ResizeRule::ShortSide { short_px: 800, max_long_px: 1333, rounding };
         // 640x480: 800/480 · 640 = 1066.67.
         assert_eq!(resized_size(rule(SizeRounding::Nearest), 640, 480), (1067, 800));
         assert_eq!(resized_size(rule(SizeRounding::Floor), 640, 480), (1066, 800));

@@ -35,34 +35,23 @@ pub enum Distribution {
 impl Distribution {
     /// He's normal distribution for layers before a ReLU: standard deviation `√(2 / fan)`.
     pub fn he_normal(fan: usize) -> Self {
-        Self::Normal {
-            std: (2.0 / fan as f64).sqrt(),
-        }
+        Self::Normal { std: (2.0 / fan as f64).sqrt() }
     }
 
     /// Uniform of variance `1 / fan`: bound `√(3 / fan)`, for linear layers.
     pub fn lecun_uniform(fan: usize) -> Self {
-        Self::Uniform {
-            bound: (3.0 / fan as f64).sqrt(),
-        }
+        Self::Uniform { bound: (3.0 / fan as f64).sqrt() }
     }
 }
 
 impl Initializer {
     /// An initialiser for parameters on `device`.
     pub fn new(device: &Device, seed: u64) -> Self {
-        Self {
-            rng: Pcg64Mcg::seed_from_u64(seed),
-            device: device.clone(),
-        }
+        Self { rng: Pcg64Mcg::seed_from_u64(seed), device: device.clone() }
     }
 
     /// Draws a trainable parameter.
-    pub fn param<const D: usize>(
-        &mut self,
-        dims: [usize; D],
-        distribution: Distribution,
-    ) -> Param<Tensor<D>> {
+    pub fn param<const D: usize>(&mut self, dims: [usize; D], distribution: Distribution) -> Param<Tensor<D>> {
         let count = dims.iter().product();
         let values = self.values(count, distribution);
         Param::from_data(TensorData::new(values, dims), &self.device)
@@ -70,19 +59,16 @@ impl Initializer {
 
     /// Makes a parameter of one value that is never trained.
     pub fn frozen<const D: usize>(&mut self, dims: [usize; D], value: f64) -> Param<Tensor<D>> {
-        self.param(dims, Distribution::Constant(value))
-            .set_require_grad(false)
+        self.param(dims, Distribution::Constant(value)).set_require_grad(false)
     }
 
     fn values(&mut self, count: usize, distribution: Distribution) -> Vec<f32> {
         match distribution {
             Distribution::Constant(value) => vec![value as f32; count],
-            Distribution::Normal { std } => (0..count)
-                .map(|_| (std * self.standard_normal()) as f32)
-                .collect(),
-            Distribution::Uniform { bound } => (0..count)
-                .map(|_| (bound * (2.0 * self.rng.random::<f64>() - 1.0)) as f32)
-                .collect(),
+            Distribution::Normal { std } => (0..count).map(|_| (std * self.standard_normal()) as f32).collect(),
+            Distribution::Uniform { bound } => {
+                (0..count).map(|_| (bound * (2.0 * self.rng.random::<f64>() - 1.0)) as f32).collect()
+            }
         }
     }
 

@@ -73,9 +73,7 @@ impl Norm {
         let rstd = (variance + GROUP_NORM_EPS).sqrt().recip();
         // Scale and shift are small, [N, C, 1, 1]: the image is passed over twice, not six times.
         let spread = |per_group: Tensor<3>| -> Tensor<4> {
-            per_group
-                .expand([n, num_groups, c / num_groups])
-                .reshape([n, c, 1, 1])
+            per_group.expand([n, num_groups, c / num_groups]).reshape([n, c, 1, 1])
         };
         let scale = spread(rstd) * self.weight.val().reshape([1, c, 1, 1]);
         let shift = self.bias.val().reshape([1, c, 1, 1]) - spread(mean) * scale.clone();
@@ -112,12 +110,7 @@ pub struct Conv2dShape {
 impl Conv2dShape {
     /// A shape of stride 1.
     pub fn new(in_channels: usize, out_channels: usize, kernel: usize) -> Self {
-        Self {
-            in_channels,
-            out_channels,
-            kernel,
-            stride: 1,
-        }
+        Self { in_channels, out_channels, kernel, stride: 1 }
     }
 
     /// The same with another stride.
@@ -136,31 +129,15 @@ impl Conv2dShape {
     }
 
     /// Draws the parameters. A norm stands instead of the bias.
-    pub fn init(
-        self,
-        distribution: Distribution,
-        norm: NormKind,
-        init: &mut Initializer,
-    ) -> Conv2d {
-        let Self {
-            in_channels,
-            out_channels,
-            kernel,
-            stride,
-        } = self;
+    pub fn init(self, distribution: Distribution, norm: NormKind, init: &mut Initializer) -> Conv2d {
+        let Self { in_channels, out_channels, kernel, stride } = self;
         let weight = init.param([out_channels, in_channels, kernel, kernel], distribution);
         let norm = Norm::init(norm, out_channels, init);
         let bias = match norm {
             Some(_) => None,
             None => Some(init.param([out_channels], Distribution::Constant(0.0))),
         };
-        Conv2d {
-            weight,
-            bias,
-            norm,
-            stride,
-            padding: kernel / 2,
-        }
+        Conv2d { weight, bias, norm, stride, padding: kernel / 2 }
     }
 }
 
@@ -183,9 +160,7 @@ impl Conv2d {
                 let [c_out, ..] = weight.dims();
                 conv2d(x, weight * scale.reshape([c_out, 1, 1, 1]), Some(shift), params)
             }
-            (NormKind::Group { num_groups }, None) => {
-                norm.group_norm(conv2d(x, weight, None, params), num_groups)
-            }
+            (NormKind::Group { num_groups }, None) => norm.group_norm(conv2d(x, weight, None, params), num_groups),
             _ => conv2d(x, weight, None, params),
         }
     }
@@ -202,12 +177,7 @@ pub struct Linear {
 
 impl Linear {
     /// Draws the parameters; the bias is zero.
-    pub fn init(
-        in_features: usize,
-        out_features: usize,
-        distribution: Distribution,
-        init: &mut Initializer,
-    ) -> Self {
+    pub fn init(in_features: usize, out_features: usize, distribution: Distribution, init: &mut Initializer) -> Self {
         Self {
             weight: init.param([out_features, in_features], distribution),
             bias: init.param([out_features], Distribution::Constant(0.0)),
@@ -262,9 +232,7 @@ impl ConvTranspose2x {
 /// - output: `[N, C, 2H, 2W]`
 pub fn upsample_nearest_2x(x: Tensor<4>) -> Tensor<4> {
     let [n, c, h, w] = x.dims();
-    x.reshape([n, c, h, 1, w, 1])
-        .expand([n, c, h, 2, w, 2])
-        .reshape([n, c, 2 * h, 2 * w])
+    x.reshape([n, c, h, 1, w, 1]).expand([n, c, h, 2, w, 2]).reshape([n, c, 2 * h, 2 * w])
 }
 
 /// Doubles height and width of square maps by linear interpolation along each axis, edges
@@ -286,10 +254,7 @@ pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
     }
     let stretch = Tensor::<1>::from_floats(weights.as_slice(), &x.device()).reshape([s, 2 * s]);
     // Both axes by a matrix product over the last: [N·C·S, S] x [S, 2S], then the rows alike.
-    let wide: Tensor<3> = x
-        .reshape([n * c * s, s])
-        .matmul(stretch.clone())
-        .reshape([n * c, s, 2 * s]);
+    let wide: Tensor<3> = x.reshape([n * c * s, s]).matmul(stretch.clone()).reshape([n * c, s, 2 * s]);
     wide.swap_dims(1, 2)
         .reshape([n * c * 2 * s, s])
         .matmul(stretch)
@@ -316,23 +281,15 @@ mod tests {
     fn nearest_upsampling_repeats() {
         let x = tensor(&[1.0, 2.0, 3.0, 4.0], [1, 1, 2, 2]);
         let expected = [1, 1, 2, 2, 1, 1, 2, 2, 3, 3, 4, 4, 3, 3, 4, 4].map(|v| v as f32);
-        assert_eq!(
-            upsample_nearest_2x(x).into_data().try_to_vec_as::<f32>().unwrap(),
-            expected
-        );
+        assert_eq!(upsample_nearest_2x(x).into_data().try_to_vec_as::<f32>().unwrap(), expected);
     }
 
     #[test]
     fn bilinear_upsampling_by_hand() {
         // Rows [0, 4] become [0, 1, 3, 4]; columns 0 and 8 apart likewise.
         let x = tensor(&[0.0, 4.0, 8.0, 12.0], [1, 1, 2, 2]);
-        let expected = [
-            0.0, 1.0, 3.0, 4.0, 2.0, 3.0, 5.0, 6.0, 6.0, 7.0, 9.0, 10.0, 8.0, 9.0, 11.0, 12.0,
-        ];
-        assert_eq!(
-            upsample_bilinear_2x(x).into_data().try_to_vec_as::<f32>().unwrap(),
-            expected
-        );
+        let expected = [0.0, 1.0, 3.0, 4.0, 2.0, 3.0, 5.0, 6.0, 6.0, 7.0, 9.0, 10.0, 8.0, 9.0, 11.0, 12.0];
+        assert_eq!(upsample_bilinear_2x(x).into_data().try_to_vec_as::<f32>().unwrap(), expected);
     }
 
     #[test]
@@ -342,9 +299,7 @@ mod tests {
         // Group 1 holds 1, 3 (mean 2, deviation 1), group 2 holds 10, 30 (mean 20, deviation 10).
         let x = tensor(&[1.0, 3.0, 10.0, 30.0], [1, 4, 1, 1]);
         let expected = tensor(&[-1.0, 1.0, -1.0, 1.0], [1, 4, 1, 1]);
-        norm.group_norm(x, 2)
-            .into_data()
-            .assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
+        norm.group_norm(x, 2).into_data().assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
     }
 
     #[test]

@@ -22,10 +22,7 @@ pub struct Losses {
 impl Losses {
     /// Sum of all losses.
     pub fn total(&self) -> Tensor<1> {
-        let boxes = self.rpn_cls.clone()
-            + self.rpn_loc.clone()
-            + self.cls.clone()
-            + self.box_reg.clone();
+        let boxes = self.rpn_cls.clone() + self.rpn_loc.clone() + self.cls.clone() + self.box_reg.clone();
         match &self.keypoint {
             Some(keypoint) => boxes + keypoint.clone(),
             None => boxes,

@@ -71,11 +71,7 @@ mod tests {
     use super::*;
 
     fn config(low_quality: LowQualityMatches) -> MatcherConfig {
-        MatcherConfig {
-            negative_below: 0.3,
-            positive_from: 0.7,
-            low_quality,
-        }
+        MatcherConfig { negative_below: 0.3, positive_from: 0.7, low_quality }
     }
 
     // A 10 px high ground truth of width 10; a candidate of width w inside it overlaps w / 10.
@@ -86,11 +82,8 @@ mod tests {
 
     #[test]
     fn thresholds_split_in_three() {
-        let matches = match_boxes(
-            &[inside(2.0), inside(5.0), inside(8.0)],
-            &[GT],
-            &config(LowQualityMatches::Forbidden),
-        );
+        let matches =
+            match_boxes(&[inside(2.0), inside(5.0), inside(8.0)], &[GT], &config(LowQualityMatches::Forbidden));
         assert_eq!(matches, [Match::Negative, Match::Ignored, Match::Positive(0)]);
     }
 
@@ -101,10 +94,7 @@ mod tests {
             match_boxes(&candidates, &[GT], &config(LowQualityMatches::Allowed)),
             [Match::Negative, Match::Positive(0), Match::Positive(0)]
         );
-        assert_eq!(
-            match_boxes(&candidates, &[GT], &config(LowQualityMatches::Forbidden)),
-            [Match::Negative; 3]
-        );
+        assert_eq!(match_boxes(&candidates, &[GT], &config(LowQualityMatches::Forbidden)), [Match::Negative; 3]);
     }
 
     #[test]

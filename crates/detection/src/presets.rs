@@ -2,12 +2,8 @@
 
 use crate::config::*;
 
-const UNIT_WEIGHTS: BoxCoderConfig = BoxCoderConfig {
-    weights: [1.0, 1.0, 1.0, 1.0],
-};
-const ROI_WEIGHTS: BoxCoderConfig = BoxCoderConfig {
-    weights: [10.0, 10.0, 5.0, 5.0],
-};
+const UNIT_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [1.0, 1.0, 1.0, 1.0] };
+const ROI_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [10.0, 10.0, 5.0, 5.0] };
 
 /// The default: a small detector for two CPU cores, trained from nothing in a few minutes.
 ///
@@ -26,10 +22,7 @@ pub fn edge(num_keypoints: usize) -> RcnnConfig {
     };
     RcnnConfig {
         input: ImageTransformConfig {
-            resize: ResizeRule::FitWithin {
-                width_px: 320,
-                height_px: 240,
-            },
+            resize: ResizeRule::FitWithin { width_px: 320, height_px: 240 },
             filter: ResizeFilter::AntialiasedBytes,
             channel_order: ChannelOrder::Rgb,
             pixel_range: PixelRange::Unit,
@@ -45,10 +38,7 @@ pub fn edge(num_keypoints: usize) -> RcnnConfig {
             norm: NormKind::Group { num_groups: 8 },
             freeze: Freeze::Nothing,
         },
-        fpn: FpnConfig {
-            channels: 64,
-            norm: NormKind::Identity,
-        },
+        fpn: FpnConfig { channels: 64, norm: NormKind::Identity },
         anchors: AnchorConfig {
             sizes_px: [24.0, 40.0, 70.0, 120.0, 200.0],
             aspect_ratios: vec![0.5, 1.0, 2.0],
@@ -57,24 +47,11 @@ pub fn edge(num_keypoints: usize) -> RcnnConfig {
             stride: AnchorStride::Nominal,
         },
         rpn: RpnConfig {
-            matcher: MatcherConfig {
-                negative_below: 0.3,
-                positive_from: 0.7,
-                low_quality: LowQualityMatches::Allowed,
-            },
-            sampler: SamplerConfig {
-                batch_size_per_image: 128,
-                positive_fraction: 0.5,
-            },
+            matcher: MatcherConfig { negative_below: 0.3, positive_from: 0.7, low_quality: LowQualityMatches::Allowed },
+            sampler: SamplerConfig { batch_size_per_image: 128, positive_fraction: 0.5 },
             box_coder: UNIT_WEIGHTS,
-            pre_nms_top_n: PerMode {
-                train: 200,
-                test: 100,
-            },
-            post_nms_top_n: PerMode {
-                train: 100,
-                test: 30,
-            },
+            pre_nms_top_n: PerMode { train: 200, test: 100 },
+            post_nms_top_n: PerMode { train: 100, test: 30 },
             nms_threshold: 0.7,
             min_box_size_px: 0.0,
             regression_loss: RegressionLoss::SmoothL1 { beta: 1.0 / 9.0 },
@@ -87,10 +64,7 @@ pub fn edge(num_keypoints: usize) -> RcnnConfig {
                 positive_from: 0.5,
                 low_quality: LowQualityMatches::Forbidden,
             },
-            sampler: SamplerConfig {
-                batch_size_per_image: 64,
-                positive_fraction: 0.25,
-            },
+            sampler: SamplerConfig { batch_size_per_image: 64, positive_fraction: 0.25 },
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 fc_channels: 256,
@@ -163,11 +137,7 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
     };
     RcnnConfig {
         input: ImageTransformConfig {
-            resize: ResizeRule::ShortSide {
-                short_px: 800,
-                max_long_px: 1333,
-                rounding: SizeRounding::Nearest,
-            },
+            resize: ResizeRule::ShortSide { short_px: 800, max_long_px: 1333, rounding: SizeRounding::Nearest },
             filter: ResizeFilter::AntialiasedBytes,
             channel_order: ChannelOrder::Bgr,
             pixel_range: PixelRange::Byte,
@@ -179,17 +149,11 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
             stem_channels: 64,
             res2_channels: 256,
             num_blocks: [3, 4, 6, 3],
-            block: BlockKind::Bottleneck {
-                inner_channels: 64,
-                stride_in: StrideIn::Conv1x1,
-            },
+            block: BlockKind::Bottleneck { inner_channels: 64, stride_in: StrideIn::Conv1x1 },
             norm: NormKind::FrozenBatch { eps: 1e-5 },
             freeze: Freeze::ThroughRes2,
         },
-        fpn: FpnConfig {
-            channels: 256,
-            norm: NormKind::Identity,
-        },
+        fpn: FpnConfig { channels: 256, norm: NormKind::Identity },
         anchors: AnchorConfig {
             sizes_px: [32.0, 64.0, 128.0, 256.0, 512.0],
             aspect_ratios: vec![0.5, 1.0, 2.0],
@@ -198,24 +162,11 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
             stride: AnchorStride::Nominal,
         },
         rpn: RpnConfig {
-            matcher: MatcherConfig {
-                negative_below: 0.3,
-                positive_from: 0.7,
-                low_quality: LowQualityMatches::Allowed,
-            },
-            sampler: SamplerConfig {
-                batch_size_per_image: 256,
-                positive_fraction: 0.5,
-            },
+            matcher: MatcherConfig { negative_below: 0.3, positive_from: 0.7, low_quality: LowQualityMatches::Allowed },
+            sampler: SamplerConfig { batch_size_per_image: 256, positive_fraction: 0.5 },
             box_coder: UNIT_WEIGHTS,
-            pre_nms_top_n: PerMode {
-                train: 2000,
-                test: 1000,
-            },
-            post_nms_top_n: PerMode {
-                train: post_nms_train,
-                test: 1000,
-            },
+            pre_nms_top_n: PerMode { train: 2000, test: 1000 },
+            post_nms_top_n: PerMode { train: post_nms_train, test: 1000 },
             nms_threshold: 0.7,
             min_box_size_px: 0.0,
             regression_loss: RegressionLoss::L1,
@@ -228,10 +179,7 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
                 positive_from: 0.5,
                 low_quality: LowQualityMatches::Forbidden,
             },
-            sampler: SamplerConfig {
-                batch_size_per_image: 512,
-                positive_fraction: 0.25,
-            },
+            sampler: SamplerConfig { batch_size_per_image: 512, positive_fraction: 0.25 },
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 fc_channels: 1024,

@@ -22,14 +22,10 @@ fn triangle_taps(input: usize, output: usize) -> Vec<Taps> {
             let center = (position as f64 + 0.5) * scale;
             let first = (center - filter_scale + 0.5).max(0.0) as usize;
             let end = ((center + filter_scale + 0.5) as usize).min(input);
-            let exact: Vec<f64> = (first..end)
-                .map(|i| (1.0 - ((i as f64 - center + 0.5) / filter_scale).abs()).max(0.0))
-                .collect();
+            let exact: Vec<f64> =
+                (first..end).map(|i| (1.0 - ((i as f64 - center + 0.5) / filter_scale).abs()).max(0.0)).collect();
             let sum: f64 = exact.iter().sum();
-            let weights = exact
-                .iter()
-                .map(|w| (w / sum * f64::from(1 << PRECISION_BITS) + 0.5) as i32)
-                .collect();
+            let weights = exact.iter().map(|w| (w / sum * f64::from(1 << PRECISION_BITS) + 0.5) as i32).collect();
             Taps { first, weights }
         })
         .collect()

@@ -28,9 +28,7 @@ impl Stem {
     /// `[N, 3, H, W]` to `[N, C, H/4, W/4]`.
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let x = relu(self.conv1.forward(x));
-        let pool = MaxPoolOptions::new([3, 3])
-            .with_stride([2, 2])
-            .with_padding([1, 1]);
+        let pool = MaxPoolOptions::new([3, 3]).with_stride([2, 2]).with_padding([1, 1]);
         max_pool2d(x, pool)
     }
 }
@@ -49,27 +47,16 @@ pub struct ResidualBlock {
 }
 
 impl ResidualBlock {
-    fn init(
-        config: &ResNetConfig,
-        stage: usize,
-        in_channels: usize,
-        stride: usize,
-        init: &mut Initializer,
-    ) -> Self {
+    fn init(config: &ResNetConfig, stage: usize, in_channels: usize, stride: usize, init: &mut Initializer) -> Self {
         let out_channels = config.stage_channels()[stage];
-        let mut conv = |shape: Conv2dShape| {
-            shape.init(Distribution::he_normal(shape.fan_out()), config.norm, init)
-        };
+        let mut conv = |shape: Conv2dShape| shape.init(Distribution::he_normal(shape.fan_out()), config.norm, init);
         let (conv1, conv2, conv3) = match config.block {
             BlockKind::Basic => (
                 conv(Conv2dShape::new(in_channels, out_channels, 3).with_stride(stride)),
                 conv(Conv2dShape::new(out_channels, out_channels, 3)),
                 None,
             ),
-            BlockKind::Bottleneck {
-                inner_channels,
-                stride_in,
-            } => {
+            BlockKind::Bottleneck { inner_channels, stride_in } => {
                 let inner = inner_channels << stage;
                 let (stride_1x1, stride_3x3) = match stride_in {
                     StrideIn::Conv1x1 => (stride, 1),
@@ -84,12 +71,7 @@ impl ResidualBlock {
         };
         let shortcut = (in_channels != out_channels || stride != 1)
             .then(|| conv(Conv2dShape::new(in_channels, out_channels, 1).with_stride(stride)));
-        Self {
-            conv1,
-            conv2,
-            conv3,
-            shortcut,
-        }
+        Self { conv1, conv2, conv3, shortcut }
     }
 
     /// `[N, C_in, H, W]` to `[N, C_out, H/stride, W/stride]`.
@@ -126,9 +108,7 @@ impl ResNet {
     /// Draws the parameters and freezes the configured part.
     pub fn init(config: &ResNetConfig, init: &mut Initializer) -> Self {
         let shape = Conv2dShape::new(3, config.stem_channels, 7).with_stride(2);
-        let stem = Stem {
-            conv1: shape.init(Distribution::he_normal(shape.fan_out()), config.norm, init),
-        };
+        let stem = Stem { conv1: shape.init(Distribution::he_normal(shape.fan_out()), config.norm, init) };
         let channels = config.stage_channels();
         let mut stage = |idx: usize| -> Vec<ResidualBlock> {
             let before = match idx {
@@ -145,13 +125,7 @@ impl ResNet {
                 })
                 .collect()
         };
-        let mut net = Self {
-            stem,
-            res2: stage(0),
-            res3: stage(1),
-            res4: stage(2),
-            res5: stage(3),
-        };
+        let mut net = Self { stem, res2: stage(0), res3: stage(1), res4: stage(2), res5: stage(3) };
         if config.freeze >= Freeze::Stem {
             net.stem = frozen(net.stem);
         }
@@ -170,9 +144,7 @@ impl ResNet {
     /// - `x`: `[N, 3, H, W]`, H and W multiples of 32
     /// - output: `[N, C_l, H/s_l, W/s_l]` with strides 4, 8, 16, 32
     pub fn forward(&self, x: Tensor<4>) -> [Tensor<4>; 4] {
-        let run = |x: Tensor<4>, stage: &[ResidualBlock]| {
-            stage.iter().fold(x, |x, block| block.forward(x))
-        };
+        let run = |x: Tensor<4>, stage: &[ResidualBlock]| stage.iter().fold(x, |x, block| block.forward(x));
         let res2 = run(self.stem.forward(x), &self.res2);
         let res3 = run(res2.clone(), &self.res3);
         let res4 = run(res3.clone(), &self.res4);

@@ -80,12 +80,7 @@ pub enum Mode {
 
 impl RegionProposalNetwork {
     /// Draws the parameters for a pyramid of `channels` channels.
-    pub fn init(
-        config: &RpnConfig,
-        anchors: &AnchorConfig,
-        channels: usize,
-        init: &mut Initializer,
-    ) -> Self {
+    pub fn init(config: &RpnConfig, anchors: &AnchorConfig, channels: usize, init: &mut Initializer) -> Self {
         let num_anchors = anchors.aspect_ratios.len();
         let normal = Distribution::Normal { std: HEAD_STD };
         let mut conv = |out_channels, kernel| {
@@ -131,12 +126,7 @@ impl RegionProposalNetwork {
     }
 
     /// Picks the proposals of each image: best anchors of each level, decoded, clipped, NMS.
-    pub fn propose(
-        &self,
-        predictions: &RpnPredictions,
-        image_sizes: &[ImageSize],
-        mode: Mode,
-    ) -> Vec<Proposals> {
+    pub fn propose(&self, predictions: &RpnPredictions, image_sizes: &[ImageSize], mode: Mode) -> Vec<Proposals> {
         let logits = host_values(predictions.objectness_logits.clone());
         let deltas = host_values(predictions.deltas.clone());
         let num_anchors: usize = predictions.anchors.iter().map(Vec::len).sum();
@@ -144,9 +134,7 @@ impl RegionProposalNetwork {
             .iter()
             .zip(logits.chunks_exact(num_anchors))
             .zip(deltas.chunks_exact(num_anchors * 4))
-            .map(|((size, logits), deltas)| {
-                self.propose_image(&predictions.anchors, logits, deltas, *size, mode)
-            })
+            .map(|((size, logits), deltas)| self.propose_image(&predictions.anchors, logits, deltas, *size, mode))
             .collect()
     }
 
@@ -229,19 +217,13 @@ impl RegionProposalNetwork {
             RpnNormaliser::DrawnSamples => sampled_idxs.len().max(1),
         } as f64;
         let idxs = Tensor::<1, Int>::from_ints(sampled_idxs.as_slice(), &device);
-        let logits = predictions
-            .objectness_logits
-            .reshape([num_images * num_anchors])
-            .select(0, idxs);
+        let logits = predictions.objectness_logits.reshape([num_images * num_anchors]).select(0, idxs);
         let cls = losses::binary_cross_entropy(logits, &objectness_targets) / divisor;
         if positive_idxs.is_empty() {
             return [cls, Tensor::zeros([1], &device)];
         }
         let idxs = Tensor::<1, Int>::from_ints(positive_idxs.as_slice(), &device);
-        let deltas = predictions
-            .deltas
-            .reshape([num_images * num_anchors, 4])
-            .select(0, idxs);
+        let deltas = predictions.deltas.reshape([num_images * num_anchors, 4]).select(0, idxs);
         let loc = losses::regression(deltas, &delta_targets, self.config.regression_loss) / divisor;
         [cls, loc]
     }
@@ -249,10 +231,7 @@ impl RegionProposalNetwork {
 
 /// Reads a tensor's values, row by row, without its gradient.
 pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    tensor
-        .into_data()
-        .try_to_vec_as::<f32>()
-        .expect("a float tensor reads as f32")
+    tensor.into_data().try_to_vec_as::<f32>().expect("a float tensor reads as f32")
 }
 
 /// Indices of the `k` largest values, largest first; of equal ones the earlier first.

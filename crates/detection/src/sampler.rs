@@ -47,10 +47,7 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
 
-    const CONFIG: SamplerConfig = SamplerConfig {
-        batch_size_per_image: 8,
-        positive_fraction: 0.25,
-    };
+    const CONFIG: SamplerConfig = SamplerConfig { batch_size_per_image: 8, positive_fraction: 0.25 };
 
     fn matches(num_positive: usize, num_negative: usize) -> Vec<Match> {
         let mut all = vec![Match::Positive(0); num_positive];

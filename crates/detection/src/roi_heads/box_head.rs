@@ -93,8 +93,7 @@ impl BoxPredictor {
     pub fn init(config: &BoxHeadConfig, num_classes: usize, init: &mut Initializer) -> Self {
         let hidden = config.fc_channels;
         let columns = num_delta_columns(config, num_classes);
-        let mut linear =
-            |outputs, std| Linear::init(hidden, outputs, Distribution::Normal { std }, init);
+        let mut linear = |outputs, std| Linear::init(hidden, outputs, Distribution::Normal { std }, init);
         Self {
             cls_score: linear(num_classes + 1, SCORE_STD),
             bbox_pred: linear(4 * columns, DELTA_STD),
@@ -128,12 +127,7 @@ impl BoxPredictor {
     ///
     /// # Shapes
     /// - `hidden`: `[R, F]`
-    pub fn losses(
-        &self,
-        hidden: Tensor<2>,
-        rois: &[SampledRoi],
-        targets: &[ResizedTarget],
-    ) -> [Tensor<1>; 2] {
+    pub fn losses(&self, hidden: Tensor<2>, rois: &[SampledRoi], targets: &[ResizedTarget]) -> [Tensor<1>; 2] {
         let device = hidden.device();
         let coder = BoxCoder::new(&self.config.box_coder);
         let columns = num_delta_columns(&self.config, self.num_classes);
@@ -156,28 +150,18 @@ impl BoxPredictor {
             return [cls, Tensor::zeros([1], &device)];
         }
         let delta_rows = Tensor::<1, Int>::from_ints(delta_rows.as_slice(), &device);
-        let deltas = self
-            .bbox_pred
-            .forward(hidden)
-            .reshape([rois.len() * columns, 4])
-            .select(0, delta_rows);
+        let deltas = self.bbox_pred.forward(hidden).reshape([rois.len() * columns, 4]).select(0, delta_rows);
         let reg = losses::regression(deltas, &delta_targets, self.config.regression_loss) / count;
         [cls, reg]
     }
 
     /// Gives the detections of each image, best first, without keypoints.
-    pub fn detect(
-        &self,
-        hidden: Tensor<2>,
-        rois: &[Roi],
-        image_sizes: &[ImageSize],
-    ) -> Vec<Vec<RoiDetection>> {
+    pub fn detect(&self, hidden: Tensor<2>, rois: &[Roi], image_sizes: &[ImageSize]) -> Vec<Vec<RoiDetection>> {
         let scores = host_values(activation::softmax(self.cls_score.forward(hidden.clone()), 1));
         let deltas = host_values(self.bbox_pred.forward(hidden));
         let columns = num_delta_columns(&self.config, self.num_classes);
         let coder = BoxCoder::new(&self.config.box_coder);
-        let mut candidates: Vec<(Vec<Corners>, Vec<f32>, Vec<usize>)> =
-            vec![Default::default(); image_sizes.len()];
+        let mut candidates: Vec<(Vec<Corners>, Vec<f32>, Vec<usize>)> = vec![Default::default(); image_sizes.len()];
         for (row, roi) in rois.iter().enumerate() {
             let [height, width] = image_sizes[roi.image_idx];
             let (boxes, kept_scores, classes) = &mut candidates[roi.image_idx];

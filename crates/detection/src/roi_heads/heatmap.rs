@@ -73,15 +73,9 @@ pub fn decode(
     };
     let score = match score {
         KeypointScore::Logit => peak,
-        KeypointScore::NormalisedPeak => {
-            1.0 / logits.iter().map(|l| (l - peak).exp()).sum::<f32>()
-        }
+        KeypointScore::NormalisedPeak => 1.0 / logits.iter().map(|l| (l - peak).exp()).sum::<f32>(),
     };
-    ReadKeypoint {
-        x: roi[0] + x,
-        y: roi[1] + y,
-        score,
-    }
+    ReadKeypoint { x: roi[0] + x, y: roi[1] + y, score }
 }
 
 fn argmax(values: &[f32]) -> usize {
@@ -131,8 +125,7 @@ fn resize_bicubic(map: &[f32], size: usize, columns: usize, rows: usize) -> Vec<
             .map(|i| {
                 let at = (i as f32 + 0.5) * scale - 0.5;
                 let first = at.floor();
-                let idxs = [-1, 0, 1, 2]
-                    .map(|d| (first as isize + d).clamp(0, size as isize - 1) as usize);
+                let idxs = [-1, 0, 1, 2].map(|d| (first as isize + d).clamp(0, size as isize - 1) as usize);
                 (idxs, cubic_weights(at - first))
             })
             .collect()
@@ -165,11 +158,7 @@ mod tests {
     const ROI: Corners = [10.0, 20.0, 66.0, 132.0];
 
     fn keypoint(x: f64, y: f64) -> Keypoint {
-        Keypoint {
-            x,
-            y,
-            visibility: Visibility::Visible,
-        }
+        Keypoint { x, y, visibility: Visibility::Visible }
     }
 
     #[test]
@@ -179,10 +168,7 @@ mod tests {
         assert_eq!(encode(&keypoint(66.0, 132.0), &ROI, 56), Some(56 * 56 - 1));
         assert_eq!(encode(&keypoint(9.9, 30.0), &ROI, 56), None);
         assert_eq!(encode(&keypoint(30.0, 132.1), &ROI, 56), None);
-        let unlabelled = Keypoint {
-            visibility: Visibility::Unlabelled,
-            ..keypoint(30.0, 30.0)
-        };
+        let unlabelled = Keypoint { visibility: Visibility::Unlabelled, ..keypoint(30.0, 30.0) };
         assert_eq!(encode(&unlabelled, &ROI, 56), None);
     }
 
@@ -223,8 +209,13 @@ mod tests {
         ) {
             let roi = [30.0, 40.0, 30.0 + w, 40.0 + h];
             let point = keypoint(30.0 + fx * f64::from(w), 40.0 + fy * f64::from(h));
-            let mut logits = vec![0f32; 56 * 56];
-            logits[encode(&point, &roi, 56).unwrap()] = 20.0;
+            // A hill around the taught cell: resizing to fewer pixels than cells, which has no
+            // antialiasing, would step over a single high cell.
+            let cell = encode(&point, &roi, 56).unwrap();
+            let (row, column) = ((cell / 56) as f32, (cell % 56) as f32);
+            let logits: Vec<f32> = (0..56 * 56)
+                .map(|i| -((i / 56) as f32 - row).powi(2) - ((i % 56) as f32 - column).powi(2))
+                .collect();
             let readout = if cubic { KeypointReadout::BicubicArgmax } else { KeypointReadout::LocalMean { radius: 2 } };
             let read = decode(&logits, 56, &roi, readout, KeypointScore::NormalisedPeak);
             // Half a cell from encoding, and half a pixel from the resized map.

@@ -41,11 +41,7 @@ impl KeypointHead {
             .map(|out_channels| {
                 let shape = Conv2dShape::new(in_channels, *out_channels, 3);
                 in_channels = *out_channels;
-                shape.init(
-                    Distribution::he_normal(shape.fan_out()),
-                    NormKind::Identity,
-                    init,
-                )
+                shape.init(Distribution::he_normal(shape.fan_out()), NormKind::Identity, init)
             })
             .collect();
         Self {
@@ -63,20 +59,12 @@ impl KeypointHead {
     /// Gives heatmap logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
-        let hidden = self
-            .conv_fcn
-            .iter()
-            .fold(pooled, |x, conv| relu(conv.forward(x)));
+        let hidden = self.conv_fcn.iter().fold(pooled, |x, conv| relu(conv.forward(x)));
         upsample_bilinear_2x(self.score_lowres.forward(hidden))
     }
 
     /// Gives the cross-entropy over the cells, divided by the keypoints that have a cell.
-    pub fn loss(
-        &self,
-        features: &[Tensor<4>; 5],
-        rois: &[SampledRoi],
-        targets: &[ResizedTarget],
-    ) -> Tensor<1> {
+    pub fn loss(&self, features: &[Tensor<4>; 5], rois: &[SampledRoi], targets: &[ResizedTarget]) -> Tensor<1> {
         let size = self.config.heatmap_size();
         let cells: Vec<Option<usize>> = rois
             .iter()
@@ -105,10 +93,7 @@ impl KeypointHead {
             .iter()
             .enumerate()
             .flat_map(|(image_idx, found)| {
-                found.iter().map(move |detection| Roi {
-                    image_idx,
-                    corners: detection.corners,
-                })
+                found.iter().map(move |detection| Roi { image_idx, corners: detection.corners })
             })
             .collect();
         if rois.is_empty() {

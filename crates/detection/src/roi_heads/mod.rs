@@ -93,10 +93,7 @@ impl RoiHeads {
         Self {
             box_head: BoxHead::init(&config.box_head, fpn.channels, init),
             box_predictor: BoxPredictor::init(&config.box_head, config.num_classes, init),
-            keypoint_head: config
-                .keypoint_head
-                .as_ref()
-                .map(|head| KeypointHead::init(head, fpn.channels, init)),
+            keypoint_head: config.keypoint_head.as_ref().map(|head| KeypointHead::init(head, fpn.channels, init)),
             config: config.clone(),
         }
     }
@@ -111,27 +108,16 @@ impl RoiHeads {
         rngs: &mut [Pcg64Mcg],
     ) -> Vec<SampledRoi> {
         let mut rois = Vec::new();
-        for (image_idx, ((proposals, target), rng)) in
-            proposals.iter().zip(targets).zip(rngs).enumerate()
-        {
-            let candidates: Vec<Corners> =
-                proposals.boxes.iter().chain(&target.boxes).copied().collect();
+        for (image_idx, ((proposals, target), rng)) in proposals.iter().zip(targets).zip(rngs).enumerate() {
+            let candidates: Vec<Corners> = proposals.boxes.iter().chain(&target.boxes).copied().collect();
             let matches = match_boxes(&candidates, &target.boxes, &self.config.matcher);
             let sampled = sample(&matches, &self.config.sampler, rng);
-            rois.extend(sampled.positive.iter().chain(&sampled.negative).map(|idx| {
-                SampledRoi {
-                    roi: Roi {
-                        image_idx,
-                        corners: candidates[*idx],
-                    },
-                    class: match matches[*idx] {
-                        Match::Positive(gt_idx) => RoiClass::Object {
-                            class_idx: target.labels[gt_idx],
-                            gt_idx,
-                        },
-                        _ => RoiClass::Background,
-                    },
-                }
+            rois.extend(sampled.positive.iter().chain(&sampled.negative).map(|idx| SampledRoi {
+                roi: Roi { image_idx, corners: candidates[*idx] },
+                class: match matches[*idx] {
+                    Match::Positive(gt_idx) => RoiClass::Object { class_idx: target.labels[gt_idx], gt_idx },
+                    _ => RoiClass::Background,
+                },
             }));
         }
         rois
@@ -161,11 +147,7 @@ impl RoiHeads {
                 false => head.loss(features, &chosen, targets),
             }
         });
-        RoiLosses {
-            cls,
-            box_reg,
-            keypoint,
-        }
+        RoiLosses { cls, box_reg, keypoint }
     }
 
     /// Gives the detections of each image, best first.
@@ -179,10 +161,7 @@ impl RoiHeads {
             .iter()
             .enumerate()
             .flat_map(|(image_idx, proposals)| {
-                proposals.boxes.iter().map(move |corners| Roi {
-                    image_idx,
-                    corners: *corners,
-                })
+                proposals.boxes.iter().map(move |corners| Roi { image_idx, corners: *corners })
             })
             .collect();
         if rois.is_empty() {
@@ -228,7 +207,5 @@ fn choose_keypoint_rois(
 
 fn is_inside(keypoint: &Keypoint, corners: &Corners) -> bool {
     let (x, y) = (keypoint.x as f32, keypoint.y as f32);
-    keypoint.is_labelled()
-        && (corners[0]..=corners[2]).contains(&x)
-        && (corners[1]..=corners[3]).contains(&y)
+    keypoint.is_labelled() && (corners[0]..=corners[2]).contains(&x) && (corners[1]..=corners[3]).contains(&y)
 }
