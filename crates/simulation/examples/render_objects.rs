@@ -129,7 +129,7 @@ fn pendulum() -> Part {
         ],
         grasp_half_line: 0.024,
         jaw_width: arm_width,
-        grasp_height: 0.012,
+        grasp_height: 0.009,
         mark_height: 0.016,
         friction: 0.6,
     }
@@ -214,7 +214,7 @@ fn fuel_line() -> Part {
         collisions,
         grasp_half_line: 0.026,
         jaw_width: 2.0 * tube_radius,
-        grasp_height: 0.0125,
+        grasp_height: 0.0085,
         mark_height: height,
         friction: 0.6,
     }
@@ -316,7 +316,7 @@ fn rod_end() -> Part {
         ],
         grasp_half_line: 0.020,
         jaw_width: 2.0 * shank_radius,
-        grasp_height: half_ball,
+        grasp_height: 0.012,
         mark_height: half_ball,
         friction: 0.6,
     }

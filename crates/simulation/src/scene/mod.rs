@@ -13,9 +13,11 @@ pub mod footprint;
 mod fragment;
 mod light;
 pub mod mesh;
+pub mod outline;
 pub mod solids;
 mod table;
 pub mod texture;
+mod views;
 
 use std::ops::{Range, RangeInclusive};
 
@@ -29,6 +31,10 @@ pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
 pub use table::{Table, TableSurface};
+pub use views::{
+    DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
+    in_picture, test_view, test_views,
+};
 
 /// Within what a scene is varied.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,8 +54,8 @@ pub struct VariationConfig {
 impl Default for VariationConfig {
     fn default() -> Self {
         Self {
-            object_x_m: 0.38..0.62,
-            object_y_m: -0.18..0.18,
+            object_x_m: 0.37..0.62,
+            object_y_m: -0.20..0.20,
             distractors: 0..=6,
             clearance_m: 0.006,
             appearance: true,
@@ -90,8 +96,11 @@ enum Stream {
 
 impl Stream {
     fn rng(self, seed: u64) -> Pcg64Mcg {
-        // An odd multiplier spreads neighbouring seeds; the stream's number then keeps the aspects apart.
-        Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(self as u64))
+        // SplitMix64's finaliser: neighbouring seeds and streams end up with nothing in common.
+        let mut mixed = seed.wrapping_add((self as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        Pcg64Mcg::seed_from_u64(mixed ^ (mixed >> 31))
     }
 }
 
