@@ -1,5 +1,7 @@
 //! The extension on `Autodiff<Flex>`: what is kept for the backward pass, and which gradients are computed.
 
+use std::sync::Arc;
+
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
@@ -14,6 +16,8 @@ use crate::conv::kernel::{self as conv, ConvShape};
 use crate::conv::weight_gradient::weight_gradient;
 use crate::extension::KernelBackend;
 use crate::flex::{all_f32, shape4, tensor, values};
+use crate::group_norm::GroupNormParams;
+use crate::group_norm::kernel::{self as norm, Statistics};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
 
@@ -28,17 +32,9 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
             return composed::conv2d::<Self>(x, weight, bias, params);
         }
         let shape = ConvShape::forward(shape4(x.primitive()), shape4(weight.primitive()), params);
-        let prepared = Conv2dBackward
-            .prepare::<C>([x.node(), weight.node(), bias.node()])
-            .compute_bound()
-            .stateful();
+        let prepared = Conv2dBackward.prepare::<C>([x.node(), weight.node(), bias.node()]).compute_bound().stateful();
         let kept = Operands::keep::<C>(&x, &weight);
-        let output = Flex::kernel_conv2d(
-            x.into_primitive(),
-            weight.into_primitive(),
-            bias.into_primitive(),
-            params,
-        );
+        let output = Flex::kernel_conv2d(x.into_primitive(), weight.into_primitive(), bias.into_primitive(), params);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
@@ -54,19 +50,12 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         if !all_f32([x.primitive(), weight.primitive(), bias.primitive()]) {
             return composed::conv_transpose2d::<Self>(x, weight, bias, params);
         }
-        let shape =
-            ConvShape::transposed(shape4(x.primitive()), shape4(weight.primitive()), params);
-        let prepared = ConvTranspose2dBackward
-            .prepare::<C>([x.node(), weight.node(), bias.node()])
-            .compute_bound()
-            .stateful();
+        let shape = ConvShape::transposed(shape4(x.primitive()), shape4(weight.primitive()), params);
+        let prepared =
+            ConvTranspose2dBackward.prepare::<C>([x.node(), weight.node(), bias.node()]).compute_bound().stateful();
         let kept = Operands::keep::<C>(&x, &weight);
-        let output = Flex::kernel_conv_transpose2d(
-            x.into_primitive(),
-            weight.into_primitive(),
-            bias.into_primitive(),
-            params,
-        );
+        let output =
+            Flex::kernel_conv_transpose2d(x.into_primitive(), weight.into_primitive(), bias.into_primitive(), params);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
@@ -84,14 +73,35 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         // ROIs are constants: they are no parent of the crops.
         let rois = rois.into_primitive().to_contiguous();
         let shape = shape4(features.primitive());
-        let prepared = RoiAlignBackward
-            .prepare::<C>([features.node()])
-            .compute_bound()
-            .stateful();
+        let prepared = RoiAlignBackward.prepare::<C>([features.node()]).compute_bound().stateful();
         let crops = Flex::kernel_roi_align(features.into_primitive(), rois.clone(), params);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((rois, shape, params), crops),
             OpsKind::UnTracked(prep) => prep.finish(crops),
+        }
+    }
+
+    fn kernel_group_norm(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        params: GroupNormParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([x.primitive(), gamma.primitive(), beta.primitive()]) {
+            return composed::group_norm::<Self>(x, gamma, beta, params);
+        }
+        let shape = shape4(x.primitive());
+        let prepared = GroupNormBackward.prepare::<C>([x.node(), gamma.node(), beta.node()]).compute_bound().stateful();
+        let operands = [x, gamma, beta].map(|operand| operand.into_primitive().to_contiguous());
+        let [x, gamma, beta] = operands.each_ref().map(values);
+        let (output, statistics) = norm::forward(Isa::detect(), x, shape, gamma, beta, &params);
+        let output = tensor(output, shape);
+        match prepared {
+            OpsKind::Tracked(prep) => {
+                let kept = GroupNormKept { operands, statistics: Arc::new(statistics), params };
+                prep.finish(kept, output)
+            }
+            OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
 }
@@ -104,7 +114,10 @@ struct Operands {
 }
 
 impl Operands {
-    fn keep<C: CheckpointStrategy>(x: &FloatTensor<Autodiff<Flex, C>>, weight: &FloatTensor<Autodiff<Flex, C>>) -> Self {
+    fn keep<C: CheckpointStrategy>(
+        x: &FloatTensor<Autodiff<Flex, C>>,
+        weight: &FloatTensor<Autodiff<Flex, C>>,
+    ) -> Self {
         Self {
             x: weight.is_tracked().then(|| x.primitive().clone()),
             weight: x.is_tracked().then(|| weight.primitive().clone()),
@@ -127,8 +140,7 @@ impl Backward<Flex, 3> for Conv2dBackward {
         let [x, weight, bias] = ops.parents;
         if let Some(x) = x {
             let weight = kept.weight.expect(KEPT).to_contiguous();
-            let grad =
-                conv::input_gradient(Isa::detect(), output_grad, values(&weight), None, &shape);
+            let grad = conv::input_gradient(Isa::detect(), output_grad, values(&weight), None, &shape);
             grads.register::<Flex>(x.id, tensor(grad, shape.input()));
         }
         if let Some(weight) = weight {
@@ -184,9 +196,50 @@ impl Backward<Flex, 1> for RoiAlignBackward {
         let crop_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
         let (rois, shape, params) = ops.state;
         if let [Some(features)] = ops.parents {
-            let grad =
-                roi_align::kernel::backward(values(&crop_grad), shape, values(&rois), &params);
+            let grad = roi_align::kernel::backward(values(&crop_grad), shape, values(&rois), &params);
             grads.register::<Flex>(features.id, tensor(grad, shape));
+        }
+    }
+}
+
+/// What the gradients of a group normalisation need.
+#[derive(Clone, Debug)]
+struct GroupNormKept {
+    /// x, gamma and beta.
+    operands: [FlexTensor; 3],
+    statistics: Arc<Statistics>,
+    params: GroupNormParams,
+}
+
+#[derive(Debug)]
+struct GroupNormBackward;
+
+impl Backward<Flex, 3> for GroupNormBackward {
+    type State = GroupNormKept;
+
+    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let kept = ops.state;
+        let shape = shape4(&kept.operands[0]);
+        let [x, gamma, beta] = kept.operands.each_ref().map(values);
+        let found = norm::backward(
+            Isa::detect(),
+            values(&output_grad),
+            x,
+            shape,
+            [gamma, beta],
+            &kept.statistics,
+            &kept.params,
+        );
+        let [x, gamma, beta] = ops.parents;
+        if let Some(x) = x {
+            grads.register::<Flex>(x.id, tensor(found.x, shape));
+        }
+        if let Some(gamma) = gamma {
+            grads.register::<Flex>(gamma.id, tensor(found.gamma, [shape[1]]));
+        }
+        if let Some(beta) = beta {
+            grads.register::<Flex>(beta.id, tensor(found.beta, [shape[1]]));
         }
     }
 }

@@ -9,6 +9,7 @@ use burn::backend::{Backend, TensorMetadata, read_sync};
 use burn::tensor::{Shape, Slice, TensorData};
 
 use crate::conv::Conv2dParams;
+use crate::group_norm::{Activation, GroupNormParams};
 use crate::roi_align::{RoiAlignParams, RoiBins};
 
 /// [`conv2d`](crate::conv2d) by burn's `conv2d`.
@@ -36,11 +37,7 @@ pub fn conv_transpose2d<B: Backend>(
 /// [`roi_align`](crate::roi_align()) by two matrix products an image, one per axis.
 ///
 /// Holds `R·C·Ph·W` floats at a time, R the most ROIs of one image.
-pub fn roi_align<B: Backend>(
-    features: FloatTensor<B>,
-    rois: FloatTensor<B>,
-    params: RoiAlignParams,
-) -> FloatTensor<B> {
+pub fn roi_align<B: Backend>(features: FloatTensor<B>, rois: FloatTensor<B>, params: RoiAlignParams) -> FloatTensor<B> {
     let shape = features.shape();
     let [num_images, channels, height, width] = [shape[0], shape[1], shape[2], shape[3]];
     let [bins_y, bins_x] = params.output_size;
@@ -64,9 +61,7 @@ pub fn roi_align<B: Backend>(
     let mut row_of_roi = vec![0; bins.len()];
     let mut rows_done = 0;
     for image_idx in 0..num_images {
-        let of_image: Vec<usize> = (0..bins.len())
-            .filter(|&roi| bins[roi].image_idx == image_idx)
-            .collect();
+        let of_image: Vec<usize> = (0..bins.len()).filter(|&roi| bins[roi].image_idx == image_idx).collect();
         if of_image.is_empty() {
             continue;
         }
@@ -77,12 +72,8 @@ pub fn roi_align<B: Backend>(
             row_of_roi[roi] = rows_done + slot;
             let y = slot * bins_y * height;
             let x = slot * bins_x * width;
-            bins[roi]
-                .y
-                .write_dense(&mut weights_y[y..y + bins_y * height], height);
-            bins[roi]
-                .x
-                .write_dense(&mut weights_x[x..x + bins_x * width], width);
+            bins[roi].y.write_dense(&mut weights_y[y..y + bins_y * height], height);
+            bins[roi].x.write_dense(&mut weights_x[x..x + bins_x * width], width);
         }
         rows_done += num_rois;
 
@@ -105,4 +96,29 @@ pub fn roi_align<B: Backend>(
     let order: Vec<i64> = row_of_roi.iter().map(|&row| row as i64).collect();
     let order = TensorData::new(order, [bins.len()]);
     B::float_select(crops, 0, B::int_from_data(order, &device))
+}
+
+/// [`group_norm`](crate::group_norm()) by means over a reshaped tensor.
+pub fn group_norm<B: Backend>(
+    x: FloatTensor<B>,
+    gamma: FloatTensor<B>,
+    beta: FloatTensor<B>,
+    params: GroupNormParams,
+) -> FloatTensor<B> {
+    let shape = x.shape();
+    let [num_images, channels] = [shape[0], shape[1]];
+    let values = channels / params.num_groups * shape[2] * shape[3];
+    let grouped = Shape::from(vec![num_images, params.num_groups, values]);
+    let x = B::float_reshape(x, grouped);
+    let x = B::float_sub(x.clone(), B::float_mean_dim(x, 2));
+    let variance = B::float_mean_dim(B::float_mul(x.clone(), x.clone()), 2);
+    let deviation = B::float_sqrt(B::float_add_scalar(variance, params.epsilon.into()));
+    let x = B::float_reshape(B::float_div(x, deviation), shape);
+    let per_channel = |values| B::float_reshape(values, Shape::from(vec![1, channels, 1, 1]));
+    let x = B::float_mul(x, per_channel(gamma));
+    let x = B::float_add(x, per_channel(beta));
+    match params.activation {
+        Activation::Identity => x,
+        Activation::Relu => B::relu(x),
+    }
 }

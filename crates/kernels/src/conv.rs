@@ -12,6 +12,11 @@ pub(crate) mod kernel;
 mod params;
 pub(crate) mod weight_gradient;
 
+#[cfg(test)]
+mod kernel_tests;
+#[cfg(test)]
+mod tests;
+
 pub use params::Conv2dParams;
 
 /// Convolves `x` with `weight` (cross-correlation, as everywhere in deep learning) and adds `bias`.
@@ -23,12 +28,7 @@ pub use params::Conv2dParams;
 /// # Panics
 /// Where the shapes do not fit each other, a dimension or stride is 0, or the kernel is larger than the
 /// padded input.
-pub fn conv2d(
-    x: Tensor<4>,
-    weight: Tensor<4>,
-    bias: Option<Tensor<1>>,
-    params: Conv2dParams,
-) -> Tensor<4> {
+pub fn conv2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: Conv2dParams) -> Tensor<4> {
     let [num_images, in_channels, in_height, in_width] = x.dims();
     let [out_channels, weight_channels, kernel_height, kernel_width] = weight.dims();
     check_parameters("conv2d", x.dims(), weight.dims(), params);
@@ -39,9 +39,7 @@ pub fn conv2d(
         weight.dims(),
     );
     assert!(
-        params
-            .output_size([in_height, in_width], [kernel_height, kernel_width])
-            .is_some(),
+        params.output_size([in_height, in_width], [kernel_height, kernel_width]).is_some(),
         "conv2d: expected a padded input of at least the kernel's {kernel_height} x {kernel_width}, found \
          {num_images} maps of {in_height} x {in_width} with padding {:?}",
         params.padding,
@@ -63,12 +61,7 @@ pub fn conv2d(
 ///
 /// # Panics
 /// Where the shapes do not fit each other, a dimension or stride is 0, or the padding leaves no output.
-pub fn conv_transpose2d(
-    x: Tensor<4>,
-    weight: Tensor<4>,
-    bias: Option<Tensor<1>>,
-    params: Conv2dParams,
-) -> Tensor<4> {
+pub fn conv_transpose2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: Conv2dParams) -> Tensor<4> {
     let [_, in_channels, in_height, in_width] = x.dims();
     let [weight_channels, out_channels, kernel_height, kernel_width] = weight.dims();
     check_parameters("conv_transpose2d", x.dims(), weight.dims(), params);
@@ -79,9 +72,7 @@ pub fn conv_transpose2d(
         weight.dims(),
     );
     assert!(
-        params
-            .transposed_output_size([in_height, in_width], [kernel_height, kernel_width])
-            .is_some(),
+        params.transposed_output_size([in_height, in_width], [kernel_height, kernel_width]).is_some(),
         "conv_transpose2d: expected padding that leaves an output, found {:?} for an input of {in_height} x \
          {in_width}, kernel {kernel_height} x {kernel_width}, stride {:?}",
         params.padding,
@@ -110,12 +101,7 @@ fn check_parameters(name: &str, x: [usize; 4], weight: [usize; 4], params: Conv2
 
 /// The extension's methods take tensors, not options of tensors, so an absent bias is zeros, which no
 /// gradient reaches.
-fn bias_or_zeros(
-    name: &str,
-    bias: Option<Tensor<1>>,
-    out_channels: usize,
-    x: &Tensor<4>,
-) -> Tensor<1> {
+fn bias_or_zeros(name: &str, bias: Option<Tensor<1>>, out_channels: usize, x: &Tensor<4>) -> Tensor<1> {
     match bias {
         Some(bias) => {
             assert!(

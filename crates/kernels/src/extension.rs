@@ -3,9 +3,9 @@
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
-
 use crate::composed;
 use crate::conv::Conv2dParams;
+use crate::group_norm::GroupNormParams;
 use crate::roi_align::RoiAlignParams;
 
 /// Backends that run this crate's operations.
@@ -42,5 +42,15 @@ pub trait KernelBackend: Backend {
         params: RoiAlignParams,
     ) -> FloatTensor<Self> {
         composed::roi_align::<Self>(features, rois, params)
+    }
+
+    /// See [`group_norm`](crate::group_norm()).
+    fn kernel_group_norm(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        params: GroupNormParams,
+    ) -> FloatTensor<Self> {
+        composed::group_norm::<Self>(x, gamma, beta, params)
     }
 }

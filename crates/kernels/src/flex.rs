@@ -9,6 +9,7 @@ use crate::composed;
 use crate::conv::Conv2dParams;
 use crate::conv::kernel::{self as conv, ConvShape};
 use crate::extension::KernelBackend;
+use crate::group_norm::{self, GroupNormParams};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
 
@@ -24,13 +25,7 @@ impl KernelBackend for Flex {
         }
         let shape = ConvShape::forward(shape4(&x), shape4(&weight), params);
         let [x, weight, bias] = [x, weight, bias].map(|tensor| tensor.to_contiguous());
-        let output = conv::forward(
-            Isa::detect(),
-            values(&x),
-            values(&weight),
-            Some(values(&bias)),
-            &shape,
-        );
+        let output = conv::forward(Isa::detect(), values(&x), values(&weight), Some(values(&bias)), &shape);
         tensor(output, shape.output())
     }
 
@@ -46,13 +41,7 @@ impl KernelBackend for Flex {
         // A transposed convolution is what carries a convolution's gradient back to its input.
         let shape = ConvShape::transposed(shape4(&x), shape4(&weight), params);
         let [x, weight, bias] = [x, weight, bias].map(|tensor| tensor.to_contiguous());
-        let output = conv::input_gradient(
-            Isa::detect(),
-            values(&x),
-            values(&weight),
-            Some(values(&bias)),
-            &shape,
-        );
+        let output = conv::input_gradient(Isa::detect(), values(&x), values(&weight), Some(values(&bias)), &shape);
         tensor(output, shape.input())
     }
 
@@ -72,6 +61,22 @@ impl KernelBackend for Flex {
         let [bins_y, bins_x] = params.output_size;
         tensor(crops, [num_rois, shape[1], bins_y, bins_x])
     }
+
+    fn kernel_group_norm(
+        x: FloatTensor<Self>,
+        gamma: FloatTensor<Self>,
+        beta: FloatTensor<Self>,
+        params: GroupNormParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&x, &gamma, &beta]) {
+            return composed::group_norm::<Self>(x, gamma, beta, params);
+        }
+        let shape = shape4(&x);
+        let [x, gamma, beta] = [x, gamma, beta].map(|tensor| tensor.to_contiguous());
+        let (output, _) =
+            group_norm::kernel::forward(Isa::detect(), values(&x), shape, values(&gamma), values(&beta), &params);
+        tensor(output, shape)
+    }
 }
 
 /// The kernels are for `f32`; other float types take the composed default.
@@ -81,9 +86,7 @@ pub(crate) fn all_f32<const N: usize>(tensors: [&FlexTensor; N]) -> bool {
 
 /// The values of a contiguous `f32` tensor, first to last.
 pub(crate) fn values(tensor: &FlexTensor) -> &[f32] {
-    tensor
-        .as_slice()
-        .expect("made contiguous and known to be f32 by the caller")
+    tensor.as_slice().expect("made contiguous and known to be f32 by the caller")
 }
 
 /// A tensor that takes the values over.

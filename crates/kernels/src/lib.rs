@@ -42,13 +42,17 @@ pub mod composed;
 mod conv;
 mod extension;
 mod flex;
+mod group_norm;
 mod nms;
 mod parallel;
+#[cfg(test)]
+mod reference;
 mod roi_align;
 mod scratch;
 mod simd;
 
 pub use conv::{Conv2dParams, conv_transpose2d, conv2d};
 pub use extension::KernelBackend;
+pub use group_norm::{Activation, GroupNormParams, group_norm};
 pub use nms::{batched_nms, nms};
 pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};

@@ -21,12 +21,7 @@ pub fn nms(boxes: &[[f32; 4]], scores: &[f32], iou_threshold: f32) -> Vec<usize>
 ///
 /// # Panics
 /// Where the numbers of boxes, scores and classes differ or the threshold is NaN.
-pub fn batched_nms(
-    boxes: &[[f32; 4]],
-    scores: &[f32],
-    classes: &[usize],
-    iou_threshold: f32,
-) -> Vec<usize> {
+pub fn batched_nms(boxes: &[[f32; 4]], scores: &[f32], classes: &[usize], iou_threshold: f32) -> Vec<usize> {
     assert!(
         classes.len() == boxes.len(),
         "batched_nms: expected a class for each of {} boxes, found {}",
@@ -36,31 +31,18 @@ pub fn batched_nms(
     suppress(boxes, scores, Some(classes), iou_threshold)
 }
 
-fn suppress(
-    boxes: &[[f32; 4]],
-    scores: &[f32],
-    classes: Option<&[usize]>,
-    iou_threshold: f32,
-) -> Vec<usize> {
+fn suppress(boxes: &[[f32; 4]], scores: &[f32], classes: Option<&[usize]>, iou_threshold: f32) -> Vec<usize> {
     assert!(
         boxes.len() == scores.len(),
         "nms: expected a score for each of {} boxes, found {}",
         boxes.len(),
         scores.len()
     );
-    assert!(
-        !iou_threshold.is_nan(),
-        "nms: expected an IoU threshold, found NaN"
-    );
-    let mut order: Vec<usize> = (0..boxes.len())
-        .filter(|&idx| !scores[idx].is_nan() && boxes[idx].iter().all(|c| c.is_finite()))
-        .collect();
+    assert!(!iou_threshold.is_nan(), "nms: expected an IoU threshold, found NaN");
+    let mut order: Vec<usize> =
+        (0..boxes.len()).filter(|&idx| !scores[idx].is_nan() && boxes[idx].iter().all(|c| c.is_finite())).collect();
     // Stable, and -0 equals 0.
-    order.sort_by(|&a, &b| {
-        scores[b]
-            .partial_cmp(&scores[a])
-            .unwrap_or(std::cmp::Ordering::Equal)
-    });
+    order.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap_or(std::cmp::Ordering::Equal));
 
     let mut kept = Vec::new();
     let mut alive = vec![true; order.len()];
@@ -93,4 +75,120 @@ fn suppress(
 
 fn area([x1, y1, x2, y2]: [f32; 4]) -> f32 {
     (x2 - x1) * (y2 - y1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SQUARE: [f32; 4] = [0.0, 0.0, 10.0, 10.0];
+
+    #[test]
+    fn overlap_above_the_threshold_falls_and_at_it_stays() {
+        // 10 × 10 boxes shifted by 5: intersection 50, union 150.
+        let boxes = [SQUARE, [5.0, 0.0, 15.0, 10.0]];
+        let scores = [0.4, 0.6];
+        assert_eq!(nms(&boxes, &scores, 0.33), [1]);
+        assert_eq!(nms(&boxes, &scores, 0.34), [1, 0]);
+        // Intersection 50 of union 100: exactly the threshold.
+        let boxes = [SQUARE, [0.0, 0.0, 10.0, 5.0]];
+        assert_eq!(nms(&boxes, &scores, 0.5), [1, 0]);
+    }
+
+    #[test]
+    fn a_suppressed_box_suppresses_nothing() {
+        let boxes = [SQUARE, [4.0, 0.0, 14.0, 10.0], [8.0, 0.0, 18.0, 10.0]];
+        assert_eq!(nms(&boxes, &[0.9, 0.8, 0.7], 0.3), [0, 2]);
+    }
+
+    #[test]
+    fn equal_scores_keep_their_order() {
+        let boxes = [SQUARE, SQUARE, [20.0, 0.0, 30.0, 10.0], SQUARE];
+        assert_eq!(nms(&boxes, &[0.5; 4], 0.5), [0, 2]);
+        assert_eq!(nms(&boxes[..3], &[0.0, -0.0, 0.0], 0.5), [0, 2]);
+    }
+
+    #[test]
+    fn not_a_number_is_dropped_and_infinite_scores_are_ranked() {
+        let boxes = [
+            SQUARE,
+            [20.0, 0.0, 30.0, 10.0],
+            [f32::NAN, 0.0, 1.0, 1.0],
+            [0.0, 0.0, f32::INFINITY, 1.0],
+            [40.0, 0.0, 50.0, 10.0],
+        ];
+        let scores = [f32::NAN, f32::NEG_INFINITY, 1.0, 1.0, f32::INFINITY];
+        assert_eq!(nms(&boxes, &scores, 0.5), [4, 1]);
+    }
+
+    #[test]
+    fn boxes_without_area_overlap_nothing() {
+        let point = [5.0, 5.0, 5.0, 5.0];
+        assert_eq!(nms(&[point, point, SQUARE], &[0.9, 0.8, 0.7], 0.0), [0, 1, 2]);
+    }
+
+    #[test]
+    fn no_boxes_give_none() {
+        assert!(nms(&[], &[], 0.5).is_empty());
+    }
+
+    #[test]
+    #[should_panic(expected = "expected a score for each of 1 boxes, found 0")]
+    fn a_missing_score_is_refused() {
+        nms(&[SQUARE], &[], 0.5);
+    }
+
+    fn iou(a: [f32; 4], b: [f32; 4]) -> f32 {
+        let width = (a[2].min(b[2]) - a[0].max(b[0])).max(0.0);
+        let height = (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+        let both = width * height;
+        both / (area(a) + area(b) - both)
+    }
+
+    fn boxes_scores_classes() -> impl Strategy<Value = (Vec<[f32; 4]>, Vec<f32>, Vec<usize>)> {
+        let one = (0u8..20, 0u8..20, 1u8..12, 1u8..12, 0u8..8, 0usize..3);
+        proptest::collection::vec(one, 0..30).prop_map(|all| {
+            let boxes = all.iter().map(|&(x, y, w, h, _, _)| [x, y, x + w, y + h].map(f32::from));
+            (
+                boxes.collect(),
+                // Few values, so that ties happen.
+                all.iter().map(|all| f32::from(all.4) / 8.0).collect(),
+                all.iter().map(|all| all.5).collect(),
+            )
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            rng_seed: proptest::test_runner::RngSeed::Fixed(2),
+            failure_persistence: None,
+            ..ProptestConfig::default()
+        })]
+
+        #[test]
+        fn agrees_with_the_definition((boxes, scores, classes) in boxes_scores_classes()) {
+            // 0.47 is no ratio of the small whole areas here, so rounding decides nothing.
+            let kept = batched_nms(&boxes, &scores, &classes, 0.47);
+            let before = |a: usize, b: usize| scores[a] > scores[b] || (scores[a] == scores[b] && a < b);
+            prop_assert!(kept.windows(2).all(|pair| before(pair[0], pair[1])));
+            for idx in 0..boxes.len() {
+                let beaten = kept.iter().any(|&other| {
+                    classes[other] == classes[idx]
+                        && before(other, idx)
+                        && iou(boxes[other], boxes[idx]) > 0.47
+                });
+                prop_assert_eq!(kept.contains(&idx), !beaten, "box {}", idx);
+            }
+        }
+
+        #[test]
+        fn a_second_pass_changes_nothing((boxes, scores, _) in boxes_scores_classes()) {
+            let kept = nms(&boxes, &scores, 0.47);
+            let kept_boxes: Vec<_> = kept.iter().map(|&idx| boxes[idx]).collect();
+            let kept_scores: Vec<_> = kept.iter().map(|&idx| scores[idx]).collect();
+            let again = nms(&kept_boxes, &kept_scores, 0.47);
+            prop_assert_eq!(again, (0..kept.len()).collect::<Vec<_>>());
+        }
+    }
 }

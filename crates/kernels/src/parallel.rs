@@ -4,6 +4,7 @@
 //! that results are the same bits for any number of threads.
 
 use std::marker::PhantomData;
+use std::mem::MaybeUninit;
 
 /// Calls `unit` with every index below `num_units`, in any order, perhaps at the same time.
 pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send) {
@@ -11,10 +12,7 @@ pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send
     {
         use rayon::prelude::*;
         if num_units > 1 {
-            (0..num_units)
-                .into_par_iter()
-                .with_max_len(1)
-                .for_each(unit);
+            (0..num_units).into_par_iter().with_max_len(1).for_each(unit);
             return;
         }
     }
@@ -36,11 +34,7 @@ unsafe impl Send for SharedSlice<'_> {}
 impl<'a> SharedSlice<'a> {
     /// Borrows a slice for the units of one loop.
     pub(crate) fn new(slice: &'a mut [f32]) -> Self {
-        Self {
-            start: slice.as_mut_ptr(),
-            len: slice.len(),
-            slice: PhantomData,
-        }
+        Self { start: slice.as_mut_ptr(), len: slice.len(), slice: PhantomData }
     }
 
     /// The `len` elements from `start`.
@@ -49,11 +43,7 @@ impl<'a> SharedSlice<'a> {
     /// No two ranges that live at the same time overlap.
     #[allow(clippy::mut_from_ref)] // The point of the type: disjoint parts of one borrowed slice.
     pub(crate) unsafe fn range(&self, start: usize, len: usize) -> &'a mut [f32] {
-        assert!(
-            start <= self.len && len <= self.len - start,
-            "range {start}+{len} of a slice of {}",
-            self.len
-        );
+        assert!(start <= self.len && len <= self.len - start, "range {start}+{len} of a slice of {}", self.len);
         // SAFETY: in bounds by the assertion, borrowed for 'a, and disjoint by the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(start), len) }
     }
@@ -66,18 +56,14 @@ pub(crate) struct Output {
     len: usize,
 }
 
-// SAFETY: the only access is through `write`, whose callers promise disjoint parts.
+// SAFETY: the only access is through `write` and `range`, whose callers promise disjoint parts.
 unsafe impl Sync for Output {}
 
 impl Output {
     /// Room for `len` values.
     pub(crate) fn new(len: usize) -> Self {
         let mut values = Vec::with_capacity(len);
-        Self {
-            start: values.as_mut_ptr(),
-            values,
-            len,
-        }
+        Self { start: values.as_mut_ptr(), values, len }
     }
 
     /// Copies `run` to `at`, and every `stride` from there.
@@ -89,11 +75,7 @@ impl Output {
         let Some(last) = run.len().checked_sub(1) else {
             return;
         };
-        assert!(
-            at + last * stride < self.len,
-            "write past the end of {}",
-            self.len
-        );
+        assert!(at + last * stride < self.len, "write past the end of {}", self.len);
         // SAFETY: in bounds by the assertion; not written elsewhere by the caller's promise; `run` is a
         // borrowed slice and cannot be this vector, which nothing can borrow yet.
         unsafe {
@@ -106,6 +88,17 @@ impl Output {
                 }
             }
         }
+    }
+
+    /// The `len` elements from `start`, to be written.
+    ///
+    /// # Safety
+    /// No two ranges that live at the same time overlap, each other or a `write`.
+    #[allow(clippy::mut_from_ref)] // As in `SharedSlice`.
+    pub(crate) unsafe fn range(&self, start: usize, len: usize) -> &mut [MaybeUninit<f32>] {
+        assert!(start <= self.len && len <= self.len - start, "range {start}+{len} of {}", self.len);
+        // SAFETY: in bounds by the assertion, allocated while `self` lives, disjoint by the caller's promise.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(start).cast(), len) }
     }
 
     /// The filled vector.

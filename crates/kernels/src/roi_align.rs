@@ -16,6 +16,8 @@ use burn::tensor::Tensor;
 use crate::extension::KernelBackend;
 
 pub(crate) mod kernel;
+#[cfg(test)]
+mod tests;
 
 /// How many bilinear samples a bin averages along each axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,11 +64,7 @@ pub struct RoiAlignParams {
 pub fn roi_align(features: Tensor<4>, rois: Tensor<2>, params: RoiAlignParams) -> Tensor<4> {
     let [num_images, channels, height, width] = features.dims();
     let [num_rois, columns] = rois.dims();
-    assert!(
-        columns == 5,
-        "roi_align: expected ROIs of [R, 5] (image index, x1, y1, x2, y2), found {:?}",
-        rois.dims()
-    );
+    assert!(columns == 5, "roi_align: expected ROIs of [R, 5] (image index, x1, y1, x2, y2), found {:?}", rois.dims());
     assert!(
         params.output_size.iter().all(|&bins| bins > 0),
         "roi_align: expected at least one bin an axis, found {:?}",
@@ -83,21 +81,14 @@ pub fn roi_align(features: Tensor<4>, rois: Tensor<2>, params: RoiAlignParams) -
     );
     let [bins_y, bins_x] = params.output_size;
     if num_rois == 0 {
-        return Tensor::zeros(
-            [0, channels, bins_y, bins_x],
-            (&features.device(), features.dtype()),
-        );
+        return Tensor::zeros([0, channels, bins_y, bins_x], (&features.device(), features.dtype()));
     }
     assert!(
         num_images * channels * height * width > 0,
         "roi_align: expected feature maps of at least one pixel, found {:?}",
         features.dims()
     );
-    Tensor::from_dispatch(Dispatch::kernel_roi_align(
-        features.into_dispatch(),
-        rois.into_dispatch(),
-        params,
-    ))
+    Tensor::from_dispatch(Dispatch::kernel_roi_align(features.into_dispatch(), rois.into_dispatch(), params))
 }
 
 /// One ROI, read from a row of `[R, 5]`, as weights on the feature map.
@@ -124,9 +115,7 @@ impl RoiBins {
             image_idx >= 0.0 && image_idx.fract() == 0.0 && image_idx < num_images as f32,
             "roi_align: expected an image index in 0..{num_images} in ROI {roi_idx}, found {image_idx}"
         );
-        let axis = |low: f32, high: f32, bins: usize, map_size: usize| {
-            AxisBins::new(low, high, bins, map_size, params)
-        };
+        let axis = |low: f32, high: f32, bins: usize, map_size: usize| AxisBins::new(low, high, bins, map_size, params);
         let [bins_y, bins_x] = params.output_size;
         let [height, width] = map_size;
         Self {
@@ -164,11 +153,7 @@ impl AxisBins {
             // The cast gives 0 for a negative size.
             SamplingRatio::Adaptive => bin.ceil() as usize,
         };
-        let mut axis = Self {
-            first: Vec::with_capacity(bins),
-            offsets: vec![0],
-            weights: Vec::new(),
-        };
+        let mut axis = Self { first: Vec::with_capacity(bins), offsets: vec![0], weights: Vec::new() };
         let finite = low.is_finite() && high.is_finite() && start.is_finite() && extent.is_finite();
         for bin_idx in 0..bins {
             if finite {
@@ -201,8 +186,7 @@ impl AxisBins {
             // Bins of negative length, which only a fixed ratio samples, walk backwards.
             if low < first {
                 let missing = first - low;
-                self.weights
-                    .splice(base..base, std::iter::repeat_n(0.0, missing));
+                self.weights.splice(base..base, std::iter::repeat_n(0.0, missing));
                 first = low;
             }
             if self.weights.len() < base + high - first + 1 {
@@ -238,8 +222,6 @@ fn samples_on_map(start: f32, bin: f32, grid: usize, map_size: usize) -> std::op
     }
     // One sample of slack either side for rounding; the caller tests each sample again.
     let first = ((-1.0 - f64::from(start)) / step - 1.5).floor().max(0.0) as usize;
-    let end = ((map_size as f64 - f64::from(start)) / step + 1.5)
-        .ceil()
-        .max(0.0) as usize;
+    let end = ((map_size as f64 - f64::from(start)) / step + 1.5).ceil().max(0.0) as usize;
     first.min(grid)..end.min(grid)
 }

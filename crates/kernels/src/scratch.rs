@@ -18,9 +18,7 @@ impl Scratch {
     pub(crate) fn take(len: usize) -> Self {
         let mut buffer = FREE.with_borrow_mut(|free| {
             // The smallest that is large enough, else the largest, which then grows.
-            let fitting = (0..free.len())
-                .filter(|&idx| free[idx].len() >= len)
-                .min_by_key(|&idx| free[idx].len());
+            let fitting = (0..free.len()).filter(|&idx| free[idx].len() >= len).min_by_key(|&idx| free[idx].len());
             let chosen = fitting.or_else(|| (0..free.len()).max_by_key(|&idx| free[idx].len()));
             chosen.map_or_else(Vec::new, |idx| free.swap_remove(idx))
         });

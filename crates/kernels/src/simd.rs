@@ -8,9 +8,9 @@ use std::sync::OnceLock;
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{
-    __m256, __m512, __mmask16, _mm256_add_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_set1_ps,
-    _mm256_setzero_ps, _mm256_storeu_ps, _mm512_add_ps, _mm512_fmadd_ps, _mm512_loadu_ps,
-    _mm512_maskz_loadu_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_storeu_ps,
+    __m256, __m512, __mmask16, _mm256_add_ps, _mm256_fmadd_ps, _mm256_loadu_ps, _mm256_set1_ps, _mm256_setzero_ps,
+    _mm256_storeu_ps, _mm512_add_ps, _mm512_fmadd_ps, _mm512_loadu_ps, _mm512_maskz_loadu_ps, _mm512_set1_ps,
+    _mm512_setzero_ps, _mm512_storeu_ps,
 };
 
 /// Rows of a tile.
@@ -128,12 +128,7 @@ pub(crate) fn multiply_tile(
 /// AVX-512 is there, and `multiply_tile`'s assertions hold for `GROUPS`.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-unsafe fn tile_avx512<const GROUPS: usize>(
-    left: &[f32],
-    right: Rows<'_>,
-    tile: &mut [f32],
-    accumulate: bool,
-) {
+unsafe fn tile_avx512<const GROUPS: usize>(left: &[f32], right: Rows<'_>, tile: &mut [f32], accumulate: bool) {
     let mut sums: [[__m512; GROUPS]; ROWS] = [[_mm512_setzero_ps(); GROUPS]; ROWS];
     let mut left = left.as_ptr();
     // SAFETY: `left` has 8 values a row of `right`, every row of `right` has 16·GROUPS values, and the tile
@@ -161,11 +156,7 @@ unsafe fn tile_avx512<const GROUPS: usize>(
         for (idx, sums) in sums.iter().enumerate() {
             for (group, sum) in sums.iter().enumerate() {
                 let target = tile.as_mut_ptr().add(idx * COLUMNS + group * GROUP);
-                let sum = if accumulate {
-                    _mm512_add_ps(_mm512_loadu_ps(target), *sum)
-                } else {
-                    *sum
-                };
+                let sum = if accumulate { _mm512_add_ps(_mm512_loadu_ps(target), *sum) } else { *sum };
                 _mm512_storeu_ps(target, sum);
             }
         }
@@ -213,11 +204,7 @@ unsafe fn tile_avx2<const VECTORS: usize>(
             for (vector, sum) in sums.iter().enumerate() {
                 let at = (first_row + idx) * COLUMNS + first_column + vector * 8;
                 let target = tile.as_mut_ptr().add(at);
-                let sum = if accumulate {
-                    _mm256_add_ps(_mm256_loadu_ps(target), *sum)
-                } else {
-                    *sum
-                };
+                let sum = if accumulate { _mm256_add_ps(_mm256_loadu_ps(target), *sum) } else { *sum };
                 _mm256_storeu_ps(target, sum);
             }
         }
@@ -258,11 +245,7 @@ fn tile_portable(
 /// Fused where that is one instruction; elsewhere `mul_add` would be a call into the C library.
 #[inline(always)]
 fn multiply_add(a: f32, b: f32, c: f32) -> f32 {
-    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
-        a.mul_add(b, c)
-    } else {
-        a * b + c
-    }
+    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// A run of neighbouring columns of a panel and where their values stand.
@@ -278,13 +261,7 @@ pub(crate) struct ColumnRun {
 /// Gathers a panel of `[row_offsets.len(), 48]` from runs of the source.
 ///
 /// Runs are in the order of their columns, without gaps. Columns that no run covers are left undefined.
-pub(crate) fn pack_panel(
-    isa: Isa,
-    panel: &mut [f32],
-    source: &[f32],
-    row_offsets: &[usize],
-    runs: &[ColumnRun],
-) {
+pub(crate) fn pack_panel(isa: Isa, panel: &mut [f32], source: &[f32], row_offsets: &[usize], runs: &[ColumnRun]) {
     let end = runs.iter().map(|run| run.source + run.len).max();
     let last = row_offsets.iter().max();
     let (Some(end), Some(last)) = (end, last) else {
@@ -302,8 +279,7 @@ pub(crate) fn pack_panel(
             for (row, offset) in panel.chunks_exact_mut(COLUMNS).zip(row_offsets) {
                 for run in runs {
                     let from = run.source + offset;
-                    row[run.column..run.column + run.len]
-                        .copy_from_slice(&source[from..from + run.len]);
+                    row[run.column..run.column + run.len].copy_from_slice(&source[from..from + run.len]);
                 }
             }
         }
@@ -314,12 +290,7 @@ pub(crate) fn pack_panel(
 /// AVX-512 is there, and `pack_panel`'s assertions hold.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-unsafe fn pack_avx512(
-    panel: &mut [f32],
-    source: &[f32],
-    row_offsets: &[usize],
-    runs: &[ColumnRun],
-) {
+unsafe fn pack_avx512(panel: &mut [f32], source: &[f32], row_offsets: &[usize], runs: &[ColumnRun]) {
     let source = source.as_ptr();
     let panel = panel.as_mut_ptr();
     // SAFETY: every read is within `run.len` of a run's start, masked at its end; every write begins inside a
@@ -459,3 +430,39 @@ unsafe fn transpose_blocks_avx(
         }
     }
 }
+
+/// Compiles a plain loop for every instruction set and picks one when called, with the set as first argument.
+///
+/// Nothing is fused or reordered: the result is the same bits on all of them.
+macro_rules! widest {
+    (fn $name:ident($($arg:ident: $kind:ty),* $(,)?) -> $result:ty $body:block) => {
+        #[allow(clippy::unused_unit)] // The macro names every result, also `()`.
+        fn $name(isa: $crate::simd::Isa, $($arg: $kind),*) -> $result {
+            #[inline(always)]
+            fn plain($($arg: $kind),*) -> $result $body
+
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f")]
+            fn avx512($($arg: $kind),*) -> $result {
+                plain($($arg),*)
+            }
+
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2")]
+            fn avx2($($arg: $kind),*) -> $result {
+                plain($($arg),*)
+            }
+
+            match isa {
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the machine has AVX-512 (`Isa::available`).
+                $crate::simd::Isa::Avx512 => unsafe { avx512($($arg),*) },
+                #[cfg(target_arch = "x86_64")]
+                // SAFETY: the machine has AVX2 (`Isa::available`).
+                $crate::simd::Isa::Avx2 => unsafe { avx2($($arg),*) },
+                $crate::simd::Isa::Portable => plain($($arg),*),
+            }
+        }
+    };
+}
+pub(crate) use widest;

@@ -37,12 +37,7 @@ pub(crate) struct PackedFilters {
 
 impl PackedFilters {
     /// Filter m's k-th value is `weight[m · filter_step + offsets[k]]`.
-    pub(crate) fn new(
-        weight: &[f32],
-        num_filters: usize,
-        filter_step: usize,
-        offsets: &[usize],
-    ) -> Self {
+    pub(crate) fn new(weight: &[f32], num_filters: usize, filter_step: usize, offsets: &[usize]) -> Self {
         let depth = offsets.len();
         let blocks = num_filters.div_ceil(ROWS);
         let mut values = Scratch::take(blocks * depth * ROWS);
@@ -51,18 +46,11 @@ impl PackedFilters {
             let base = &weight[block * ROWS * filter_step..];
             for (target, offset) in target.chunks_exact_mut(ROWS).zip(offsets) {
                 for (idx, value) in target.iter_mut().enumerate() {
-                    *value = if idx < rows {
-                        base[idx * filter_step + offset]
-                    } else {
-                        0.0
-                    };
+                    *value = if idx < rows { base[idx * filter_step + offset] } else { 0.0 };
                 }
             }
         }
-        Self {
-            values,
-            num_filters,
-        }
+        Self { values, num_filters }
     }
 }
 
@@ -128,21 +116,9 @@ impl Reach {
         let [step_y, step_x] = conv.stride;
         let last_y = ((grid_height - 1) * step_y) as isize + max_dy;
         let last_x = ((grid_width - 1) * step_x) as isize + max_dx;
-        let Source {
-            channels,
-            height,
-            width,
-            ..
-        } = conv.source;
-        let in_place = step_x == 1
-            && min_dy >= 0
-            && min_dx >= 0
-            && last_y < height as isize
-            && last_x < width as isize;
-        let span = [
-            (max_dy - min_dy) as usize + 1,
-            (max_dx - min_dx) as usize + 1,
-        ];
+        let Source { channels, height, width, .. } = conv.source;
+        let in_place = step_x == 1 && min_dy >= 0 && min_dx >= 0 && last_y < height as isize && last_x < width as isize;
+        let span = [(max_dy - min_dy) as usize + 1, (max_dx - min_dx) as usize + 1];
         let phases = step_x.min(span[1]);
         let phase_len = ((grid_width - 1) * step_x + span[1]).div_ceil(step_x);
         // A unit that begins inside a row touches one row more.
@@ -161,16 +137,7 @@ impl Reach {
                 });
             }
         }
-        Self {
-            min_dy,
-            min_dx,
-            span,
-            in_place,
-            phases,
-            phase_len,
-            band_rows,
-            offsets,
-        }
+        Self { min_dy, min_dx, span, in_place, phases, phase_len, band_rows, offsets }
     }
 
     fn band_len(&self, channels: usize) -> usize {
@@ -220,34 +187,19 @@ impl GatherConv<'_> {
         let first_image = columns.start / positions;
         let last_image = (columns.end - 1) / positions;
         let band_len = reach.band_len(channels);
-        let mut bands = Scratch::take(if reach.in_place {
-            0
-        } else {
-            (last_image - first_image + 1) * band_len
-        });
+        let mut bands = Scratch::take(if reach.in_place { 0 } else { (last_image - first_image + 1) * band_len });
         // First grid row of each band.
         let band_start = |image: usize| {
-            if image == first_image {
-                columns.start % positions / grid_width
-            } else {
-                0
-            }
+            if image == first_image { columns.start % positions / grid_width } else { 0 }
         };
         if !reach.in_place {
             for (image, band) in (first_image..=last_image).zip(bands.chunks_exact_mut(band_len)) {
-                let end = if image == last_image {
-                    (columns.end - 1) % positions / grid_width + 1
-                } else {
-                    grid_height
-                };
+                let end =
+                    if image == last_image { (columns.end - 1) % positions / grid_width + 1 } else { grid_height };
                 self.fill_band(reach, image, band_start(image)..end, band);
             }
         }
-        let gathered_from = if reach.in_place {
-            self.source.values
-        } else {
-            &bands
-        };
+        let gathered_from = if reach.in_place { self.source.values } else { &bands };
 
         let depth = reach.offsets.len();
         let depth_blocks = depth.div_ceil(BLOCK_DEPTH).max(1);
@@ -262,43 +214,26 @@ impl GatherConv<'_> {
             let mut column = panel_columns.start;
             while column < panel_columns.end {
                 let image = column / positions;
-                let (y, x) = (
-                    column % positions / grid_width,
-                    column % positions % grid_width,
-                );
+                let (y, x) = (column % positions / grid_width, column % positions % grid_width);
                 let mut len = (grid_width - x).min(panel_columns.end - column);
                 let source = if reach.in_place {
                     if self.stride[0] == 1 && grid_width == self.source.width {
                         // Rows follow each other without a gap.
                         len = (positions - column % positions).min(panel_columns.end - column);
                     }
-                    (image * channels * self.source.height + y * self.stride[0]) * self.source.width
-                        + x
+                    (image * channels * self.source.height + y * self.stride[0]) * self.source.width + x
                 } else {
                     let row = (y - band_start(image)) * self.stride[0] * reach.phases;
                     (image - first_image) * band_len + row * reach.phase_len + x
                 };
-                runs.push(ColumnRun {
-                    source,
-                    column: column - panel_columns.start,
-                    len,
-                });
+                runs.push(ColumnRun { source, column: column - panel_columns.start, len });
                 column += len;
             }
 
             for (block_idx, offsets) in reach.offsets.chunks(block_depth).enumerate() {
                 pack_panel(isa, &mut panel, gathered_from, offsets, &runs);
-                let right = Rows {
-                    values: &panel,
-                    inner: offsets.len(),
-                    inner_step: COLUMNS,
-                    outer: 1,
-                    outer_step: 0,
-                };
-                for (block, tile) in blocks
-                    .clone()
-                    .zip(tiles.chunks_exact_mut(ROWS * COLUMNS))
-                {
+                let right = Rows { values: &panel, inner: offsets.len(), inner_step: COLUMNS, outer: 1, outer_step: 0 };
+                for (block, tile) in blocks.clone().zip(tiles.chunks_exact_mut(ROWS * COLUMNS)) {
                     let start = (block * depth + block_idx * block_depth) * ROWS;
                     let left = &self.filters.values[start..start + offsets.len() * ROWS];
                     multiply_tile(isa, left, right, groups, tile, block_idx > 0);
@@ -309,20 +244,8 @@ impl GatherConv<'_> {
     }
 
     /// Copies grid rows `rows` of an image, with all that their taps reach, zeros outside the map.
-    fn fill_band(
-        &self,
-        reach: &Reach,
-        image: usize,
-        rows: std::ops::Range<usize>,
-        band: &mut [f32],
-    ) {
-        let Source {
-            values,
-            channels,
-            height,
-            width,
-            ..
-        } = self.source;
+    fn fill_band(&self, reach: &Reach, image: usize, rows: std::ops::Range<usize>, band: &mut [f32]) {
+        let Source { values, channels, height, width, .. } = self.source;
         let [step_y, step_x] = self.stride;
         let row_len = reach.phases * reach.phase_len;
         let num_rows = (rows.len() - 1) * step_y + reach.span[0];
@@ -394,17 +317,9 @@ impl GatherConv<'_> {
 
 /// `target[i] = source[start + i·step]`, zero outside the source.
 fn copy_phase(target: &mut [f32], source: &[f32], start: isize, step: usize) {
-    let before = if start < 0 {
-        (start.unsigned_abs().div_ceil(step)).min(target.len())
-    } else {
-        0
-    };
+    let before = if start < 0 { (start.unsigned_abs().div_ceil(step)).min(target.len()) } else { 0 };
     let first = start + (before * step) as isize;
-    let inside = if first < source.len() as isize {
-        (source.len() - first as usize).div_ceil(step)
-    } else {
-        0
-    };
+    let inside = if first < source.len() as isize { (source.len() - first as usize).div_ceil(step) } else { 0 };
     let inside = inside.min(target.len() - before);
     target[..before].fill(0.0);
     target[before + inside..].fill(0.0);

@@ -76,21 +76,12 @@ impl ConvShape {
 }
 
 /// The convolution of `x` with `weight`, plus `bias`: `[N, Co, Ho, Wo]`.
-pub(crate) fn forward(
-    isa: Isa,
-    x: &[f32],
-    weight: &[f32],
-    bias: Option<&[f32]>,
-    shape: &ConvShape,
-) -> Vec<f32> {
+pub(crate) fn forward(isa: Isa, x: &[f32], weight: &[f32], bias: Option<&[f32]>, shape: &ConvShape) -> Vec<f32> {
     let [kernel_height, kernel_width] = shape.kernel;
     let [padding_y, padding_x] = shape.params.padding;
     let taps: Vec<Tap> = (0..kernel_height)
         .flat_map(|y| (0..kernel_width).map(move |x| (y, x)))
-        .map(|(y, x)| Tap {
-            dy: y as isize - padding_y as isize,
-            dx: x as isize - padding_x as isize,
-        })
+        .map(|(y, x)| Tap { dy: y as isize - padding_y as isize, dx: x as isize - padding_x as isize })
         .collect();
     let depth = shape.in_channels * taps.len();
     let offsets: Vec<usize> = (0..depth).collect();
@@ -109,11 +100,7 @@ pub(crate) fn forward(
         grid: shape.out_size,
         filters: &filters,
         bias,
-        target: Target {
-            size: shape.out_size,
-            origin: [0, 0],
-            step: [1, 1],
-        },
+        target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
     };
     conv.run(isa, &output);
     // SAFETY: the grid is the whole output.
@@ -154,15 +141,8 @@ pub(crate) fn input_gradient(
                     cells.push(cell_y * kernel_width + cell_x);
                 }
             }
-            let target = Target {
-                size: shape.in_size,
-                origin: [phase_y, phase_x],
-                step: [step_y, step_x],
-            };
-            let grid = [
-                (shape.in_size[0] - phase_y).div_ceil(step_y),
-                (shape.in_size[1] - phase_x).div_ceil(step_x),
-            ];
+            let target = Target { size: shape.in_size, origin: [phase_y, phase_x], step: [step_y, step_x] };
+            let grid = [(shape.in_size[0] - phase_y).div_ceil(step_y), (shape.in_size[1] - phase_x).div_ceil(step_x)];
             if taps.is_empty() {
                 fill_phase(&output, shape, target, grid, bias);
                 continue;
@@ -176,15 +156,7 @@ pub(crate) fn input_gradient(
                 })
                 .collect();
             let filters = PackedFilters::new(weight, shape.in_channels, num_cells, &offsets);
-            let conv = GatherConv {
-                source,
-                taps: &taps,
-                stride: [1, 1],
-                grid,
-                filters: &filters,
-                bias,
-                target,
-            };
+            let conv = GatherConv { source, taps: &taps, stride: [1, 1], grid, filters: &filters, bias, target };
             conv.run(isa, &output);
         }
     }
@@ -193,12 +165,7 @@ pub(crate) fn input_gradient(
 }
 
 /// Kernel cells that reach input pixels `phase + q·stride`, each with its output pixel relative to q.
-fn cells_of_phase(
-    phase: usize,
-    kernel: usize,
-    stride: usize,
-    padding: usize,
-) -> Vec<(usize, isize)> {
+fn cells_of_phase(phase: usize, kernel: usize, stride: usize, padding: usize) -> Vec<(usize, isize)> {
     (0..kernel)
         .filter(|cell| (phase + padding) % stride == cell % stride)
         .map(|cell| {
@@ -209,13 +176,7 @@ fn cells_of_phase(
 }
 
 /// Writes pixels that no kernel cell reaches.
-fn fill_phase(
-    output: &Output,
-    shape: &ConvShape,
-    target: Target,
-    grid: [usize; 2],
-    bias: Option<&[f32]>,
-) {
+fn fill_phase(output: &Output, shape: &ConvShape, target: Target, grid: [usize; 2], bias: Option<&[f32]>) {
     let [height, width] = target.size;
     for plane in 0..shape.num_images * shape.in_channels {
         let value = bias.map_or(0.0, |bias| bias[plane % shape.in_channels]);

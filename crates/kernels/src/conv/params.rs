@@ -11,17 +11,11 @@ pub struct Conv2dParams {
 
 impl Conv2dParams {
     /// Stride 1, no padding.
-    pub const UNIT: Self = Self {
-        stride: [1, 1],
-        padding: [0, 0],
-    };
+    pub const UNIT: Self = Self { stride: [1, 1], padding: [0, 0] };
 
     /// The same stride and padding on both axes.
     pub const fn square(stride: usize, padding: usize) -> Self {
-        Self {
-            stride: [stride, stride],
-            padding: [padding, padding],
-        }
+        Self { stride: [stride, stride], padding: [padding, padding] }
     }
 
     /// Size of the convolution's output map, or `None` where the padded input is smaller than the kernel.
@@ -41,17 +35,11 @@ impl Conv2dParams {
     ///
     /// # Shapes
     /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.
-    pub fn transposed_output_size(
-        &self,
-        input: [usize; 2],
-        kernel: [usize; 2],
-    ) -> Option<[usize; 2]> {
+    pub fn transposed_output_size(&self, input: [usize; 2], kernel: [usize; 2]) -> Option<[usize; 2]> {
         let mut output = [0; 2];
         for axis in 0..2 {
             let full = input[axis].checked_sub(1)? * self.stride[axis] + kernel[axis];
-            output[axis] = full
-                .checked_sub(2 * self.padding[axis])
-                .filter(|&size| size > 0)?;
+            output[axis] = full.checked_sub(2 * self.padding[axis]).filter(|&size| size > 0)?;
         }
         Some(output)
     }

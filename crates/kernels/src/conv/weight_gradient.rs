@@ -22,12 +22,7 @@ const MIN_UNITS: usize = 8;
 const TILE: usize = ROWS * COLUMNS;
 
 /// The gradient with respect to the weight, `[Co, Ci, Kh, Kw]`.
-pub(crate) fn weight_gradient(
-    isa: Isa,
-    x: &[f32],
-    output_grad: &[f32],
-    shape: &ConvShape,
-) -> Vec<f32> {
+pub(crate) fn weight_gradient(isa: Isa, x: &[f32], output_grad: &[f32], shape: &ConvShape) -> Vec<f32> {
     let padded = PaddedInput::new(isa, x, shape);
     let left = interleave_channels(isa, output_grad, shape);
     let [out_height, out_width] = shape.out_size;
@@ -36,9 +31,7 @@ pub(crate) fn weight_gradient(
     let positions = shape.num_images * out_height * out_width;
 
     // Blocks of whole output rows of one image, as even as they come.
-    let blocks_per_image = (out_height * out_width)
-        .div_ceil(BLOCK_POSITIONS)
-        .min(out_height);
+    let blocks_per_image = (out_height * out_width).div_ceil(BLOCK_POSITIONS).min(out_height);
     let block_rows = out_height.div_ceil(blocks_per_image);
     let blocks_per_image = out_height.div_ceil(block_rows);
     let num_blocks = shape.num_images * blocks_per_image;
@@ -135,11 +128,7 @@ impl PaddedInput {
         let channels = shape.in_channels;
         // A 1 × 1 kernel looks at every stride-th pixel only, so only those are copied.
         let pointwise = shape.kernel == [1, 1] && shape.params.padding == [0, 0];
-        let (sampling, stride) = if pointwise {
-            (shape.params.stride, [1, 1])
-        } else {
-            ([1, 1], shape.params.stride)
-        };
+        let (sampling, stride) = if pointwise { (shape.params.stride, [1, 1]) } else { ([1, 1], shape.params.stride) };
         let height = (out_height - 1) * stride[0] + shape.kernel[0];
         let width = (out_width - 1) * stride[1] + shape.kernel[1];
         let [padding_y, padding_x] = shape.params.padding;
@@ -150,9 +139,7 @@ impl PaddedInput {
             let (image, padded_y) = (unit / height, unit % height);
             // SAFETY: every unit has its own row.
             let row = unsafe { shared.range(unit * row_len, row_len) };
-            let y = (padded_y * sampling[0])
-                .checked_sub(padding_y)
-                .filter(|&y| y < in_height);
+            let y = (padded_y * sampling[0]).checked_sub(padding_y).filter(|&y| y < in_height);
             let Some(y) = y else {
                 row.fill(0.0);
                 return;
@@ -183,14 +170,7 @@ impl PaddedInput {
         // What lies past the end is multiplied into columns that nobody reads.
         let end = values.len() - COLUMNS;
         values[end..].fill(0.0);
-        Self {
-            values,
-            height,
-            width,
-            channels,
-            out_width,
-            stride,
-        }
+        Self { values, height, width, channels, out_width, stride }
     }
 
     /// What kernel row `kernel_y` sees from `rows` output rows, from column `first` of its run on.

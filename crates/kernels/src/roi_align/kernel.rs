@@ -10,12 +10,7 @@ use crate::parallel::{SharedSlice, for_each_unit};
 const CHANNEL_BLOCK: usize = 16;
 
 /// Crops of `features` `[N, C, H, W]` at `rois` `[R, 5]`: `[R, C, Ph, Pw]`.
-pub(crate) fn forward(
-    features: &[f32],
-    shape: [usize; 4],
-    rois: &[f32],
-    params: &RoiAlignParams,
-) -> Vec<f32> {
+pub(crate) fn forward(features: &[f32], shape: [usize; 4], rois: &[f32], params: &RoiAlignParams) -> Vec<f32> {
     let [num_images, channels, height, width] = shape;
     let [bins_y, bins_x] = params.output_size;
     let num_bins = bins_y * bins_x;
@@ -51,12 +46,7 @@ pub(crate) fn forward(
 }
 
 /// Gradient with respect to the features, `[N, C, H, W]`, from that of the crops, `[R, C, Ph, Pw]`.
-pub(crate) fn backward(
-    crop_grad: &[f32],
-    shape: [usize; 4],
-    rois: &[f32],
-    params: &RoiAlignParams,
-) -> Vec<f32> {
+pub(crate) fn backward(crop_grad: &[f32], shape: [usize; 4], rois: &[f32], params: &RoiAlignParams) -> Vec<f32> {
     let [num_images, channels, height, width] = shape;
     let [bins_y, bins_x] = params.output_size;
     let num_bins = bins_y * bins_x;
@@ -116,12 +106,7 @@ fn add_scaled(sum: &mut [f32], values: &[f32], weight: f32) {
 }
 
 /// `[N, C, P]` to `[N, P, C]`.
-fn channels_last(
-    features: &[f32],
-    num_images: usize,
-    channels: usize,
-    num_pixels: usize,
-) -> Vec<f32> {
+fn channels_last(features: &[f32], num_images: usize, channels: usize, num_pixels: usize) -> Vec<f32> {
     const TILE: usize = 16;
     let mut output = vec![0.0; features.len()];
     let pixels = SharedSlice::new(&mut output);

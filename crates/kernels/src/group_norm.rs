@@ -1,0 +1,66 @@
+//! Group normalisation in one pass forwards and one backwards, with the ReLU that follows it if wanted.
+//!
+//! Shapes: N images, C channels in G groups, P pixels; a group of an image has m = C/G · P values.
+//!
+//! Source: Wu and He, Group Normalization (2018), equations 1, 2 and 6; the variance is that of the whole
+//! group (divided by m), as in PyTorch's `group_norm`.
+
+use burn::backend::Dispatch;
+use burn::tensor::Tensor;
+
+use crate::extension::KernelBackend;
+
+pub(crate) mod kernel;
+#[cfg(test)]
+mod tests;
+
+/// What follows the normalisation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Activation {
+    /// Nothing.
+    #[default]
+    Identity,
+    /// `max(x, 0)`.
+    Relu,
+}
+
+/// Parameters of [`group_norm`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupNormParams {
+    /// Groups the channels are cut into; divides the number of channels.
+    pub num_groups: usize,
+    /// Added to the variance, such as 1e-5.
+    pub epsilon: f32,
+    /// What follows.
+    pub activation: Activation,
+}
+
+/// Normalises each group of channels of each image to mean 0 and variance 1, then scales by `gamma` and shifts
+/// by `beta`.
+///
+/// # Shapes
+/// `x` `[N, C, H, W]`, `gamma` and `beta` `[C]`; the result has the shape of `x`.
+///
+/// # Panics
+/// Where the shapes do not fit each other, a dimension is 0, or the groups do not divide the channels.
+pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: GroupNormParams) -> Tensor<4> {
+    let channels = x.dims()[1];
+    assert!(x.dims().iter().all(|&size| size > 0), "group_norm: expected no empty dimension, found {:?}", x.dims());
+    assert!(
+        params.num_groups > 0 && channels % params.num_groups == 0,
+        "group_norm: expected a number of groups that divides {channels} channels, found {}",
+        params.num_groups
+    );
+    assert!(
+        gamma.dims() == [channels] && beta.dims() == [channels],
+        "group_norm: expected gamma and beta of [{channels}], found {:?} and {:?}",
+        gamma.dims(),
+        beta.dims()
+    );
+    Tensor::from_dispatch(Dispatch::kernel_group_norm(
+        x.into_dispatch(),
+        gamma.into_dispatch(),
+        beta.into_dispatch(),
+        params,
+    ))
+}
