@@ -47,7 +47,7 @@ pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: Group
     let channels = x.dims()[1];
     assert!(x.dims().iter().all(|&size| size > 0), "group_norm: expected no empty dimension, found {:?}", x.dims());
     assert!(
-        params.num_groups > 0 && channels % params.num_groups == 0,
+        params.num_groups > 0 && channels.is_multiple_of(params.num_groups),
         "group_norm: expected a number of groups that divides {channels} channels, found {}",
         params.num_groups
     );

@@ -154,9 +154,8 @@ fn sum_lanes<const N: usize>(len: usize, term: impl Fn(usize) -> [f32; N]) -> [f
         let whole = (end - start) / LANES * LANES;
         for block in (start..start + whole).step_by(LANES) {
             for lane in 0..LANES {
-                let terms = term(block + lane);
-                for n in 0..N {
-                    lanes[n][lane] += terms[n];
+                for (lanes, term) in lanes.iter_mut().zip(term(block + lane)) {
+                    lanes[lane] += term;
                 }
             }
         }
