@@ -27,6 +27,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod attempt;
 mod camera;
 mod controller;
 mod data;
@@ -37,11 +38,15 @@ mod gripper;
 mod guard;
 mod model;
 pub mod objects;
+mod oracle;
 mod panda;
 mod perception;
+mod record;
 mod render;
 pub mod scene;
+mod workcell;
 
+pub use attempt::{AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep};
 pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
 pub use controller::{ArmController, ArmReference};
 pub use data::{Contact, Data};
@@ -49,8 +54,11 @@ pub use error::{Result, SimulationError};
 pub use extent::lowest_point_m;
 pub use gripper::{Gripper, MAX_FINGER_FORCE_N};
 pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
+pub use oracle::marked_grasp;
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };
 pub use perception::{GraspTarget, Perception};
+pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
+pub use workcell::{MotionEnd, PERIOD_SECS, Workcell, WorkcellConfig, camera_looking_down};

@@ -1,0 +1,343 @@
+//! The robot at its table: one scene, its state, its cameras, and motion through time.
+
+use std::sync::Arc;
+
+use image::RgbImage;
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::{IkOptions, Panda, Trajectory, ready_pose};
+
+use crate::camera::{CameraView, posed_camera};
+use crate::controller::{ArmController, ArmReference};
+use crate::data::Data;
+use crate::error::{Result, SimulationError};
+use crate::extent::lowest_point_m;
+use crate::gripper::Gripper;
+use crate::model::{Body, Camera, Id, Joint, Model};
+use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
+use crate::record::{RecordConfig, Recorder};
+use crate::render::{RenderConfig, Renderer, Segmentation};
+use crate::scene::SceneVariation;
+
+/// Control period and timestep of the physics in seconds: 1 kHz.
+pub const PERIOD_SECS: f64 = 1e-3;
+
+/// A joint that is this far from its reference is held up by something, in radians.
+const BLOCKED_RAD: f64 = 0.03;
+
+/// What a workcell is made of.
+#[derive(Debug, Clone)]
+pub struct WorkcellConfig {
+    /// Part, light, table and distractors.
+    pub scene: SceneVariation,
+    /// How the wrist camera's pictures are drawn.
+    pub wrist_render: RenderConfig,
+}
+
+impl WorkcellConfig {
+    /// A scene with the wrist camera's usual pictures.
+    pub fn new(scene: SceneVariation) -> Self {
+        Self { scene, wrist_render: RenderConfig::default() }
+    }
+}
+
+/// The part to grasp, as MuJoCo knows it.
+#[derive(Debug, Clone, Copy)]
+struct PartIds {
+    body: Id<Body>,
+    joint: Id<Joint>,
+}
+
+/// How a motion ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MotionEnd {
+    /// The arm is where the motion ends.
+    Arrived,
+    /// Something held the arm up; what touched it, in words.
+    Blocked(String),
+}
+
+/// A Panda at a table with a part, its physics and its cameras.
+pub struct Workcell {
+    config: WorkcellConfig,
+    pub(crate) data: Data,
+    pub(crate) panda_ids: PandaIds,
+    pub(crate) panda: Panda,
+    part: Option<PartIds>,
+    wrist_renderer: Renderer,
+    scene_camera: Id<Camera>,
+    controller: ArmController,
+    pub(crate) gripper: Gripper,
+    reference: ArmReference,
+    recorder: Option<Recorder>,
+    tcp_from_camera: Isometry3<f64>,
+}
+
+impl Workcell {
+    /// Builds the scene, its physics and the wrist camera's renderer.
+    ///
+    /// # Errors
+    /// `Model` where MuJoCo refuses the scene, `Rendering` without OpenGL, `Library` for the wrong
+    /// libmujoco.
+    pub fn new(config: &WorkcellConfig) -> Result<Self> {
+        let fragment = config.scene.fragment();
+        let xml = include_str!("../assets/workcell.xml")
+            .replace("PANDA_FILE", PANDA_FILE)
+            .replace("<!-- SCENE -->", &fragment.sections);
+        let mut assets = fragment.files;
+        assets.push(panda_asset());
+        let model = Arc::new(Model::from_xml(&xml, &assets)?);
+
+        let panda_ids = PandaIds::find(&model)?;
+        let part = match config.scene.object {
+            Some(_) => Some(PartIds { body: model.id("object")?, joint: model.id("object_joint")? }),
+            None => None,
+        };
+        let wrist_renderer = Renderer::new(&model, config.wrist_render)?;
+        let scene_camera = model.id("scene")?;
+        let mut data = Data::new(model)?;
+        panda_ids.set_position(&mut data, &ready_pose());
+        data.forward()?;
+        let world_from_camera = posed_camera(&wrist_renderer, &data, panda_ids.wrist_camera).world_from_camera;
+        let tcp_from_camera = panda_ids.base_from_tcp(&data).inverse() * world_from_camera;
+
+        let mut workcell = Self {
+            config: config.clone(),
+            data,
+            panda_ids,
+            panda: Panda::new(),
+            part,
+            wrist_renderer,
+            scene_camera,
+            controller: ArmController::default(),
+            gripper: Gripper::at_opening_m(0.08),
+            reference: ArmReference::at_rest(ready_pose()),
+            recorder: None,
+            tcp_from_camera,
+        };
+        workcell.reset(&ready_pose())?;
+        Ok(workcell)
+    }
+
+    /// What the workcell was built from.
+    pub fn config(&self) -> &WorkcellConfig {
+        &self.config
+    }
+
+    /// Puts everything back to the start: part and distractors at their places, the arm at rest at
+    /// `q` with its hand open.
+    ///
+    /// # Errors
+    /// [`SimulationError::Unstable`] where the scene itself is impossible.
+    pub fn reset(&mut self, q: &sdg_kinematics::JointVector) -> Result<()> {
+        self.data.reset();
+        self.panda_ids.set_position(&mut self.data, q);
+        self.panda_ids.set_finger_position_m(&mut self.data, crate::panda::FINGER_TRAVEL_M);
+        self.gripper = Gripper::at_opening_m(0.08);
+        self.reference = ArmReference::at_rest(*q);
+        self.data.forward()
+    }
+
+    /// Physics as they stand.
+    pub fn data(&self) -> &Data {
+        &self.data
+    }
+
+    /// The arm in the model.
+    pub fn panda_ids(&self) -> &PandaIds {
+        &self.panda_ids
+    }
+
+    /// Where the part is, in the base frame; `None` in a scene without it.
+    pub fn base_from_object(&self) -> Option<Isometry3<f64>> {
+        self.part.map(|part| self.data.world_from_body(part.body))
+    }
+
+    /// Puts the part somewhere else, at rest.
+    ///
+    /// # Errors
+    /// [`SimulationError::Configuration`] in a scene without a part.
+    pub fn place_object(&mut self, base_from_object: &Isometry3<f64>) -> Result<()> {
+        let part = self.part.ok_or_else(|| SimulationError::Configuration {
+            field: "scene.object",
+            expected: "a part".into(),
+            found: "none".into(),
+        })?;
+        self.data.place(part.joint, base_from_object);
+        self.data.forward()
+    }
+
+    /// Height of the part's lowest point above the table, in metres.
+    pub fn object_height_m(&self) -> Option<f64> {
+        self.part.map(|part| lowest_point_m(&self.data, part.body))
+    }
+
+    /// Which fingers (left, right) touch the part.
+    pub fn fingers_on_object(&self) -> [bool; 2] {
+        let mut touching = [false; 2];
+        let Some(part) = self.part else { return touching };
+        let model = self.data.model();
+        for contact in self.data.contacts().filter(|contact| contact.normal_force_n > 0.1) {
+            for (one, other) in [(contact.geom1, contact.geom2), (contact.geom2, contact.geom1)] {
+                if let (Some(finger), true) = (self.panda_ids.finger_of(model, one), model.body_of(other) == part.body) {
+                    touching[finger] = true;
+                }
+            }
+        }
+        touching
+    }
+
+    /// Distance between the fingers in metres.
+    pub fn opening_m(&self) -> f64 {
+        self.panda_ids.finger_position_m(&self.data).iter().sum()
+    }
+
+    /// The tool centre point's pose for the wrist camera to be at a pose (optical frame).
+    pub fn base_from_tcp_for_camera(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
+        base_from_camera * self.tcp_from_camera.inverse()
+    }
+
+    /// What the wrist camera sees now.
+    ///
+    /// # Errors
+    /// As [`Renderer::image`].
+    pub fn wrist_view(&mut self) -> Result<CameraView> {
+        // A step leaves positions one period behind the joints.
+        self.data.forward()?;
+        CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.panda_ids.wrist_camera)
+    }
+
+    /// Which geom each pixel of the wrist camera's picture shows now.
+    ///
+    /// # Errors
+    /// As [`Renderer::segmentation`].
+    pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
+        self.wrist_renderer.segmentation(&mut self.data, self.panda_ids.wrist_camera)
+    }
+
+    /// Puts the arm, without moving through time, where its wrist camera is at a pose, and takes a
+    /// picture: for demonstrations and test images.
+    ///
+    /// # Errors
+    /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
+    pub fn view_from(&mut self, base_from_camera: &Isometry3<f64>) -> Result<CameraView> {
+        let base_from_tcp = self.base_from_tcp_for_camera(base_from_camera);
+        let solution =
+            self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map_err(|error| {
+                SimulationError::Configuration {
+                    field: "base_from_camera",
+                    expected: "a pose within the arm's reach".into(),
+                    found: error.to_string(),
+                }
+            })?;
+        self.panda_ids.set_position(&mut self.data, &solution.q);
+        self.reference = ArmReference::at_rest(solution.q);
+        self.data.forward()?;
+        self.wrist_view()
+    }
+
+    /// A picture of the whole workcell from outside.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`] and [`Renderer::image`].
+    pub fn scene_image(&mut self, config: RenderConfig) -> Result<RgbImage> {
+        Renderer::new(self.data.model(), config)?.image(&mut self.data, self.scene_camera)
+    }
+
+    /// Takes pictures from outside from now on, while time passes.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn start_recording(&mut self, config: &RecordConfig) -> Result<()> {
+        self.recorder = Some(Recorder::new(self.data.model(), self.scene_camera, config)?);
+        Ok(())
+    }
+
+    /// Ends the recording and hands out its pictures.
+    pub fn stop_recording(&mut self) -> Vec<RgbImage> {
+        self.recorder.take().map(Recorder::into_frames).unwrap_or_default()
+    }
+
+    /// Lets one control period pass, the arm following the reference.
+    fn tick(&mut self) -> Result<()> {
+        self.data.step1()?;
+        self.controller.apply(&mut self.data, &self.panda_ids, &self.reference);
+        self.gripper.apply(&mut self.data, &self.panda_ids, PERIOD_SECS);
+        self.data.step2()?;
+        match &mut self.recorder {
+            Some(recorder) => recorder.look(&mut self.data),
+            None => Ok(()),
+        }
+    }
+
+    /// Stands still for a while.
+    ///
+    /// # Errors
+    /// [`SimulationError::Unstable`] or a renderer's error while recording.
+    pub fn wait(&mut self, duration_secs: f64) -> Result<()> {
+        self.reference = ArmReference::at_rest(self.reference.position);
+        for _ in 0..(duration_secs / PERIOD_SECS).round() as usize {
+            self.tick()?;
+        }
+        Ok(())
+    }
+
+    /// Follows a motion and stops at the first obstacle.
+    ///
+    /// # Errors
+    /// [`SimulationError::Unstable`] or a renderer's error while recording.
+    pub fn follow(&mut self, trajectory: &Trajectory) -> Result<MotionEnd> {
+        let num_periods = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
+        for period in 1..=num_periods {
+            let (position, velocity, acceleration) = trajectory.sample(period as f64 * PERIOD_SECS);
+            self.reference = ArmReference { position, velocity, acceleration };
+            self.tick()?;
+            let error = (self.panda_ids.position(&self.data) - position).amax();
+            if error > BLOCKED_RAD {
+                let obstacle = self.describe_arm_contacts();
+                self.reference = ArmReference::at_rest(self.panda_ids.position(&self.data));
+                return Ok(MotionEnd::Blocked(obstacle));
+            }
+        }
+        Ok(MotionEnd::Arrived)
+    }
+
+    /// Where the controller wants the arm.
+    pub(crate) fn commanded(&self) -> sdg_kinematics::JointVector {
+        self.reference.position
+    }
+
+    /// What touches the arm, in words.
+    fn describe_arm_contacts(&self) -> String {
+        let model = self.data.model();
+        let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());
+        let mut touching: Vec<String> = self
+            .data
+            .contacts()
+            .map(|contact| {
+                let (one, other) = (model.body_of(contact.geom1), model.body_of(contact.geom2));
+                (name_of(one), name_of(other))
+            })
+            .filter(|(one, other)| is_arm(one) != is_arm(other))
+            .map(|(one, other)| if is_arm(&one) { format!("{one} on {other}") } else { format!("{other} on {one}") })
+            .collect();
+        touching.sort();
+        touching.dedup();
+        if touching.is_empty() { "the motors were too weak".into() } else { touching.join(", ") }
+    }
+}
+
+fn is_arm(body: &str) -> bool {
+    body.starts_with("link") || body == "hand" || body.ends_with("_finger")
+}
+
+/// A camera pose straight down from `height_m` above the table, over (x, y): with yaw 0 the
+/// picture's up is the base's x and its right is -y; a positive yaw turns it counter-clockwise as
+/// seen from above.
+pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
+    // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
+    let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
+        * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(at_yaw_zero));
+    Isometry3::from_parts(Translation3::new(x, y, height_m), rotation)
+}
+
