@@ -35,6 +35,8 @@
 //! assert_eq!(nms(&boxes, &[0.9, 0.8, 0.7], 0.5), [0, 2]);
 //! ```
 #![cfg_attr(test, allow(clippy::unwrap_used))]
+// Backward passes are compiled without `autodiff` too, and then nothing calls them.
+#![cfg_attr(not(feature = "autodiff"), allow(dead_code, unused_imports))]
 
 #[cfg(feature = "autodiff")]
 mod autodiff;
