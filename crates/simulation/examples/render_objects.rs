@@ -118,9 +118,24 @@ fn pendulum() -> Part {
             },
         ],
         finishes: vec![
-            Finish { name: "printed", texture: Texture::printed(256, [0.86, 0.40, 0.13], 26.0, 11), specular: 0.15, shininess: 0.2 },
-            Finish { name: "steel", texture: Texture::turned(64, [0.68, 0.69, 0.71], 0.18, 12), specular: 0.6, shininess: 0.5 },
-            Finish { name: "brass", texture: Texture::turned(64, [0.80, 0.64, 0.32], 0.16, 13), specular: 0.5, shininess: 0.5 },
+            Finish {
+                name: "printed",
+                texture: Texture::printed(256, [0.86, 0.40, 0.13], 26.0, 11),
+                specular: 0.15,
+                shininess: 0.2,
+            },
+            Finish {
+                name: "steel",
+                texture: Texture::turned(64, [0.68, 0.69, 0.71], 0.18, 12),
+                specular: 0.6,
+                shininess: 0.5,
+            },
+            Finish {
+                name: "brass",
+                texture: Texture::turned(64, [0.80, 0.64, 0.32], 0.16, 13),
+                specular: 0.5,
+                shininess: 0.5,
+            },
         ],
         collisions: vec![
             format!("type=\"box\" pos=\"-0.013 0 0.008\" size=\"0.050 {} 0.008\"", arm_width / 2.0),
@@ -139,7 +154,8 @@ fn pendulum() -> Part {
 fn fuel_line() -> Part {
     let height = 0.0095;
     let point = |x: f64, y: f64| Point3::new(x, y, height);
-    let corners = [point(-0.088, 0.046), point(-0.050, 0.0), point(0.042, 0.0), point(0.064, -0.040), point(0.098, -0.040)];
+    let corners =
+        [point(-0.088, 0.046), point(-0.050, 0.0), point(0.042, 0.0), point(0.064, -0.040), point(0.098, -0.040)];
     let tube_radius = 0.004;
     let path = rounded_path(&corners, 0.014, 8);
     let tube = sweep(&path, tube_radius, 20);
@@ -206,10 +222,30 @@ fn fuel_line() -> Part {
             Piece { name: "clip", mesh: clip, density: RUBBER, material: "plastic" },
         ],
         finishes: vec![
-            Finish { name: "tube", texture: Texture::round_bar(64, [0.58, 0.60, 0.63], 0.8, 21), specular: 0.4, shininess: 0.5 },
-            Finish { name: "zinc", texture: Texture::brushed(128, [0.74, 0.66, 0.42], 0.10, 22), specular: 0.5, shininess: 0.4 },
-            Finish { name: "steel", texture: Texture::brushed(64, [0.55, 0.55, 0.56], 0.12, 23), specular: 0.5, shininess: 0.4 },
-            Finish { name: "plastic", texture: Texture::grained(64, [0.13, 0.13, 0.14], 0.08, 24), specular: 0.2, shininess: 0.3 },
+            Finish {
+                name: "tube",
+                texture: Texture::round_bar(64, [0.58, 0.60, 0.63], 0.8, 21),
+                specular: 0.4,
+                shininess: 0.5,
+            },
+            Finish {
+                name: "zinc",
+                texture: Texture::brushed(128, [0.74, 0.66, 0.42], 0.10, 22),
+                specular: 0.5,
+                shininess: 0.4,
+            },
+            Finish {
+                name: "steel",
+                texture: Texture::brushed(64, [0.55, 0.55, 0.56], 0.12, 23),
+                specular: 0.5,
+                shininess: 0.4,
+            },
+            Finish {
+                name: "plastic",
+                texture: Texture::grained(64, [0.13, 0.13, 0.14], 0.08, 24),
+                specular: 0.2,
+                shininess: 0.3,
+            },
         ],
         collisions,
         grasp_half_line: 0.026,
@@ -241,7 +277,12 @@ fn rod_end() -> Part {
     profile.push((ball_radius + 0.0001, 0.0));
     let housing = centred_texture(lathe(&profile, 64), 0.06).transformed(&Isometry3::translation(eye, 0.0, half_ball));
 
-    let liner = moved(ring(race - 0.0006, race + 0.0016, 2.0 * half_eye + 0.0006, 0.0003, 56), eye, 0.0, half_ball - half_eye - 0.0003);
+    let liner = moved(
+        ring(race - 0.0006, race + 0.0016, 2.0 * half_eye + 0.0006, 0.0003, 56),
+        eye,
+        0.0,
+        half_ball - half_eye - 0.0003,
+    );
 
     let flat = (ball_radius * ball_radius - half_ball * half_ball).sqrt();
     let mut profile = vec![(bore, -half_ball + 0.0006), (bore + 0.0006, -half_ball), (flat, -half_ball)];
@@ -276,8 +317,16 @@ fn rod_end() -> Part {
     let nut = hex_prism(0.027, 0.010, 0.0).transformed(&(Isometry3::translation(nut_x, 0.0, 0.0) * level));
 
     let nipple_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 135f64.to_radians());
-    let nipple_profile =
-        [(0.0, 0.0), (0.0036, 0.0), (0.0036, 0.0035), (0.0022, 0.0038), (0.0022, 0.0058), (0.0029, 0.0068), (0.0020, 0.0086), (0.0, 0.0088)];
+    let nipple_profile = [
+        (0.0, 0.0),
+        (0.0036, 0.0),
+        (0.0036, 0.0035),
+        (0.0022, 0.0038),
+        (0.0022, 0.0058),
+        (0.0029, 0.0068),
+        (0.0020, 0.0086),
+        (0.0, 0.0088),
+    ];
     let nipple = lathe(&nipple_profile, 20).transformed(
         &(Isometry3::from_parts(Translation3::new(eye, 0.0, half_ball), nipple_turn)
             * Isometry3::translation(eye_radius - 0.0012, 0.0, 0.0)
@@ -300,11 +349,36 @@ fn rod_end() -> Part {
             Piece { name: "plated", mesh: plated, density: STEEL * 0.8, material: "plated" },
         ],
         finishes: vec![
-            Finish { name: "forged", texture: Texture::cast(128, [0.50, 0.51, 0.53], 0.07, 31), specular: 0.35, shininess: 0.3 },
-            Finish { name: "bronze", texture: Texture::grained(64, [0.66, 0.47, 0.26], 0.06, 32), specular: 0.4, shininess: 0.4 },
-            Finish { name: "polished", texture: Texture::turned(128, [0.74, 0.75, 0.77], 0.22, 33), specular: 0.9, shininess: 0.8 },
-            Finish { name: "rolled", texture: Texture::round_bar(64, [0.48, 0.49, 0.50], 0.45, 34), specular: 0.5, shininess: 0.5 },
-            Finish { name: "plated", texture: Texture::brushed(128, [0.70, 0.70, 0.68], 0.10, 35), specular: 0.6, shininess: 0.5 },
+            Finish {
+                name: "forged",
+                texture: Texture::cast(128, [0.50, 0.51, 0.53], 0.07, 31),
+                specular: 0.35,
+                shininess: 0.3,
+            },
+            Finish {
+                name: "bronze",
+                texture: Texture::grained(64, [0.66, 0.47, 0.26], 0.06, 32),
+                specular: 0.4,
+                shininess: 0.4,
+            },
+            Finish {
+                name: "polished",
+                texture: Texture::turned(128, [0.74, 0.75, 0.77], 0.22, 33),
+                specular: 0.9,
+                shininess: 0.8,
+            },
+            Finish {
+                name: "rolled",
+                texture: Texture::round_bar(64, [0.48, 0.49, 0.50], 0.45, 34),
+                specular: 0.5,
+                shininess: 0.5,
+            },
+            Finish {
+                name: "plated",
+                texture: Texture::brushed(128, [0.70, 0.70, 0.68], 0.10, 35),
+                specular: 0.6,
+                shininess: 0.5,
+            },
         ],
         collisions: vec![
             format!("type=\"cylinder\" pos=\"{eye} 0 {half_ball}\" size=\"{eye_radius} {half_eye}\""),
@@ -377,7 +451,16 @@ fn write_part(folder: &Path, part: &Part) -> std::io::Result<()> {
         "<mujoco model=\"{}\">\n  <asset>\n{assets}  </asset>\n  <worldbody>\n    <body name=\"object\">\n      \
          <freejoint name=\"object_joint\"/>\n      <inertial pos=\"{:.6} {:.6} {:.6}\" mass=\"{mass:.5}\" \
          fullinertia=\"{:.4e} {:.4e} {:.4e} {:.4e} {:.4e} {:.4e}\"/>\n{geoms}    </body>\n  </worldbody>\n</mujoco>\n",
-        part.name, centre.x, centre.y, centre.z, i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]
+        part.name,
+        centre.x,
+        centre.y,
+        centre.z,
+        i[(0, 0)],
+        i[(1, 1)],
+        i[(2, 2)],
+        i[(0, 1)],
+        i[(0, 2)],
+        i[(1, 2)]
     );
     fs::write(folder.join("object.xml"), mjcf)?;
     let footprint: Vec<[f64; 2]> = hull(part).iter().map(|p| [round(p.x), round(p.y)]).collect();

@@ -159,9 +159,7 @@ impl ObjectSpec {
     /// # Errors
     /// [`SimulationError::File`] when a file is missing, cannot be read or does not say what it must.
     pub fn from_folder(folder: &Path) -> Result<Self> {
-        Self::read(folder, |file| {
-            std::fs::read(folder.join(file)).map(Cow::Owned).map_err(|error| error.to_string())
-        })
+        Self::read(folder, |file| std::fs::read(folder.join(file)).map(Cow::Owned).map_err(|error| error.to_string()))
     }
 
     fn read<'a>(folder: &Path, read: impl Fn(&str) -> std::result::Result<Cow<'a, [u8]>, String>) -> Result<Self> {
@@ -173,7 +171,8 @@ impl ObjectSpec {
         metadata.check().map_err(|reason| fail("object.json", reason))?;
 
         let mjcf_name = metadata.mjcf.as_str();
-        let text = String::from_utf8(load(mjcf_name)?.into_owned()).map_err(|error| fail(mjcf_name, error.to_string()))?;
+        let text =
+            String::from_utf8(load(mjcf_name)?.into_owned()).map_err(|error| fail(mjcf_name, error.to_string()))?;
         let mjcf = sections_of(&text).map_err(|reason| fail(mjcf_name, reason))?;
         let mut files = Vec::new();
         for name in files_named_in(mjcf) {

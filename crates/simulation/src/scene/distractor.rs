@@ -109,9 +109,8 @@ impl Distractor {
     pub fn new(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64) -> Self {
         let pieces = pieces(kind, seed);
         let lowest = pieces.iter().map(|piece| piece.mesh.bounds().0.z).fold(f64::INFINITY, f64::min);
-        let outline = convex_hull(
-            pieces.iter().flat_map(|piece| piece.mesh.vertices.iter().map(|vertex| vertex.position.xy())),
-        );
+        let outline =
+            convex_hull(pieces.iter().flat_map(|piece| piece.mesh.vertices.iter().map(|vertex| vertex.position.xy())));
         let place = table_from_distractor.translation.vector;
         Self {
             kind,
@@ -256,8 +255,10 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let (length, width) = (rng.random_range(0.04..0.10), rng.random_range(0.025..0.05));
             let hole = rng.random_range(0.002..0.005);
             let (x, y) = (length / 2.0 - 0.009, width / 2.0 - 0.009);
-            let mut holes: Vec<_> =
-                [(x, y), (-x, y), (-x, -y), (x, -y)].iter().map(|&(x, y)| circle(Point2::new(x, y), hole, 20)).collect();
+            let mut holes: Vec<_> = [(x, y), (-x, y), (-x, -y), (x, -y)]
+                .iter()
+                .map(|&(x, y)| circle(Point2::new(x, y), hole, 20))
+                .collect();
             if rng.random_bool(0.5) && width > 0.035 {
                 holes.push(circle(Point2::origin(), rng.random_range(0.004..0.007), 28));
             }
@@ -295,7 +296,8 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
         }
         DistractorKind::Block => {
             let (length, width) = (rng.random_range(0.02..0.06), rng.random_range(0.018..0.04));
-            let bore = circle(Point2::new(length * rng.random_range(-0.2..0.2), 0.0), width * rng.random_range(0.15..0.3), 28);
+            let bore =
+                circle(Point2::new(length * rng.random_range(-0.2..0.2), 0.0), width * rng.random_range(0.15..0.3), 28);
             one(extrude(&rounded_rectangle(length, width, 0.002), &[bore], rng.random_range(0.01..0.03), 0.001), any)
         }
         DistractorKind::Gear => {
@@ -315,12 +317,8 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let reach = rng.random_range(0.04..0.08);
             let point = |x: f64, y: f64| Point3::new(x, y, radius);
             let sides = [rng.random_range(0.02..0.05), rng.random_range(-0.05..0.05)];
-            let corners = [
-                point(-reach, sides[0]),
-                point(-reach * 0.45, 0.0),
-                point(reach * 0.5, 0.0),
-                point(reach, sides[1]),
-            ];
+            let corners =
+                [point(-reach, sides[0]), point(-reach * 0.45, 0.0), point(reach * 0.5, 0.0), point(reach, sides[1])];
             bar(&rounded_path(&corners, 0.010, 6), radius, metal, rng)
         }
         DistractorKind::Lever => {
@@ -328,7 +326,8 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let (left, right): (f64, f64) = (rng.random_range(0.011..0.019), rng.random_range(0.011..0.022));
             let width = left.min(right) * rng.random_range(0.7..1.2);
             let outline = lever_outline((-half, left), (half, right), width, 0.006);
-            let holes = [circle(Point2::new(-half, 0.0), left * 0.45, 28), circle(Point2::new(half, 0.0), right * 0.5, 28)];
+            let holes =
+                [circle(Point2::new(-half, 0.0), left * 0.45, 28), circle(Point2::new(half, 0.0), right * 0.5, 28)];
             one(extrude(&outline, &holes, rng.random_range(0.006..0.014), 0.0008), any)
         }
         DistractorKind::EyeBolt => {
@@ -430,7 +429,9 @@ mod tests {
                 let distractor = Distractor::new(kind, &Isometry2::new(Vector2::new(0.5, 0.1), 0.3), seed);
                 let lowest = pieces(kind, seed)
                     .iter()
-                    .flat_map(|piece| piece.mesh.vertices.iter().map(|v| (distractor.base_from_distractor * v.position).z))
+                    .flat_map(|piece| {
+                        piece.mesh.vertices.iter().map(|v| (distractor.base_from_distractor * v.position).z)
+                    })
                     .fold(f64::INFINITY, f64::min);
                 assert!(lowest.abs() < 1e-9, "{kind:?} {seed}: lowest point at {lowest} m");
                 assert!(distractor.footprint.len() >= 3);
@@ -449,7 +450,10 @@ mod tests {
                     for line in obj.lines().filter(|line| line.starts_with("f ")) {
                         let face: Vec<&str> = line.split([' ', '/']).skip(1).step_by(3).collect();
                         for corner in 0..3 {
-                            assert!(edges.insert((face[corner].to_owned(), face[(corner + 1) % 3].to_owned())), "{kind:?} {seed}: {line}");
+                            assert!(
+                                edges.insert((face[corner].to_owned(), face[(corner + 1) % 3].to_owned())),
+                                "{kind:?} {seed}: {line}"
+                            );
                         }
                     }
                 }

@@ -37,9 +37,10 @@ pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> V
 /// It is the true distance for outlines that face each other with an edge, and less than it otherwise.
 pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     let along = |normal: &Vector2<f64>, points: &[Point2<f64>]| {
-        points.iter().map(|point| normal.dot(&point.coords)).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
-            (low.min(at), high.max(at))
-        })
+        points
+            .iter()
+            .map(|point| normal.dot(&point.coords))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
     };
     let gaps = |from: &[Point2<f64>], to: &[Point2<f64>]| {
         (0..from.len())
@@ -59,7 +60,10 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn square(x: f64, y: f64) -> Vec<Point2<f64>> {
-        convex_hull([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5), (0.5, 0.0)].map(|(u, v)| Point2::new(x + u, y + v)))
+        convex_hull(
+            [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5), (0.5, 0.0)]
+                .map(|(u, v)| Point2::new(x + u, y + v)),
+        )
     }
 
     #[test]

@@ -10,6 +10,18 @@ use super::texture::Colour;
 /// The middle of the table's part that the camera sees, which lamps are aimed at (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
 
+/// Radius around the aim within which shadows are drawn, in metres: what the wrist camera sees, and little more.
+const SHADOW_RADIUS_M: f64 = 0.5;
+
+/// Part of a lamp's cone that its shadow map covers. The map has as many texels however much it covers: a wide lamp
+/// with a narrow map lights evenly and still draws shadows of a millimetre's sharpness.
+const SHADOW_PART_OF_CONE: f64 = 0.35;
+
+/// The cone, as half of its angle in degrees, with which a lamp's shadows reach [`SHADOW_RADIUS_M`].
+fn cutoff_deg(distance_m: f64) -> f64 {
+    ((SHADOW_RADIUS_M / distance_m).atan().to_degrees() / SHADOW_PART_OF_CONE).min(75.0)
+}
+
 /// A lamp above the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lamp {
@@ -41,13 +53,16 @@ pub struct Lighting {
 impl Lighting {
     /// The even light under which parts are shown to the system.
     pub fn nominal() -> Self {
-        let lamp = |x: f64, y: f64, strength: f64, casts_shadows: bool| Lamp {
-            position: Point3::new(x, y, 1.5),
-            target: AIM,
-            diffuse: [strength; 3],
-            specular: 0.5,
-            cutoff_deg: 50.0,
-            casts_shadows,
+        let lamp = |x: f64, y: f64, strength: f64, casts_shadows: bool| {
+            let position = Point3::new(x, y, 1.5);
+            Lamp {
+                position,
+                target: AIM,
+                diffuse: [strength; 3],
+                specular: 0.5,
+                cutoff_deg: cutoff_deg((position - AIM).norm()),
+                casts_shadows,
+            }
         };
         Self {
             ambient: [0.32; 3],
@@ -77,18 +92,15 @@ impl Lighting {
                 let azimuth = rng.random_range(0.0..std::f64::consts::TAU);
                 let elevation: f64 = rng.random_range(40f64..80.0).to_radians();
                 let distance = rng.random_range(1.1..1.9);
-                let direction = Vector3::new(
-                    azimuth.cos() * elevation.cos(),
-                    azimuth.sin() * elevation.cos(),
-                    elevation.sin(),
-                );
+                let direction =
+                    Vector3::new(azimuth.cos() * elevation.cos(), azimuth.sin() * elevation.cos(), elevation.sin());
                 let aside = Vector3::new(rng.random_range(-0.12..0.12), rng.random_range(-0.12..0.12), 0.0);
                 Lamp {
                     position: AIM + direction * distance,
                     target: AIM + aside,
                     diffuse: scaled(tint(rng), total * (1.0 - surrounding) * share / sum / elevation.sin()),
                     specular: rng.random_range(0.2..0.9) * share,
-                    cutoff_deg: rng.random_range(40.0..60.0),
+                    cutoff_deg: cutoff_deg(distance),
                     // Two shadows at most: a third cannot be told from them and costs another pass.
                     casts_shadows: idx < 2,
                 }
@@ -107,7 +119,7 @@ impl Lighting {
         fragment.write(format_args!(
             "<visual><headlight ambient=\"{}\" diffuse=\"{}\" specular=\"0.05 0.05 0.05\"/>\
              <quality shadowsize=\"2048\" numquads=\"24\" offsamples=\"4\"/>\
-             <map znear=\"0.005\" shadowscale=\"0.8\"/></visual>",
+             <map znear=\"0.005\" shadowscale=\"{SHADOW_PART_OF_CONE}\"/></visual>",
             rgb(self.ambient),
             rgb(self.from_camera)
         ));

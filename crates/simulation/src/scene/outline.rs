@@ -7,7 +7,7 @@ use sdg_geometry::{Mask, Polygon};
 pub const MOST_VERTICES: usize = 56;
 
 /// How far the thinned outline may run from the traced one at first, in pixels.
-const LEAST_TOLERANCE_PX: f64 = 0.55;
+const LEAST_TOLERANCE_PX: f64 = 0.35;
 
 /// The outer outline of the largest piece of a mask, holes left out; `None` for a mask without a piece of any size.
 ///
@@ -124,7 +124,8 @@ mod tests {
 
     #[test]
     fn ring_gives_its_outer_circle() {
-        let distance = |x: u32, y: u32| ((f64::from(x) + 0.5 - 60.0).powi(2) + (f64::from(y) + 0.5 - 50.0).powi(2)).sqrt();
+        let distance =
+            |x: u32, y: u32| ((f64::from(x) + 0.5 - 60.0).powi(2) + (f64::from(y) + 0.5 - 50.0).powi(2)).sqrt();
         let mask = Mask::from_fn(120, 100, |x, y| (20.0..40.0).contains(&distance(x, y)));
         let outline = outer_outline(&mask).unwrap();
         assert!((20..=MOST_VERTICES).contains(&outline.vertices.len()), "{}", outline.vertices.len());

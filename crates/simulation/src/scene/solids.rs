@@ -191,7 +191,10 @@ pub fn ring(inner_radius: f64, outer_radius: f64, height: f64, chamfer: f64, seg
 /// A cylinder with chamfered edges standing on z = 0.
 pub fn cylinder(radius: f64, height: f64, chamfer: f64, segments: usize) -> TriangleMesh {
     let c = chamfer;
-    lathe(&[(0.0, 0.0), (radius - c, 0.0), (radius, c), (radius, height - c), (radius - c, height), (0.0, height)], segments)
+    lathe(
+        &[(0.0, 0.0), (radius - c, 0.0), (radius, c), (radius, height - c), (radius - c, height), (0.0, height)],
+        segments,
+    )
 }
 
 /// A hexagonal prism about the z axis whose corners are turned off at 30° at both ends, as nuts and heads have them.
@@ -239,10 +242,7 @@ pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> Tr
         let z = length * (row.clamp(1, rows) - 1) as f64 / (rows - 1) as f64;
         let radius = if row == 0 || row == rows + 1 { 0.0 } else { radius_at(angle, z) };
         let position = Point3::new(radius * angle.cos(), radius * angle.sin(), z);
-        MeshVertex {
-            position,
-            texcoord: Point2::new(col as f64 / segments as f64, z / METRES_PER_REPEAT),
-        }
+        MeshVertex { position, texcoord: Point2::new(col as f64 / segments as f64, z / METRES_PER_REPEAT) }
     });
     mesh
 }
@@ -301,10 +301,7 @@ pub fn sweep(path: &[Point3<f64>], radius: f64, segments: usize) -> TriangleMesh
         let offset = if capping { 0.0 } else { radius };
         // `up`, then `side = tangent × up`: increasing angle turns about the tangent, so that faces look outwards.
         let position = path[idx] + (up[idx] * angle.cos() + side * angle.sin()) * offset;
-        MeshVertex {
-            position,
-            texcoord: Point2::new(col as f64 / segments as f64, along[idx] / METRES_PER_REPEAT),
-        }
+        MeshVertex { position, texcoord: Point2::new(col as f64 / segments as f64, along[idx] / METRES_PER_REPEAT) }
     });
     mesh
 }

@@ -122,7 +122,8 @@ impl Table {
                 Texture::paint(TEXELS, |u, v| {
                     let board = (v * 5.0).floor() / 5.0;
                     let gap = if (v * 5.0).fract() < 0.02 { 0.55 } else { 1.0 };
-                    let rings = (std::f64::consts::TAU * (9.0 * v + 1.3 * warp.at(u, v) + 3.0 * boards.at(0.0, board))).sin();
+                    let rings =
+                        (std::f64::consts::TAU * (9.0 * v + 1.3 * warp.at(u, v) + 3.0 * boards.at(0.0, board))).sin();
                     let grain = 0.35 + 0.25 * rings + 0.3 * fibres.at(u, v);
                     mix(base, self.accent, grain).map(|c| c * gap * (1.0 + 0.12 * boards.at(0.0, board + 0.01)))
                 })

@@ -140,7 +140,9 @@ impl Noise {
 
     /// The noise summed over octaves, each of twice the frequency and half the strength; about -1 to 1.
     pub fn fractal(&self, u: f64, v: f64, octaves: u32) -> f64 {
-        (0..octaves).map(|octave| self.at(u * f64::from(1 << octave), v * f64::from(1 << octave)) / f64::from(1 << octave)).sum::<f64>()
+        (0..octaves)
+            .map(|octave| self.at(u * f64::from(1 << octave), v * f64::from(1 << octave)) / f64::from(1 << octave))
+            .sum::<f64>()
             * 0.6
     }
 }
