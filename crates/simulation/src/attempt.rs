@@ -259,10 +259,7 @@ impl Workcell {
 }
 
 /// Perception that may also look at the physics.
-pub(crate) type PerceiveFn<'a> = dyn FnMut(
-        &Workcell,
-        &CameraView,
-    ) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>>
+pub(crate) type PerceiveFn<'a> = dyn FnMut(&Workcell, &CameraView) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>>
     + 'a;
 
 struct Attempt<'a, 'p> {
@@ -465,7 +462,12 @@ impl Attempt<'_, '_> {
     }
 
     /// Goes along a straight line with a share of Franka's Cartesian velocity, acceleration and jerk.
-    fn move_along(&mut self, path: JointPath, [velocity, acceleration, jerk]: [f64; 3], step: AttemptStep) -> Sequence<()> {
+    fn move_along(
+        &mut self,
+        path: JointPath,
+        [velocity, acceleration, jerk]: [f64; 3],
+        step: AttemptStep,
+    ) -> Sequence<()> {
         let cartesian = fails_at(step, CartesianLimits::franka().scaled(velocity, acceleration, jerk))?;
         let motion = fails_at(step, Trajectory::along_path(path, &JointLimits::franka(), &cartesian))?;
         self.follow(&motion, step)

@@ -259,10 +259,7 @@ impl Drop for Data {
 }
 
 fn isometry_from_quaternion([x, y, z]: [f64; 3], [w, i, j, k]: [f64; 4]) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)),
-    )
+    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k)))
 }
 
 /// Reads the `index`th position and row-major rotation matrix.
@@ -271,9 +268,8 @@ fn isometry_from_quaternion([x, y, z]: [f64; 3], [w, i, j, k]: [f64; 4]) -> Isom
 /// The arrays must hold more than `index` triples and ninefolds.
 unsafe fn isometry_at(positions: *const f64, rotations: *const f64, index: usize) -> Isometry3<f64> {
     // SAFETY: promised by the caller.
-    let (position, rotation) = unsafe {
-        (*positions.add(3 * index).cast::<[f64; 3]>(), *rotations.add(9 * index).cast::<[f64; 9]>())
-    };
+    let (position, rotation) =
+        unsafe { (*positions.add(3 * index).cast::<[f64; 3]>(), *rotations.add(9 * index).cast::<[f64; 9]>()) };
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&rotation));
     Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_rotation_matrix(&rotation))
 }

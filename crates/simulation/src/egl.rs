@@ -1,6 +1,5 @@
 //! An OpenGL context that needs no display: EGL on Mesa's surfaceless platform.
 
-use std::ffi::c_void;
 use std::sync::OnceLock;
 
 use khronos_egl as egl;
@@ -28,10 +27,7 @@ unsafe impl Sync for Surfaceless {}
 
 fn surfaceless() -> Result<&'static Surfaceless> {
     static SURFACELESS: OnceLock<std::result::Result<Surfaceless, String>> = OnceLock::new();
-    SURFACELESS
-        .get_or_init(open)
-        .as_ref()
-        .map_err(|reason| SimulationError::Rendering { reason: reason.clone() })
+    SURFACELESS.get_or_init(open).as_ref().map_err(|reason| SimulationError::Rendering { reason: reason.clone() })
 }
 
 fn open() -> std::result::Result<Surfaceless, String> {
@@ -39,14 +35,9 @@ fn open() -> std::result::Result<Surfaceless, String> {
     let egl = unsafe { Egl::load_required() }.map_err(|error| format!("libEGL.so.1 could not be loaded ({error})"))?;
     // SAFETY: the default display is what the surfaceless platform expects, with an empty list of
     // attributes.
-    let display = unsafe {
-        egl.get_platform_display(
-            PLATFORM_SURFACELESS_MESA,
-            egl::DEFAULT_DISPLAY as *mut c_void,
-            &[egl::ATTRIB_NONE],
-        )
-    }
-    .map_err(|error| format!("no surfaceless display ({error})"))?;
+    let display =
+        unsafe { egl.get_platform_display(PLATFORM_SURFACELESS_MESA, egl::DEFAULT_DISPLAY, &[egl::ATTRIB_NONE]) }
+            .map_err(|error| format!("no surfaceless display ({error})"))?;
     egl.initialize(display).map_err(|error| format!("EGL could not be initialised ({error})"))?;
     egl.bind_api(egl::OPENGL_API).map_err(|error| format!("no desktop OpenGL ({error})"))?;
     let wanted = [egl::RENDERABLE_TYPE, egl::OPENGL_BIT, egl::SURFACE_TYPE, 0, egl::NONE];

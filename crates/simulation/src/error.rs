@@ -56,9 +56,7 @@ pub enum SimulationError {
     },
 
     /// No OpenGL context could be made without a display.
-    #[error(
-        "offscreen OpenGL through EGL failed: {reason}. On Debian 12: `apt-get install libegl1 libgl1-mesa-dri`"
-    )]
+    #[error("offscreen OpenGL through EGL failed: {reason}. On Debian 12: `apt-get install libegl1 libgl1-mesa-dri`")]
     Rendering {
         /// The step that failed and EGL's or MuJoCo's own words.
         reason: String,

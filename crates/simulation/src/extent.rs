@@ -34,11 +34,7 @@ pub fn lowest_point_m(data: &Data, body: Id<Body>) -> f64 {
 fn reach(raw: &mj::mjModel, geom: usize, direction: &Vector3<f64>) -> f64 {
     // SAFETY: `geom_type` and `geom_dataid` have `ngeom` entries, `geom_size` three times as many.
     let (kind, size, mesh) = unsafe {
-        (
-            *raw.geom_type.add(geom) as u32,
-            *raw.geom_size.add(3 * geom).cast::<[f64; 3]>(),
-            *raw.geom_dataid.add(geom),
-        )
+        (*raw.geom_type.add(geom) as u32, *raw.geom_size.add(3 * geom).cast::<[f64; 3]>(), *raw.geom_dataid.add(geom))
     };
     let across = direction.x.hypot(direction.y);
     match kind {
@@ -72,7 +68,9 @@ mod tests {
     use crate::model::Model;
 
     fn lowest(geom: &str) -> f64 {
-        let xml = format!("<mujoco><compiler angle='degree'/><worldbody><body name='b' pos='0 0 1'>{geom}</body></worldbody></mujoco>");
+        let xml = format!(
+            "<mujoco><compiler angle='degree'/><worldbody><body name='b' pos='0 0 1'>{geom}</body></worldbody></mujoco>"
+        );
         let data = Data::new(Arc::new(Model::from_xml(&xml, &[]).unwrap())).unwrap();
         lowest_point_m(&data, data.model().id("b").unwrap())
     }

@@ -44,12 +44,8 @@ impl Gripper {
     pub fn grasp(&mut self, force_n: f64) {
         // The reference may run into the part by what the spring needs to reach the force.
         let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
-        *self = Self {
-            target_m: -beyond,
-            speed_m_s: 0.05,
-            max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N),
-            ..*self
-        };
+        *self =
+            Self { target_m: -beyond, speed_m_s: 0.05, max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N), ..*self };
     }
 
     /// Sets the fingers' motors for this instant and moves the reference on by `period_secs`.
@@ -64,8 +60,8 @@ impl Gripper {
         let mean = 0.5 * (position[0] + position[1]);
         self.reference_m = self.reference_m.clamp(mean - lead, mean + lead);
         for finger in 0..2 {
-            let force = STIFFNESS_N_M * (self.reference_m - position[finger])
-                + DAMPING_N_S_M * (velocity - speed[finger]);
+            let force =
+                STIFFNESS_N_M * (self.reference_m - position[finger]) + DAMPING_N_S_M * (velocity - speed[finger]);
             data.ctrl_mut()[panda.finger_motors[finger].index()] = force.clamp(-self.max_force_n, self.max_force_n);
         }
     }

@@ -86,10 +86,7 @@ mod tests {
             // SAFETY: the string ends in NUL.
             unsafe { mj::mju_error(c"the stack overflowed".as_ptr()) }
         });
-        assert_eq!(
-            result,
-            Err(SimulationError::MuJoCo { call: "mju_error", message: "the stack overflowed".into() })
-        );
+        assert_eq!(result, Err(SimulationError::MuJoCo { call: "mju_error", message: "the stack overflowed".into() }));
     }
 
     #[test]

@@ -136,9 +136,7 @@ impl Model {
         let ptr = guarded("mj_loadXML", || {
             // SAFETY: the name ends in NUL, the file system is initialised, and the buffer is as
             // long as we say.
-            unsafe {
-                mj::mj_loadXML(name.as_ptr(), files.as_ptr(), message.as_mut_ptr(), message.len() as c_int)
-            }
+            unsafe { mj::mj_loadXML(name.as_ptr(), files.as_ptr(), message.as_mut_ptr(), message.len() as c_int) }
         })
         .map_err(|error| match error {
             SimulationError::MuJoCo { message, .. } => SimulationError::Model { message },
@@ -256,7 +254,11 @@ impl Drop for Model {
 impl std::fmt::Debug for Model {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let raw = self.raw();
-        write!(f, "Model {{ nq: {}, nv: {}, nu: {}, nbody: {}, ngeom: {} }}", raw.nq, raw.nv, raw.nu, raw.nbody, raw.ngeom)
+        write!(
+            f,
+            "Model {{ nq: {}, nv: {}, nu: {}, nbody: {}, ngeom: {} }}",
+            raw.nq, raw.nv, raw.nu, raw.nbody, raw.ngeom
+        )
     }
 }
 
@@ -342,7 +344,10 @@ mod tests {
     #[test]
     fn mujocos_complaint_is_passed_on() {
         let error = Model::from_xml("<mujoco>\n<worldbody><geom size='-1'/></worldbody></mujoco>", &[]).unwrap_err();
-        assert!(matches!(&error, SimulationError::Model { message } if message.contains("size") && message.contains('2')), "{error}");
+        assert!(
+            matches!(&error, SimulationError::Model { message } if message.contains("size") && message.contains('2')),
+            "{error}"
+        );
         assert!(Model::from_xml("<mujoco", &[]).is_err());
     }
 

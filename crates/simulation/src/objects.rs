@@ -294,7 +294,12 @@ pub fn source_folder() -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::data::Data;
+    use crate::model::{Body, Model};
+    use crate::scene::SceneVariation;
     use approx::assert_relative_eq;
 
     #[test]
@@ -370,5 +375,24 @@ mod tests {
         assert!(sections_of("<mujoco><body name=\"object\"/></mujoco>").is_err());
         assert!(sections_of(body).is_err());
         assert!(sections_of("</mujoco><mujoco").is_err());
+    }
+
+    #[test]
+    fn every_part_lies_still_on_the_table() {
+        for name in ObjectSpec::names() {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            let placed = spec.base_from_object(0.5, 0.1, 0.7);
+            let fragment = SceneVariation::nominal(Some((&spec, placed))).fragment();
+            let model = Arc::new(Model::from_xml(&fragment.to_standalone_mjcf(), &fragment.files).unwrap());
+            let body = model.id::<Body>("object").unwrap();
+            assert_relative_eq!(model.mass_kg(body), spec.mass_kg, epsilon = 1e-4);
+            let mut data = Data::new(model.clone()).unwrap();
+            while data.time_secs() < 2.0 {
+                data.step().unwrap();
+            }
+            let drift = placed.inverse() * data.world_from_body(body);
+            assert!(drift.translation.vector.norm() < 1e-3, "{name} moved by {}", drift.translation);
+            assert!(drift.rotation.angle() < 0.01, "{name} turned by {} rad", drift.rotation.angle());
+        }
     }
 }

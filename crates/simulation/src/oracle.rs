@@ -30,9 +30,7 @@ impl Workcell {
     pub fn run_oracle_attempt(&mut self, config: &AttemptConfig, seed: u64) -> Result<AttemptReport> {
         let spec = self.config().scene.object.as_ref().map(|object| object.spec.clone());
         self.run_attempt_with(
-            &mut |cell, _| {
-                Ok(spec.as_ref().zip(cell.base_from_object()).map(|(spec, pose)| marked_grasp(spec, &pose)))
-            },
+            &mut |cell, _| Ok(spec.as_ref().zip(cell.base_from_object()).map(|(spec, pose)| marked_grasp(spec, &pose))),
             config,
             seed,
         )

@@ -163,7 +163,8 @@ mod tests {
             data.forward().unwrap();
             let frames = panda.frames(&q);
             for (index, &joint) in ids.joints.iter().enumerate() {
-                let body = data.model().id::<Body>(&data.model().name(joint).unwrap().replace("joint", "link")).unwrap();
+                let body =
+                    data.model().id::<Body>(&data.model().name(joint).unwrap().replace("joint", "link")).unwrap();
                 let difference = frames.base_from_link[index].inverse() * data.world_from_body(body);
                 assert!(difference.translation.vector.norm() < 1e-9, "link {}", index + 1);
                 assert!(difference.rotation.angle() < 1e-7, "link {}", index + 1);

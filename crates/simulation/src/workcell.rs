@@ -178,7 +178,8 @@ impl Workcell {
         let model = self.data.model();
         for contact in self.data.contacts().filter(|contact| contact.normal_force_n > 0.1) {
             for (one, other) in [(contact.geom1, contact.geom2), (contact.geom2, contact.geom1)] {
-                if let (Some(finger), true) = (self.panda_ids.finger_of(model, one), model.body_of(other) == part.body) {
+                if let (Some(finger), true) = (self.panda_ids.finger_of(model, one), model.body_of(other) == part.body)
+                {
                     touching[finger] = true;
                 }
             }
@@ -221,14 +222,13 @@ impl Workcell {
     /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
     pub fn view_from(&mut self, base_from_camera: &Isometry3<f64>) -> Result<CameraView> {
         let base_from_tcp = self.base_from_tcp_for_camera(base_from_camera);
-        let solution =
-            self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map_err(|error| {
-                SimulationError::Configuration {
-                    field: "base_from_camera",
-                    expected: "a pose within the arm's reach".into(),
-                    found: error.to_string(),
-                }
-            })?;
+        let solution = self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map_err(|error| {
+            SimulationError::Configuration {
+                field: "base_from_camera",
+                expected: "a pose within the arm's reach".into(),
+                found: error.to_string(),
+            }
+        })?;
         self.panda_ids.set_position(&mut self.data, &solution.q);
         self.reference = ArmReference::at_rest(solution.q);
         self.data.forward()?;
@@ -340,4 +340,3 @@ pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isome
         * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(at_yaw_zero));
     Isometry3::from_parts(Translation3::new(x, y, height_m), rotation)
 }
-

@@ -1,0 +1,191 @@
+//! Whole grasp attempts: what the robot alone can do with the true pose, and every way to fail.
+//!
+//! Twenty attempts a part are run by `examples/oracle.rs`; here are few, for time.
+
+#![allow(clippy::unwrap_used)]
+
+use std::error::Error;
+use std::fs;
+
+use nalgebra::{Isometry3, Translation3};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::{
+    AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep, CameraView, GraspTarget, RecordConfig, RenderConfig,
+    SimulationError, Workcell, WorkcellConfig, camera_looking_down, marked_grasp,
+};
+
+type Perceived = Result<Option<GraspTarget>, Box<dyn Error + Send + Sync>>;
+
+/// A square bar of 20 x 20 x 120 mm and 0.2 kg, written and read as a user would bring a part.
+fn bar() -> ObjectSpec {
+    // Each test runs in a process or thread of its own.
+    let folder = std::env::temp_dir().join(format!("sdg-bar-{}-{:?}", std::process::id(), std::thread::current().id()));
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(
+        folder.join("object.json"),
+        r#"{"format": 1, "name": "bar", "title": "Bar", "description": "a square bar", "mass_kg": 0.2, "friction": 0.6,
+            "grasp_start": [-0.02, 0, 0.02], "grasp_end": [0.02, 0, 0.02], "jaw_width_m": 0.02,
+            "grasp_height_m": 0.01, "mark_height_m": 0.02, "rest_height_m": 0.0, "symmetry": "none",
+            "footprint": [[-0.06, -0.01], [0.06, -0.01], [0.06, 0.01], [-0.06, 0.01]], "mjcf": "object.xml"}"#,
+    )
+    .unwrap();
+    fs::write(
+        folder.join("object.xml"),
+        r#"<mujoco><worldbody><body name="object"><freejoint name="object_joint"/>
+           <geom type="box" pos="0 0 0.01" size="0.06 0.01 0.01" mass="0.2" rgba="0.8 0.1 0.1 1"/>
+           </body></worldbody></mujoco>"#,
+    )
+    .unwrap();
+    let spec = ObjectSpec::from_folder(&folder).unwrap();
+    fs::remove_dir_all(folder).unwrap();
+    spec
+}
+
+fn bar_cell(x: f64, y: f64, yaw_rad: f64) -> Workcell {
+    let spec = bar();
+    let pose = spec.base_from_object(x, y, yaw_rad);
+    let scene = SceneVariation::nominal(Some((&spec, pose)));
+    Workcell::new(&WorkcellConfig {
+        wrist_render: RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() },
+        ..WorkcellConfig::new(scene)
+    })
+    .unwrap()
+}
+
+/// The step and the reason of a failure.
+fn failure(report: AttemptReport) -> (AttemptStep, String) {
+    match report.outcome {
+        AttemptOutcome::Failure { step, why } => (step, why),
+        AttemptOutcome::Success => panic!("a success was not expected"),
+    }
+}
+
+fn attempt(cell: &mut Workcell, mut perceive: impl FnMut(&CameraView) -> Perceived) -> (AttemptStep, String) {
+    failure(cell.run_attempt(&mut perceive, &AttemptConfig::default(), 1).unwrap())
+}
+
+fn true_target() -> GraspTarget {
+    let spec = bar();
+    marked_grasp(&spec, &spec.base_from_object(0.48, 0.05, 0.6))
+}
+
+#[test]
+fn a_bar_of_known_pose_is_lifted() {
+    for (x, y, yaw_rad, seed) in [(0.45, 0.10, 0.3, 1), (0.60, -0.15, -1.2, 2), (0.39, -0.10, 2.9, 3)] {
+        let mut cell = bar_cell(x, y, yaw_rad);
+        let report = cell.run_oracle_attempt(&AttemptConfig::default(), seed).unwrap();
+        assert_eq!(report.outcome, AttemptOutcome::Success, "bar at ({x}, {y}) turned {yaw_rad}");
+        // Lifted by 0.45 m, or by the least allowed where the arm ends.
+        assert!(report.object_height_m.unwrap() > 0.2, "{:?}", report.object_height_m);
+        assert_eq!((report.views.len(), report.targets.len()), (2, 2));
+        // At the second look the camera stands over the part.
+        let camera = report.views[1].camera.world_from_camera.translation;
+        assert!((camera.x - x).hypot(camera.y - y) < 0.003 && (camera.z - 0.50).abs() < 0.003, "{camera}");
+    }
+}
+
+#[test]
+fn the_three_parts_of_known_pose_are_lifted() {
+    for name in ObjectSpec::names() {
+        let spec = ObjectSpec::by_name(name).unwrap();
+        let scene = SceneVariation::sample(Some(&spec), &VariationConfig::default(), 101);
+        let mut cell = Workcell::new(&WorkcellConfig::new(scene)).unwrap();
+        let report = cell.run_oracle_attempt(&AttemptConfig::default(), 101).unwrap();
+        assert_eq!(report.outcome, AttemptOutcome::Success, "{name}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_attempt_and_another_start_another() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let nothing = |_: &CameraView| -> Perceived { Ok(None) };
+    let mut run = |seed| cell.run_attempt(&mut { nothing }, &AttemptConfig::default(), seed).unwrap();
+    let (one, again, other) = (run(5), run(5), run(6));
+    assert_eq!(one.views, again.views);
+    assert_eq!(one.simulated_secs, again.simulated_secs);
+    assert_ne!(one.simulated_secs, other.simulated_secs);
+}
+
+#[test]
+fn nothing_seen_is_a_failure_to_detect() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let (step, why) = attempt(&mut cell, |_| Ok(None));
+    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found at the first look"));
+
+    let mut looks = 0;
+    let (step, why) = attempt(&mut cell, |_| {
+        looks += 1;
+        Ok((looks == 1).then(true_target))
+    });
+    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found from above the part"));
+}
+
+#[test]
+fn a_part_wider_than_the_hand_is_refused() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let (step, why) = attempt(&mut cell, |_| Ok(Some(GraspTarget { jaw_width_m: 0.095, ..true_target() })));
+    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part is 95 mm wide, the hand opens 80 mm"));
+}
+
+#[test]
+fn a_target_out_of_reach_is_a_failure_to_hover() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let (step, why) = attempt(&mut cell, |_| {
+        let far = Isometry3::from_parts(Translation3::new(1.4, 0.2, 0.01), true_target().base_from_tcp.rotation);
+        Ok(Some(GraspTarget { base_from_tcp: far, ..true_target() }))
+    });
+    assert_eq!(step, AttemptStep::Hover);
+    assert!(why.starts_with("the part at (1.40, 0.20) m is out of reach"), "{why}");
+}
+
+#[test]
+fn a_target_beside_the_part_closes_on_nothing() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let (step, why) = attempt(&mut cell, |_| {
+        let beside = Translation3::new(-0.05, -0.15, 0.0) * true_target().base_from_tcp;
+        Ok(Some(GraspTarget { base_from_tcp: beside, ..true_target() }))
+    });
+    assert_eq!(step, AttemptStep::Close);
+    assert!(why.contains("without touching the part"), "{why}");
+}
+
+#[test]
+fn perception_that_breaks_is_an_error_and_not_a_failed_grasp() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let mut broken = |_: &CameraView| -> Perceived { Err("the model file is gone".into()) };
+    let error = cell.run_attempt(&mut broken, &AttemptConfig::default(), 1).unwrap_err();
+    assert_eq!(error, SimulationError::Perception("the model file is gone".into()));
+}
+
+#[test]
+fn the_wrist_camera_stands_where_it_is_told_with_the_fingers_out_of_view() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let wanted = camera_looking_down(0.5, 0.1, 0.55, 0.4);
+    let view = cell.view_from(&wanted).unwrap();
+    let miss = wanted.inverse() * view.camera.world_from_camera;
+    assert!(miss.translation.vector.norm() < 1e-5 && miss.rotation.angle() < 1e-5);
+    let model = cell.data().model().clone();
+    let segmentation = cell.wrist_segmentation().unwrap();
+    let own = segmentation.pixels_where(|geom| {
+        let body = model.name(model.body_of(geom)).unwrap_or_default();
+        body == "hand" || body.ends_with("_finger")
+    });
+    assert_eq!(own.count(), 0);
+    assert!(cell.view_from(&camera_looking_down(2.0, 0.0, 0.5, 0.0)).is_err());
+}
+
+#[test]
+fn a_recording_has_a_picture_for_each_period() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let record = RecordConfig {
+        period_secs: 0.25,
+        render: RenderConfig { width: 64, height: 48, shadow_size: 0, samples: 0, ..RenderConfig::default() },
+    };
+    let config = AttemptConfig { record: Some(record), ..AttemptConfig::default() };
+    let mut nothing = |_: &CameraView| -> Perceived { Ok(None) };
+    let report = cell.run_attempt(&mut nothing, &config, 1).unwrap();
+    let expected = report.simulated_secs / 0.25;
+    assert!((report.frames.len() as f64 - expected).abs() <= 1.0, "{} frames in {expected}", report.frames.len());
+    assert!(report.frames.iter().all(|frame| frame.dimensions() == (64, 48)));
+}
