@@ -253,7 +253,7 @@ impl Metadata {
         }
         let (start, end) = (Point3::from(self.grasp_start), Point3::from(self.grasp_end));
         let length = (end.xy() - start.xy()).norm();
-        if !(length >= 1e-3) {
+        if length.is_nan() || length < 1e-3 {
             return Err(format!("grasp_start, grasp_end: expected marks at least 0.001 m apart, found {length} m"));
         }
         if self.footprint.len() < 3 || self.footprint.iter().flatten().any(|value| !value.is_finite()) {
