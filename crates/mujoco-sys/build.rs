@@ -51,15 +51,10 @@ fn library_dir() -> Option<PathBuf> {
         .filter(|path| path.is_absolute() && path.exists())
         .and_then(|path| path.parent().map(Path::to_path_buf));
     let usual = || {
-        [
-            "/usr/lib/x86_64-linux-gnu",
-            "/usr/lib/aarch64-linux-gnu",
-            "/usr/lib",
-            "/usr/local/lib",
-        ]
-        .into_iter()
-        .map(PathBuf::from)
-        .find(|dir| dir.join(LIBRARY).exists())
+        ["/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/usr/lib", "/usr/local/lib"]
+            .into_iter()
+            .map(PathBuf::from)
+            .find(|dir| dir.join(LIBRARY).exists())
     };
     from_compiler.or_else(usual)
 }
@@ -69,8 +64,7 @@ fn library_dir() -> Option<PathBuf> {
 #[cfg(feature = "buildtime_bindgen")]
 fn generate() {
     let include = env::var("MUJOCO_INCLUDE_DIR").unwrap_or_else(|_| "/usr/include".to_owned());
-    let out =
-        PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR")).join("bindings.rs");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR")).join("bindings.rs");
     let generated = bindgen::Builder::default()
         .header_contents("mujoco_all.h", "#include <mujoco/mujoco.h>\n")
         .clang_arg(format!("-I{include}"))
@@ -90,7 +84,5 @@ fn generate() {
         .generate_comments(false)
         .generate()
         .expect("bindgen failed on mujoco/mujoco.h: is libclang-dev installed?");
-    generated
-        .write_to_file(out)
-        .expect("the bindings could not be written to OUT_DIR");
+    generated.write_to_file(out).expect("the bindings could not be written to OUT_DIR");
 }

@@ -21,9 +21,7 @@ pub enum LibraryMismatch {
         found: i32,
     },
     /// The library initialises more or fewer bytes of a struct than the bindings hold.
-    #[error(
-        "libmujoco's {name} takes {found} bytes, expected {expected}: bindings and library differ"
-    )]
+    #[error("libmujoco's {name} takes {found} bytes, expected {expected}: bindings and library differ")]
     StructSize {
         /// Name of the C struct.
         name: &'static str,
@@ -62,10 +60,7 @@ pub fn check_library() -> Result<(), LibraryMismatch> {
 /// and takes the last byte that came out equal both times for the end of the struct.
 ///
 /// Trailing padding need not be written, hence the tolerance of one alignment.
-fn check_size<T>(
-    name: &'static str,
-    initialise: unsafe extern "C-unwind" fn(*mut T),
-) -> Result<(), LibraryMismatch> {
+fn check_size<T>(name: &'static str, initialise: unsafe extern "C-unwind" fn(*mut T)) -> Result<(), LibraryMismatch> {
     let written = [0x5a_u8, 0xa5].map(|filling| {
         let mut room: Box<[MaybeUninit<T>]> = (0..2).map(|_| MaybeUninit::uninit()).collect();
         let bytes = room.as_mut_ptr().cast::<u8>();
@@ -77,18 +72,10 @@ fn check_size<T>(
             std::slice::from_raw_parts(bytes, 2 * size_of::<T>()).to_vec()
         }
     });
-    let found = written[0]
-        .iter()
-        .zip(&written[1])
-        .rposition(|(a, b)| a == b)
-        .map_or(0, |last| last + 1);
+    let found = written[0].iter().zip(&written[1]).rposition(|(a, b)| a == b).map_or(0, |last| last + 1);
     let expected = size_of::<T>();
     if found > expected || found + align_of::<T>() <= expected {
-        return Err(LibraryMismatch::StructSize {
-            name,
-            expected,
-            found,
-        });
+        return Err(LibraryMismatch::StructSize { name, expected, found });
     }
     Ok(())
 }
@@ -115,9 +102,7 @@ mod tests {
             (check_size::<[u64; 4]>("long", writes_24_bytes), 32),
         ] {
             match result {
-                Err(LibraryMismatch::StructSize {
-                    expected: e, found, ..
-                }) => {
+                Err(LibraryMismatch::StructSize { expected: e, found, .. }) => {
                     assert_eq!((e, found), (expected, 24));
                 }
                 other => panic!("{other:?}"),

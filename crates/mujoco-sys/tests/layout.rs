@@ -47,24 +47,16 @@ fn bindings_have_the_layout_of_the_c_headers() {
 
     let dir = std::env::temp_dir().join(format!("sdg-mujoco-layout-{}", std::process::id()));
     std::fs::create_dir_all(&dir).unwrap();
-    let mut source = String::from(
-        "#include <stddef.h>\n#include <stdio.h>\n#include <mujoco/mujoco.h>\nint main(void) {\n",
-    );
+    let mut source =
+        String::from("#include <stddef.h>\n#include <stdio.h>\n#include <mujoco/mujoco.h>\nint main(void) {\n");
     for (expression, _) in &expected {
         writeln!(source, "  printf(\"%zu\\n\", (size_t)({expression}));").unwrap();
     }
     source.push_str("  return 0;\n}\n");
     std::fs::write(dir.join("layout.c"), source).unwrap();
     // Only headers are used, so that nothing has to be linked.
-    let compiled = Command::new("cc")
-        .current_dir(&dir)
-        .args(["layout.c", "-o", "layout"])
-        .status()
-        .unwrap();
-    assert!(
-        compiled.success(),
-        "cc could not compile against mujoco/mujoco.h"
-    );
+    let compiled = Command::new("cc").current_dir(&dir).args(["layout.c", "-o", "layout"]).status().unwrap();
+    assert!(compiled.success(), "cc could not compile against mujoco/mujoco.h");
     let output = Command::new(dir.join("layout")).output().unwrap();
     std::fs::remove_dir_all(&dir).unwrap();
 
