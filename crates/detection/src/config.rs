@@ -6,8 +6,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::{DetectionError, Result};
-
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RcnnConfig {
@@ -459,104 +457,5 @@ impl KeypointHeadConfig {
     /// Side of the heatmaps: the pooled side times four (transposed convolution, bilinear).
     pub fn heatmap_size(&self) -> usize {
         self.pooler.output_size * 4
-    }
-}
-
-fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString) -> Result<()> {
-    if holds {
-        return Ok(());
-    }
-    Err(DetectionError::Config { field, expected: expected.to_owned(), found: found.to_string() })
-}
-
-impl RcnnConfig {
-    /// Checks that every value is usable and that values that depend on each other agree.
-    ///
-    /// # Errors
-    /// [`DetectionError::Config`] names the first field that is not.
-    pub fn validate(&self) -> Result<()> {
-        let (w, h) = match self.input.resize {
-            ResizeRule::ShortSide { short_px, max_long_px, .. } => (short_px, max_long_px),
-            ResizeRule::FitWithin { width_px, height_px } => (width_px, height_px),
-        };
-        check(
-            (1..=8192).contains(&w) && (1..=8192).contains(&h),
-            "input.resize",
-            "from 1 to 8192 px",
-            format!("{w}, {h}"),
-        )?;
-        check(
-            self.input.size_divisibility % 32 == 0 && self.input.size_divisibility > 0,
-            "input.size_divisibility",
-            "a multiple of 32, so that the levels of the pyramid halve exactly",
-            self.input.size_divisibility,
-        )?;
-        check(
-            self.input.std.iter().all(|s| *s > 0.0 && s.is_finite()),
-            "input.std",
-            "positive",
-            format!("{:?}", self.input.std),
-        )?;
-        for (field, norm, channels) in [
-            ("backbone.norm", self.backbone.norm, self.backbone.stem_channels),
-            ("backbone.norm", self.backbone.norm, self.backbone.res2_channels),
-            ("fpn.norm", self.fpn.norm, self.fpn.channels),
-        ] {
-            if let NormKind::Group { num_groups } = norm {
-                check(
-                    num_groups > 0 && channels % num_groups == 0,
-                    field,
-                    "a number of groups that divides the channels",
-                    format!("{num_groups} groups of {channels} channels"),
-                )?;
-            }
-        }
-        check(
-            self.backbone.num_blocks.iter().all(|n| *n > 0),
-            "backbone.num_blocks",
-            "at least one block a stage",
-            format!("{:?}", self.backbone.num_blocks),
-        )?;
-        check(
-            !self.anchors.aspect_ratios.is_empty() && self.anchors.aspect_ratios.iter().all(|r| *r > 0.0),
-            "anchors.aspect_ratios",
-            "one or more positive numbers",
-            format!("{:?}", self.anchors.aspect_ratios),
-        )?;
-        check(
-            self.anchors.sizes_px.iter().all(|s| *s > 0.0 && s.is_finite()),
-            "anchors.sizes_px",
-            "positive",
-            format!("{:?}", self.anchors.sizes_px),
-        )?;
-        for (field, matcher) in [("rpn.matcher", &self.rpn.matcher), ("roi_heads.matcher", &self.roi_heads.matcher)] {
-            check(
-                0.0 <= matcher.negative_below
-                    && matcher.negative_below <= matcher.positive_from
-                    && matcher.positive_from <= 1.0,
-                field,
-                "0 <= negative_below <= positive_from <= 1",
-                format!("{} and {}", matcher.negative_below, matcher.positive_from),
-            )?;
-        }
-        for (field, sampler) in [("rpn.sampler", &self.rpn.sampler), ("roi_heads.sampler", &self.roi_heads.sampler)] {
-            check(
-                sampler.batch_size_per_image > 0 && (0.0..=1.0).contains(&sampler.positive_fraction),
-                field,
-                "at least one sample, and a fraction from 0 to 1",
-                format!("{}, {}", sampler.batch_size_per_image, sampler.positive_fraction),
-            )?;
-        }
-        check(self.roi_heads.num_classes > 0, "roi_heads.num_classes", "at least 1", self.roi_heads.num_classes)?;
-        if let Some(head) = &self.roi_heads.keypoint_head {
-            check(head.num_keypoints > 0, "roi_heads.keypoint_head.num_keypoints", "at least 1", head.num_keypoints)?;
-            check(
-                !head.conv_channels.is_empty(),
-                "roi_heads.keypoint_head.conv_channels",
-                "one or more convolutions",
-                "none",
-            )?;
-        }
-        Ok(())
     }
 }

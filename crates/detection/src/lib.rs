@@ -36,6 +36,7 @@ pub mod anchors;
 pub mod box_coder;
 pub mod boxes;
 pub mod config;
+mod config_check;
 mod error;
 pub mod fpn;
 mod generalized_rcnn;

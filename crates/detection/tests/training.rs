@@ -85,7 +85,7 @@ fn the_seed_decides_every_bit() {
     let run = |init_seed, step_seed| {
         let detector = tiny().init(&device, init_seed).unwrap();
         let images = [transformed(&detector, &image)];
-        let losses = detector.losses(&images, &[target.clone()], step_seed).unwrap();
+        let losses = detector.losses(&images, std::slice::from_ref(&target), step_seed).unwrap();
         let gradients = losses.total().backward();
         let weight = &detector.backbone.bottom_up.stem.conv1.weight;
         let gradient = weight.val().grad(&gradients).unwrap().into_data();

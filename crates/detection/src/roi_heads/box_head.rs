@@ -167,8 +167,7 @@ impl BoxPredictor {
             let (boxes, kept_scores, classes) = &mut candidates[roi.image_idx];
             for class_idx in 0..self.num_classes {
                 let score = scores[row * (self.num_classes + 1) + self.score_column(class_idx)];
-                // A NaN score fails this comparison as well.
-                if !(f64::from(score) > self.config.score_threshold) {
+                if score.is_nan() || f64::from(score) <= self.config.score_threshold {
                     continue;
                 }
                 let at = (row * columns + self.delta_column(class_idx)) * 4;
