@@ -94,3 +94,41 @@ fn damped_step(
         None => right / (damping + normal.trace()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::limits::ready_pose;
+
+    #[test]
+    fn descent_recovers_a_pose_close_by() {
+        let panda = Panda::new();
+        let target = panda.forward(&ready_pose().add_scalar(0.1));
+        let q = descend(&panda, panda.limits(), &target, &ready_pose(), 0.3);
+        assert!(pose_error(&panda.forward(&q), &target).norm() < 1e-9);
+    }
+
+    #[test]
+    fn descent_stops_inside_the_limits_and_slides_along_them() {
+        // So close to the base joint 4 would have to fold beyond its limit.
+        let panda = Panda::new();
+        let mut target = panda.forward(&ready_pose());
+        target.translation.vector = nalgebra::Vector3::new(0.1, 0.0, 0.1);
+        let q = descend(&panda, panda.limits(), &target, &ready_pose().add_scalar(0.2), 0.3);
+        assert_eq!(panda.limits().worst_violation(&q, 0.0), None);
+        assert_eq!(q[3], panda.limits().position_min[3]);
+        // It rests where no joint can lower the cost by a small move inside the limits: the others did not stop with joint 4.
+        let cost = |q: &JointVector| {
+            let error = pose_error(&panda.forward(q), &target);
+            error.fixed_rows::<3>(0).norm_squared() + 0.09 * error.fixed_rows::<3>(3).norm_squared()
+        };
+        for joint_idx in 0..NUM_JOINTS {
+            for step in [-1e-3, 1e-3] {
+                let mut moved = q;
+                moved[joint_idx] += step;
+                let moved = panda.limits().clamp(&moved);
+                assert!(cost(&moved) >= cost(&q) - 1e-9, "joint {}", joint_idx + 1);
+            }
+        }
+    }
+}

@@ -104,6 +104,31 @@ fn most_descents_from_the_best_configuration_succeed() {
 }
 
 #[test]
+fn the_elbow_slides_away_from_limits_without_moving_the_tcp() {
+    let panda = Panda::new();
+    let limits = panda.limits();
+    // Sum of the fourth powers of the joints' places in their ranges, -1 to 1.
+    let crowding = |q: &JointVector| {
+        let half_range = (limits.position_max - limits.position_min) * 0.5;
+        (q - limits.middle()).component_div(&half_range).map(|u| u.powi(4)).sum()
+    };
+    // An elbow turned far to one side.
+    let mut seed = ready_pose();
+    (seed[0], seed[2]) = (1.6, -1.6);
+    let nearest_to_seed = IkOptions { posture_weight: 0.0, limit_weight: 0.0, ..IkOptions::default() };
+    let above = top_grasp(0.45, 0.2, 0.3, 0.0);
+    let start = panda.inverse(&above, &seed, &nearest_to_seed).unwrap();
+    let end = top_grasp(0.45, 0.2, 0.05, 0.0);
+    let [without, with] = [0.0, 4.0].map(|limit_avoidance| {
+        let options = LineOptions { limit_avoidance, ..LineOptions::default() };
+        panda.straight_path(&start.q, &end, &options).unwrap()
+    });
+    assert!(crowding(with.end()) < crowding(without.end()) - 0.01);
+    let apart = pose_error(&panda.forward(with.end()), &panda.forward(without.end()));
+    assert!(apart.norm() < 1e-9);
+}
+
+#[test]
 fn a_path_out_of_reach_says_how_far_it_gets() {
     let panda = Panda::new();
     let end = top_grasp(1.2, 0.0, 0.4, 0.0);

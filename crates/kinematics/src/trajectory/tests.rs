@@ -185,6 +185,28 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
 }
 
 #[test]
+fn a_low_jerk_limit_binds_and_holds_on_a_curved_path() {
+    // At a five-hundredth of Franka's jerk the acceleration limits are out of reach, and the path's curvature counts.
+    let panda = Panda::new();
+    let limits = panda.limits().scaled(1.0, 1.0, 0.002).unwrap();
+    let start = top_grasp(0.4, 0.2, 0.3, 0.5);
+    let start = panda.inverse(&start, &ready_pose(), &IkOptions::default()).unwrap();
+    let end = top_grasp(0.6, -0.2, 0.05, -0.6);
+    let path = panda.straight_path(&start.q, &end, &LineOptions::default()).unwrap();
+    let trajectory = Trajectory::along_path(path, &limits, &CartesianLimits::franka()).unwrap();
+    const NUM: usize = 4000;
+    assert_within_limits(&trajectory, &limits, NUM);
+    let step = trajectory.duration_secs() / NUM as f64;
+    let most_jerk = (1..=NUM)
+        .map(|i| {
+            let [before, after] = [i - 1, i].map(|i| trajectory.sample(step * i as f64).2);
+            share(&((after - before) / step), &limits.jerk_max)
+        })
+        .fold(0.0, f64::max);
+    assert!(most_jerk > 0.9, "{most_jerk}");
+}
+
+#[test]
 fn standing_still_takes_no_time() {
     let limits = JointLimits::franka();
     let trajectory = Trajectory::point_to_point(&ready_pose(), &ready_pose(), &limits).unwrap();
