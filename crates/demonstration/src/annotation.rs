@@ -152,10 +152,12 @@ impl Draft {
 
 /// The point, moved to the edge if it misses the image by no more than the tolerance.
 fn inside(point: Point2<f64>, place: &str, image: &ImageFacts) -> Result<Point2<f64>> {
+    if let Some(found) = [point.x, point.y].into_iter().find(|value| !value.is_finite()) {
+        return Err(Error::NotFinite { place: place.into(), found: found.to_string() });
+    }
     let (width, height) = (f64::from(image.width), f64::from(image.height));
     let kept = Point2::new(point.x.clamp(0.0, width), point.y.clamp(0.0, height));
     let missed_by = (kept.x - point.x).abs().max((kept.y - point.y).abs());
-    // Written so that NaN is refused as well.
     if missed_by <= EDGE_TOLERANCE_PX {
         Ok(kept)
     } else {

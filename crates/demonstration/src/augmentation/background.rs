@@ -171,7 +171,10 @@ fn draw_colours(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
             let level = uniform(rng, 0.35, 0.95);
             [level, level * uniform(rng, 0.68, 0.85), level * uniform(rng, 0.4, 0.65)]
         }
-        3 => [uniform(rng, 0.0, 0.95), uniform(rng, 0.0, 0.95), uniform(rng, 0.0, 0.95)],
+        3 => {
+            let (grey, colour) = (uniform(rng, 0.05, 0.9), uniform(rng, 0.1, 0.8));
+            std::array::from_fn(|_| grey + (uniform(rng, 0.0, 0.95) - grey) * colour)
+        }
         4 => part.colours[index_below(rng, part.colours.len())],
         _ => {
             let at = index_below(rng, part.background.pixels.len());

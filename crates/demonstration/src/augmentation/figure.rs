@@ -49,33 +49,39 @@ impl Primitive {
             Self::Capsule { a, b, radius } => {
                 let (px, py, ex, ey) = (x - a[0], y - a[1], b[0] - a[0], b[1] - a[1]);
                 let t = ((px * ex + py * ey) / (ex * ex + ey * ey).max(1e-9)).clamp(0.0, 1.0);
-                (px - ex * t).hypot(py - ey * t) - radius
+                length(px - ex * t, py - ey * t) - radius
             }
             Self::Ring { center, radius, half_width } => {
-                ((x - center[0]).hypot(y - center[1]) - radius).abs() - half_width
+                (length(x - center[0], y - center[1]) - radius).abs() - half_width
             }
             Self::Polygon { center, radius, sides, turn } => {
                 let (px, py) = (x - center[0], y - center[1]);
                 let sector = std::f32::consts::TAU / sides;
                 let angle = (py.atan2(px) + turn).rem_euclid(sector) - 0.5 * sector;
-                px.hypot(py) * angle.cos() - radius * (0.5 * sector).cos()
+                length(px, py) * angle.cos() - radius * (0.5 * sector).cos()
             }
             Self::Box { center, half, corner } => {
                 let qx = (x - center[0]).abs() - half[0] + corner;
                 let qy = (y - center[1]).abs() - half[1] + corner;
-                qx.max(0.0).hypot(qy.max(0.0)) + qx.max(qy).min(0.0) - corner
+                length(qx.max(0.0), qy.max(0.0)) + qx.max(qy).min(0.0) - corner
             }
             Self::Gear { radius, teeth, depth } => {
                 let wave = (y.atan2(x) * teeth).cos();
                 // Steepened to flanks; the factor keeps the slope near one.
-                (x.hypot(y) - radius - depth * (3.0 * wave).clamp(-1.0, 1.0)) * 0.8
+                (length(x, y) - radius - depth * (3.0 * wave).clamp(-1.0, 1.0)) * 0.8
             }
             Self::Arc { radius, half_angle, half_width } => {
                 let angle = y.atan2(x).clamp(-half_angle, half_angle);
-                (x - radius * angle.cos()).hypot(y - radius * angle.sin()) - half_width
+                length(x - radius * angle.cos(), y - radius * angle.sin()) - half_width
             }
         }
     }
+}
+
+/// Without `hypot`'s care for overflow, which costs most of the time here.
+#[inline(always)]
+fn length(x: f32, y: f32) -> f32 {
+    (x * x + y * y).sqrt()
 }
 
 /// Some figures joined, with round holes, all in the unit frame.
@@ -92,7 +98,7 @@ impl Figure {
     #[inline]
     pub fn distance(&self, x: f32, y: f32) -> f32 {
         let solid = self.solids.iter().fold(f32::MAX, |d, solid| d.min(solid.distance(x, y)));
-        self.holes.iter().fold(solid, |d, &[u, v, r]| d.max(r - (x - u).hypot(y - v)))
+        self.holes.iter().fold(solid, |d, &[u, v, r]| d.max(r - length(x - u, y - v)))
     }
 
     /// A rod, bent tube, ring, nut, plate, bracket, gear, eye rod, arc or blob.

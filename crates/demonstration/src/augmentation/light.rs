@@ -40,7 +40,7 @@ pub(crate) fn relight(canvas: &mut Raster, rng: &mut SampleRng) {
 }
 
 fn draw_curves(rng: &mut SampleRng) -> [Vec<f32>; 3] {
-    let gain = uniform(rng, -0.55, 0.45).exp();
+    let gain = uniform(rng, -0.55, 0.35).exp();
     let gamma = uniform(rng, -0.3, 0.3).exp();
     let contrast = uniform(rng, 0.75, 1.25);
     // Bright lamps and dark corners: at times a lifted black.
@@ -51,8 +51,40 @@ fn draw_curves(rng: &mut SampleRng) -> [Vec<f32>; 3] {
             .map(|step| {
                 let value = (step as f32 + 0.5) * CURVE_TOP / CURVE_STEPS as f32;
                 let toned = (value * gain * cast).powf(gamma);
-                ((toned - 0.5) * contrast + 0.5 + lift).clamp(0.0, 1.0)
+                shoulder((toned - 0.5) * contrast + 0.5 + lift)
             })
             .collect()
     })
+}
+
+/// Lets highlights run out softly, as cameras do: a part that is cut off at white has no surface left to learn.
+fn shoulder(value: f32) -> f32 {
+    const BEND: f32 = 0.82;
+    if value <= BEND {
+        return value.max(0.0);
+    }
+    BEND + (1.0 - BEND) * (1.0 - (-(value - BEND) / (1.0 - BEND)).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{Stream, sample_rng};
+    use super::*;
+
+    #[test]
+    fn curves_rise_and_stay_in_range() {
+        for index in 0..50 {
+            for curve in draw_curves(&mut sample_rng(2, Stream::Preparation, index)) {
+                assert!(curve.windows(2).all(|pair| pair[0] <= pair[1]), "falls: {curve:?}");
+                assert!(curve.iter().all(|v| (0.0..=1.0).contains(v)));
+                assert!(curve[CURVE_STEPS / 2] > 0.4, "white has become {}", curve[CURVE_STEPS / 2]);
+            }
+        }
+    }
+
+    #[test]
+    fn highlights_meet_the_straight_part_smoothly() {
+        assert_eq!(shoulder(0.5), 0.5);
+        assert!((shoulder(0.8201) - 0.8201).abs() < 1e-6 && shoulder(5.0) <= 1.0);
+    }
 }

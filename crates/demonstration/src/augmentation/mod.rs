@@ -29,6 +29,8 @@ mod random;
 mod raster;
 mod scene;
 mod sensor;
+#[cfg(test)]
+mod tests;
 
 pub use augmenter::{Augmenter, Sample, SampleObject};
 pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle};

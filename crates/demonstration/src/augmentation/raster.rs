@@ -65,6 +65,9 @@ impl Raster {
 /// Folds `x` into `[0, length]`.
 #[inline(always)]
 fn reflect(x: f32, length: f32) -> f32 {
+    if (0.0..=length).contains(&x) {
+        return x;
+    }
     let folded = x.rem_euclid(2.0 * length);
     if folded > length { 2.0 * length - folded } else { folded }
 }

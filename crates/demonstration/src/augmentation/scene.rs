@@ -127,7 +127,7 @@ impl Studio<'_> {
         }
         // The same light as the photo's where the photo is around it, a little of its own elsewhere.
         let gain: [f32; 3] = if own_table { [1.0; 3] } else { std::array::from_fn(|_| uniform(rng, 0.9, 1.1)) };
-        let level = if own_table { 1.0 } else { uniform(rng, 0.75, 1.25) };
+        let level = if own_table { 1.0 } else { uniform(rng, 0.75, 1.15) };
         let (edge, feather) = (uniform(rng, -0.3, 1.2), uniform(rng, 0.5, 1.6));
         let rect = PixelRect::covering(bounds, 2.0, canvas.width, canvas.height);
         for y in rect.y1..rect.y2 {
