@@ -272,7 +272,7 @@ mod tests {
         let mut file = CocoFile::new();
         let other = Annotation { label: "rod".into(), grasp: None, outline: None, ..pendulum() };
         file.push_image("a.png", 640, 480, &[pendulum()]);
-        file.push_image("b.png", 640, 480, &[other.clone()]);
+        file.push_image("b.png", 640, 480, std::slice::from_ref(&other));
         let value: Value = serde_json::from_str(&file.to_json()).unwrap();
         assert_eq!(read_named(&value, Some("folder/b.png")).unwrap(), [other]);
         let found = read_named(&value, Some("c.png")).unwrap_err().to_string();

@@ -5,7 +5,7 @@ use nalgebra::Point2;
 use sdg_geometry::{Angle, BoundingBox, GraspLine, Keypoint, PlanarSimilarity, Polygon, Visibility};
 
 use super::background::NoiseBank;
-use super::config::{AugmentationConfig, AugmentationStyle};
+use super::config::{AugmentationConfig, AugmentationStyle, check_output_size};
 use super::homography::Homography;
 use super::noise::NormalTable;
 use super::paper::PaperDraw;
@@ -120,6 +120,7 @@ impl Augmenter {
         };
         demonstrations.iter().try_for_each(Demonstration::check)?;
         let size = config.output_size.unwrap_or([first.image.width(), first.image.height()]);
+        check_output_size(size)?;
         let mut rng = sample_rng(seed, Stream::Preparation, 0);
         let parts = demonstrations.iter().map(|one| Prepared::new(one, size, &mut rng)).collect();
         let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));

@@ -124,12 +124,6 @@ impl AugmentationConfig {
 
     /// Refuses settings that make no sense.
     pub(crate) fn check(&self) -> Result<()> {
-        if let Some([width, height]) = self.output_size {
-            let side = 16..=8192;
-            if !side.contains(&width) || !side.contains(&height) {
-                return refuse("output_size", "16 to 8192 pixels a side", format!("{width}×{height}"));
-            }
-        }
         match &self.style {
             AugmentationStyle::Paper(paper) => {
                 check_share("per_channel_probability", paper.per_channel_probability)?;
@@ -157,6 +151,20 @@ impl AugmentationConfig {
                 check_value("max_distractors", scenes.max_distractors as f32, [1.0, 50.0])
             }
         }
+    }
+}
+
+/// Refuses sizes that no sample can have, whether they were set or are the photo's own.
+pub(crate) fn check_output_size([width, height]: [u32; 2]) -> Result<()> {
+    let side = 16..=8192;
+    if side.contains(&width) && side.contains(&height) {
+        Ok(())
+    } else {
+        refuse(
+            "output_size",
+            "16 to 8192 pixels a side (set one where the photo has none)",
+            format!("{width}×{height}"),
+        )
     }
 }
 
@@ -192,6 +200,7 @@ mod tests {
             ..AugmentationConfig::default()
         };
         assert!(bad.check().unwrap_err().to_string().contains("positive_share: expected 0 to 1, found NaN"));
-        assert!(AugmentationConfig::paper().with_output_size(0, 240).check().is_err());
+        assert!(check_output_size([0, 240]).is_err() && check_output_size([320, 240]).is_ok());
+        assert!(check_output_size([30_000, 100]).unwrap_err().to_string().contains("30000×100"));
     }
 }

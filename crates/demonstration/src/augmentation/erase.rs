@@ -46,8 +46,9 @@ pub(crate) fn fill(picture: &Raster, hole: &[bool]) -> Raster {
                 continue;
             }
             let mean = local_mean(picture, hole, sx as usize, sy as usize);
-            for k in 0..3 {
-                filled.pixels[at][k] = (filled.pixels[at][k] + picture.pixels[source][k] - mean[k]).clamp(0.0, 1.0);
+            let grain = picture.pixels[source];
+            for ((out, grain), mean) in filled.pixels[at].iter_mut().zip(grain).zip(mean) {
+                *out = (*out + grain - mean).clamp(0.0, 1.0);
             }
         }
     }
