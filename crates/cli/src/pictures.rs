@@ -3,7 +3,7 @@
 use image::RgbImage;
 use sdg_geometry::Keypoint;
 use sdg_grasp::GraspDetection;
-use sdg_report::draw::{DetectionMark, Verdict, draw_detection};
+use sdg_report::{DetectionMark, Verdict, draw_detection};
 
 /// The image with every detection drawn on it.
 pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {

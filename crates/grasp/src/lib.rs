@@ -51,7 +51,7 @@ pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
-pub use sdg_training::{Ending, Event, History, StepRecord, Validation, ValidationRecord};
+pub use sdg_training::{Ending, Event, History, LossValues, StepRecord, Validation, ValidationRecord};
 #[cfg(feature = "teach")]
 pub use teach::{Preset, Taught, TeachOptions, teach};
 

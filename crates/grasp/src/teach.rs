@@ -11,7 +11,6 @@ use std::ops::ControlFlow;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
 
-use burn::module::Module;
 use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, AugmentationConfig, Demonstration, Sample};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, presets};
@@ -142,9 +141,9 @@ pub fn teach(
 
     let [width, height] = options.preset.sample_size();
     let at_input_size = AugmentationConfig::default().with_output_size(width, height);
-    let samples = Augmenter::new(demonstrations.to_vec(), at_input_size, options.seed)?;
+    let samples = Augmenter::new(demonstrations, at_input_size, options.seed)?;
     // Held back at the photo's own size, so that verification is calibrated on what it will see.
-    let held_back = Augmenter::new(demonstrations.to_vec(), AugmentationConfig::default(), options.seed)?;
+    let held_back = Augmenter::new(demonstrations, AugmentationConfig::default(), options.seed)?;
     let held_back: Vec<Sample> =
         (0..training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
 

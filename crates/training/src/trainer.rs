@@ -83,7 +83,7 @@ impl Run<'_> {
             if let Some(ending) = self.pace.ending(step, self.elapsed_secs()) {
                 // The last steps have the lowest learning rate; without a look at them the best checkpoint is unknown.
                 if self.validations.last().is_none_or(|record| record.steps_done < step) {
-                    self.validate(step, examine, observe)?;
+                    let _ = self.validate(step, examine, observe)?;
                 }
                 break ending;
             }

@@ -26,7 +26,7 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     let label = demonstrations[0].annotation.label.clone();
-    let augmenter = Augmenter::new(demonstrations, config, args.seed)?;
+    let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
     files::prepare_folder(&args.out)?;
 
     let mut coco = CocoFile::new();

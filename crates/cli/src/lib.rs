@@ -1,0 +1,54 @@
+//! `sdg`: teach a robot a grasp from one photo.
+//!
+//! ```text
+//! args ─ commands/<verb>.rs ─ grasp, simulation, report
+//! ```
+//!
+//! The binary is a thin shell around [`run`]; [`rehearsal`] and [`trial`] are open to the end-to-end tests.
+//!
+//! ```
+//! use clap::Parser;
+//! use sdg_cli::args::{Args, Command};
+//!
+//! let args = Args::try_parse_from(["sdg", "demo", "--attempts", "3"]).expect("a call of the contract");
+//! assert!(matches!(args.command, Command::Demo(demo) if demo.object == "pendulum" && demo.attempts == 3));
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod args;
+mod commands;
+mod demonstrations;
+mod exit;
+mod files;
+mod interrupt;
+mod pictures;
+pub mod rehearsal;
+mod run_page;
+pub mod shipped;
+mod teaching_progress;
+pub mod trial;
+
+use std::process::ExitCode;
+
+use crate::args::{Args, Command};
+use crate::exit::Outcome;
+
+/// Runs one command; prints the one line of an error and returns the exit code.
+pub fn run(args: &Args) -> ExitCode {
+    let done = match &args.command {
+        Command::Demo(demo) => commands::demo::run(demo),
+        Command::Teach(teach) => commands::teach::run(teach),
+        Command::Detect(detect) => commands::detect::run(detect),
+        Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
+        Command::Augment(augment) => commands::augment::run(augment),
+    };
+    match done {
+        Ok(outcome) => outcome.into(),
+        Err(error) if exit::is_closed_pipe(&error) => Outcome::Done.into(),
+        Err(error) => {
+            eprintln!("sdg: {}", exit::one_line(&error));
+            exit::code_of(&error)
+        }
+    }
+}

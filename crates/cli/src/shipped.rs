@@ -1,0 +1,54 @@
+//! The demonstrations under datasets/, compiled in, so that `sdg demo` runs from any folder.
+
+use anyhow::{Context, Result, bail};
+use sdg_demonstration::{Annotation, Demonstration, ImageFacts, ImageLimits, decode_image};
+
+macro_rules! shipped {
+    ($($name:literal),*) => {
+        [$((
+            $name,
+            include_bytes!(concat!("../../../datasets/demonstrations/", $name, "/image.png")).as_slice(),
+            include_bytes!(concat!("../../../datasets/demonstrations/", $name, "/annotation.json")).as_slice(),
+        )),*]
+    };
+}
+
+/// Name, photo, annotation.
+const SHIPPED: [(&str, &[u8], &[u8]); 3] = shipped!["pendulum", "fuel_line", "rod_end"];
+
+/// The demonstration of a shipped object.
+pub fn demonstration(object: &str) -> Result<Demonstration> {
+    let Some((name, photo, annotation)) = SHIPPED.into_iter().find(|(name, ..)| *name == object) else {
+        let known: Vec<&str> = SHIPPED.iter().map(|(name, ..)| *name).collect();
+        bail!("expected an object out of {}, found \"{object}\"", known.join(", "));
+    };
+    let image = decode_image(photo, &ImageLimits::default())?;
+    let facts = ImageFacts { width: image.width(), height: image.height(), file_name: Some("image.png") };
+    let annotation = Annotation::read(annotation, &facts)?
+        .into_iter()
+        .next()
+        .with_context(|| format!("the shipped annotation of {name} marks nothing"))?;
+    Ok(Demonstration { image, annotation })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_simulation::objects::ObjectSpec;
+
+    #[test]
+    fn every_object_has_a_demonstration_with_all_marks() {
+        for name in ObjectSpec::names() {
+            let demonstration = demonstration(name).unwrap();
+            assert!(demonstration.annotation.require_grasp().is_ok(), "{name}");
+            assert!(demonstration.annotation.require_outline().is_ok(), "{name}");
+            assert_eq!(demonstration.annotation.label, name);
+        }
+    }
+
+    #[test]
+    fn an_unknown_object_is_told_the_known_ones() {
+        let error = demonstration("teapot").unwrap_err().to_string();
+        assert_eq!(error, "expected an object out of pendulum, fuel_line, rod_end, found \"teapot\"");
+    }
+}

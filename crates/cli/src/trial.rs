@@ -1,0 +1,93 @@
+//! A model tried on pictures of the simulator that it has never seen, against the simulator's truth.
+
+use anyhow::Result;
+use image::RgbImage;
+use sdg_geometry::Angle;
+use sdg_grasp::{GraspDetection, GraspModel, GraspPose, Verification};
+use sdg_report::DetectionError;
+use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
+use sdg_simulation::scene::test_views;
+
+use crate::pictures;
+use crate::rehearsal::grasp_plane;
+
+/// Largest distance at which a detection counts as right, in millimetres.
+pub const RIGHT_MM: f64 = 10.0;
+/// Largest turn at which a detection counts as right, in degrees.
+pub const RIGHT_DEGREES: f64 = 10.0;
+
+/// One picture and what the model said of it.
+pub struct Trial {
+    /// The picture with all detections drawn on it.
+    pub drawn: RgbImage,
+    /// Whether the part is in the picture.
+    pub present: bool,
+    /// Score of the best detection, accepted or not; zero for none.
+    pub best_score: f64,
+    /// Agreement of the best detection, where it was verified.
+    pub best_agreement: Option<f64>,
+    /// The network's score of the best detection; zero for none.
+    pub network_score: f64,
+    /// Error of the accepted detection, where the part is there and was found.
+    pub error: Option<DetectionError>,
+    /// Error of the best detection even if it was refused.
+    pub best_error: Option<DetectionError>,
+    /// Time of the detection.
+    pub seconds: f64,
+}
+
+impl Trial {
+    /// Whether the part was there and a grasp was found near enough to the truth.
+    pub fn is_right(&self) -> bool {
+        self.error.is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
+    }
+
+    /// Whether the part was not there and something was accepted all the same.
+    pub fn is_false_alarm(&self) -> bool {
+        !self.present && self.best_score >= 0.5
+    }
+}
+
+/// Shows a model `count` pictures, seeds from `seed` on, with the part or without.
+pub fn try_views(
+    model: &GraspModel,
+    object: &ObjectSpec,
+    present: bool,
+    count: usize,
+    seed: u64,
+    verification: Verification,
+) -> Result<Vec<Trial>> {
+    test_views(object, present, count, seed)
+        .map(|view| {
+            let seen = view?;
+            let start = std::time::Instant::now();
+            let detections = model.detect(&seen.view.image, verification)?;
+            let seconds = start.elapsed().as_secs_f64();
+            let best = detections.first();
+            let error = |detection: &GraspDetection| -> Option<DetectionError> {
+                let truth = seen.truth.as_ref()?;
+                let plane = grasp_plane(object);
+                let pose =
+                    GraspPose::from_planar(&seen.view.camera, &detection.grasp, &plane, LARGEST_JAW_WIDTH_M).ok()?;
+                let found = pose.base_from_tcp.translation.vector;
+                let along = pose.base_from_tcp * nalgebra::Vector3::x();
+                let turn = Angle::from_direction(along.x, along.y).distance(Angle::from_radians(truth.direction_rad));
+                Some(DetectionError {
+                    distance_mm: (found.x - truth.tcp.x).hypot(found.y - truth.tcp.y) * 1e3,
+                    angle_deg: turn.to_degrees(),
+                })
+            };
+            let best_error = best.and_then(error);
+            Ok(Trial {
+                drawn: pictures::with_detections(&seen.view.image, &detections),
+                present,
+                best_score: best.map_or(0.0, |d| d.score),
+                best_agreement: best.and_then(|d| d.agreement),
+                network_score: best.map_or(0.0, |d| d.network_score),
+                error: best_error.filter(|_| best.is_some_and(GraspDetection::is_accepted)),
+                best_error,
+                seconds,
+            })
+        })
+        .collect()
+}
