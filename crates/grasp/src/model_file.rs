@@ -246,3 +246,98 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
         teaching: metadata.json("teaching")?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+    use nalgebra::Point2;
+    use sdg_detection::presets;
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
+
+    /// A model of an untaught network: everything that a file holds, in no time.
+    fn untaught() -> GraspModel {
+        let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 20.0, x2: 100.0, y2: 50.0 });
+        let cutout = RgbImage::from_fn(120, 70, |x, y| {
+            let inside = outline.contains(&Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            Rgb(if inside { [40, 60, 90] } else { [200, 190, 180] })
+        });
+        let marks = TaughtMarks {
+            label: "bar".to_owned(),
+            bbox: outline.bounds(),
+            grasp: GraspLine::new(Point2::new(40.0, 35.0), Point2::new(80.0, 35.0)),
+            outline: Some(outline),
+            width_px: 30.0,
+        };
+        GraspModel {
+            kind: ModelKind::C,
+            preset: "edge".to_owned(),
+            network: presets::edge(crate::NUM_KEYPOINTS).init(&Device::flex(), 3).unwrap(),
+            demonstrations: vec![TaughtDemonstration::from_parts(cutout, marks).unwrap()],
+            calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: Calibration::NEUTRAL },
+            facts: TeachingFacts {
+                seed: 3,
+                samples: 0,
+                steps: 0,
+                seconds: 0.5,
+                validation_hit_rate: 0.0,
+                validation_error_px: 1.0,
+                validation_error_degrees: 1.0,
+                base_weights_sha256: None,
+            },
+        }
+    }
+
+    fn with_metadata(bytes: &[u8], from: &str, to: &str) -> Vec<u8> {
+        assert_eq!(from.len(), to.len(), "the header's length must not change");
+        let at = bytes.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+        let mut altered = bytes.to_vec();
+        altered[at..at + to.len()].copy_from_slice(to.as_bytes());
+        altered
+    }
+
+    #[test]
+    fn a_file_gives_the_model_back() {
+        let bytes = untaught().to_bytes().unwrap();
+        assert!(bytes.len() < 12_000_000);
+        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+        // Half precision was rounded once: a second round changes nothing.
+        assert_eq!(read.to_bytes().unwrap(), bytes);
+        assert_eq!(summarize(&bytes).unwrap().object, "bar");
+    }
+
+    #[test]
+    fn other_versions_are_told_apart_from_damage() {
+        let bytes = untaught().to_bytes().unwrap();
+        let newer = with_metadata(&bytes, r#""format_version":"1""#, r#""format_version":"7""#);
+        let refused = GraspModel::from_bytes(&newer, &Device::flex()).unwrap_err();
+        assert!(matches!(&refused, GraspError::OtherVersion { expected: 1, found } if found == "7"), "{refused}");
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_an_error() {
+        let bytes = untaught().to_bytes().unwrap();
+        for length in [0, 1, 7, 8, 100, 5_000, bytes.len() / 2, bytes.len() - 1] {
+            assert!(GraspModel::from_bytes(&bytes[..length], &Device::flex()).is_err(), "{length} bytes");
+        }
+        let mut longer = bytes;
+        longer.push(0);
+        assert!(GraspModel::from_bytes(&longer, &Device::flex()).is_err());
+    }
+
+    #[test]
+    fn a_parameter_of_another_name_is_an_error_that_names_it() {
+        let bytes = untaught().to_bytes().unwrap();
+        let renamed = with_metadata(&bytes, "network.roi_heads.box_head.fc1.weight", "network.roi_heads.box_head.fc9.weight");
+        let refused = GraspModel::from_bytes(&renamed, &Device::flex()).unwrap_err().to_string();
+        assert!(refused.contains("roi_heads.box_head.fc1.weight"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_no_model_is_named() {
+        for (bytes, name) in [(&b""[..], "an empty file"), (b"\x89PNG\r\n", "a PNG image"), (b"{\"a\": 1}", "a text file")] {
+            let refused = summarize(bytes).unwrap_err().to_string();
+            assert!(refused.contains(name), "{refused}");
+        }
+    }
+}

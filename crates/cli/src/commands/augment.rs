@@ -2,7 +2,7 @@
 
 use std::io::Cursor;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use image::ImageFormat;
 use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter, CocoFile};
 use sdg_geometry::GraspLine;
@@ -11,7 +11,7 @@ use serde_json::json;
 
 use crate::args::AugmentArgs;
 use crate::demonstrations;
-use crate::exit::Outcome;
+use crate::exit::{Outcome, Usage};
 use crate::files;
 
 /// The file that lists every sample's marks.
@@ -22,7 +22,9 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     let config = match args.preset.as_str() {
         "edge" => AugmentationConfig::default(),
         "paper" => AugmentationConfig::paper(),
-        other => bail!("expected a preset out of edge, paper, found \"{other}\""),
+        other => {
+            return Err(Usage(format!("--preset: expected a preset out of edge, paper, found \"{other}\"")).into());
+        }
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     let label = demonstrations[0].annotation.label.clone();

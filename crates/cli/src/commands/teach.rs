@@ -1,15 +1,16 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
+use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_grasp::{Ending, TeachOptions, teach};
+use sdg_grasp::{Ending, GraspError, TeachOptions, teach};
 use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::args::TeachArgs;
 use crate::demonstrations;
-use crate::exit::Outcome;
+use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::teaching_progress::TeachingProgress;
@@ -17,8 +18,8 @@ use crate::teaching_progress::TeachingProgress;
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let options = TeachOptions {
-        kind: args.model.parse()?,
-        preset: args.preset.parse()?,
+        kind: parse("--model", &args.model)?,
+        preset: parse("--preset", &args.preset)?,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         steps: args.steps.map(|steps| steps as usize),
         ..TeachOptions::new(args.seed)
@@ -64,4 +65,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
     }
     Ok(Outcome::Done)
+}
+
+/// An argument that names one of a few things; another name is wrong usage.
+fn parse<T: FromStr<Err = GraspError>>(argument: &str, name: &str) -> Result<T> {
+    Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
 }

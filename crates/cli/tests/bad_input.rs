@@ -1,0 +1,164 @@
+//! Wrong input, as a user would give it: one clear line, the contract's exit code, nothing half-written.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
+}
+
+/// Asserts exit code and one line on standard error that contains every part.
+fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = sdg(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+    assert_eq!(stderr.lines().count(), 1, "{arguments:?}: {stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "{arguments:?}: expected \"{part}\" in: {stderr}");
+    }
+}
+
+fn teach(demonstration: &str, out: &Path, code: i32, parts: &[&str]) {
+    assert_refused(&["teach", "--demo", demonstration, "--out", out.to_str().unwrap()], code, parts);
+    assert!(!out.exists());
+}
+
+fn pair(image: &Path, annotation: &Path) -> String {
+    format!("{}:{}", image.display(), annotation.display())
+}
+
+fn files_in(folder: &Path) -> Vec<String> {
+    fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn unreadable_images_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("model.sdg");
+    let annotation = shipped("annotation.json");
+    teach(&pair(Path::new("/nowhere.png"), &annotation), &out, 1, &["/nowhere.png", "cannot read"]);
+
+    let truncated = folder.path().join("truncated.png");
+    let whole = fs::read(shipped("image.png")).unwrap();
+    fs::write(&truncated, &whole[..whole.len() / 2]).unwrap();
+    teach(&pair(&truncated, &annotation), &out, 1, &["truncated.png"]);
+
+    let text = folder.path().join("text.png");
+    fs::write(&text, "not a picture").unwrap();
+    teach(&pair(&text, &annotation), &out, 1, &["text.png"]);
+}
+
+#[test]
+fn a_decompression_bomb_is_refused_before_memory_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let bomb = folder.path().join("bomb.png");
+    // A valid header that promises 60000 × 60000 pixels; width and height are bytes 16 to 23, their sum of IHDR follows.
+    let mut bytes = fs::read(shipped("image.png")).unwrap();
+    bytes[16..20].copy_from_slice(&60_000u32.to_be_bytes());
+    bytes[20..24].copy_from_slice(&60_000u32.to_be_bytes());
+    let checksum = crc32(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
+    fs::write(&bomb, bytes).unwrap();
+    let out = folder.path().join("model.sdg");
+    teach(&pair(&bomb, &shipped("annotation.json")), &out, 1, &["bomb.png", "60000"]);
+}
+
+/// PNG's checksum, bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 })
+    })
+}
+
+#[test]
+fn annotations_that_mark_nothing_usable_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("model.sdg");
+    let image = shipped("image.png");
+    let annotated = |name: &str, json: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, json).unwrap();
+        pair(&image, &path)
+    };
+    let shapes = |shapes: &str| format!(r#"{{"imageWidth": 640, "imageHeight": 480, "shapes": [{shapes}]}}"#);
+    let rectangle = |x1: &str, y1: &str, x2: &str, y2: &str| {
+        shapes(&format!(
+            r#"{{"label": "part", "shape_type": "rectangle", "points": [[{x1}, {y1}], [{x2}, {y2}]]}}"#
+        ))
+    };
+    teach(&annotated("text.json", "hello"), &out, 1, &["text.json"]);
+    teach(&annotated("list.json", "[1, 2]"), &out, 1, &["list.json"]);
+    teach(&annotated("outside.json", &rectangle("10", "10", "900", "50")), &out, 1, &["outside.json", "900"]);
+    teach(&annotated("zero.json", &rectangle("10", "10", "10", "50")), &out, 1, &["zero.json"]);
+    teach(&annotated("nan.json", &rectangle("NaN", "10", "10", "50")), &out, 1, &["nan.json"]);
+    teach(&annotated("no_grasp.json", &rectangle("10", "10", "90", "50")), &out, 1, &["grasp_start"]);
+    let other = r#"{"imageWidth": 320, "imageHeight": 240, "shapes": []}"#;
+    teach(&annotated("other.json", other), &out, 1, &["other.json", "320", "640"]);
+}
+
+#[test]
+fn what_is_no_model_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = shipped("image.png");
+    let image = image.to_str().unwrap();
+    let fake = folder.path().join("fake.sdg");
+    fs::write(&fake, b"").unwrap();
+    assert_refused(&["detect", "--grasp-model", fake.to_str().unwrap(), image], 1, &["fake.sdg", "an empty file"]);
+    assert_refused(&["detect", "--grasp-model", image, image], 1, &["expected a grasp model", "a PNG image"]);
+    assert_refused(&["rehearse", "--grasp-model", image, "--object", "teapot"], 1, &["teapot", "pendulum"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_told_before_the_work() {
+    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let missing = Path::new("/nowhere/model.sdg");
+    teach(&demonstration, missing, 1, &["/nowhere", "cannot write"]);
+    assert_refused(&["demo", "--out", "/proc/report"], 1, &["/proc/report"]);
+    let count = ["augment", "--demo", &demonstration, "--count", "1", "--out", "/proc/samples"];
+    assert_refused(&count, 1, &["/proc/samples"]);
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    for arguments in [
+        vec![],
+        vec!["fly"],
+        vec!["teach", "--out", "m.sdg"],
+        vec!["teach", "--demo", "only-an-image.png", "--out", "m.sdg"],
+        vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--model", "Z"],
+        vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--preset", "huge"],
+        vec!["augment", "--demo", &demonstration, "--count", "1", "--out", "x", "--preset", "huge"],
+        vec!["demo", "--attempts", "0"],
+        vec!["demo", "--time-budget", "-3"],
+    ] {
+        assert_eq!(sdg(&arguments).status.code(), Some(2), "{arguments:?}");
+    }
+}
+
+#[test]
+fn augment_writes_pictures_and_their_list() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("samples");
+    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let run = |seed: &str| {
+        let output = sdg(&[
+            "augment", "--demo", &demonstration, "--count", "4", "--seed", seed, "--json", "--out",
+            out.to_str().unwrap(),
+        ]);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        fs::read(out.join("000002.png")).unwrap()
+    };
+    let first = run("3");
+    assert_eq!(first, run("3"));
+    assert_ne!(first, run("4"));
+    let mut names = files_in(&out);
+    names.sort();
+    assert_eq!(names, ["000000.png", "000001.png", "000002.png", "000003.png", "annotations.json"]);
+}

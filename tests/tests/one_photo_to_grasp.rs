@@ -1,0 +1,64 @@
+//! The road from end to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the one
+//! test that says whether the product works.
+#![allow(clippy::unwrap_used)]
+
+use std::ops::ControlFlow;
+
+use sdg_cli::rehearsal::Rehearsal;
+use sdg_cli::shipped;
+use sdg_cli::trial::{Trial, try_views};
+use sdg_grasp::{Device, GraspModel, TeachOptions, Verification, teach};
+use sdg_simulation::objects::ObjectSpec;
+
+/// Seeds of the pictures; neither the demo's nor the attempts'.
+const VIEWS_SEED: u64 = 1000;
+
+#[test]
+fn the_pendulum_is_taught_found_and_grasped() {
+    let object = ObjectSpec::by_name("pendulum").unwrap();
+    let demonstration = shipped::demonstration("pendulum").unwrap();
+    let taught = teach(&[demonstration], &TeachOptions::new(1), &mut |_| ControlFlow::Continue(())).unwrap();
+    let seconds = taught.model.facts().seconds;
+    println!("taught in {seconds:.0} s: {:?}", taught.history.best.validation);
+
+    // What is used from here on is what a file gives back.
+    let bytes = taught.model.to_bytes().unwrap();
+    assert!(bytes.len() < 12_000_000, "{} bytes", bytes.len());
+    let model = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+
+    let tried = |present, count| {
+        try_views(&model, &object, present, count, VIEWS_SEED, Verification::ByShape).unwrap()
+    };
+    let right = tried(true, 100).iter().filter(|trial| trial.is_right()).count();
+    let false_alarms = tried(false, 50).iter().filter(|trial| Trial::is_false_alarm(trial)).count();
+    println!("right on {right} of 100 pictures, {false_alarms} false alarms on 50 without the part");
+    assert!(right >= 95, "right on {right} of 100 unseen pictures");
+    assert_eq!(false_alarms, 0, "false alarms on 50 pictures without the part");
+
+    let rehearsal =
+        Rehearsal { model: &model, object: &object, attempts: 10, seed: 1, verification: Verification::ByShape };
+    let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
+    println!("grasped in {} of 10, failures {:?}", rehearsed.successes(), rehearsed.failures());
+    assert!(rehearsed.successes() >= 9, "{:?}", rehearsed.failures());
+}
+
+/// Losses of the first steps of a teaching, which ends without a model.
+fn first_losses(seed: u64) -> Vec<f64> {
+    const STEPS: usize = 3;
+    let demonstration = shipped::demonstration("rod_end").unwrap();
+    let mut losses = Vec::new();
+    let ended = teach(&[demonstration], &TeachOptions::new(seed), &mut |event| {
+        if let sdg_grasp::Event::Step { record, .. } = event {
+            losses.push(record.losses.total());
+        }
+        if losses.len() == STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(ended.unwrap_err().to_string().contains("no model to keep"));
+    losses
+}
+
+#[test]
+fn the_same_seed_teaches_the_same_bits_and_an_interrupt_leaves_nothing() {
+    assert_eq!(first_losses(5), first_losses(5));
+    assert_ne!(first_losses(5), first_losses(6));
+}
