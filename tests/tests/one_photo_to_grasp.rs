@@ -26,9 +26,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
     assert!(bytes.len() < 12_000_000, "{} bytes", bytes.len());
     let model = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
 
-    let tried = |present, count| {
-        try_views(&model, &object, present, count, VIEWS_SEED, Verification::ByShape).unwrap()
-    };
+    let tried = |present, count| try_views(&model, &object, present, count, VIEWS_SEED, Verification::ByShape).unwrap();
     let right = tried(true, 100).iter().filter(|trial| trial.is_right()).count();
     let false_alarms = tried(false, 50).iter().filter(|trial| Trial::is_false_alarm(trial)).count();
     println!("right on {right} of 100 pictures, {false_alarms} false alarms on 50 without the part");

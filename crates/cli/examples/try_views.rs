@@ -1,5 +1,5 @@
-//! A model on unseen pictures, with and without verification: `try_views MODEL OBJECT WITH WITHOUT SEED [-v]`.
-//! `-v` lists every picture.
+//! A model on unseen pictures, with and without verification: `try_views MODEL OBJECT WITH WITHOUT SEED [DIR]`.
+//! With DIR every picture is listed, and those that went wrong are written there.
 
 use sdg_cli::trial::{Trial, try_views};
 use sdg_grasp::{Device, GraspModel, Verification};
@@ -9,7 +9,7 @@ use sdg_simulation::objects::ObjectSpec;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, model, object, with, without, seed, rest @ ..] = &arguments[..] else {
-        return Err("usage: try_views MODEL OBJECT WITH WITHOUT SEED [-v]".into());
+        return Err("usage: try_views MODEL OBJECT WITH WITHOUT SEED [DIR]".into());
     };
     let model = GraspModel::from_bytes(&std::fs::read(model)?, &Device::flex())?;
     let object = ObjectSpec::by_name(object)?;
@@ -18,8 +18,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             Ok(try_views(&model, &object, present, count.parse()?, seed.parse()?, verification)?)
         };
         let (present, absent) = (tried(true, with)?, tried(false, without)?);
-        if !rest.is_empty() {
+        if let Some(folder) = rest.first() {
             for (i, trial) in present.iter().chain(&absent).enumerate() {
+                if trial.present && !trial.is_right() || trial.is_false_alarm() {
+                    trial.drawn.save(format!("{folder}/{verification:?}_{i:03}.png"))?;
+                }
                 println!(
                     "{i:3} {} score {:.2} network {:.2} agreement {:.2} {:?}",
                     if trial.present { "with   " } else { "without" },

@@ -16,6 +16,10 @@ use sdg_simulation::{
 };
 use serde::Serialize;
 
+/// Height of the camera over the table when the shipped demonstrations were photographed, in metres: at the same height
+/// the part has the same size in the picture.
+const DEMONSTRATION_HEIGHT_M: f64 = 0.58;
+
 /// What to rehearse.
 pub struct Rehearsal<'a> {
     /// The model that looks.
@@ -59,11 +63,7 @@ impl Rehearsed {
         self.attempts
             .iter()
             .filter(|attempt| !attempt.success)
-            .map(|attempt| Failure {
-                attempt: attempt.number,
-                step: attempt.step.name(),
-                why: attempt.why.clone(),
-            })
+            .map(|attempt| Failure { attempt: attempt.number, step: attempt.step.name(), why: attempt.why.clone() })
             .collect()
     }
 
@@ -85,10 +85,9 @@ impl Rehearsal<'_> {
             let mut workcell = Workcell::new(&WorkcellConfig::new(scene))?;
             let mut perception = ModelPerception { rehearsal: self, last: None };
             let record = (!filmed_success).then(RecordConfig::default);
-            let config = AttemptConfig { record, ..AttemptConfig::default() };
-            let mut report = workcell
-                .run_attempt(&mut perception, &config, seed)
-                .with_context(|| format!("attempt {number}"))?;
+            let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
+            let mut report =
+                workcell.run_attempt(&mut perception, &config, seed).with_context(|| format!("attempt {number}"))?;
             if !report.frames.is_empty() {
                 rehearsed.film = std::mem::take(&mut report.frames);
                 filmed_success = report.outcome.is_success();
@@ -165,11 +164,7 @@ impl Perception for ModelPerception<'_> {
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
         let Some(best) = detections.into_iter().next().filter(GraspDetection::is_accepted) else { return Ok(None) };
         let pose = GraspPose::from_planar(&view.camera, &best.grasp, &grasp_plane(object), LARGEST_JAW_WIDTH_M)?;
-        Ok(Some(GraspTarget {
-            base_from_tcp: pose.base_from_tcp,
-            jaw_width_m: pose.jaw_width_m,
-            score: best.score,
-        }))
+        Ok(Some(GraspTarget { base_from_tcp: pose.base_from_tcp, jaw_width_m: pose.jaw_width_m, score: best.score }))
     }
 }
 

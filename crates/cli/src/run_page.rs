@@ -248,9 +248,13 @@ fn attempts(page: &RunPage) -> Section {
 }
 
 fn last_looks(page: &RunPage) -> Section {
-    let figures = page.rehearsed.views.iter().zip(&page.rehearsed.attempts).take(12).map(|(view, attempt)| {
-        Figure::photo(view.clone()).caption(format!("Attempt {}", attempt.number))
-    });
+    let figures = page
+        .rehearsed
+        .views
+        .iter()
+        .zip(&page.rehearsed.attempts)
+        .take(12)
+        .map(|(view, attempt)| Figure::photo(view.clone()).caption(format!("Attempt {}", attempt.number)));
     Section::new("Last looks")
         .lead("What the wrist camera saw before the hand went down.")
         .gallery(GallerySize::Medium, figures.collect())

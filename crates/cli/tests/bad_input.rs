@@ -88,9 +88,7 @@ fn annotations_that_mark_nothing_usable_are_refused() {
     };
     let shapes = |shapes: &str| format!(r#"{{"imageWidth": 640, "imageHeight": 480, "shapes": [{shapes}]}}"#);
     let rectangle = |x1: &str, y1: &str, x2: &str, y2: &str| {
-        shapes(&format!(
-            r#"{{"label": "part", "shape_type": "rectangle", "points": [[{x1}, {y1}], [{x2}, {y2}]]}}"#
-        ))
+        shapes(&format!(r#"{{"label": "part", "shape_type": "rectangle", "points": [[{x1}, {y1}], [{x2}, {y2}]]}}"#))
     };
     teach(&annotated("text.json", "hello"), &out, 1, &["text.json"]);
     teach(&annotated("list.json", "[1, 2]"), &out, 1, &["list.json"]);
@@ -149,7 +147,15 @@ fn augment_writes_pictures_and_their_list() {
     let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
     let run = |seed: &str| {
         let output = sdg(&[
-            "augment", "--demo", &demonstration, "--count", "4", "--seed", seed, "--json", "--out",
+            "augment",
+            "--demo",
+            &demonstration,
+            "--count",
+            "4",
+            "--seed",
+            seed,
+            "--json",
+            "--out",
             out.to_str().unwrap(),
         ]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -27,7 +27,9 @@ pub enum GraspError {
         found: String,
     },
     /// A grasp model file of another version.
-    #[error("expected a grasp model of format version {expected}, found version {found}: it was written by another sdg")]
+    #[error(
+        "expected a grasp model of format version {expected}, found version {found}: it was written by another sdg"
+    )]
     OtherVersion {
         /// The version read here.
         expected: u32,

@@ -38,6 +38,7 @@ mod model_file;
 mod pose;
 mod reading;
 mod safetensors_file;
+mod surface;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;
@@ -49,9 +50,9 @@ pub use facts::{ModelKind, TeachingFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
-pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use sdg_training::{Ending, Event, History, LossValues, StepRecord, Validation, ValidationRecord};
+pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use teach::{Preset, Taught, TeachOptions, teach};
 

@@ -116,7 +116,7 @@ impl GraspModel {
             Verification::Off => candidates.iter().map(|c| self.unverified(c)).collect(),
             Verification::ByShape => {
                 let field = GradientField::new(image);
-                candidates.iter().map(|c| self.verified(c, &field)).collect()
+                candidates.iter().map(|c| self.verified(c, image, &field)).collect()
             }
         };
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -144,12 +144,10 @@ impl GraspModel {
 
     /// Lays the demonstration over the image where the network proposes, both ways round: a network that mistakes one
     /// end of a part for the other is half a turn off, and the demonstration sees which end it is.
-    fn verified(&self, candidate: &Candidate, field: &GradientField) -> GraspDetection {
+    fn verified(&self, candidate: &Candidate, image: &RgbImage, field: &GradientField) -> GraspDetection {
         let demonstration = &self.demonstrations[candidate.demonstration_idx];
-        let (pose, agreement) = reading::verify(demonstration, candidate, field);
+        let (pose, agreement) = reading::verify(demonstration, candidate, image, field);
         let outline = demonstration.outline(&pose);
-        let by_network = self.calibrations.network.apply(candidate.network_score);
-        let by_shape = self.calibrations.agreement.apply(agreement);
         let keypoints = demonstration
             .keypoints()
             .iter()
@@ -157,7 +155,7 @@ impl GraspModel {
             .map(|(taught, (_, score))| (pose.apply(&taught.point()), *score))
             .collect();
         GraspDetection {
-            score: by_network.min(by_shape),
+            score: self.calibrations.agreement.apply(agreement),
             network_score: candidate.network_score,
             agreement: Some(agreement),
             bbox: outline.bounds().clip(field.width() as f64, field.height() as f64),

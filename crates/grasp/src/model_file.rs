@@ -17,8 +17,8 @@ use burn::tensor::Device;
 use image::ImageFormat;
 use safetensors::{Dtype, SafeTensors};
 use sdg_demonstration::{ImageLimits, decode_image};
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::RcnnConfig;
+use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -177,10 +177,10 @@ struct Metadata(HashMap<String, String>);
 
 impl Metadata {
     fn text(&self, key: &str) -> Result<&str> {
-        self.0.get(key).map(String::as_str).ok_or_else(|| GraspError::Damaged {
-            expected: format!("metadata \"{key}\""),
-            found: "none".to_owned(),
-        })
+        self.0
+            .get(key)
+            .map(String::as_str)
+            .ok_or_else(|| GraspError::Damaged { expected: format!("metadata \"{key}\""), found: "none".to_owned() })
     }
 
     fn json<T: DeserializeOwned>(&self, key: &str) -> Result<T> {
@@ -328,14 +328,17 @@ mod tests {
     #[test]
     fn a_parameter_of_another_name_is_an_error_that_names_it() {
         let bytes = untaught().to_bytes().unwrap();
-        let renamed = with_metadata(&bytes, "network.roi_heads.box_head.fc1.weight", "network.roi_heads.box_head.fc9.weight");
+        let renamed =
+            with_metadata(&bytes, "network.roi_heads.box_head.fc1.weight", "network.roi_heads.box_head.fc9.weight");
         let refused = GraspModel::from_bytes(&renamed, &Device::flex()).unwrap_err().to_string();
         assert!(refused.contains("roi_heads.box_head.fc1.weight"), "{refused}");
     }
 
     #[test]
     fn what_is_no_model_is_named() {
-        for (bytes, name) in [(&b""[..], "an empty file"), (b"\x89PNG\r\n", "a PNG image"), (b"{\"a\": 1}", "a text file")] {
+        for (bytes, name) in
+            [(&b""[..], "an empty file"), (b"\x89PNG\r\n", "a PNG image"), (b"{\"a\": 1}", "a text file")]
+        {
             let refused = summarize(bytes).unwrap_err().to_string();
             assert!(refused.contains(name), "{refused}");
         }

@@ -43,9 +43,11 @@ impl GraspPose {
         max_opening_m: f64,
     ) -> Result<Self, GraspError> {
         let on_plane = |pixel: Point2<f64>| {
-            camera
-                .at_height(&pixel, plane.mark_height_m)
-                .ok_or(GraspError::OffPlane { x: pixel.x, y: pixel.y, height_m: plane.mark_height_m })
+            camera.at_height(&pixel, plane.mark_height_m).ok_or(GraspError::OffPlane {
+                x: pixel.x,
+                y: pixel.y,
+                height_m: plane.mark_height_m,
+            })
         };
         let center = on_plane(grasp.center())?;
         // A short step along the line, so that perspective does not bend the direction.

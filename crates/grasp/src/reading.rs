@@ -1,5 +1,6 @@
 //! Model C's own reading of what the network detected: keypoints to grasp, and the check by the demonstration.
 
+use image::RgbImage;
 use nalgebra::Point2;
 use sdg_detection::Detections;
 use sdg_geometry::{Angle, BoundingBox, Keypoint, PlanarGrasp, PlanarSimilarity};
@@ -10,6 +11,8 @@ use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
 const MOST_CANDIDATES: usize = 4;
+/// Share of the surface in the agreement; the edges have the rest.
+const SURFACE_SHARE: f64 = 0.4;
 /// Below this the network itself does not believe it.
 const LEAST_NETWORK_SCORE: f64 = 0.05;
 
@@ -77,6 +80,7 @@ fn nearest_demonstration(
 pub(crate) fn verify(
     demonstration: &TaughtDemonstration,
     candidate: &Candidate,
+    image: &RgbImage,
     field: &GradientField,
 ) -> (PlanarSimilarity, f64) {
     let pose = candidate.image_from_cutout;
@@ -87,15 +91,23 @@ pub(crate) fn verify(
     let mut best = (pose, f64::NEG_INFINITY);
     for start in [rescaled, turned] {
         let refined = demonstration.refine(field, &start);
-        if refined.agreement > best.1 {
-            best = (refined.image_from_demonstration, refined.agreement);
+        let refined_pose = refined.image_from_demonstration;
+        let surface = demonstration.surface_agreement(image, &refined_pose);
+        let agreement = (1.0 - SURFACE_SHARE) * refined.agreement + SURFACE_SHARE * surface;
+        if agreement > best.1 {
+            best = (refined_pose, agreement);
         }
     }
     best
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.
-fn about_grasp(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity, turn: Angle, scale: f64) -> PlanarSimilarity {
+fn about_grasp(
+    demonstration: &TaughtDemonstration,
+    pose: &PlanarSimilarity,
+    turn: Angle,
+    scale: f64,
+) -> PlanarSimilarity {
     let pivot = demonstration.outline(pose).bounds().center();
     PlanarSimilarity::about(pivot, pivot, turn, scale).compose(pose)
 }

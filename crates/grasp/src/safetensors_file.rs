@@ -36,7 +36,10 @@ pub(crate) fn values_from_halves(bytes: &[u8]) -> Vec<f32> {
 }
 
 /// Puts a file together: header length, header, tensors in the order of their names.
-pub(crate) fn write(metadata: &BTreeMap<String, String>, tensors: &BTreeMap<String, (Vec<usize>, TensorBytes)>) -> Vec<u8> {
+pub(crate) fn write(
+    metadata: &BTreeMap<String, String>,
+    tensors: &BTreeMap<String, (Vec<usize>, TensorBytes)>,
+) -> Vec<u8> {
     let mut header = Map::new();
     header.insert("__metadata__".to_owned(), json!(metadata));
     let mut offset = 0;

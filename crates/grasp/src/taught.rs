@@ -7,6 +7,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilari
 use sdg_shape::{GradientField, Refinement, ShapeConfig, ShapeTemplate};
 use serde::{Deserialize, Serialize};
 
+use crate::surface::Surface;
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides.
@@ -35,6 +36,7 @@ pub struct TaughtDemonstration {
     /// The marks on it.
     pub marks: TaughtMarks,
     template: ShapeTemplate,
+    surface: Surface,
 }
 
 impl TaughtDemonstration {
@@ -82,7 +84,8 @@ impl TaughtDemonstration {
     pub fn from_parts(cutout: RgbImage, marks: TaughtMarks) -> Result<Self, GraspError> {
         let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
         let template = ShapeTemplate::new(&cutout, &outline, &ShapeConfig::default())?;
-        Ok(Self { cutout, marks, template })
+        let surface = Surface::new(&cutout, &outline);
+        Ok(Self { cutout, marks, template, surface })
     }
 
     /// The twelve keypoints, in pixels of the cut-out.
@@ -104,9 +107,14 @@ impl TaughtDemonstration {
         }
     }
 
-    /// Lays the cut-out over an image near `initial` and lets it climb to where it agrees best.
+    /// Lays the cut-out over an image near `initial` and lets it climb to where its edges agree best.
     pub fn refine(&self, field: &GradientField, initial: &PlanarSimilarity) -> Refinement {
         self.template.refine(field, initial)
+    }
+
+    /// How much the part's surface looks like the image there, in `[0, 1]`; see [`Surface`].
+    pub fn surface_agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
+        self.surface.agreement(image, image_from_cutout)
     }
 }
 

@@ -12,7 +12,7 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use burn::tensor::Device;
-use sdg_demonstration::{Augmenter, AugmentationConfig, Demonstration, Sample};
+use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration, Sample};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, presets};
 use sdg_geometry::PlanarGrasp;
 use sdg_shape::GradientField;
@@ -144,8 +144,7 @@ pub fn teach(
     let samples = Augmenter::new(demonstrations, at_input_size, options.seed)?;
     // Held back at the photo's own size, so that verification is calibrated on what it will see.
     let held_back = Augmenter::new(demonstrations, AugmentationConfig::default(), options.seed)?;
-    let held_back: Vec<Sample> =
-        (0..training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
+    let held_back: Vec<Sample> = (0..training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
 
     let mut model = GraspModel {
         kind: options.kind,
@@ -233,7 +232,7 @@ impl GraspModel {
             let mut network_best = [0.0f64; 2];
             for candidate in reading::candidates(&detections, &self.demonstrations) {
                 let demonstration = &self.demonstrations[candidate.demonstration_idx];
-                let (pose, agreement) = reading::verify(demonstration, &candidate, &field);
+                let (pose, agreement) = reading::verify(demonstration, &candidate, &sample.image, &field);
                 let right = sample.objects.first().is_some_and(|object| {
                     let scale = 1.0 / object.image_from_demonstration.scale;
                     let outcome = Outcome::found(&demonstration.grasp(&pose), &truth(object), 1.0, scale);
@@ -255,10 +254,7 @@ impl GraspModel {
             }
         }
         self.calibrations = scores.calibrations();
-        Ok((
-            median(&mut errors_px).unwrap_or(f64::INFINITY),
-            median(&mut errors_degrees).unwrap_or(f64::INFINITY),
-        ))
+        Ok((median(&mut errors_px).unwrap_or(f64::INFINITY), median(&mut errors_degrees).unwrap_or(f64::INFINITY)))
     }
 }
 
@@ -272,8 +268,6 @@ struct Scores {
 }
 
 impl Scores {
-    /// What `--no-verify` has to decide by is also what verification must not lose by: with the demonstration to
-    /// dispose, the network need not be sure.
     fn network(&mut self, right: bool) -> &mut Vec<f64> {
         &mut self.network[usize::from(right)]
     }

@@ -20,9 +20,7 @@ impl Pace {
     /// Progress before `step`, `elapsed_secs` after the start.
     pub fn progress(&self, step: usize, elapsed_secs: f64) -> f64 {
         let by_steps = match self.cool_down {
-            Some((from, reached, length)) => {
-                reached + (1.0 - reached) * (step - from) as f64 / length.max(1) as f64
-            }
+            Some((from, reached, length)) => reached + (1.0 - reached) * (step - from) as f64 / length.max(1) as f64,
             None => step as f64 / self.steps as f64,
         };
         let by_time = self.budget_secs.map_or(0.0, |budget| elapsed_secs / budget);

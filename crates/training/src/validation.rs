@@ -3,8 +3,8 @@
 //! A pixel error says little when the training image is half the photo's size, so errors are given in pixels **of the
 //! demonstration**: there, millimetres a pixel are a constant of the camera's height.
 
-use serde::{Deserialize, Serialize};
 use sdg_geometry::{Angle, PlanarGrasp};
+use serde::{Deserialize, Serialize};
 
 /// A detection farther from the truth than this is not the part, in demonstration pixels: 10 mm at the paper's camera
 /// height of 0.6 m and 550 px focal length.
@@ -133,10 +133,13 @@ mod tests {
 
     #[test]
     fn counts_hits_misses_and_false_alarms() {
-        let outcomes =
-            [found(1.0, 2.0), found(3.0, 179.0), Outcome::Missed, Outcome::Absent { score: 0.6 }, Outcome::Absent {
-                score: 0.4,
-            }];
+        let outcomes = [
+            found(1.0, 2.0),
+            found(3.0, 179.0),
+            Outcome::Missed,
+            Outcome::Absent { score: 0.6 },
+            Outcome::Absent { score: 0.4 },
+        ];
         let validation = Validation::from_outcomes(&outcomes);
         assert_eq!((validation.positives, validation.hits), (3, 1));
         assert_eq!((validation.negatives, validation.false_alarms), (2, 1));
