@@ -124,10 +124,10 @@ impl Sighting {
             if self.num_crests < MAX_CRESTS {
                 self.crests[self.num_crests] = crest;
                 self.num_crests += 1;
-            } else if let Some(furthest) = self.crests.iter_mut().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())) {
-                if distance.abs() < furthest.0.abs() {
-                    *furthest = crest;
-                }
+            } else if let Some(furthest) = self.crests.iter_mut().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+                && distance.abs() < furthest.0.abs()
+            {
+                *furthest = crest;
             }
         }
     }
