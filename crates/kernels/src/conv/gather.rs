@@ -307,7 +307,7 @@ impl GatherConv<'_> {
                     let len = len.min(columns.end - column);
                     let run = &row[column - columns.start..][..len];
                     // SAFETY: a unit alone writes its grid positions of its filters.
-                    unsafe { output.write(at, step_x, run) };
+                    unsafe { output.write(at, if dense { 1 } else { step_x }, run) };
                     column += len;
                 }
             }
