@@ -1,7 +1,7 @@
 //! The demonstrations under datasets/, compiled in, so that `sdg demo` runs from any folder.
 
 use anyhow::{Context, Result, bail};
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts, ImageLimits, decode_image};
+use sdg_demonstration::Demonstration;
 
 macro_rules! shipped {
     ($($name:literal),*) => {
@@ -22,13 +22,8 @@ pub fn demonstration(object: &str) -> Result<Demonstration> {
         let known: Vec<&str> = SHIPPED.iter().map(|(name, ..)| *name).collect();
         bail!("expected an object out of {}, found \"{object}\"", known.join(", "));
     };
-    let image = decode_image(photo, &ImageLimits::default())?;
-    let facts = ImageFacts { width: image.width(), height: image.height(), file_name: Some("image.png") };
-    let annotation = Annotation::read(annotation, &facts)?
-        .into_iter()
-        .next()
-        .with_context(|| format!("the shipped annotation of {name} marks nothing"))?;
-    Ok(Demonstration { image, annotation })
+    Demonstration::decode(photo, annotation, Some("image.png"))
+        .with_context(|| format!("the shipped demonstration of {name}"))
 }
 
 #[cfg(test)]

@@ -50,14 +50,9 @@ pub use facts::{ModelKind, TeachingFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
+pub use sdg_demonstration::NUM_KEYPOINTS;
 #[cfg(feature = "teach")]
 pub use sdg_training::{Ending, Event, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use teach::{Preset, Taught, TeachOptions, teach};
-
-/// Keypoints on the grasp line: the two marked points and ten between them.
-///
-/// # Source
-/// OpenDR single_demo_grasp.
-pub const NUM_KEYPOINTS: usize = 12;

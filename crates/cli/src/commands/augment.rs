@@ -5,7 +5,6 @@ use std::io::Cursor;
 use anyhow::Result;
 use image::ImageFormat;
 use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter, CocoFile};
-use sdg_geometry::GraspLine;
 use sdg_report::write_atomically;
 use serde_json::json;
 
@@ -40,19 +39,8 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         sample.image.write_to(&mut png, ImageFormat::Png)?;
         write_atomically(&args.out.join(&name), &png.into_inner())?;
 
-        let objects: Vec<Annotation> = sample
-            .objects
-            .iter()
-            .map(|object| {
-                let ends = object.keypoints.first().zip(object.keypoints.last());
-                Annotation {
-                    label: label.clone(),
-                    bbox: object.bbox,
-                    grasp: ends.map(|(start, end)| GraspLine::new(start.point(), end.point())),
-                    outline: object.outline.clone(),
-                }
-            })
-            .collect();
+        let objects: Vec<Annotation> =
+            sample.objects.iter().map(|object| object.annotation(&label, &sample.image)).collect();
         with_part += usize::from(!objects.is_empty());
         coco.push_image(&name, sample.image.width(), sample.image.height(), &objects);
     }
