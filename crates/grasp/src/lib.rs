@@ -38,7 +38,6 @@ mod model_file;
 mod pose;
 mod reading;
 mod safetensors_file;
-mod surface;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;

@@ -4,15 +4,13 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_detection::Detections;
 use sdg_geometry::{Angle, BoundingBox, Keypoint, PlanarGrasp, PlanarSimilarity};
-use sdg_shape::GradientField;
+use sdg_shape::{GradientField, SURFACE_SHARE};
 
 use crate::model::pose_from_keypoints;
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
 const MOST_CANDIDATES: usize = 4;
-/// Share of the surface in the agreement; the edges have the rest.
-const SURFACE_SHARE: f64 = 0.4;
 /// Below this the network itself does not believe it.
 const LEAST_NETWORK_SCORE: f64 = 0.05;
 

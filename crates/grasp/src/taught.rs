@@ -4,10 +4,9 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, Refinement, ShapeConfig, ShapeTemplate};
+use sdg_shape::{GradientField, Refinement, ShapeConfig, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
 
-use crate::surface::Surface;
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides.

@@ -12,6 +12,7 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
+//! [`Surface`] is a second witness: the colours inside the outline.
 //!
 //! What this crate leaves out: it proposes no poses (detectors do), knows no grasp and no camera, and a
 //! part lies flat: poses are turns, shifts and scales in the image plane.
@@ -51,9 +52,11 @@ mod error;
 mod gradient_field;
 mod pose;
 mod refinement;
+mod surface;
 mod template;
 
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
 pub use refinement::Refinement;
+pub use surface::{SURFACE_SHARE, Surface};
 pub use template::{ScaleRange, ShapeConfig, ShapeTemplate};
