@@ -1,0 +1,280 @@
+//! From a checkpoint's tensors to the network's parameters: what goes where, and a report of every name.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::architecture::{Architecture, Background};
+use crate::checkpoint::Checkpoint;
+use crate::error::{Result, WeightsError, printable};
+use crate::naming::{Naming, Renamed};
+use crate::report::{Applied, Mismatch, Report};
+use crate::source::Source;
+use crate::tensor::StoredTensor;
+
+/// Box deltas of a class.
+const DELTAS: usize = 4;
+
+/// Where a parameter's values come from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Origin {
+    /// A tensor, as it is.
+    Tensor(StoredTensor),
+    /// Rows of a tensor in another order; `None` for a row of zeros.
+    Rows(StoredTensor, Vec<Option<usize>>),
+    /// A tensor that the file leaves out because all its values are this one.
+    Constant(f32),
+}
+
+/// A parameter to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Planned {
+    pub shape: Vec<usize>,
+    pub origin: Origin,
+}
+
+/// What will be written, and what became of every name.
+#[derive(Debug)]
+pub struct Conversion {
+    pub(crate) parameters: BTreeMap<String, Planned>,
+    report: Report,
+}
+
+impl Conversion {
+    /// Finds a tensor for every parameter of the network, outside the parts that are to stay as initialised.
+    ///
+    /// A part is named by the start of its parameters' names, such as `roi_heads.box_predictor`. The result may be
+    /// incomplete: see [`Self::complete`].
+    ///
+    /// # Errors
+    /// Names of no known scheme; a backbone alone where the target is a detector is none: only its part is filled.
+    pub fn plan(checkpoint: &Checkpoint, target: &Architecture, reinitialized: &[String]) -> Result<Self> {
+        let naming = naming_of(checkpoint)?;
+        let mut expected = target.parameters();
+        if naming.is_backbone_alone() {
+            expected.retain(|name, _| name.starts_with("backbone.bottom_up."));
+        }
+        let mut report = Report::new(checkpoint.format, naming);
+        let is_reinitialized = |name: &str| reinitialized.iter().any(|part| is_part_of(name, part));
+        let mut parameters = BTreeMap::new();
+        let mut taken = BTreeSet::new();
+        report.not_needed.extend(checkpoint.not_tensors.iter().map(|name| printable(name)));
+        for (their_name, tensor) in &checkpoint.tensors {
+            let name = match naming.rename(strip_wrapper(their_name)) {
+                Renamed::To(name) => name,
+                Renamed::NotNeeded => {
+                    report.not_needed.push(printable(their_name));
+                    continue;
+                }
+                Renamed::Unknown => {
+                    report.unused.push(printable(their_name));
+                    continue;
+                }
+            };
+            let Some(shape) = expected.get(&name).filter(|_| !taken.contains(&name)) else {
+                report.unused.push(printable(their_name));
+                continue;
+            };
+            taken.insert(name.clone());
+            if is_reinitialized(&name) {
+                report.reinitialized.push(name);
+                continue;
+            }
+            let origin = arrange(&name, tensor, shape, naming, target);
+            match origin.filter(|_| tensor.element().is_float()) {
+                Some(origin) => {
+                    report.applied.push(Applied {
+                        name: name.clone(),
+                        shape: shape.clone(),
+                        from: printable(their_name),
+                        rows_moved: matches!(origin, Origin::Rows(..)),
+                    });
+                    parameters.insert(name, Planned { shape: shape.clone(), origin });
+                }
+                None => report.mismatched.push(Mismatch {
+                    name,
+                    expected: shape.clone(),
+                    found: tensor.shape().to_vec(),
+                    element: tensor.element().name(),
+                }),
+            }
+        }
+        for (name, shape) in expected {
+            if taken.contains(&name) {
+                continue;
+            }
+            if is_reinitialized(&name) {
+                report.reinitialized.push(name);
+            } else if let Some(value) = stands_for_missing(naming, &name) {
+                report.filled.push((name.clone(), value));
+                parameters.insert(name, Planned { shape, origin: Origin::Constant(value) });
+            } else {
+                report.missing.push(name);
+            }
+        }
+        report.reinitialized.sort();
+        Ok(Self { parameters, report })
+    }
+
+    /// What became of every name.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Makes sure that nothing is missing and every shape fits.
+    ///
+    /// # Errors
+    /// [`WeightsError::Incomplete`] otherwise; [`Self::report`] lists what is wrong.
+    pub fn complete(&self) -> Result<()> {
+        let Report { missing, mismatched, .. } = &self.report;
+        let first = match (mismatched.first(), missing.first()) {
+            (Some(mismatch), _) => mismatch.to_string(),
+            (None, Some(name)) => name.clone(),
+            (None, None) => return Ok(()),
+        };
+        Err(WeightsError::Incomplete { missing: missing.len(), mismatched: mismatched.len(), first })
+    }
+
+    /// Number of values that will be written.
+    pub fn num_parameters(&self) -> usize {
+        self.parameters.values().map(|planned| planned.shape.iter().product::<usize>()).sum()
+    }
+}
+
+/// The checkpoint's naming scheme.
+///
+/// # Errors
+/// Names of no known scheme.
+pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
+    let names = checkpoint.tensors.keys().map(|name| strip_wrapper(name));
+    Naming::detect(names).ok_or_else(|| WeightsError::UnknownNames {
+        count: checkpoint.tensors.len(),
+        examples: checkpoint.tensors.keys().take(3).map(|name| printable(name)).collect(),
+    })
+}
+
+/// Our name for a tensor, if it has one.
+pub(crate) fn our_name(naming: Naming, name: &str) -> Option<String> {
+    match naming.rename(strip_wrapper(name)) {
+        Renamed::To(ours) => Some(ours),
+        Renamed::NotNeeded | Renamed::Unknown => None,
+    }
+}
+
+/// torch's parallel training puts `module.` in front of every name.
+fn strip_wrapper(name: &str) -> &str {
+    name.strip_prefix("module.").unwrap_or(name)
+}
+
+/// Whether a parameter belongs to a part: `roi_heads.box` is no part of `roi_heads.box_head.fc1.weight`.
+fn is_part_of(name: &str, part: &str) -> bool {
+    let part = part.trim_end_matches('.');
+    name.strip_prefix(part).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+/// Caffe2's norms have been folded into scale and shift: their mean is 0 and their variance 1, as Detectron2 reads it.
+fn stands_for_missing(naming: Naming, name: &str) -> Option<f32> {
+    let folded = naming == Naming::Caffe2Resnet;
+    match name.rsplit_once('.')?.1 {
+        "running_mean" if folded => Some(0.0),
+        "running_var" if folded => Some(1.0),
+        _ => None,
+    }
+}
+
+/// Rows that carry classes go where the target has the class; everything else must have the right shape.
+fn arrange(
+    name: &str,
+    tensor: &StoredTensor,
+    shape: &[usize],
+    naming: Naming,
+    target: &Architecture,
+) -> Option<Origin> {
+    let from = if naming.background_is_first() { Background::First } else { Background::Last };
+    let to = target.heads.as_ref().map(|heads| heads.background).filter(|_| naming != Naming::Ours).unwrap_or(from);
+    let class_rows = from != to;
+    let (rows, num_rows) = (*tensor.shape().first()?, *shape.first()?);
+    if tensor.shape()[1..] != shape[1..] {
+        return None;
+    }
+    let layer = name.strip_prefix("roi_heads.").and_then(|layer| layer.rsplit_once('.')).map(|(layer, _)| layer);
+    // The number of rows is checked first: the file says it, and the list of rows takes memory.
+    let moved = match layer.filter(|_| class_rows) {
+        Some("box_predictor.cls_score") if rows == num_rows => move_background(rows, to),
+        // One set of deltas for all classes knows no background.
+        Some("box_predictor.bbox_pred") if target.heads.as_ref()?.class_specific_boxes => {
+            drop_or_add_background(rows, num_rows, DELTAS, to)?
+        }
+        Some("mask_head.predictor") => drop_or_add_background(rows, num_rows, 1, to)?,
+        _ if rows == num_rows => return Some(Origin::Tensor(tensor.clone())),
+        _ => return None,
+    };
+    Some(Origin::Rows(tensor.clone(), moved))
+}
+
+/// All classes, the background moved from one end to the other.
+fn move_background(rows: usize, to: Background) -> Vec<Option<usize>> {
+    match to {
+        Background::Last => (1..rows).chain([0]).map(Some).collect(),
+        Background::First => (rows - 1..rows).chain(0..rows - 1).map(Some).collect(),
+    }
+}
+
+/// The background's own rows stand in front; nothing reads them, so zeros will do.
+fn drop_or_add_background(
+    rows: usize,
+    num_rows: usize,
+    rows_a_class: usize,
+    to: Background,
+) -> Option<Vec<Option<usize>>> {
+    match to {
+        Background::Last if rows.checked_sub(rows_a_class) == Some(num_rows) => {
+            Some((rows_a_class..rows).map(Some).collect())
+        }
+        Background::First if num_rows.checked_sub(rows_a_class) == Some(rows) => {
+            Some(std::iter::repeat_n(None, rows_a_class).chain((0..rows).map(Some)).collect())
+        }
+        _ => None,
+    }
+}
+
+impl Planned {
+    /// Hands the values over in order, some at a time.
+    pub(crate) fn stream(&self, source: &mut Source, mut take: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
+        match &self.origin {
+            Origin::Tensor(tensor) => tensor.stream(source, take),
+            Origin::Rows(tensor, rows) => {
+                let values = tensor.values(source)?;
+                let width: usize = self.shape[1..].iter().product();
+                let zeros = vec![0.0; width];
+                rows.iter().try_for_each(|row| match row {
+                    Some(row) => take(&values[row * width..][..width]),
+                    None => take(&zeros),
+                })
+            }
+            Origin::Constant(value) => take(&vec![*value; self.shape.iter().product()]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_background_moves_to_the_other_end() {
+        let numbers =
+            |rows: Vec<Option<usize>>| rows.into_iter().map(|row| row.map_or(-1, |r| r as i64)).collect::<Vec<_>>();
+        assert_eq!(numbers(move_background(3, Background::Last)), [1, 2, 0]);
+        assert_eq!(numbers(move_background(3, Background::First)), [2, 0, 1]);
+        assert_eq!(numbers(drop_or_add_background(8, 4, 4, Background::Last).unwrap()), [4, 5, 6, 7]);
+        let added = drop_or_add_background(4, 8, 4, Background::First).unwrap();
+        assert_eq!(numbers(added), [-1, -1, -1, -1, 0, 1, 2, 3]);
+        assert!(drop_or_add_background(3, 4, 4, Background::Last).is_none());
+    }
+
+    #[test]
+    fn parts_end_at_dots() {
+        assert!(is_part_of("roi_heads.box_predictor.cls_score.weight", "roi_heads.box_predictor"));
+        assert!(is_part_of("roi_heads.box_predictor.cls_score.weight", "roi_heads.box_predictor."));
+        assert!(!is_part_of("roi_heads.box_predictor.cls_score.weight", "roi_heads.box"));
+    }
+}

@@ -1,0 +1,130 @@
+//! What can be wrong with a checkpoint.
+
+use std::io;
+
+/// Why a checkpoint could not be read or converted. Each message says what was expected and found.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WeightsError {
+    /// The file system refused something.
+    #[error("cannot {action}: {source}")]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Bytes of no format that is read here.
+    #[error("expected a pickled checkpoint (protocol 2 to 5), a torch checkpoint or a safetensors file, found {found}")]
+    NotACheckpoint {
+        /// What the bytes are, as far as can be told.
+        found: String,
+    },
+    /// A pickle that asks for a function or class which weights do not need.
+    #[error(
+        "refused: the pickle asks for {name} (byte {offset}); weights need only numpy arrays, torch tensors and dicts"
+    )]
+    ForbiddenGlobal {
+        /// Module and name, as the file spells them.
+        name: String,
+        /// Where in the file.
+        offset: u64,
+    },
+    /// A file that was cut short, altered, or written by something unknown.
+    #[error("{part}: expected {expected}, found {found}")]
+    Damaged {
+        /// The part of the file.
+        part: String,
+        /// What ought to be there.
+        expected: String,
+        /// What is.
+        found: String,
+    },
+    /// A file that asks for more than any checkpoint needs.
+    #[error("{what}: expected at most {most}, found {found}")]
+    TooLarge {
+        /// What there is too much of.
+        what: String,
+        /// The bound.
+        most: u64,
+        /// What was asked for.
+        found: u64,
+    },
+    /// Names of no naming scheme that is known here.
+    #[error(
+        "expected names as Detectron2, torchvision or Caffe2 write them, found {count} tensors such as {}",
+        .examples.join(", ")
+    )]
+    UnknownNames {
+        /// Number of tensors.
+        count: usize,
+        /// A few of them.
+        examples: Vec<String>,
+    },
+    /// An architecture that the names do not tell.
+    #[error("{part}: expected {expected}, found {found}")]
+    Architecture {
+        /// The part of the network.
+        part: &'static str,
+        /// What it may be.
+        expected: String,
+        /// What it is.
+        found: String,
+    },
+    /// The checkpoint does not fill the network.
+    #[error(
+        "{missing} parameters missing, {mismatched} of another shape (first: {first}); \
+         to leave a part as initialised, name it: --reinit roi_heads.box_predictor"
+    )]
+    Incomplete {
+        /// Parameters without a tensor.
+        missing: usize,
+        /// Parameters whose tensor has another shape.
+        mismatched: usize,
+        /// One of them.
+        first: String,
+    },
+    /// A value that weights cannot have.
+    #[error("{name}: expected finite values{limit}, found {found}")]
+    Value {
+        /// The parameter.
+        name: String,
+        /// " up to 65504" where half precision is asked for.
+        limit: &'static str,
+        /// The value.
+        found: f32,
+    },
+}
+
+impl WeightsError {
+    pub(crate) fn io(action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { action, source }
+    }
+
+    pub(crate) fn damaged(part: impl Into<String>, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self::Damaged { part: part.into(), expected: expected.into(), found: found.into() }
+    }
+}
+
+/// Result of the fallible functions of this crate.
+pub type Result<T> = std::result::Result<T, WeightsError>;
+
+/// A name from a file, fit for one line: control characters escaped, cut at 120 characters.
+pub(crate) fn printable(name: &str) -> String {
+    let mut line: String = name.chars().take(120).flat_map(char::escape_debug).collect();
+    if name.chars().nth(120).is_some() {
+        line.push('…');
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_stay_on_one_line() {
+        assert_eq!(printable("a\nb\u{1b}[2J"), "a\\nb\\u{1b}[2J");
+        assert_eq!(printable(&"x".repeat(500)).chars().count(), 121);
+    }
+}

@@ -1,0 +1,62 @@
+//! Weights from elsewhere: Detectron2's and torchvision's checkpoints become this project's files.
+//!
+//! ```text
+//! file ─ format told by content ─┬─ pickle of numpy arrays ─┐
+//!                                ├─ torch zip, legacy ──────┼─ Checkpoint: name → shape, place in the file
+//!                                └─ safetensors ────────────┘
+//! Checkpoint + Architecture ─ naming scheme ─ Conversion: what goes where, and a Report ─ write ─ safetensors
+//! ```
+//!
+//! Values stay in the file until they are written, so a conversion needs the memory of one layer. Checkpoints are
+//! programs for Python's pickle machine and come from strangers: this crate imitates the few functions that weights
+//! need, refuses every other by name, and checks every size before it takes memory.
+//!
+//! Left out: running the network (`sdg weights verify` does), downloads, torch's pre-2017 tar files, compressed zips.
+//!
+//! # Example
+//! ```
+//! use sdg_weights_conversion::{Checkpoint, FileFormat, Source};
+//!
+//! # fn main() -> Result<(), sdg_weights_conversion::WeightsError> {
+//! // A safetensors file by hand: one weight.
+//! let header = br#"{"w":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}"#;
+//! let bytes = [&(header.len() as u64).to_le_bytes(), header.as_slice(), &0.5f32.to_le_bytes()].concat();
+//! let mut source = Source::from_bytes(bytes);
+//! let checkpoint = Checkpoint::read(&mut source)?;
+//! assert_eq!(checkpoint.format, FileFormat::Safetensors);
+//! assert_eq!(checkpoint.tensors["w"].values(&mut source)?, [0.5]);
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod architecture;
+mod checkpoint;
+mod conversion;
+mod digest;
+mod element;
+mod error;
+mod naming;
+mod pickle;
+mod report;
+mod safetensors_file;
+mod self_description;
+mod source;
+mod tensor;
+mod torch;
+mod writing;
+mod zip_archive;
+
+pub use architecture::Architecture;
+pub use checkpoint::{Checkpoint, FileFormat};
+pub use conversion::{Conversion, naming_of};
+pub use digest::sha256_of;
+pub use element::ElementType;
+pub use error::{Result, WeightsError};
+pub use naming::Naming;
+pub use report::{Applied, Mismatch, Report};
+pub use self_description::SecondStage;
+pub use source::Source;
+pub use tensor::StoredTensor;
+pub use writing::{Precision, WEIGHTS_VERSION, Written};

@@ -1,0 +1,259 @@
+//! Writing this project's safetensors: streamed, under a temporary name, there whole or not at all.
+//!
+//! ```text
+//! metadata   weights_version, source_file, source_sha256, source_format, source_names, licence_note, …
+//! tensors    matrices and kernels f32 or f16; vectors (biases, norms) always f32
+//! ```
+//!
+//! Vectors stay in full precision because they are a thousandth of the file, and a stored variance may lie outside
+//! of half precision's range.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use crate::checkpoint::Checkpoint;
+use crate::conversion::{Conversion, Planned};
+use crate::digest::sha256_of;
+use crate::error::{Result, WeightsError, printable};
+use crate::naming::Naming;
+use crate::source::Source;
+
+/// The version of the metadata written here.
+pub const WEIGHTS_VERSION: &str = "1";
+
+/// Names within one process must differ, however many threads write at once.
+static NEXT_TEMPORARY: AtomicU64 = AtomicU64::new(0);
+
+/// Element type of matrices and kernels in the written file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Precision {
+    /// As exact as the source.
+    F32,
+    /// Half as large.
+    F16,
+}
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Written {
+    /// Size of the new file.
+    pub bytes: u64,
+    /// SHA-256 of the checkpoint that it was made from.
+    pub source_sha256: String,
+}
+
+/// What is known of the licence, by who named the tensors; the file itself says nothing.
+fn licence_note(naming: Naming) -> &'static str {
+    match naming {
+        Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => {
+            "weights of Detectron2's model zoo are CC BY-SA 3.0; weights from elsewhere have their own licence"
+        }
+        Naming::Torchvision | Naming::TorchvisionResnet => {
+            "torchvision's code is BSD-3-Clause; its weights may carry the terms of their training data"
+        }
+        Naming::Ours => "as the file that this one was converted from",
+    }
+}
+
+impl Conversion {
+    /// Writes the parameters to `out`; `extra` joins the metadata. The input is hashed meanwhile.
+    ///
+    /// # Errors
+    /// Where [`Self::complete`] finds one; values that are not finite, or too large for the precision; a checkpoint
+    /// that ends early; a folder that cannot be written. Whatever stood at `out` before is then unchanged.
+    pub fn write(
+        &self,
+        checkpoint: &Checkpoint,
+        source: &mut Source,
+        paths: [&Path; 2],
+        precision: Precision,
+        extra: &BTreeMap<String, String>,
+    ) -> Result<Written> {
+        self.complete()?;
+        let [from, out] = paths;
+        let out = &writable(out)?;
+        thread::scope(|scope| {
+            let hashing = scope.spawn(|| sha256_of(from));
+            // The header comes first in the file and holds the hash, which comes last: its place is kept.
+            let temporary = TemporaryFile::beside(out);
+            let file = BufWriter::with_capacity(1 << 20, temporary.open()?);
+            let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
+            let header = self.header(&metadata(&"0".repeat(64)), precision);
+            let mut file = self.write_body(source, file, &header, precision)?;
+            let sha256 = match hashing.join() {
+                Ok(sha256) => sha256?,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            let header = self.header(&metadata(&sha256), precision);
+            write_at_start(&mut file, &header)?;
+            let bytes = file.metadata().map_err(WeightsError::io("ask for the new file's size"))?.len();
+            file.sync_all().map_err(WeightsError::io("flush the new file to the disk"))?;
+            drop(file);
+            temporary.rename_to(out)?;
+            Ok(Written { bytes, source_sha256: sha256 })
+        })
+    }
+
+    fn metadata(
+        &self,
+        checkpoint: &Checkpoint,
+        from: &Path,
+        sha256: &str,
+        extra: &BTreeMap<String, String>,
+    ) -> BTreeMap<String, String> {
+        let report = self.report();
+        let mut metadata = extra.clone();
+        let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
+        put("weights_version", WEIGHTS_VERSION.to_owned());
+        put("source_file", printable(&from.file_name().unwrap_or_default().to_string_lossy()));
+        put("source_sha256", sha256.to_owned());
+        put("source_format", checkpoint.format.to_string());
+        put("source_names", report.naming.to_string());
+        put("licence_note", licence_note(report.naming).to_owned());
+        if let Some(author) = &checkpoint.author {
+            put("source_author", author.clone());
+        }
+        if !report.reinitialized.is_empty() {
+            put("reinitialized", report.reinitialized.join(" "));
+        }
+        metadata
+    }
+
+    /// Parameters in the order of the file: the format wants wider elements in front, so that all are aligned.
+    fn in_file_order(&self, precision: Precision) -> impl Iterator<Item = (&String, &Planned, Precision)> {
+        let all = move |wanted| {
+            self.parameters.iter().filter_map(move |(name, planned)| {
+                let stored = if planned.shape.len() < 2 { Precision::F32 } else { precision };
+                (stored == wanted).then_some((name, planned, stored))
+            })
+        };
+        all(Precision::F32).chain(all(Precision::F16))
+    }
+
+    /// Length, JSON, and spaces up to a multiple of eight.
+    fn header(&self, metadata: &BTreeMap<String, String>, precision: Precision) -> Vec<u8> {
+        let mut entries = Map::new();
+        entries.insert("__metadata__".to_owned(), json!(metadata));
+        let mut offset = 0;
+        for (name, planned, stored) in self.in_file_order(precision) {
+            let (dtype, size) = match stored {
+                Precision::F32 => ("F32", 4),
+                Precision::F16 => ("F16", 2),
+            };
+            let end = offset + planned.shape.iter().product::<usize>() * size;
+            let entry = json!({"dtype": dtype, "shape": planned.shape, "data_offsets": [offset, end]});
+            entries.insert(name.clone(), entry);
+            offset = end;
+        }
+        let mut json = Value::Object(entries).to_string().into_bytes();
+        json.resize(json.len().next_multiple_of(8), b' ');
+        [(json.len() as u64).to_le_bytes().as_slice(), &json].concat()
+    }
+
+    fn write_body(
+        &self,
+        source: &mut Source,
+        mut file: BufWriter<File>,
+        header: &[u8],
+        precision: Precision,
+    ) -> Result<File> {
+        file.write_all(header).map_err(WeightsError::io("write the new file"))?;
+        let mut bytes = Vec::new();
+        let mut halves: Vec<f16> = Vec::new();
+        for (name, planned, stored) in self.in_file_order(precision) {
+            planned.stream(source, |values| {
+                check_values(name, values, stored)?;
+                bytes.clear();
+                match stored {
+                    Precision::F32 => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
+                    Precision::F16 => {
+                        halves.resize(values.len(), f16::ZERO);
+                        halves.convert_from_f32_slice(values);
+                        bytes.extend(halves.iter().flat_map(|value| value.to_le_bytes()));
+                    }
+                }
+                file.write_all(&bytes).map_err(WeightsError::io("write the new file"))
+            })?;
+        }
+        file.into_inner().map_err(|error| WeightsError::io("write the new file")(error.into_error()))
+    }
+}
+
+fn check_values(name: &str, values: &[f32], stored: Precision) -> Result<()> {
+    // 65504 is half precision's largest number; from 65520 on, numbers round to infinity.
+    let (most, limit) = match stored {
+        Precision::F32 => (f32::MAX, ""),
+        Precision::F16 => (65519.0, " up to 65504, for half precision"),
+    };
+    // False for NaN too. No early end inside a piece: this way the loop is vectorised.
+    let all_fit = values.iter().fold(true, |fit, value| fit & (value.abs() <= most));
+    if all_fit {
+        return Ok(());
+    }
+    let found = values.iter().copied().find(|value| value.is_nan() || value.abs() > most).unwrap_or(f32::NAN);
+    Err(WeightsError::Value { name: printable(name), limit, found })
+}
+
+/// The file to replace: a link is followed, and what is no file is left alone.
+fn writable(out: &Path) -> Result<PathBuf> {
+    let target =
+        if out.is_symlink() { fs::canonicalize(out).unwrap_or_else(|_| out.to_owned()) } else { out.to_owned() };
+    if target.file_name().is_none() || (target.exists() && !target.is_file()) {
+        let source = io::Error::other("expected the path of a file, found a folder or a device");
+        return Err(WeightsError::Io { action: "write the new file", source });
+    }
+    Ok(target)
+}
+
+fn write_at_start(file: &mut File, header: &[u8]) -> Result<()> {
+    let written = file.seek(SeekFrom::Start(0)).and_then(|_| file.write_all(header));
+    written.map_err(WeightsError::io("write the new file's header"))
+}
+
+/// A temporary path that is deleted when it goes out of scope before the rename.
+struct TemporaryFile {
+    path: PathBuf,
+    renamed: bool,
+}
+
+impl TemporaryFile {
+    fn beside(out: &Path) -> Self {
+        // Long names are cut: with the suffix they could pass the file system's limit.
+        let stem: String = out.file_name().unwrap_or_default().to_string_lossy().chars().take(40).collect();
+        let mut name = OsString::from(".");
+        name.push(stem);
+        let serial = NEXT_TEMPORARY.fetch_add(1, Ordering::Relaxed);
+        name.push(format!(".{}-{serial}.tmp", std::process::id()));
+        Self { path: out.with_file_name(name), renamed: false }
+    }
+
+    fn open(&self) -> Result<File> {
+        let opened = OpenOptions::new().write(true).create_new(true).open(&self.path);
+        opened.map_err(WeightsError::io("make a temporary file beside the output"))
+    }
+
+    fn rename_to(mut self, out: &Path) -> Result<()> {
+        fs::rename(&self.path, out).map_err(WeightsError::io("give the new file its name"))?;
+        self.renamed = true;
+        Ok(())
+    }
+}
+
+impl Drop for TemporaryFile {
+    fn drop(&mut self) {
+        if !self.renamed {
+            // Nothing is left to do when even this fails, and the first error is the one to report.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
