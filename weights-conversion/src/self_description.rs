@@ -65,3 +65,82 @@ impl Backbone {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::architecture::{Architecture, Background, Heads, KeypointHead, MaskHead, Norm};
+    use crate::checkpoint::FileFormat;
+    use crate::conversion::{Conversion, naming_of};
+    use crate::element::ElementType;
+    use crate::source::Span;
+    use crate::tensor::{Encoding, Payload, StoredTensor};
+
+    /// Checkpoints with the names and shapes that torchvision's own models have, and no values.
+    fn torchvision_models() -> BTreeMap<String, Checkpoint> {
+        let names: BTreeMap<String, BTreeMap<String, Vec<usize>>> =
+            serde_json::from_str(include_str!("../tests/fixtures/torchvision_names.json")).unwrap();
+        let tensor = |shape: Vec<usize>| {
+            let span = Span { offset: 0, len: 4 * shape.iter().product::<usize>() as u64 };
+            let payload = Payload { span, encoding: Encoding::Raw };
+            StoredTensor::dense("t", shape, false, ElementType::F32, payload).unwrap()
+        };
+        let checkpoint = |names: BTreeMap<String, Vec<usize>>| Checkpoint {
+            format: FileFormat::TorchZip,
+            author: None,
+            metadata: BTreeMap::new(),
+            tensors: names.into_iter().map(|(name, shape)| (name, tensor(shape))).collect(),
+            not_tensors: Vec::new(),
+        };
+        names.into_iter().map(|(kind, names)| (kind, checkpoint(names))).collect()
+    }
+
+    #[test]
+    fn torchvision_s_detectors_fill_ours_to_the_last_name() {
+        let models = torchvision_models();
+        for (kind, num_classes, num_keypoints, num_masks) in [
+            ("fasterrcnn_resnet50_fpn", 90, None, None),
+            ("keypointrcnn_resnet50_fpn", 1, Some(17), None),
+            ("maskrcnn_resnet50_fpn", 90, None, Some(91)),
+        ] {
+            let checkpoint = &models[kind];
+            let naming = naming_of(checkpoint).unwrap();
+            assert_eq!(naming, Naming::Torchvision);
+            let found = SecondStage::of(checkpoint, naming).unwrap();
+            assert_eq!(found, SecondStage { num_classes, num_keypoints, has_masks: num_masks.is_some() });
+            let heads = Heads {
+                fpn_channels: 256,
+                fpn_norm: Norm::None,
+                num_anchors: 3,
+                box_pooled_size: 7,
+                fc_channels: 1024,
+                num_classes,
+                background: Background::First,
+                class_specific_boxes: true,
+                keypoint: num_keypoints.map(|k| KeypointHead { conv_channels: vec![512; 8], num_keypoints: k }),
+                mask: num_masks.map(|num_masks| MaskHead { conv_channels: vec![256; 4], num_masks }),
+            };
+            let target = Architecture { backbone: Backbone::of(checkpoint, naming).unwrap(), heads: Some(heads) };
+            let conversion = Conversion::plan(checkpoint, &target, &[]).unwrap();
+            conversion.complete().unwrap();
+            assert_eq!(conversion.report().applied.len(), target.parameters().len());
+            assert_eq!(conversion.report().unused, [""; 0], "{kind}");
+        }
+    }
+
+    #[test]
+    fn torchvision_s_classifiers_fill_a_backbone() {
+        let models = torchvision_models();
+        for (kind, depth) in [("resnet18", 18), ("resnet34", 34), ("resnet50", 50)] {
+            let checkpoint = &models[kind];
+            let naming = naming_of(checkpoint).unwrap();
+            let backbone = Backbone::of(checkpoint, naming).unwrap();
+            assert_eq!(backbone, Backbone::resnet(depth).unwrap());
+            let conversion = Conversion::plan(checkpoint, &Architecture { backbone, heads: None }, &[]).unwrap();
+            conversion.complete().unwrap();
+            assert_eq!(conversion.report().unused, ["fc.bias", "fc.weight"]);
+        }
+    }
+}

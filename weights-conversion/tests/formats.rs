@@ -1,0 +1,88 @@
+//! The same arrays as every writer wrote them. The files come from `fixtures/make_fixtures.py`.
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use sdg_weights_conversion::{Checkpoint, ElementType, FileFormat, Source};
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
+}
+
+/// 0, 0.25, 0.5, …
+fn counted(count: usize) -> Vec<f32> {
+    (0..count).map(|i| i as f32 * 0.25).collect()
+}
+
+fn assert_tensor(file: &str, name: &str, shape: &[usize], element: ElementType, values: &[f32]) {
+    let mut source = Source::open(&fixture(file)).unwrap();
+    let checkpoint = Checkpoint::read(&mut source).unwrap();
+    let tensor = &checkpoint.tensors[name];
+    assert_eq!(tensor.shape(), shape, "{file}: {name}");
+    assert_eq!(tensor.element(), element, "{file}: {name}");
+    assert_eq!(tensor.values(&mut source).unwrap(), values, "{file}: {name}");
+}
+
+fn assert_common_arrays(file: &str) {
+    assert_tensor(file, "dense", &[2, 3], ElementType::F32, &counted(6));
+    assert_tensor(file, "half", &[4], ElementType::F16, &counted(4));
+    assert_tensor(file, "double", &[2, 2], ElementType::F64, &counted(4));
+    // Stored with another axis innermost, read in the usual order.
+    assert_tensor(file, "columns", &[2, 3, 2, 2], ElementType::F32, &counted(24));
+    assert_tensor(file, "large", &[40, 40], ElementType::F32, &counted(1600));
+    let checkpoint = Checkpoint::read(&mut Source::open(&fixture(file)).unwrap()).unwrap();
+    let counter = &checkpoint.tensors["counter"];
+    assert_eq!((counter.shape(), counter.element()), (&[][..], ElementType::I64));
+    assert!(counter.values(&mut Source::open(&fixture(file)).unwrap()).is_err(), "an integer is no weight");
+}
+
+#[test]
+fn numpy_arrays_of_every_protocol_numpy_and_python() {
+    for file in [
+        "arrays_protocol2.pkl",
+        "arrays_protocol3.pkl",
+        "arrays_protocol4.pkl",
+        "arrays_protocol5.pkl",
+        "arrays_numpy1.pkl",
+        "arrays_python2.pkl",
+    ] {
+        assert_common_arrays(file);
+        let checkpoint = Checkpoint::read(&mut Source::open(&fixture(file)).unwrap()).unwrap();
+        assert_eq!(checkpoint.format, FileFormat::NumpyPickle);
+        assert_eq!(checkpoint.tensors.len(), 6, "{file}");
+    }
+    let checkpoint = Checkpoint::read(&mut Source::open(&fixture("arrays_protocol4.pkl")).unwrap()).unwrap();
+    assert_eq!(checkpoint.author.as_deref(), Some("fixture"));
+}
+
+#[test]
+fn torch_tensors_of_both_formats() {
+    for (file, format) in [("tensors_zip.pth", FileFormat::TorchZip), ("tensors_legacy.pth", FileFormat::TorchLegacy)] {
+        assert_common_arrays(file);
+        assert_tensor(file, "bfloat", &[3], ElementType::Bf16, &counted(3));
+        assert_tensor(file, "parameter", &[5], ElementType::F32, &counted(5));
+        // Elements 2 to 7 of its storage as two rows of three, transposed.
+        assert_tensor(file, "view", &[3, 2], ElementType::F32, &[0.5, 1.25, 0.75, 1.5, 1.0, 1.75]);
+        assert_tensor(file, "running_var", &[2], ElementType::F32, &[1.0, 1.0]);
+        let checkpoint = Checkpoint::read(&mut Source::open(&fixture(file)).unwrap()).unwrap();
+        assert_eq!(checkpoint.format, format);
+        assert_eq!(checkpoint.tensors.len(), 14);
+    }
+}
+
+#[test]
+fn what_is_no_checkpoint_is_named() {
+    for (bytes, name) in [
+        (&b""[..], "an empty file"),
+        (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "Git LFS"),
+        (b"\x80\x01}.", "protocol 1"),
+        (b"{\"a\": 1}", "JSON"),
+        (b"\x1f\x8b\x08", "gzip"),
+    ] {
+        let refused = Checkpoint::read(&mut Source::from_bytes(bytes)).unwrap_err().to_string();
+        assert!(refused.contains(name), "{refused}");
+    }
+    let folder = Source::open(Path::new(env!("CARGO_MANIFEST_DIR"))).err().unwrap().to_string();
+    assert!(folder.contains("a folder"), "{folder}");
+}
