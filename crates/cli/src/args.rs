@@ -26,6 +26,8 @@ pub enum Command {
     Rehearse(RehearseArgs),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
+    /// Detectron2 and torchvision checkpoints: convert, inspect
+    Weights(WeightsArgs),
 }
 
 /// `sdg demo`
@@ -152,6 +154,61 @@ pub struct AugmentArgs {
     pub json: bool,
 }
 
+/// `sdg weights`
+#[derive(Debug, ClapArgs)]
+#[command(arg_required_else_help = true)]
+pub struct WeightsArgs {
+    /// What to do with the checkpoint.
+    #[command(subcommand)]
+    pub command: WeightsCommand,
+}
+
+/// The verbs of `sdg weights`.
+#[derive(Debug, Subcommand)]
+pub enum WeightsCommand {
+    /// A checkpoint to this project's safetensors, with a report of every name
+    Convert(ConvertArgs),
+    /// What a checkpoint holds, without converting it
+    Inspect(InspectArgs),
+}
+
+/// `sdg weights convert`
+#[derive(Debug, ClapArgs)]
+pub struct ConvertArgs {
+    /// Detectron2 .pkl or .pth, torchvision .pth, safetensors: told by content, not by name
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// The detector: r50-detectron2, r50-torchvision; without it, as the names of the checkpoint say
+    #[arg(long, value_name = "NAME", conflicts_with = "config")]
+    pub preset: Option<String>,
+    /// The detector's configuration as JSON, for other widths and depths
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Store kernels and matrices in half precision: a file half as large
+    #[arg(long)]
+    pub f16: bool,
+    /// Leave this part as initialised, such as roi_heads.box_predictor; repeat for several
+    #[arg(long = "reinit", value_name = "PREFIX")]
+    pub reinitialized: Vec<String>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg weights inspect`
+#[derive(Debug, ClapArgs)]
+pub struct InspectArgs {
+    /// A checkpoint of any format that convert reads
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// A positive, finite number of seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -179,6 +236,8 @@ mod tests {
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg augment --demo a.png:a.json --count 5 --out samples",
+            "sdg weights convert model.pkl model.safetensors --preset r50-detectron2 --f16 --reinit roi_heads --json",
+            "sdg weights inspect model.pth --json",
         ] {
             assert!(Args::try_parse_from(line.split(' ')).is_ok(), "{line}");
         }

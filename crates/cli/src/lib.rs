@@ -19,6 +19,7 @@
 pub mod args;
 mod commands;
 mod demonstrations;
+pub mod detector_config;
 mod exit;
 mod files;
 mod interrupt;
@@ -42,6 +43,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Detect(detect) => commands::detect::run(detect),
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
         Command::Augment(augment) => commands::augment::run(augment),
+        Command::Weights(weights) => commands::weights::run(weights),
     };
     match done {
         Ok(outcome) => outcome.into(),

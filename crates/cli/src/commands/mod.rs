@@ -5,3 +5,4 @@ pub mod demo;
 pub mod detect;
 pub mod rehearse;
 pub mod teach;
+pub mod weights;
