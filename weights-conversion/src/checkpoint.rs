@@ -127,6 +127,9 @@ impl Checkpoint {
                 Self { format, author: None, metadata, tensors, not_tensors: Vec::new() }
             }
         };
+        if checkpoint.tensors.is_empty() {
+            return Err(WeightsError::damaged("checkpoint", "tensors by name", "none"));
+        }
         checkpoint.check_total(source.len())?;
         Ok(checkpoint)
     }
