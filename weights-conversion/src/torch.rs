@@ -97,7 +97,7 @@ pub(crate) fn read_legacy(source: &mut Source) -> Result<(Pickle, Storages)> {
             let expected = format!("{} elements in storage {}", storage.num_elements, printable(key));
             return Err(damaged("storages", expected, count.to_string()));
         }
-        let bytes = count.checked_mul(storage.element.size() as u64).unwrap_or(u64::MAX);
+        let bytes = count.saturating_mul(storage.element.size() as u64);
         spans.insert(key.to_owned(), scanner.skip(bytes)?);
     }
     Ok((pickle, Storages { spans }))
