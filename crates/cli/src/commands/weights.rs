@@ -141,13 +141,18 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
     }
     writeln!(stdout, "tensors     {}; {} values in floats", types.join(", "), checkpoint.num_parameters())?;
     for (key, value) in &checkpoint.metadata {
-        writeln!(stdout, "metadata    {} = {}", key.escape_debug(), value.escape_debug())?;
+        writeln!(stdout, "metadata    {} = {}", one_line(key), one_line(value))?;
     }
     for (name, tensor) in &checkpoint.tensors {
-        writeln!(stdout, "tensor      {} {:?} {}", name.escape_debug(), tensor.shape(), tensor.element().name())?;
+        writeln!(stdout, "tensor      {} {:?} {}", one_line(name), tensor.shape(), tensor.element().name())?;
     }
     for name in &checkpoint.not_tensors {
-        writeln!(stdout, "no tensor   {}", name.escape_debug())?;
+        writeln!(stdout, "no tensor   {}", one_line(name))?;
     }
     Ok(Outcome::Done)
+}
+
+/// A text from a file, whatever it holds, on one line.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }

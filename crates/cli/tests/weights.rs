@@ -1,0 +1,106 @@
+//! `sdg weights` as a user calls it.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::{Value, json};
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).arg("weights").args(arguments).output().unwrap()
+}
+
+fn fixture(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../weights-conversion/tests/fixtures");
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
+/// The short form of a configuration: the widths of `detectron2_keypoint.pkl`.
+fn config(folder: &Path, classes: usize) -> PathBuf {
+    let path = folder.join("config.json");
+    let config = json!({
+        "kind": "keypoint", "classes": classes, "keypoints": 12, "min_size_test": 240, "max_size_test": 400,
+        "pre_nms_topk": 300, "post_nms_topk_test": 100, "post_nms_topk_train": 150, "detections_per_image": 20,
+        "score_thresh_test": 0.05, "stem_out_channels": 2, "res2_out_channels": 4, "width_per_group": 1,
+        "fpn_channels": 4, "box_head_fc": 8, "keypoint_convs": 4, "mask_convs": 4,
+    });
+    fs::write(&path, config.to_string()).unwrap();
+    path
+}
+
+fn one_json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn a_detectron2_pickle_becomes_a_file_that_says_where_it_comes_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("converted.safetensors");
+    let config = config(folder.path(), 1);
+    let (out, config) = (out.to_str().unwrap(), config.to_str().unwrap());
+    let output = sdg(&["convert", &fixture("detectron2_keypoint.pkl"), out, "--config", config, "--f16", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let line = one_json(&output);
+    let names = |list: &str| line["report"][list].as_array().unwrap().len();
+    assert_eq!((names("applied"), names("missing"), names("mismatched"), names("unused")), (313, 0, 0, 0));
+    assert_eq!(line["report"]["naming"], "detectron2");
+
+    let inspected = one_json(&sdg(&["inspect", out, "--json"]));
+    assert_eq!(inspected["tensors"].as_array().unwrap().len(), 313);
+    assert_eq!(inspected["metadata"]["source_sha256"], line["written"]["source_sha256"]);
+    let network: Value = serde_json::from_str(inspected["metadata"]["network"].as_str().unwrap()).unwrap();
+    assert_eq!(network["fpn"]["channels"], 4);
+    // A converted file brings its configuration.
+    let again = folder.path().join("again.safetensors");
+    assert_eq!(sdg(&["convert", out, again.to_str().unwrap()]).status.code(), Some(0));
+}
+
+#[test]
+fn what_does_not_fit_is_listed_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("converted.safetensors");
+    let config = config(folder.path(), 1);
+    let mut wrong: Value = serde_json::from_slice(&fs::read(&config).unwrap()).unwrap();
+    wrong["keypoints"] = json!(5);
+    fs::write(&config, wrong.to_string()).unwrap();
+    let (out, config) = (out.to_str().unwrap(), config.to_str().unwrap());
+    let arguments = ["convert", &fixture("detectron2_keypoint.pkl"), out, "--config", config];
+    let output = sdg(&arguments);
+    assert_eq!(output.status.code(), Some(1));
+    let (stdout, stderr) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert!(stdout.contains("mismatched  roi_heads.keypoint_head.score_lowres.bias: expected [5], found [12]"));
+    assert!(stderr.lines().count() == 1 && stderr.contains("--reinit"), "{stderr}");
+    assert!(!Path::new(out).exists());
+    let named = [&arguments[..], &["--reinit", "roi_heads.keypoint_head.score_lowres"]].concat();
+    assert_eq!(sdg(&named).status.code(), Some(0));
+}
+
+#[test]
+fn wrong_input_is_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let code = at("code.pkl", b"\x80\x02cposix\nsystem\nX\x02\x00\x00\x00id\x85R.");
+    let torn = at("torn.pth", b"PK\x03\x04");
+    let out = folder.path().join("out.safetensors");
+    for (arguments, exit, part) in [
+        (["inspect", &code, "--json"], 1, "posix.system"),
+        (["inspect", &torn, "--json"], 1, "an end record"),
+        (["inspect", "/nowhere.pkl", "--json"], 1, "/nowhere.pkl"),
+        (["convert", &fixture("arrays_protocol4.pkl"), out.to_str().unwrap()], 1, "expected names as Detectron2"),
+    ] {
+        let output = sdg(&arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(exit), "{stderr}");
+        assert!(stderr.lines().count() == 1 && stderr.contains(part), "{stderr}");
+    }
+    let preset = ["convert", &fixture("detectron2_keypoint.pkl"), out.to_str().unwrap(), "--preset", "yolo"];
+    let output = sdg(&preset);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("r50-detectron2"));
+    assert!(!out.exists());
+}
