@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         boxes: vec![BoundingBox { x1: 200.0, y1: 150.0, x2: 400.0, y2: 250.0 }],
         labels: vec![0],
         keypoints: vec![line.keypoints(12)],
+        masks: Vec::new(),
     };
     let targets = vec![target; batch];
 

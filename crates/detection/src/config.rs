@@ -4,7 +4,11 @@
 //! ends of most choices are Detectron2 and torchvision. A configuration is plain data and
 //! serialises, so a model file can carry the one it was trained with.
 
+mod mask_head;
+
 use serde::{Deserialize, Serialize};
+
+pub use mask_head::{MaskHeadConfig, MaskPasting, MaskTargets};
 
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -384,6 +388,8 @@ pub struct RoiHeadsConfig {
     pub box_head: BoxHeadConfig,
     /// The keypoint head, if the detector has one.
     pub keypoint_head: Option<KeypointHeadConfig>,
+    /// The mask head, if the detector has one.
+    pub mask_head: Option<MaskHeadConfig>,
 }
 
 /// Two fully connected layers, class scores and box deltas.

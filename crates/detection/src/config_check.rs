@@ -98,6 +98,21 @@ impl RcnnConfig {
                 "none",
             )?;
         }
+        if let Some(head) = &self.roi_heads.mask_head {
+            check(
+                !head.conv_channels.is_empty() && head.conv_channels.iter().all(|channels| *channels > 0),
+                "roi_heads.mask_head.conv_channels",
+                "one or more convolutions with channels",
+                format!("{:?}", head.conv_channels),
+            )?;
+            check(head.deconv_channels > 0, "roi_heads.mask_head.deconv_channels", "at least 1", head.deconv_channels)?;
+            check(
+                head.threshold > 0.0 && head.threshold < 1.0,
+                "roi_heads.mask_head.threshold",
+                "between 0 and 1",
+                head.threshold,
+            )?;
+        }
         Ok(())
     }
 }
@@ -105,12 +120,13 @@ impl RcnnConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::presets::{RcnnKind, edge, r50_detectron2};
+    use crate::presets::{RcnnKind, edge, edge_of, r50_detectron2};
 
     #[test]
     fn presets_pass_and_survive_serialisation() {
         let keypoint = RcnnKind::Keypoint { num_keypoints: 17 };
-        for config in [edge(12), r50_detectron2(keypoint), r50_detectron2(RcnnKind::Faster { num_classes: 80 })] {
+        let (faster, mask) = (RcnnKind::Faster { num_classes: 80 }, RcnnKind::Mask { num_classes: 2 });
+        for config in [keypoint, faster, mask].into_iter().flat_map(|kind| [edge_of(kind), r50_detectron2(kind)]) {
             assert_eq!(config.validate(), Ok(()));
             let json = serde_json::to_string(&config).unwrap();
             assert_eq!(serde_json::from_str::<RcnnConfig>(&json).unwrap(), config);

@@ -4,9 +4,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
-use sdg_geometry::{BoundingBox, Keypoint};
+use sdg_geometry::{BoundingBox, Mask};
 
-use crate::config::RcnnConfig;
+use crate::config::{MaskHeadConfig, RcnnConfig};
 use crate::error::{DetectionError, Result};
 use crate::fpn::Fpn;
 use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
@@ -15,6 +15,7 @@ use crate::losses::Losses;
 use crate::resnet::ResNet;
 use crate::roi_heads::{ResizedTarget, RoiDetection, RoiHeads};
 use crate::rpn::{ImageSize, Mode, RegionProposalNetwork};
+use crate::target::Target;
 
 /// Residual network and feature pyramid.
 #[derive(Module, Debug)]
@@ -35,7 +36,7 @@ impl Backbone {
 /// A detector of the R-CNN family.
 ///
 /// Paths of the parameters follow Detectron2, but for `backbone.fpn.`, which stands before the
-/// pyramid's names, and `conv_fcn.0` for `conv_fcn1`.
+/// pyramid's names, and `conv_fcn.0`, `mask_fcn.0` for `conv_fcn1`, `mask_fcn1`.
 #[derive(Module, Debug)]
 pub struct GeneralizedRcnn {
     /// Features.
@@ -46,17 +47,6 @@ pub struct GeneralizedRcnn {
     pub roi_heads: RoiHeads,
     #[module(skip)]
     config: RcnnConfig,
-}
-
-/// What is to be found in one image, in pixels of the original image.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Target {
-    /// Boxes; none for an image without objects.
-    pub boxes: Vec<BoundingBox>,
-    /// Class of each box, from 0.
-    pub labels: Vec<usize>,
-    /// Keypoints of each box; may be empty where the detector has no keypoint head.
-    pub keypoints: Vec<Vec<Keypoint>>,
 }
 
 /// A keypoint as detected, in pixels of the original image.
@@ -81,6 +71,8 @@ pub struct Detections {
     pub classes: Vec<usize>,
     /// Keypoints of each box; empty lists without a keypoint head.
     pub keypoints: Vec<Vec<ScoredKeypoint>>,
+    /// Mask of each box, as large as the image; none without a mask head.
+    pub masks: Vec<Mask>,
 }
 
 impl RcnnConfig {
@@ -161,8 +153,8 @@ impl GeneralizedRcnn {
         let gt_boxes: Vec<_> = targets.iter().map(|target| target.boxes.clone()).collect();
         let [rpn_cls, rpn_loc] = self.proposal_generator.losses(predictions, &gt_boxes, &mut rngs(1));
         let rois = self.roi_heads.sample_rois(&proposals, targets, &mut rngs(2));
-        let roi = self.roi_heads.losses(&features, &rois, targets, &mut rngs(3));
-        Losses { rpn_cls, rpn_loc, cls: roi.cls, box_reg: roi.box_reg, keypoint: roi.keypoint }
+        let roi = self.roi_heads.losses(&features, &rois, targets, &sizes, &mut rngs(3));
+        Losses { rpn_cls, rpn_loc, cls: roi.cls, box_reg: roi.box_reg, keypoint: roi.keypoint, mask: roi.mask }
     }
 
     /// Finds the objects in each image.
@@ -178,7 +170,8 @@ impl GeneralizedRcnn {
         let predictions = self.proposal_generator.predict(&features, [height, width]);
         let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Test);
         let found = self.roi_heads.detect(&features, &proposals, &sizes);
-        images.iter().zip(found).map(|(image, found)| original_detections(image, &found)).collect()
+        let mask_head = self.config.roi_heads.mask_head.as_ref();
+        images.iter().zip(found).map(|(image, found)| original_detections(image, &found, mask_head)).collect()
     }
 
     fn resized_targets(&self, images: &[TransformedImage], targets: &[Target]) -> Result<Vec<ResizedTarget>> {
@@ -192,66 +185,19 @@ impl GeneralizedRcnn {
             .iter()
             .enumerate()
             .map(|(image_idx, target)| {
-                self.check_target(image_idx, target)?;
-                Ok(resized_target(&images[image_idx], target))
+                let (image, heads) = (&images[image_idx], &self.config.roi_heads);
+                target.check(image_idx, image, heads)?;
+                Ok(target.resized(image, heads))
             })
             .collect()
     }
-
-    fn check_target(&self, image_idx: usize, target: &Target) -> Result<()> {
-        let fail =
-            |field, expected: String, found: String| Err(DetectionError::Target { image_idx, field, expected, found });
-        let heads = &self.config.roi_heads;
-        let count = target.boxes.len();
-        if target.labels.len() != count {
-            let found = target.labels.len().to_string();
-            return fail("labels", format!("{count}, one a box"), found);
-        }
-        if let Some(label) = target.labels.iter().find(|l| **l >= heads.num_classes) {
-            let expected = format!("classes below {}", heads.num_classes);
-            return fail("labels", expected, label.to_string());
-        }
-        for b in &target.boxes {
-            let finite = [b.x1, b.y1, b.x2, b.y2].iter().all(|v| v.is_finite());
-            if !finite || b.width() <= 0.0 || b.height() <= 0.0 {
-                let expected = "finite, with width and height".to_owned();
-                return fail("boxes", expected, format!("{b:?}"));
-            }
-        }
-        let Some(head) = &heads.keypoint_head else {
-            return Ok(());
-        };
-        if target.keypoints.len() != count {
-            let found = target.keypoints.len().to_string();
-            return fail("keypoints", format!("{count}, one list a box"), found);
-        }
-        for keypoints in &target.keypoints {
-            if keypoints.len() != head.num_keypoints {
-                let expected = format!("{} in a list", head.num_keypoints);
-                return fail("keypoints", expected, keypoints.len().to_string());
-            }
-            let broken = |k: &&Keypoint| k.is_labelled() && !(k.x.is_finite() && k.y.is_finite());
-            if let Some(keypoint) = keypoints.iter().find(broken) {
-                let expected = "finite coordinates".to_owned();
-                return fail("keypoints", expected, format!("{keypoint:?}"));
-            }
-        }
-        Ok(())
-    }
 }
 
-fn resized_target(image: &TransformedImage, target: &Target) -> ResizedTarget {
-    let [sx, sy] = image.resized_from_original();
-    let scaled =
-        |keypoint: &Keypoint| Keypoint { x: keypoint.x * sx, y: keypoint.y * sy, visibility: keypoint.visibility };
-    ResizedTarget {
-        boxes: target.boxes.iter().map(|b| image.resized_box(b)).collect(),
-        labels: target.labels.clone(),
-        keypoints: target.keypoints.iter().map(|list| list.iter().map(scaled).collect()).collect(),
-    }
-}
-
-fn original_detections(image: &TransformedImage, found: &[RoiDetection]) -> Detections {
+fn original_detections(
+    image: &TransformedImage,
+    found: &[RoiDetection],
+    mask_head: Option<&MaskHeadConfig>,
+) -> Detections {
     let [sx, sy] = image.resized_from_original();
     let mut detections = Detections::default();
     for detection in found {
@@ -268,6 +214,10 @@ fn original_detections(image: &TransformedImage, found: &[RoiDetection]) -> Dete
             score: f64::from(keypoint.score),
         });
         detections.keypoints.push(keypoints.collect());
+        if let (Some(mask), Some(head)) = (&detection.mask, mask_head) {
+            let (width, height) = (image.original_width as u32, image.original_height as u32);
+            detections.masks.push(mask.paste(&original, width, height, head.threshold, head.pasting));
+        }
     }
     detections
 }

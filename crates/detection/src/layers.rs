@@ -194,22 +194,23 @@ impl Linear {
     }
 }
 
-/// A transposed convolution with kernel 4, stride 2, padding 1: doubles height and width.
+/// A transposed convolution with stride 2 and an even kernel, padded to double height and width.
 #[derive(Module, Debug)]
 pub struct ConvTranspose2x {
-    /// Kernel, `[C_in, C_out, 4, 4]`.
+    /// Kernel, `[C_in, C_out, K, K]`.
     pub weight: Param<Tensor<4>>,
     /// Bias, `[C_out]`.
     pub bias: Param<Tensor<1>>,
 }
 
 impl ConvTranspose2x {
-    /// Draws the parameters; the bias is zero.
-    pub fn init(in_channels: usize, out_channels: usize, init: &mut Initializer) -> Self {
+    /// Draws the parameters for a kernel of 2 or 4 cells; the bias is zero.
+    pub fn init(in_channels: usize, out_channels: usize, kernel: usize, init: &mut Initializer) -> Self {
+        assert!(kernel == 2 || kernel == 4, "a kernel of {kernel} does not double the size");
         // PyTorch counts the fan of a transposed convolution along its first axis.
-        let distribution = Distribution::he_normal(in_channels * 16);
+        let distribution = Distribution::he_normal(in_channels * kernel * kernel);
         Self {
-            weight: init.param([in_channels, out_channels, 4, 4], distribution),
+            weight: init.param([in_channels, out_channels, kernel, kernel], distribution),
             bias: init.param([out_channels], Distribution::Constant(0.0)),
         }
     }
@@ -220,8 +221,10 @@ impl ConvTranspose2x {
     /// - `x`: `[N, C_in, H, W]`
     /// - output: `[N, C_out, 2H, 2W]`
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let params = Conv2dParams::square(2, 1);
-        sdg_kernels::conv_transpose2d(x, self.weight.val(), Some(self.bias.val()), params)
+        let weight = self.weight.val();
+        let [_, _, kernel, _] = weight.dims();
+        let params = Conv2dParams::square(2, (kernel - 2) / 2);
+        sdg_kernels::conv_transpose2d(x, weight, Some(self.bias.val()), params)
     }
 }
 

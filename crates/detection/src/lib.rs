@@ -1,10 +1,11 @@
-//! The R-CNN family: one detector of boxes and keypoints, driven by its configuration.
+//! The R-CNN family: one detector of boxes, keypoints and masks, driven by its configuration.
 //!
 //! ```text
 //! RgbImage ─ ImageTransform ─ batch [N, 3, H, W]
 //!   ─ ResNet ─ res2…res5 ─ Fpn ─ p2…p6
 //!   ─ RegionProposalNetwork ─ proposals
 //!   ─ RoiHeads: box head ─ detections ─ keypoint head ─ keypoints
+//!                                     └ mask head ─ masks
 //!   ─ Detections in pixels of the original image
 //! ```
 //!
@@ -13,7 +14,7 @@
 //! NMS run on the host in plain Rust, where they are small. Everything random takes a seed.
 //!
 //! Left out: files, threads and clocks; the optimiser and its schedule (crate `training`); image
-//! augmentation (crate `demonstration`). A mask head has its place beside the keypoint head.
+//! augmentation (crate `demonstration`).
 //!
 //! # Example
 //! ```
@@ -53,9 +54,11 @@ pub mod roi_pooler;
 pub mod rpn;
 pub mod sampler;
 pub mod state_dict;
+mod target;
 
 pub use config::RcnnConfig;
 pub use error::{DetectionError, Result};
-pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint, Target};
+pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint};
 pub use image_transform::{ImageTransform, TransformedImage};
 pub use losses::Losses;
+pub use target::{ObjectMask, Target};

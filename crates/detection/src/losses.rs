@@ -17,16 +17,15 @@ pub struct Losses {
     pub box_reg: Tensor<1>,
     /// Heatmaps of the proposals, where the detector has a keypoint head.
     pub keypoint: Option<Tensor<1>>,
+    /// Masks of the proposals, where the detector has a mask head.
+    pub mask: Option<Tensor<1>>,
 }
 
 impl Losses {
     /// Sum of all losses.
     pub fn total(&self) -> Tensor<1> {
         let boxes = self.rpn_cls.clone() + self.rpn_loc.clone() + self.cls.clone() + self.box_reg.clone();
-        match &self.keypoint {
-            Some(keypoint) => boxes + keypoint.clone(),
-            None => boxes,
-        }
+        [&self.keypoint, &self.mask].into_iter().flatten().fold(boxes, |sum, loss| sum + loss.clone())
     }
 
     /// Names and values, for display. Waits for the device.
@@ -41,6 +40,9 @@ impl Losses {
         if let Some(keypoint) = &self.keypoint {
             values.push(("keypoint", value(keypoint)));
         }
+        if let Some(mask) = &self.mask {
+            values.push(("mask", value(mask)));
+        }
         values
     }
 }
@@ -48,7 +50,7 @@ impl Losses {
 /// Binary cross-entropy of logits, summed.
 ///
 /// # Shapes
-/// - `logits`, `targets`: `[S]`, targets 0 or 1
+/// - `logits`, `targets`: `[S]`, targets from 0 to 1
 pub fn binary_cross_entropy(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
     let targets = Tensor::from_floats(targets, &logits.device());
     // max(x, 0) - x·t + ln(1 + e^-|x|) never overflows.

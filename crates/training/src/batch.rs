@@ -2,8 +2,9 @@
 
 use std::sync::mpsc;
 
-use sdg_demonstration::Sample;
-use sdg_detection::{ImageTransform, Target, TransformedImage};
+use sdg_demonstration::{Sample, SampleObject};
+use sdg_detection::{ImageTransform, ObjectMask, Target, TransformedImage};
+use sdg_geometry::Polygon;
 
 use crate::error::TrainingError;
 
@@ -38,7 +39,13 @@ fn target(sample: &Sample) -> Target {
         boxes: sample.objects.iter().map(|object| object.bbox).collect(),
         labels: vec![0; sample.objects.len()],
         keypoints: sample.objects.iter().map(|object| object.keypoints.clone()).collect(),
+        masks: sample.objects.iter().map(|object| ObjectMask::from(outline(object))).collect(),
     }
+}
+
+/// The outline, or the box where none was drawn.
+fn outline(object: &SampleObject) -> Polygon {
+    object.outline.clone().unwrap_or_else(|| Polygon::from_box(&object.bbox))
 }
 
 /// Runs `consume` while another thread prepares batches in the order of their steps. The thread ends with `consume`.

@@ -17,12 +17,15 @@ pub struct LossValues {
     pub box_reg: f64,
     /// Places of keypoints; zero for a detector without.
     pub keypoint: f64,
+    /// Masks; zero for a detector without.
+    #[serde(default)]
+    pub mask: f64,
 }
 
 impl LossValues {
     /// Their sum: what the step descends.
     pub fn total(&self) -> f64 {
-        self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint
+        self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint + self.mask
     }
 }
 

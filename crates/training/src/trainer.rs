@@ -169,5 +169,6 @@ fn values(losses: &Losses) -> LossValues {
         cls: value(&losses.cls),
         box_reg: value(&losses.box_reg),
         keypoint: losses.keypoint.as_ref().map_or(0.0, value),
+        mask: losses.mask.as_ref().map_or(0.0, value),
     }
 }

@@ -196,6 +196,7 @@ impl BoxPredictor {
                         score: scores[idx],
                         class_idx: classes[idx],
                         keypoints: Vec::new(),
+                        mask: None,
                     })
                     .collect()
             })

@@ -46,7 +46,7 @@ impl KeypointHead {
             .collect();
         Self {
             conv_fcn,
-            score_lowres: ConvTranspose2x::init(in_channels, config.num_keypoints, init),
+            score_lowres: ConvTranspose2x::init(in_channels, config.num_keypoints, 4, init),
             config: config.clone(),
         }
     }

@@ -3,15 +3,16 @@
 //! ```text
 //! proposals ─ sample (training) ─ box_head ─┬─ losses             (training)
 //!                                           └─ detections ─ NMS   (inference)
-//!             positive ones / detections ─ keypoint_head ─ losses / keypoints
+//!             positive ones / detections ─┬─ keypoint_head ─ losses / keypoints
+//!                                         └─ mask_head ─ losses / masks
 //! ```
-//!
-//! A mask head stands beside the keypoint head once there is one: it takes the same sampled
-//! proposals and the same detections.
 
 pub mod box_head;
 pub mod heatmap;
 pub mod keypoint_head;
+pub mod mask_head;
+pub mod mask_paste;
+pub mod mask_target;
 
 use burn::module::Module;
 use burn::tensor::Tensor;
@@ -25,10 +26,13 @@ use crate::matcher::{Match, match_boxes};
 use crate::roi_pooler::Roi;
 use crate::rpn::{ImageSize, Proposals};
 use crate::sampler::{draw, sample};
+use crate::target::ObjectMask;
 
 use box_head::{BoxHead, BoxPredictor, RoiClass};
 use heatmap::ReadKeypoint;
 use keypoint_head::KeypointHead;
+use mask_head::MaskHead;
+use mask_paste::BoxMask;
 
 /// The second stage.
 #[derive(Module, Debug)]
@@ -39,6 +43,8 @@ pub struct RoiHeads {
     pub box_predictor: BoxPredictor,
     /// Keypoints.
     pub keypoint_head: Option<KeypointHead>,
+    /// Masks.
+    pub mask_head: Option<MaskHead>,
     #[module(skip)]
     config: RoiHeadsConfig,
 }
@@ -52,6 +58,8 @@ pub struct ResizedTarget {
     pub labels: Vec<usize>,
     /// Keypoints of each box; empty where the detector has no keypoint head.
     pub keypoints: Vec<Vec<Keypoint>>,
+    /// Mask of each box; empty where the detector has no mask head.
+    pub masks: Vec<ObjectMask>,
 }
 
 /// A proposal that takes part in the losses.
@@ -74,6 +82,8 @@ pub struct RoiDetection {
     pub class_idx: usize,
     /// Keypoints, empty without a keypoint head.
     pub keypoints: Vec<ReadKeypoint>,
+    /// Mask over the box, with a mask head.
+    pub mask: Option<BoxMask>,
 }
 
 /// Losses of the second stage.
@@ -85,6 +95,8 @@ pub struct RoiLosses {
     pub box_reg: Tensor<1>,
     /// Heatmaps.
     pub keypoint: Option<Tensor<1>>,
+    /// Masks.
+    pub mask: Option<Tensor<1>>,
 }
 
 impl RoiHeads {
@@ -94,6 +106,10 @@ impl RoiHeads {
             box_head: BoxHead::init(&config.box_head, fpn.channels, init),
             box_predictor: BoxPredictor::init(&config.box_head, config.num_classes, init),
             keypoint_head: config.keypoint_head.as_ref().map(|head| KeypointHead::init(head, fpn.channels, init)),
+            mask_head: config.mask_head.as_ref().map(|head| {
+                let (classes, background) = (config.num_classes, config.box_head.background);
+                MaskHead::init(head, fpn.channels, classes, background, init)
+            }),
             config: config.clone(),
         }
     }
@@ -124,11 +140,14 @@ impl RoiHeads {
     }
 
     /// Gives the losses of the drawn proposals.
+    ///
+    /// `image_sizes` are those of the resized images, without padding.
     pub fn losses(
         &self,
         features: &[Tensor<4>; 5],
         rois: &[SampledRoi],
         targets: &[ResizedTarget],
+        image_sizes: &[ImageSize],
         rngs: &mut [Pcg64Mcg],
     ) -> RoiLosses {
         let device = features[0].device();
@@ -141,13 +160,24 @@ impl RoiHeads {
             self.box_predictor.losses(hidden, rois, targets)
         };
         let keypoint = self.keypoint_head.as_ref().map(|head| {
-            let chosen = choose_keypoint_rois(head, rois, targets, rngs);
+            let has_keypoint = |sampled: &SampledRoi, gt_idx: usize| {
+                let keypoints = &targets[sampled.roi.image_idx].keypoints[gt_idx];
+                keypoints.iter().any(|k| is_inside(k, &sampled.roi.corners))
+            };
+            let chosen = choose_objects(rois, head.max_train_rois_per_image(), rngs, has_keypoint);
             match chosen.is_empty() {
                 true => zero(),
                 false => head.loss(features, &chosen, targets),
             }
         });
-        RoiLosses { cls, box_reg, keypoint }
+        let mask = self.mask_head.as_ref().map(|head| {
+            let chosen = choose_objects(rois, head.config().max_train_rois_per_image, rngs, |_, _| true);
+            match chosen.is_empty() {
+                true => zero(),
+                false => head.loss(features, &chosen, targets, image_sizes),
+            }
+        });
+        RoiLosses { cls, box_reg, keypoint, mask }
     }
 
     /// Gives the detections of each image, best first.
@@ -172,32 +202,33 @@ impl RoiHeads {
         if let Some(head) = &self.keypoint_head {
             head.read_keypoints(features, &mut detections);
         }
+        if let Some(head) = &self.mask_head {
+            head.read_masks(features, &mut detections);
+        }
         detections
     }
 }
 
-/// The positive proposals that go through the keypoint head: those with a labelled keypoint
-/// inside, at most the configured number an image.
-fn choose_keypoint_rois(
-    head: &KeypointHead,
+/// The proposals on objects that go through a head while training: those that are `fit` for it (given the
+/// object's index in its image), at most `max` an image.
+fn choose_objects(
     rois: &[SampledRoi],
-    targets: &[ResizedTarget],
+    max: Option<usize>,
     rngs: &mut [Pcg64Mcg],
+    fit: impl Fn(&SampledRoi, usize) -> bool,
 ) -> Vec<SampledRoi> {
     let mut chosen = Vec::new();
-    for (image_idx, (target, rng)) in targets.iter().zip(rngs).enumerate() {
+    for (image_idx, rng) in rngs.iter_mut().enumerate() {
         let mut idxs: Vec<usize> = (0..rois.len())
             .filter(|idx| {
                 let sampled = &rois[*idx];
                 let RoiClass::Object { gt_idx, .. } = sampled.class else {
                     return false;
                 };
-                let keypoints = &target.keypoints;
-                sampled.roi.image_idx == image_idx
-                    && keypoints[gt_idx].iter().any(|k| is_inside(k, &sampled.roi.corners))
+                sampled.roi.image_idx == image_idx && fit(sampled, gt_idx)
             })
             .collect();
-        if let Some(max) = head.max_train_rois_per_image() {
+        if let Some(max) = max {
             draw(&mut idxs, max, rng);
         }
         chosen.extend(idxs.into_iter().map(|idx| rois[idx]));

@@ -1,0 +1,161 @@
+//! From the mask of a box to a mask of the image.
+
+use sdg_geometry::{BoundingBox, Mask};
+
+use crate::config::MaskPasting;
+
+/// The probabilities of one detection's mask, `S×S`, row by row, stretched over its box.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoxMask {
+    /// Side.
+    pub size: usize,
+    /// Values from 0 to 1.
+    pub probabilities: Vec<f32>,
+}
+
+impl BoxMask {
+    /// The mask on an image of `width × height` pixels: those where it reaches `threshold`.
+    ///
+    /// `bounds` in pixels of that image.
+    pub fn paste(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f64, pasting: MaskPasting) -> Mask {
+        assert_eq!(self.probabilities.len(), self.size * self.size, "a mask over a box is square");
+        match pasting {
+            MaskPasting::PixelCenters => self.paste_pixel_centers(bounds, width, height, threshold as f32),
+            MaskPasting::WholePixels => self.paste_whole_pixels(bounds, width, height, threshold as f32),
+        }
+    }
+
+    /// # Source
+    /// Detectron2's `paste_masks_in_image`: bilinear, zeros outside, at least the threshold.
+    fn paste_pixel_centers(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
+        let (x1, y1, x2, y2) = (bounds.x1 as f32, bounds.y1 as f32, bounds.x2 as f32, bounds.y2 as f32);
+        let mut mask = Mask::empty(width, height);
+        // No cell reaches further than half its own size beyond the box.
+        let cells = |low: f32, high: f32, extent: u32| -> (u32, Vec<f32>) {
+            let reach = (high - low) / self.size as f32;
+            let first = (low - reach).floor().clamp(0.0, extent as f32) as u32;
+            let end = (high + reach).ceil().clamp(0.0, extent as f32) as u32;
+            let cell = |pixel: u32| (pixel as f32 + 0.5 - low) / (high - low) * self.size as f32 - 0.5;
+            (first, (first..end).map(cell).collect())
+        };
+        let (first_column, columns) = cells(x1, x2, width);
+        let (first_row, rows) = cells(y1, y2, height);
+        for (y, row) in (first_row..).zip(&rows) {
+            for (x, column) in (first_column..).zip(&columns) {
+                if self.bilinear_or_zero(*column, *row) >= threshold {
+                    mask.set(x, y, true);
+                }
+            }
+        }
+        mask
+    }
+
+    /// The value at a place in cells (centres at whole numbers); cells outside are zero.
+    fn bilinear_or_zero(&self, column: f32, row: f32) -> f32 {
+        let (left, top) = (column.floor(), row.floor());
+        let (fx, fy) = (column - left, row - top);
+        let cell = |dx: i64, dy: i64| {
+            let (x, y) = (left as i64 + dx, top as i64 + dy);
+            let inside = (0..self.size as i64).contains(&x) && (0..self.size as i64).contains(&y);
+            if inside { self.probabilities[y as usize * self.size + x as usize] } else { 0.0 }
+        };
+        (cell(0, 0) * (1.0 - fx) + cell(1, 0) * fx) * (1.0 - fy) + (cell(0, 1) * (1.0 - fx) + cell(1, 1) * fx) * fy
+    }
+
+    /// # Source
+    /// torchvision's `paste_masks_in_image`: the padded mask over the box enlarged alike and cut to whole
+    /// pixels, last ones included; above the threshold, as its examples say.
+    fn paste_whole_pixels(&self, bounds: &BoundingBox, width: u32, height: u32, threshold: f32) -> Mask {
+        let padded = self.padded();
+        let enlarged = padded.size as f32 / self.size as f32;
+        let span = |low: f64, high: f64| -> (i64, usize) {
+            let (low, high) = (low as f32, high as f32);
+            let (half, center) = ((high - low) * 0.5 * enlarged, (high + low) * 0.5);
+            // Towards zero, as a conversion to integers does.
+            let (low, high) = ((center - half) as i64, (center + half) as i64);
+            (low, (high - low + 1).max(1) as usize)
+        };
+        let (left, columns) = span(bounds.x1, bounds.x2);
+        let (top, rows) = span(bounds.y1, bounds.y2);
+        let taps = |count: usize| -> Vec<(usize, usize, f32)> {
+            let scale = padded.size as f32 / count as f32;
+            (0..count)
+                .map(|i| {
+                    let at = ((i as f32 + 0.5) * scale - 0.5).max(0.0);
+                    let first = (at as usize).min(padded.size - 1);
+                    (first, (first + 1).min(padded.size - 1), at - first as f32)
+                })
+                .collect()
+        };
+        let (along_x, along_y) = (taps(columns), taps(rows));
+        let mut mask = Mask::empty(width, height);
+        let on_image = |at: i64, extent: u32| (0..i64::from(extent)).contains(&at).then_some(at as u32);
+        for (y, (y0, y1, fy)) in (top..).zip(&along_y) {
+            let Some(y) = on_image(y, height) else { continue };
+            for (x, (x0, x1, fx)) in (left..).zip(&along_x) {
+                let Some(x) = on_image(x, width) else { continue };
+                let at = |row: usize, column: usize| padded.probabilities[row * padded.size + column];
+                let upper = at(*y0, *x0) * (1.0 - fx) + at(*y0, *x1) * fx;
+                let lower = at(*y1, *x0) * (1.0 - fx) + at(*y1, *x1) * fx;
+                if upper * (1.0 - fy) + lower * fy > threshold {
+                    mask.set(x, y, true);
+                }
+            }
+        }
+        mask
+    }
+
+    /// One zero cell more on each side.
+    fn padded(&self) -> Self {
+        let size = self.size + 2;
+        let mut probabilities = vec![0f32; size * size];
+        for (row, values) in self.probabilities.chunks_exact(self.size).enumerate() {
+            probabilities[(row + 1) * size + 1..][..self.size].copy_from_slice(values);
+        }
+        Self { size, probabilities }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn full() -> BoxMask {
+        BoxMask { size: 28, probabilities: vec![1.0; 28 * 28] }
+    }
+
+    const BOUNDS: BoundingBox = BoundingBox { x1: 4.0, y1: 6.0, x2: 14.0, y2: 10.0 };
+
+    #[test]
+    fn a_full_mask_fills_its_box() {
+        let mask = full().paste(&BOUNDS, 20, 20, 0.5, MaskPasting::PixelCenters);
+        assert_eq!((mask.area(), mask.bounds()), (40, Some(BOUNDS)));
+    }
+
+    #[test]
+    fn whole_pixels_take_the_last_one_in() {
+        // The padded box is 10·30/28 wide: from 3 (3.64) to 14 (14.36), 12 pixels for 30 cells; the outermost are
+        // a quarter and less of a cell inside and read 0.75. In y likewise from 5 to 10.
+        let mask = full().paste(&BOUNDS, 20, 20, 0.5, MaskPasting::WholePixels);
+        assert_eq!(mask.bounds(), Some(BoundingBox { x1: 3.0, y1: 5.0, x2: 15.0, y2: 11.0 }));
+    }
+
+    #[test]
+    fn half_a_mask_and_a_box_beyond_the_border() {
+        let left_half = BoxMask { size: 2, probabilities: vec![1.0, 0.0, 1.0, 0.0] };
+        let bounds = BoundingBox { x1: -2.0, y1: 0.0, x2: 6.0, y2: 4.0 };
+        for pasting in [MaskPasting::PixelCenters, MaskPasting::WholePixels] {
+            let mask = left_half.paste(&bounds, 5, 3, 0.5, pasting);
+            assert!(mask.get(0, 1) && !mask.get(3, 1), "{pasting:?}");
+        }
+    }
+
+    #[test]
+    fn the_threshold_decides() {
+        let even = BoxMask { size: 28, probabilities: vec![0.6; 28 * 28] };
+        for pasting in [MaskPasting::PixelCenters, MaskPasting::WholePixels] {
+            assert_eq!(even.paste(&BOUNDS, 20, 20, 0.7, pasting).area(), 0);
+            assert!(even.paste(&BOUNDS, 20, 20, 0.5, pasting).area() >= 16);
+        }
+    }
+}
