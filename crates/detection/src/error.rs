@@ -16,6 +16,12 @@ pub enum DetectionError {
         /// What it is.
         found: String,
     },
+    /// A configuration cannot be read.
+    #[error("detector configuration: expected every value, or `kind` and what differs from its preset: {reason}")]
+    ConfigFile {
+        /// What cannot be read, and where.
+        reason: String,
+    },
     /// A batch holds another number of targets than of images.
     #[error("a batch needs one target an image: expected {expected} targets, found {found}")]
     BatchSize {

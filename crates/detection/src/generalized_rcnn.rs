@@ -14,7 +14,7 @@ use crate::initialization::Initializer;
 use crate::losses::Losses;
 use crate::resnet::ResNet;
 use crate::roi_heads::{ResizedTarget, RoiDetection, RoiHeads};
-use crate::rpn::{ImageSize, Mode, RegionProposalNetwork};
+use crate::rpn::{ImageSize, Mode, Proposals, RegionProposalNetwork};
 use crate::target::Target;
 
 /// Residual network and feature pyramid.
@@ -114,7 +114,8 @@ impl GeneralizedRcnn {
         self.roi_heads.box_head.fc1.weight.val().device()
     }
 
-    fn batch(&self, images: &[TransformedImage]) -> (Tensor<4>, Vec<ImageSize>) {
+    /// The padded batch `[N, 3, H, W]` and the sizes of its images without padding.
+    pub(crate) fn batch(&self, images: &[TransformedImage]) -> (Tensor<4>, Vec<ImageSize>) {
         let padded = pad_batch(images, self.config.input.size_divisibility);
         let data = TensorData::new(padded.pixels, padded.dims);
         let sizes = images.iter().map(|i| [i.height, i.width]).collect();
@@ -169,7 +170,18 @@ impl GeneralizedRcnn {
         let features = self.backbone.forward(tensor);
         let predictions = self.proposal_generator.predict(&features, [height, width]);
         let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Test);
-        let found = self.roi_heads.detect(&features, &proposals, &sizes);
+        self.detections(images, &features, &proposals)
+    }
+
+    /// The second stage, back in pixels of the original images.
+    pub(crate) fn detections(
+        &self,
+        images: &[TransformedImage],
+        features: &[Tensor<4>; 5],
+        proposals: &[Proposals],
+    ) -> Vec<Detections> {
+        let sizes: Vec<ImageSize> = images.iter().map(|i| [i.height, i.width]).collect();
+        let found = self.roi_heads.detect(features, proposals, &sizes);
         let mask_head = self.config.roi_heads.mask_head.as_ref();
         images.iter().zip(found).map(|(image, found)| original_detections(image, &found, mask_head)).collect()
     }

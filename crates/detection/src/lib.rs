@@ -38,6 +38,7 @@ pub mod box_coder;
 pub mod boxes;
 pub mod config;
 mod config_check;
+mod config_file;
 mod error;
 pub mod fpn;
 mod generalized_rcnn;
@@ -55,6 +56,8 @@ pub mod rpn;
 pub mod sampler;
 pub mod state_dict;
 mod target;
+#[cfg(feature = "training")]
+pub mod verification;
 
 pub use config::RcnnConfig;
 pub use error::{DetectionError, Result};
