@@ -133,6 +133,24 @@ impl Conversion {
         Err(WeightsError::Incomplete { missing: missing.len(), mismatched: mismatched.len(), first })
     }
 
+    /// Reads the parameters instead of writing them: shapes and values by name.
+    ///
+    /// # Errors
+    /// Where [`Self::complete`] finds one; a checkpoint that ends early.
+    pub fn values(&self, source: &mut Source) -> Result<BTreeMap<String, (Vec<usize>, Vec<f32>)>> {
+        self.complete()?;
+        let mut parameters = BTreeMap::new();
+        for (name, planned) in &self.parameters {
+            let mut values = Vec::with_capacity(planned.shape.iter().product());
+            planned.stream(source, |piece| {
+                values.extend_from_slice(piece);
+                Ok(())
+            })?;
+            parameters.insert(name.clone(), (planned.shape.clone(), values));
+        }
+        Ok(parameters)
+    }
+
     /// Number of values that will be written.
     pub fn num_parameters(&self) -> usize {
         self.parameters.values().map(|planned| planned.shape.iter().product::<usize>()).sum()

@@ -101,9 +101,9 @@ impl ElementType {
         })
     }
 
-    /// Appends whole elements as `f32`. Only [floats](Self::is_float) are asked for.
+    /// Appends whole elements as `f32`; integers beyond 2²⁴ are rounded.
     pub(crate) fn decode(self, bytes: &[u8], values: &mut Vec<f32>) {
-        debug_assert!(self.is_float() && bytes.len().is_multiple_of(self.size()));
+        debug_assert!(bytes.len().is_multiple_of(self.size()));
         match self {
             Self::F64 => values.extend(bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b) as f32)),
             Self::F32 => values.extend(bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b))),
@@ -114,7 +114,11 @@ impl ElementType {
                 halves.convert_to_f32_slice(&mut values[from..]);
             }
             Self::Bf16 => values.extend(bytes.as_chunks::<2>().0.iter().map(|b| bf16::from_le_bytes(*b).to_f32())),
-            _ => {}
+            Self::I64 => values.extend(bytes.as_chunks::<8>().0.iter().map(|b| i64::from_le_bytes(*b) as f32)),
+            Self::I32 => values.extend(bytes.as_chunks::<4>().0.iter().map(|b| i32::from_le_bytes(*b) as f32)),
+            Self::I16 => values.extend(bytes.as_chunks::<2>().0.iter().map(|b| f32::from(i16::from_le_bytes(*b)))),
+            Self::I8 => values.extend(bytes.iter().map(|b| f32::from(b.cast_signed()))),
+            Self::U8 | Self::Bool => values.extend(bytes.iter().map(|b| f32::from(*b))),
         }
     }
 }
@@ -132,6 +136,17 @@ mod tests {
         ElementType::F16.decode(&0x3e00u16.to_le_bytes(), &mut values);
         ElementType::Bf16.decode(&0x3fc0u16.to_le_bytes(), &mut values);
         assert_eq!(values, [1.5; 4]);
+    }
+
+    #[test]
+    fn integers_keep_their_sign() {
+        let mut values = Vec::new();
+        ElementType::I64.decode(&(-3i64).to_le_bytes(), &mut values);
+        ElementType::I32.decode(&(-3i32).to_le_bytes(), &mut values);
+        ElementType::I16.decode(&(-3i16).to_le_bytes(), &mut values);
+        ElementType::I8.decode(&(-3i8).to_le_bytes(), &mut values);
+        ElementType::U8.decode(&[253], &mut values);
+        assert_eq!(values, [-3.0, -3.0, -3.0, -3.0, 253.0]);
     }
 
     #[test]

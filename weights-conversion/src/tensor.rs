@@ -148,8 +148,17 @@ impl StoredTensor {
     /// Reads all values, last axis innermost.
     ///
     /// # Errors
-    /// Elements that are no floats; bytes that are not there.
+    /// Elements that are no floats and so no weights; bytes that are not there.
     pub fn values(&self, source: &mut Source) -> Result<Vec<f32>> {
+        self.check_float()?;
+        self.numbers(source)
+    }
+
+    /// The same for integers too, such as the classes among a reference's outputs.
+    ///
+    /// # Errors
+    /// Bytes that are not there.
+    pub fn numbers(&self, source: &mut Source) -> Result<Vec<f32>> {
         let mut values = Vec::with_capacity(self.len());
         self.stream(source, |piece| {
             values.extend_from_slice(piece);
@@ -160,9 +169,6 @@ impl StoredTensor {
 
     /// Hands the values over in order, last axis innermost, some at a time.
     pub(crate) fn stream(&self, source: &mut Source, mut take: impl FnMut(&[f32]) -> Result<()>) -> Result<()> {
-        if !self.element.is_float() {
-            return Err(WeightsError::damaged("a weight", "F64, F32, F16 or BF16 elements", self.element.name()));
-        }
         if self.is_empty() {
             return Ok(());
         }
@@ -184,6 +190,13 @@ impl StoredTensor {
             return self.check_count(stored.len());
         }
         self.gather(&stored, take)
+    }
+
+    fn check_float(&self) -> Result<()> {
+        if self.element.is_float() {
+            return Ok(());
+        }
+        Err(WeightsError::damaged("a weight", "F64, F32, F16 or BF16 elements", self.element.name()))
     }
 
     fn check_count(&self, found: usize) -> Result<()> {

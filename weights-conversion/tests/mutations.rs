@@ -1,7 +1,7 @@
 //! Mutated files: no panic, no hang, no memory above twice the file's size plus 100 MB.
 //!
 //! A short run is part of the tests; `SDG_MUTATIONS=1000000 cargo test --release -p sdg-weights-conversion --test
-//! mutations` makes a long one. This binary has one test, because it counts the memory of the whole process.
+//! mutations -- --nocapture` makes a long one, and `SDG_FIRST_MUTATION` says where it goes on. This binary has one test, because it counts the memory of the whole process.
 #![allow(clippy::unwrap_used)]
 
 mod forged;
@@ -125,11 +125,16 @@ fn digest(file: Vec<u8>, target: &Architecture) -> bool {
 
 #[test]
 fn a_mutated_file_is_an_error_or_a_checkpoint_and_nothing_else() {
-    let count: u64 = std::env::var("SDG_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(MUTATIONS);
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    let count = number("SDG_MUTATIONS").unwrap_or(MUTATIONS);
+    let first = number("SDG_FIRST_MUTATION").unwrap_or(0);
     let target = Architecture { backbone: Backbone::resnet(18).unwrap(), heads: None };
     let seeds = seeds();
     let (mut accepted, mut most_extra, mut slowest) = (0, 0, Duration::ZERO);
-    for i in 0..count {
+    for i in first..first + count {
+        if i > first && i % 20_000 == 0 {
+            println!("{} done: {accepted} accepted, {most_extra} bytes beyond, slowest {slowest:?}", i - first);
+        }
         let mut rng = Pcg64Mcg::seed_from_u64(i);
         let seed = &seeds[i as usize % seeds.len()];
         let mut file = seed.bytes.clone();
