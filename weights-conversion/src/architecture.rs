@@ -68,8 +68,10 @@ pub struct KeypointHead {
 /// The mask head.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct MaskHead {
-    /// Channels of each 3×3 convolution; the last one's also of the transposed convolution.
+    /// Channels of each 3×3 convolution.
     pub conv_channels: Vec<usize>,
+    /// Channels of the transposed convolution.
+    pub deconv_channels: usize,
     /// Masks a box: one for each class (and the background, where it is first).
     pub num_masks: usize,
 }
@@ -217,8 +219,9 @@ impl Heads {
         }
         if let Some(head) = &self.mask {
             let last = list_convs(parameters, "roi_heads.mask_head.mask_fcn", channels, &head.conv_channels);
-            list_transposed(parameters, "roi_heads.mask_head.deconv", [last, last, 2]);
-            list_conv(parameters, "roi_heads.mask_head.predictor", [head.num_masks, last, 1], Norm::None);
+            list_transposed(parameters, "roi_heads.mask_head.deconv", [last, head.deconv_channels, 2]);
+            let predictor = [head.num_masks, head.deconv_channels, 1];
+            list_conv(parameters, "roi_heads.mask_head.predictor", predictor, Norm::None);
         }
     }
 }

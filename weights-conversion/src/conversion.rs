@@ -169,14 +169,6 @@ pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
     })
 }
 
-/// Our name for a tensor, if it has one.
-pub(crate) fn our_name(naming: Naming, name: &str) -> Option<String> {
-    match naming.rename(strip_wrapper(name)) {
-        Renamed::To(ours) => Some(ours),
-        Renamed::NotNeeded | Renamed::Unknown => None,
-    }
-}
-
 /// torch's parallel training puts `module.` in front of every name.
 fn strip_wrapper(name: &str) -> &str {
     name.strip_prefix("module.").unwrap_or(name)

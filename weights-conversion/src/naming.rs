@@ -82,6 +82,14 @@ impl Naming {
         self == Self::Torchvision
     }
 
+    /// Our name for a parameter of this scheme, if we have it.
+    pub fn our_name(self, name: &str) -> Option<String> {
+        match self.rename(name.strip_prefix("module.").unwrap_or(name)) {
+            Renamed::To(ours) => Some(ours),
+            Renamed::NotNeeded | Renamed::Unknown => None,
+        }
+    }
+
     /// From a name of this scheme to ours.
     pub(crate) fn rename(self, name: &str) -> Renamed {
         if name.ends_with(".num_batches_tracked") {

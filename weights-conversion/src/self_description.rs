@@ -2,7 +2,6 @@
 
 use crate::architecture::Backbone;
 use crate::checkpoint::Checkpoint;
-use crate::conversion::our_name;
 use crate::error::{Result, WeightsError};
 use crate::naming::Naming;
 
@@ -24,7 +23,7 @@ impl SecondStage {
     /// A checkpoint without class scores.
     pub fn of(checkpoint: &Checkpoint, naming: Naming) -> Result<Self> {
         let size = |wanted: &str, axis: usize| {
-            let found = checkpoint.tensors.iter().find(|(name, _)| our_name(naming, name).as_deref() == Some(wanted));
+            let found = checkpoint.tensors.iter().find(|(name, _)| naming.our_name(name).as_deref() == Some(wanted));
             found.and_then(|(_, tensor)| tensor.shape().get(axis).copied())
         };
         let scores = size("roi_heads.box_predictor.cls_score.bias", 0);
@@ -49,7 +48,7 @@ impl Backbone {
     /// # Errors
     /// Blocks of no ResNet-18, -34 or -50.
     pub fn of(checkpoint: &Checkpoint, naming: Naming) -> Result<Self> {
-        let names: Vec<String> = checkpoint.tensors.keys().filter_map(|name| our_name(naming, name)).collect();
+        let names: Vec<String> = checkpoint.tensors.keys().filter_map(|name| naming.our_name(name)).collect();
         let has = |name: String| names.contains(&format!("backbone.bottom_up.{name}.weight"));
         let num_blocks =
             [2, 3, 4, 5].map(|stage| (0..100).take_while(|i| has(format!("res{stage}.{i}.conv1"))).count());
@@ -120,7 +119,11 @@ mod tests {
                 background: Background::First,
                 class_specific_boxes: true,
                 keypoint: num_keypoints.map(|k| KeypointHead { conv_channels: vec![512; 8], num_keypoints: k }),
-                mask: num_masks.map(|num_masks| MaskHead { conv_channels: vec![256; 4], num_masks }),
+                mask: num_masks.map(|num_masks| MaskHead {
+                    conv_channels: vec![256; 4],
+                    deconv_channels: 256,
+                    num_masks,
+                }),
             };
             let target = Architecture { backbone: Backbone::of(checkpoint, naming).unwrap(), heads: Some(heads) };
             let conversion = Conversion::plan(checkpoint, &target, &[]).unwrap();

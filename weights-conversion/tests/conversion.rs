@@ -47,7 +47,8 @@ fn narrow_keypoint() -> Architecture {
 
 fn narrow_mask() -> Architecture {
     let mut architecture = narrow(2);
-    architecture.heads.as_mut().unwrap().mask = Some(MaskHead { conv_channels: vec![4; 4], num_masks: 2 });
+    architecture.heads.as_mut().unwrap().mask =
+        Some(MaskHead { conv_channels: vec![4; 4], deconv_channels: 4, num_masks: 2 });
     architecture
 }
 

@@ -26,7 +26,7 @@ pub enum Command {
     Rehearse(RehearseArgs),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
-    /// Detectron2 and torchvision checkpoints: convert, inspect
+    /// Detectron2 and torchvision checkpoints: convert, inspect, verify
     Weights(WeightsArgs),
 }
 
@@ -170,6 +170,8 @@ pub enum WeightsCommand {
     Convert(ConvertArgs),
     /// What a checkpoint holds, without converting it
     Inspect(InspectArgs),
+    /// The detector of a checkpoint, stage by stage, against what the original gave
+    Verify(VerifyArgs),
 }
 
 /// `sdg weights convert`
@@ -209,6 +211,26 @@ pub struct InspectArgs {
     pub json: bool,
 }
 
+/// `sdg weights verify`
+#[derive(Debug, ClapArgs)]
+pub struct VerifyArgs {
+    /// A checkpoint of any format that convert reads, or a converted file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The detector's configuration as JSON; a converted file brings its own
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The image that the original was given
+    #[arg(long, value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// What the original gave at each stage: safetensors
+    #[arg(long, value_name = "FILE")]
+    pub against: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// A positive, finite number of seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -238,6 +260,7 @@ mod tests {
             "sdg augment --demo a.png:a.json --count 5 --out samples",
             "sdg weights convert model.pkl model.safetensors --preset r50-detectron2 --f16 --reinit roi_heads --json",
             "sdg weights inspect model.pth --json",
+            "sdg weights verify model.pkl --config c.json --image i.png --against expected.safetensors --json",
         ] {
             assert!(Args::try_parse_from(line.split(' ')).is_ok(), "{line}");
         }

@@ -7,11 +7,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
-use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind, ResizeRule};
+use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind};
 use sdg_detection::presets::{self, RcnnKind};
-use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, KeypointHead, Norm};
+use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, KeypointHead, MaskHead, Norm};
 use sdg_weights_conversion::{Architecture, Checkpoint, Naming, SecondStage, naming_of};
-use serde::Deserialize;
 
 use crate::exit::Usage;
 use crate::files;
@@ -21,75 +20,15 @@ const MOST_CONFIG_BYTES: u64 = 1 << 20;
 /// The presets that checkpoints are imported into.
 const PRESETS: [&str; 1] = ["r50-detectron2"];
 
-/// The short form: what differs from `r50-detectron2`.
-#[derive(Debug, Deserialize)]
-struct ShortConfig {
-    kind: String,
-    classes: usize,
-    keypoints: usize,
-    min_size_test: u32,
-    max_size_test: u32,
-    pre_nms_topk: usize,
-    post_nms_topk_test: usize,
-    post_nms_topk_train: usize,
-    detections_per_image: usize,
-    score_thresh_test: f64,
-    stem_out_channels: usize,
-    res2_out_channels: usize,
-    width_per_group: usize,
-    fpn_channels: usize,
-    box_head_fc: usize,
-    keypoint_convs: usize,
-}
-
 /// Reads a configuration file of either form.
 ///
 /// # Errors
 /// A file that cannot be read, is no JSON of either form, or contradicts itself.
 pub fn read_config(path: &Path) -> Result<RcnnConfig> {
-    let bytes = files::read(path, MOST_CONFIG_BYTES)?;
     let named = || path.display().to_string();
-    let value: serde_json::Value = serde_json::from_slice(&bytes).with_context(named)?;
-    let config = if value.get("kind").is_some() {
-        ShortConfig::deserialize(value).map_err(anyhow::Error::from).and_then(|short| short.expand())
-    } else {
-        RcnnConfig::deserialize(value).map_err(Into::into)
-    };
-    let config = config.with_context(named)?;
-    config.validate().with_context(named)?;
-    Ok(config)
-}
-
-impl ShortConfig {
-    fn expand(&self) -> Result<RcnnConfig> {
-        let kind = match self.kind.as_str() {
-            "faster" => RcnnKind::Faster { num_classes: self.classes },
-            "keypoint" => RcnnKind::Keypoint { num_keypoints: self.keypoints },
-            other => bail!("kind: expected faster or keypoint, found \"{other}\""),
-        };
-        let mut config = presets::r50_detectron2(kind);
-        if let ResizeRule::ShortSide { short_px, max_long_px, .. } = &mut config.input.resize {
-            (*short_px, *max_long_px) = (self.min_size_test, self.max_size_test);
-        }
-        config.backbone.stem_channels = self.stem_out_channels;
-        config.backbone.res2_channels = self.res2_out_channels;
-        if let BlockKind::Bottleneck { inner_channels, .. } = &mut config.backbone.block {
-            *inner_channels = self.width_per_group;
-        }
-        config.fpn.channels = self.fpn_channels;
-        let (pre, post) = (&mut config.rpn.pre_nms_top_n, &mut config.rpn.post_nms_top_n);
-        (pre.train, pre.test) = (self.pre_nms_topk, self.pre_nms_topk);
-        (post.train, post.test) = (self.post_nms_topk_train, self.post_nms_topk_test);
-        let heads = &mut config.roi_heads;
-        heads.num_classes = self.classes;
-        heads.box_head.fc_channels = self.box_head_fc;
-        heads.box_head.score_threshold = self.score_thresh_test;
-        heads.box_head.detections_per_image = self.detections_per_image;
-        if let Some(head) = &mut heads.keypoint_head {
-            head.conv_channels.fill(self.keypoint_convs);
-        }
-        Ok(config)
-    }
+    let bytes = files::read(path, MOST_CONFIG_BYTES)?;
+    let text = std::str::from_utf8(&bytes).with_context(named)?;
+    RcnnConfig::from_json(text).with_context(named)
 }
 
 /// The detector of that name, with the checkpoint's number of classes and keypoints.
@@ -102,8 +41,9 @@ pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
     let kind = match (num_keypoints, has_masks) {
         (None, false) => RcnnKind::Faster { num_classes },
         (Some(num_keypoints), false) if num_classes == 1 => RcnnKind::Keypoint { num_keypoints },
+        (None, true) => RcnnKind::Mask { num_classes },
         (Some(_), false) => bail!("expected keypoints of one class, found {num_classes} classes"),
-        (_, true) => bail!("expected a detector of boxes or keypoints, found a mask head"),
+        (Some(_), true) => bail!("expected a keypoint head or a mask head, found both: describe it with --config"),
     };
     match name {
         "r50-detectron2" => Ok(presets::r50_detectron2(kind)),
@@ -161,7 +101,14 @@ pub fn architecture_of(config: &RcnnConfig) -> Architecture {
                 conv_channels: head.conv_channels.clone(),
                 num_keypoints: head.num_keypoints,
             }),
-            mask: None,
+            mask: heads.mask_head.as_ref().map(|head| MaskHead {
+                conv_channels: head.conv_channels.clone(),
+                deconv_channels: head.deconv_channels,
+                num_masks: match heads.box_head.background {
+                    BackgroundClass::First => heads.num_classes + 1,
+                    BackgroundClass::Last => heads.num_classes,
+                },
+            }),
         }),
     }
 }
@@ -184,12 +131,21 @@ mod tests {
         };
         narrow.fpn.channels = 8;
         narrow.roi_heads.box_head.fc_channels = 16;
+        let mut mask = presets::r50_detectron2(RcnnKind::Mask { num_classes: 3 });
+        mask.backbone = narrow.backbone.clone();
+        mask.fpn.channels = 8;
+        mask.roi_heads.box_head.fc_channels = 16;
+        if let Some(head) = &mut mask.roi_heads.mask_head {
+            (head.conv_channels, head.deconv_channels) = (vec![8, 4], 6);
+        }
+        let mut mask_first = mask.clone();
+        mask_first.roi_heads.box_head.background = BackgroundClass::First;
         let mut first = narrow.clone();
         first.roi_heads.box_head.background = BackgroundClass::First;
         let mut agnostic = narrow.clone();
         agnostic.roi_heads.box_head.box_deltas = BoxDeltas::ClassAgnostic;
         agnostic.fpn.norm = NormKind::Group { num_groups: 4 };
-        for config in [presets::edge(12), narrow, first, agnostic] {
+        for config in [presets::edge(12), narrow, first, agnostic, mask, mask_first] {
             let built = state_dict::export(&config.init(&Device::flex(), 1).unwrap());
             let shapes = built.into_iter().map(|(name, weight)| (name, weight.shape)).collect();
             assert_eq!(architecture_of(&config).parameters(), shapes);

@@ -76,6 +76,33 @@ fn what_does_not_fit_is_listed_and_nothing_is_written() {
     assert_eq!(sdg(&named).status.code(), Some(0));
 }
 
+/// Detectron2's own case of a detector of boxes.
+fn golden(name: &str) -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden/detectron2");
+    folder.join(name).to_str().unwrap().to_owned()
+}
+
+#[test]
+fn verification_tells_the_right_image_from_another() {
+    let [weights, config] = ["faster/weights.safetensors", "faster/config.json"].map(golden);
+    let against = golden("faster/expected.safetensors");
+    let verify = |image: &str| {
+        sdg(&["verify", &weights, "--config", &config, "--image", image, "--against", &against, "--json"])
+    };
+    let right = verify(&golden("input.png"));
+    assert_eq!(right.status.code(), Some(0), "{right:?}");
+    let line = one_json(&right);
+    let stages: Vec<_> = line["stages"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
+    for stage in ["preprocessed", "features.p2", "detections.boxes", "gradients.backbone.fpn.fpn_lateral3.weight"] {
+        assert!(stages.contains(&stage), "{stage} in {stages:?}");
+    }
+    let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum/image.png");
+    let wrong = verify(other.to_str().unwrap());
+    assert_eq!(wrong.status.code(), Some(1));
+    let stderr = String::from_utf8(wrong.stderr).unwrap();
+    assert!(stderr.lines().count() == 1 && stderr.contains("first: preprocessed"), "{stderr}");
+}
+
 #[test]
 fn wrong_input_is_one_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -5,21 +5,26 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
+use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_detection::verification;
+use sdg_grasp::Device;
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision, Source, naming_of, sha256_of};
 use serde_json::json;
 
-use crate::args::{ConvertArgs, InspectArgs, WeightsArgs, WeightsCommand};
+use crate::args::{ConvertArgs, InspectArgs, VerifyArgs, WeightsArgs, WeightsCommand};
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
 use crate::exit::Outcome;
+use crate::files;
 
 /// Runs one of the verbs.
 pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     match &args.command {
         WeightsCommand::Convert(convert) => self::convert(convert),
         WeightsCommand::Inspect(inspect) => self::inspect(inspect),
+        WeightsCommand::Verify(verify) => self::verify(verify),
     }
 }
 
@@ -30,32 +35,32 @@ fn open(path: &Path) -> Result<(Source, Checkpoint)> {
     Ok((source, checkpoint))
 }
 
+/// The detector to fill: as configured, as the file itself says, or as its names say.
+fn config_of(checkpoint: &Checkpoint, config: Option<&Path>, preset_name: Option<&str>) -> Result<RcnnConfig> {
+    if let Some(path) = config {
+        return read_config(path);
+    }
+    let naming = naming_of(checkpoint)?;
+    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours && preset_name.is_none());
+    match (stored, preset_name) {
+        (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
+        (None, Some(name)) => preset(name, checkpoint),
+        (None, None) => preset(preset_for(naming)?, checkpoint),
+    }
+}
+
 /// The network to fill, and the metadata that says which one it is.
 fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, BTreeMap<String, String>)> {
     let naming = naming_of(checkpoint)?;
-    let mut metadata = BTreeMap::new();
-    if let Some(path) = &args.config {
-        let config = read_config(path)?;
-        metadata.insert("network".to_owned(), serde_json::to_string(&config)?);
-        return Ok((architecture_of(&config), metadata));
-    }
-    if naming.is_backbone_alone() && args.preset.is_none() {
-        metadata.insert("part".to_owned(), "backbone.bottom_up".to_owned());
+    if naming.is_backbone_alone() && args.preset.is_none() && args.config.is_none() {
+        let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
         return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
     }
-    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours && args.preset.is_none());
-    let config: RcnnConfig = match stored {
-        Some(network) => serde_json::from_str(network).context("metadata \"network\"")?,
-        None => {
-            let name = match &args.preset {
-                Some(name) => name,
-                None => preset_for(naming)?,
-            };
-            metadata.insert("preset".to_owned(), name.to_owned());
-            preset(name, checkpoint)?
-        }
-    };
-    metadata.insert("network".to_owned(), serde_json::to_string(&config)?);
+    let config = config_of(checkpoint, args.config.as_deref(), args.preset.as_deref())?;
+    let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
+    if let Some(preset) = &args.preset {
+        metadata.insert("preset".to_owned(), preset.clone());
+    }
     Ok((architecture_of(&config), metadata))
 }
 
@@ -150,6 +155,60 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
         writeln!(stdout, "no tensor   {}", one_line(name))?;
     }
     Ok(Outcome::Done)
+}
+
+/// Builds the detector, fills it and compares it; nothing is written.
+fn verify(args: &VerifyArgs) -> Result<Outcome> {
+    let named = || args.file.display().to_string();
+    let (mut source, checkpoint) = open(&args.file)?;
+    let config = config_of(&checkpoint, args.config.as_deref(), None).with_context(named)?.without_sampling();
+    let image = files::read_image(&args.image)?;
+    let reference = read_reference(&args.against)?;
+    let conversion = Conversion::plan(&checkpoint, &architecture_of(&config), &[]).with_context(named)?;
+    let weights: StateDict = conversion
+        .values(&mut source)
+        .with_context(named)?
+        .into_iter()
+        .map(|(name, (shape, values))| (name, WeightTensor { shape, values }))
+        .collect();
+    let (detector, imported) = state_dict::import(config.init(&Device::flex().autodiff(), 0)?, &weights);
+    if !imported.is_complete() {
+        bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
+    }
+    let report =
+        verification::verify(&detector, &image, &reference).with_context(|| args.against.display().to_string())?;
+    let mut stdout = std::io::stdout().lock();
+    if args.json {
+        writeln!(stdout, "{}", json!({"passed": report.passed(), "stages": report.stages}))?;
+    } else {
+        write!(stdout, "{report}")?;
+    }
+    match report.stages.iter().find(|stage| !stage.passed) {
+        None if report.passed() => Ok(Outcome::Done),
+        None => bail!("{}: expected outputs of the detector's stages, found none", args.against.display()),
+        Some(first) => {
+            let failed = report.stages.iter().filter(|stage| !stage.passed).count();
+            bail!("{failed} of {} stages outside their tolerance (first: {})", report.stages.len(), first.name)
+        }
+    }
+}
+
+/// The original's outputs; gradients come under the names of whoever made them.
+fn read_reference(path: &Path) -> Result<StateDict> {
+    const GRADIENTS: &str = "gradients.";
+    let (mut source, outputs) = open(path)?;
+    let parameters = outputs.tensors.keys().filter_map(|name| name.strip_prefix(GRADIENTS));
+    let naming = Naming::detect(parameters).unwrap_or(Naming::Ours);
+    let mut reference = StateDict::new();
+    for (name, tensor) in &outputs.tensors {
+        let ours = match name.strip_prefix(GRADIENTS) {
+            Some(parameter) => naming.our_name(parameter).map(|ours| format!("{GRADIENTS}{ours}")),
+            None => Some(name.clone()),
+        };
+        let values = tensor.numbers(&mut source).with_context(|| path.display().to_string())?;
+        reference.insert(ours.unwrap_or_else(|| name.clone()), WeightTensor { shape: tensor.shape().to_vec(), values });
+    }
+    Ok(reference)
 }
 
 /// A text from a file, whatever it holds, on one line.
