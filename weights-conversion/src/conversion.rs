@@ -10,6 +10,9 @@ use crate::report::{Applied, Mismatch, Report};
 use crate::source::Source;
 use crate::tensor::StoredTensor;
 
+/// Shapes and values of parameters by name.
+pub type ParameterValues = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
+
 /// Box deltas of a class.
 const DELTAS: usize = 4;
 
@@ -137,7 +140,7 @@ impl Conversion {
     ///
     /// # Errors
     /// Where [`Self::complete`] finds one; a checkpoint that ends early.
-    pub fn values(&self, source: &mut Source) -> Result<BTreeMap<String, (Vec<usize>, Vec<f32>)>> {
+    pub fn values(&self, source: &mut Source) -> Result<ParameterValues> {
         self.complete()?;
         let mut parameters = BTreeMap::new();
         for (name, planned) in &self.parameters {
