@@ -104,6 +104,11 @@ impl GradientLevel {
         self.height
     }
 
+    /// The samples of a row, from left to right.
+    pub(crate) fn row(&self, row: usize) -> &[DirectionSample] {
+        &self.samples[row * self.width..][..self.width]
+    }
+
     /// Energy that an edge must exceed to be trusted, in (grey levels / level pixel)².
     pub(crate) fn floor(&self) -> f32 {
         self.floor

@@ -12,10 +12,11 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] is a second witness: the colours inside the outline.
+//! [`Surface`] is a second witness: the colours inside the outline. [`InstantSearch`] needs no detector: it tries every
+//! place, turn and scale of a whole image coarsely and refines the best.
 //!
-//! What this crate leaves out: it proposes no poses (detectors do), knows no grasp and no camera, and a
-//! part lies flat: poses are turns, shifts and scales in the image plane.
+//! What this crate leaves out: it knows no grasp and no camera, and a part lies flat: poses are turns, shifts and scales
+//! in the image plane. Threads only with the feature `parallel`, and results do not depend on them.
 //!
 //! # Example
 //!
@@ -23,7 +24,7 @@
 //! use image::{Rgb, RgbImage};
 //! use nalgebra::Point2;
 //! use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity, Polygon};
-//! use sdg_shape::{GradientField, ShapeConfig, ShapeTemplate};
+//! use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeConfig, ShapeTemplate};
 //!
 //! // A dark 80 × 40 plate in the demonstration, and the same plate 5 px further to the right.
 //! let plate_at = |x: u32| {
@@ -40,6 +41,11 @@
 //! let refinement = template.refine(&field, &PlanarSimilarity::IDENTITY);
 //! assert!((refinement.image_from_demonstration.apply(&Point2::new(90.0, 70.0)).x - 95.0).abs() < 0.2);
 //! assert!(refinement.agreement > 0.9);
+//!
+//! // Without knowing where to start:
+//! let search = InstantSearch::new(&plate_at(50), &outline, &SearchConfig::default())?;
+//! let matches = search.search(&plate_at(110));
+//! assert!((matches[0].image_from_demonstration.apply(&Point2::new(90.0, 70.0)).x - 150.0).abs() < 0.2);
 //! # Ok::<(), sdg_shape::ShapeError>(())
 //! ```
 
@@ -50,13 +56,16 @@ mod consensus;
 mod edge_points;
 mod error;
 mod gradient_field;
+mod parallel;
 mod pose;
 mod refinement;
+mod search;
 mod surface;
 mod template;
 
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
 pub use refinement::Refinement;
+pub use search::{InstantSearch, Match, SearchConfig};
 pub use surface::{SURFACE_SHARE, Surface};
 pub use template::{ScaleRange, ShapeConfig, ShapeTemplate};

@@ -84,6 +84,22 @@ impl ShapeTemplate {
         }
     }
 
+    /// Climbs from `from` within `range` at the coarsest level; the pose and its agreement there.
+    pub(crate) fn climb_coarsest(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> (Pose, f64) {
+        let level = &self.levels[self.levels.len() - 1];
+        let overlay = level.overlay(field, &range.start);
+        let pose = climb(level, &overlay, range, from);
+        (pose, overlay.mean_alignment(level, &pose, LevelSampling::Bilinear))
+    }
+
+    /// Climbs and snaps from `from` within `range`, coarse to fine.
+    pub(crate) fn follow(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
+        self.levels.iter().rev().fold(from, |pose, level| {
+            let overlay = level.overlay(field, &range.start);
+            snap(level, &overlay, range, climb(level, &overlay, range, pose)).pose
+        })
+    }
+
     /// The best poses of a grid over the capture range, on the coarsest level, no two alike.
     fn grid_candidates(&self, field: &GradientField, range: &CaptureRange) -> Vec<Pose> {
         let level = &self.levels[self.levels.len() - 1];
@@ -130,6 +146,11 @@ impl CaptureRange {
         let config = &template.config;
         let shift = config.capture_shift * field.width() as f64;
         Self { start, limits: [shift, shift, config.capture_angle_rad, config.scale.max_log()] }
+    }
+
+    /// A box about `start` that reaches `limits` (px, px, rad, ln scale) to either side.
+    pub(crate) fn around(start: Pose, limits: [f64; 4]) -> Self {
+        Self { start, limits }
     }
 
     fn pose_at_cell(&self, cell: [i32; 4], counts: [i32; 4]) -> Pose {

@@ -45,6 +45,13 @@ impl Surface {
         Self { points }
     }
 
+    /// The share of the points that lie in `outline` after `outline_from_cutout`, in `[0, 1]`.
+    pub(crate) fn share_inside(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
+        let inside =
+            self.points.iter().filter(|(point, _)| outline.contains(&outline_from_cutout.apply(point))).count();
+        inside as f64 / (self.points.len() as f64).max(1.0)
+    }
+
     /// The correlation of colours, each channel about its own mean, between the cut-out and the image at a pose;
     /// 0 for none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {

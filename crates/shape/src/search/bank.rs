@@ -1,0 +1,130 @@
+//! The template turned and scaled in every way that is tried, as shifts into the look-up tables.
+
+use std::f64::consts::TAU;
+
+use crate::edge_points::EdgePoint;
+use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
+
+/// Points read for a pose. More cost time in proportion and tell little new.
+const NUM_POINTS: usize = 64;
+/// How far the outer points may move from one pose to the next, in level pixels: half of it to either side is what
+/// directions are spread.
+const POSE_STEP: f64 = 2.0 * SPREAD as f64;
+
+/// One turn and scale.
+#[derive(Debug, Clone)]
+pub(crate) struct Variant {
+    pub(crate) angle_rad: f64,
+    pub(crate) log_scale: f64,
+    looks: Vec<Look>,
+}
+
+/// One look: into which table, and how far from the part's place, in places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Look {
+    table: u8,
+    dy: i16,
+    dx: i16,
+}
+
+/// All turns and scales of one template, ordered by angle.
+#[derive(Debug, Clone)]
+pub(crate) struct Bank {
+    pub(crate) variants: Vec<Variant>,
+    /// From one angle to the next.
+    pub(crate) angle_step_rad: f64,
+    /// How far looks reach from the part's place, in places.
+    pub(crate) reach: usize,
+    /// Points of every variant; the most that a pose can score is this many times a full response.
+    pub(crate) num_points: usize,
+}
+
+impl Bank {
+    /// Turns and scales `points`, seen on a level whose pixel is `pixel_size` demonstration pixels; `log_scales` are
+    /// the least and the largest ln scale.
+    pub(crate) fn new(points: &[EdgePoint], pixel_size: f64, log_scales: [f64; 2]) -> Self {
+        let sampled = sample_by_weight(points, NUM_POINTS);
+        let outer = outer_radius(&sampled) / pixel_size;
+        let step = POSE_STEP / outer.max(1.0);
+        let num_angles = (TAU / step).ceil().max(8.0) as usize;
+        let range = log_scales[1] - log_scales[0];
+        let num_scales = (range / step).ceil() as usize + 1;
+        let angle_step_rad = TAU / num_angles as f64;
+        let log_scale_step = if num_scales > 1 { range / (num_scales - 1) as f64 } else { 0.0 };
+
+        let mut variants = Vec::with_capacity(num_angles * num_scales);
+        for angle_idx in 0..num_angles {
+            for scale_idx in 0..num_scales {
+                // A single scale stands in the middle of its range.
+                let log_scale = if num_scales > 1 {
+                    log_scales[0] + scale_idx as f64 * log_scale_step
+                } else {
+                    0.5 * (log_scales[0] + log_scales[1])
+                };
+                variants.push(Variant::new(&sampled, angle_idx as f64 * angle_step_rad, log_scale, pixel_size));
+            }
+        }
+        let reach = variants.iter().flat_map(|v| &v.looks).map(|l| l.dx.unsigned_abs().max(l.dy.unsigned_abs())).max();
+        Self { variants, angle_step_rad, reach: usize::from(reach.unwrap_or(0)), num_points: sampled.len() }
+    }
+}
+
+impl Variant {
+    fn new(points: &[EdgePoint], angle_rad: f64, log_scale: f64, pixel_size: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        let factor = log_scale.exp() / pixel_size;
+        let (sin2, cos2) = (2.0 * angle_rad).sin_cos();
+        let mut looks: Vec<Look> = points
+            .iter()
+            .map(|point| {
+                let [x, y] = point.offset.map(f64::from);
+                let [dx, dy] = point.double.map(f64::from);
+                // The part's centre stands in the middle of its place.
+                let middle = 0.5 * PITCH as f64;
+                let col = (factor * (cos * x - sin * y) + middle).floor() as i32;
+                let row = (factor * (sin * x + cos * y) + middle).floor() as i32;
+                let pitch = PITCH as i32;
+                let k = direction_idx([(cos2 * dx - sin2 * dy) as f32, (sin2 * dx + cos2 * dy) as f32]);
+                Look {
+                    table: table_idx(k, col.rem_euclid(pitch) as usize, row.rem_euclid(pitch) as usize) as u8,
+                    dx: col.div_euclid(pitch) as i16,
+                    dy: row.div_euclid(pitch) as i16,
+                }
+            })
+            .collect();
+        // Neighbouring looks touch the same memory.
+        looks.sort_unstable();
+        Self { angle_rad, log_scale, looks }
+    }
+
+    /// `(table, shift)` of every look, in tables whose rows are `stride` apart.
+    pub(crate) fn shifts(&self, stride: usize) -> Vec<(usize, isize)> {
+        self.looks
+            .iter()
+            .map(|look| (usize::from(look.table), isize::from(look.dy) * stride as isize + isize::from(look.dx)))
+            .collect()
+    }
+}
+
+/// At most `count` points, each as often as its share of the weight: equal weights add up in bytes.
+fn sample_by_weight(points: &[EdgePoint], count: usize) -> Vec<EdgePoint> {
+    let total: f64 = points.iter().map(|p| f64::from(p.weight)).sum();
+    let mut sampled = Vec::with_capacity(count);
+    let mut passed = 0.0;
+    for point in points {
+        passed += f64::from(point.weight) / total * count as f64;
+        while (sampled.len() as f64) + 0.5 < passed && sampled.len() < count {
+            sampled.push(*point);
+        }
+    }
+    sampled
+}
+
+/// Distance from the centre within which nine points of ten lie, in demonstration pixels.
+fn outer_radius(points: &[EdgePoint]) -> f64 {
+    let mut radii: Vec<f64> = points.iter().map(|p| f64::from(p.offset[0]).hypot(f64::from(p.offset[1]))).collect();
+    radii.sort_by(f64::total_cmp);
+    radii.get(radii.len() * 9 / 10).copied().unwrap_or(0.0)
+}
+
+const _: () = assert!(NUM_DIRECTIONS * PITCH * PITCH <= 256, "tables are numbered in a byte");

@@ -1,0 +1,282 @@
+//! The taught part looked for in a whole image, with no network and no teaching.
+//!
+//! ```text
+//! demonstration ─ edge points of a coarse level ─ Bank: every turn and scale as shifts into tables
+//! image ─ GradientField ─ coarse level ─ Responses: a look-up table a direction
+//!                                           │
+//!                    sweep: every place × every variant ─ local maxima: starts
+//!                                           │
+//!          climb the agreement at a coarse level, keep the best; climb and snap them level by level
+//!                                           │
+//!          edges and surface ─ agreement ─ overlapping ones suppressed ─ poor ones refined again ─ Match
+//! ```
+
+mod bank;
+mod responses;
+mod sweep;
+
+use std::ops::RangeInclusive;
+
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_geometry::{PlanarSimilarity, Polygon};
+
+use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
+use crate::error::ShapeError;
+use crate::gradient_field::GradientField;
+use crate::parallel;
+use crate::pose::Pose;
+use crate::refinement::CaptureRange;
+use crate::search::bank::Bank;
+use crate::search::responses::{PITCH, Responses};
+use crate::search::sweep::sweep;
+use crate::surface::{SURFACE_SHARE, Surface};
+use crate::template::{ShapeConfig, ShapeTemplate};
+
+/// What is looked for, and what is reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchConfig {
+    /// Scales looked for: 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
+    /// known, is faster and mistakes less.
+    pub scales: RangeInclusive<f64>,
+    /// Matches that agree less are not reported, in `[0, 1]`.
+    pub least_agreement: f64,
+    /// Most matches reported.
+    pub max_matches: usize,
+    /// How the edges are read.
+    pub shape: ShapeConfig,
+}
+
+impl Default for SearchConfig {
+    fn default() -> Self {
+        Self { scales: 0.75..=1.3, least_agreement: 0.5, max_matches: 16, shape: ShapeConfig::default() }
+    }
+}
+
+/// The taught part, found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Match {
+    /// Where the demonstration lies in the image.
+    pub image_from_demonstration: PlanarSimilarity,
+    /// Edges and surface together, in `[0, 1]`: [`SURFACE_SHARE`] of the latter.
+    pub agreement: f64,
+    /// [`ShapeTemplate::agreement`] alone.
+    pub edges: f64,
+    /// [`Surface::agreement`] alone.
+    pub surface: f64,
+}
+
+/// The level that is swept shows the part at least this large, in level pixels.
+const SWEEP_EXTENT: f64 = 50.0;
+/// Edge points read at that level, from which every pose samples.
+const SWEEP_POINTS: usize = 128;
+/// With fewer edge points than this at a level, the next finer one is swept.
+const LEAST_SWEEP_POINTS: usize = 32;
+/// Bounds of the scales that may be looked for: beyond, the swept level shows too little or too much.
+const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
+/// Starts that are climbed at the coarsest level of the template.
+const NUM_STARTS: usize = 64;
+/// Of those, how many are followed to the full size.
+const NUM_FOLLOWED: usize = 8;
+/// A start that responds less is not worth a climb.
+const LEAST_RESPONSE: f64 = 0.2;
+/// How far a climb may go from its start: in places, and in steps of angle and scale.
+const FOLLOW_PLACES: f64 = 2.5;
+const FOLLOW_STEPS: f64 = 1.5;
+/// How many of the best matches are refined again, where they agree less than surely.
+const NUM_POLISHED: usize = 3;
+const SURE: f64 = 0.65;
+/// Share of the part's area that two matches may both claim.
+const MAX_OVERLAP: f64 = 0.3;
+
+/// Looks for one taught part in whole images.
+///
+/// On 640×480 pixels a search over all scales from 0.75 to 1.3 takes some tens of milliseconds on two cores, and time
+/// grows with the number of pixels; for a part smaller than about 100 pixels it is up to four times that.
+#[derive(Debug, Clone)]
+pub struct InstantSearch {
+    config: SearchConfig,
+    template: ShapeTemplate,
+    surface: Surface,
+    outline: Polygon,
+    bank: Bank,
+    sweep_level_idx: usize,
+}
+
+impl InstantSearch {
+    /// Makes a demonstration ready to be looked for: milliseconds.
+    ///
+    /// # Units and frames
+    /// `outline` is in pixels of `image`, as for [`ShapeTemplate::new`].
+    ///
+    /// # Errors
+    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2 and for a least agreement
+    /// outside 0 to 1.
+    pub fn new(image: &RgbImage, outline: &Polygon, config: &SearchConfig) -> Result<Self, ShapeError> {
+        check_config(config)?;
+        let template = ShapeTemplate::new(image, outline, &config.shape)?;
+        let field = GradientField::new(image);
+        let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
+        let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
+        Ok(Self {
+            config: config.clone(),
+            surface: Surface::new(image, outline),
+            outline: outline.clone(),
+            bank: Bank::new(&points, (1u32 << sweep_level_idx) as f64, log_scales),
+            template,
+            sweep_level_idx,
+        })
+    }
+
+    /// Finds the part wherever it lies in `image`, best first; empty where it is not seen.
+    ///
+    /// Several may lie there, turned in any way; deterministic.
+    pub fn search(&self, image: &RgbImage) -> Vec<Match> {
+        self.search_field(image, &GradientField::new(image))
+    }
+
+    /// As [`search`](Self::search), with the field of `image` at hand because others read it too.
+    pub fn search_field(&self, image: &RgbImage, field: &GradientField) -> Vec<Match> {
+        if self.sweep_level_idx >= field.num_levels() || field.width().min(field.height()) == 0 {
+            // The image is smaller than the part.
+            return Vec::new();
+        }
+        let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
+        let starts = sweep(&responses, &self.bank, NUM_STARTS, LEAST_RESPONSE);
+        let poses: Vec<Pose> = starts
+            .iter()
+            .map(|start| {
+                let variant = &self.bank.variants[start.variant_idx];
+                let pitch = self.place_pitch();
+                let [x, y] = start.place.map(|place| (place as f64 + 0.5) * pitch);
+                Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
+            })
+            .collect();
+        let followed = parallel::map(&self.best_climbs(image, field, &poses), |&pose| {
+            self.template.follow(field, &self.range_about(pose), pose)
+        });
+        let matches = followed.iter().map(|pose| self.matched(image, field, pose.to_similarity(self.template.center)));
+        let best = self.apart(matches.collect());
+        let polished = parallel::map(&best[..best.len().min(NUM_POLISHED)], |found| self.polished(image, field, found));
+        let rest = best.into_iter().skip(NUM_POLISHED);
+        let mut matches = self.apart(polished.into_iter().chain(rest).collect());
+        matches.retain(|found| found.agreement >= self.config.least_agreement);
+        matches.truncate(self.config.max_matches);
+        matches
+    }
+
+    fn matched(&self, image: &RgbImage, field: &GradientField, image_from_demonstration: PlanarSimilarity) -> Match {
+        let edges = self.template.agreement(field, &image_from_demonstration);
+        let surface = self.surface.agreement(image, &image_from_demonstration);
+        Match { image_from_demonstration, agreement: combined(edges, surface), edges, surface }
+    }
+
+    /// Refined from all around, where the match is poor: its start may have been on the wrong side of a shadow.
+    fn polished(&self, image: &RgbImage, field: &GradientField, found: &Match) -> Match {
+        if found.agreement >= SURE {
+            return *found;
+        }
+        let refined = self.template.refine(field, &found.image_from_demonstration);
+        let refined = self.matched(image, field, refined.image_from_demonstration);
+        let is_in_range = self.config.scales.contains(&refined.image_from_demonstration.scale);
+        if is_in_range && refined.agreement > found.agreement { refined } else { *found }
+    }
+
+    /// The best first; of those that claim the same area, the best alone.
+    fn apart(&self, mut matches: Vec<Match>) -> Vec<Match> {
+        matches.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+        let mut kept: Vec<Match> = Vec::new();
+        for found in matches {
+            if kept.iter().all(|better| self.are_apart(better, &found)) {
+                kept.push(found);
+            }
+        }
+        kept
+    }
+
+    /// How far a start is followed: about itself, and within the scales looked for.
+    fn range_about(&self, pose: Pose) -> CaptureRange {
+        let [least, largest] = [self.config.scales.start().ln(), self.config.scales.end().ln()];
+        let turn = FOLLOW_STEPS * self.bank.angle_step_rad;
+        // Edges move as far by a change of ln scale as by the same angle.
+        let (low, high) = ((pose.log_scale - turn).max(least), (pose.log_scale + turn).min(largest));
+        let shift = FOLLOW_PLACES * self.place_pitch();
+        CaptureRange::around(Pose { log_scale: 0.5 * (low + high), ..pose }, [shift, shift, turn, 0.5 * (high - low)])
+    }
+
+    /// Climbs from every start at the template's coarsest level; the best by edges and surface, no two alike.
+    fn best_climbs(&self, image: &RgbImage, field: &GradientField, poses: &[Pose]) -> Vec<Pose> {
+        let mut climbed = parallel::map(poses, |&pose| {
+            let (pose, edges) = self.template.climb_coarsest(field, &self.range_about(pose), pose);
+            let surface = self.surface.agreement(image, &pose.to_similarity(self.template.center));
+            (pose, combined(edges, surface))
+        });
+        climbed.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let pitch = self.place_pitch();
+        let near = [pitch, pitch, 0.5 * self.bank.angle_step_rad, f64::INFINITY];
+        let mut kept: Vec<Pose> = Vec::new();
+        for (pose, _) in climbed {
+            if kept.len() < NUM_FOLLOWED && kept.iter().all(|other| !pose.is_near(other, near)) {
+                kept.push(pose);
+            }
+        }
+        kept
+    }
+
+    /// Image pixels from one place to the next.
+    fn place_pitch(&self) -> f64 {
+        (PITCH << self.sweep_level_idx) as f64
+    }
+
+    /// Whether two matches can both be there: parts do not lie in each other.
+    fn are_apart(&self, one: &Match, other: &Match) -> bool {
+        let one_from_other = one.image_from_demonstration.inverse().compose(&other.image_from_demonstration);
+        self.surface.share_inside(&self.outline, &one_from_other) <= MAX_OVERLAP
+    }
+}
+
+/// Edges and surface together, as detections are verified.
+fn combined(edges: f64, surface: f64) -> f64 {
+    (1.0 - SURFACE_SHARE) * edges + SURFACE_SHARE * surface
+}
+
+/// The coarsest level that still shows the part well, and its edge points there.
+fn sweep_points(
+    field: &GradientField,
+    template: &ShapeTemplate,
+    outline: &Polygon,
+    config: &SearchConfig,
+) -> (usize, Vec<EdgePoint>) {
+    let bounds = outline.bounds();
+    let extent = bounds.width().max(bounds.height());
+    let coarsest = ((extent / SWEEP_EXTENT).log2().floor().max(0.0) as usize).min(field.num_levels() - 1);
+    let selection = EdgeSelection {
+        outline,
+        center: template.center,
+        max_points: SWEEP_POINTS,
+        outline_weight: config.shape.outline_weight,
+    };
+    let points_at = |idx: usize| select_edge_points(field.level(idx), (1u32 << idx) as f64, &selection);
+    let (mut idx, mut points) = (coarsest, points_at(coarsest));
+    while idx > 0 && points.len() < LEAST_SWEEP_POINTS {
+        idx -= 1;
+        points = points_at(idx);
+    }
+    (idx, points)
+}
+
+fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
+    let (least, largest) = (*config.scales.start(), *config.scales.end());
+    let within = |scale: f64| (SCALE_BOUNDS.0..=SCALE_BOUNDS.1).contains(&scale);
+    let checks = [
+        ("scales", "from 0.5 on", least, within(least)),
+        ("scales", "up to 2, and no less than they begin with", largest, within(largest) && largest >= least),
+        ("least_agreement", "in [0, 1]", config.least_agreement, (0.0..=1.0).contains(&config.least_agreement)),
+    ];
+    for (name, expected, found, ok) in checks {
+        if !ok {
+            return Err(ShapeError::InvalidConfig { name, expected, found });
+        }
+    }
+    Ok(())
+}

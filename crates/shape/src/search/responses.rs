@@ -1,0 +1,183 @@
+//! Look-up tables of one image: how well each of a few quantised directions agrees with each place.
+//!
+//! Legend: `k` one of [`NUM_DIRECTIONS`] directions, evenly spaced over half a turn since gradients have no sign;
+//! the response of direction `k` at pixel `(x, y)` of the pyramid level is the best of
+//! `cos 2(direction k − gradient direction)` over the pixels at most [`SPREAD`] away, from 0 to [`FULL`]. An edge point
+//! of the template whose normal is nearest to direction `k` reads its share of the agreement with one look.
+//!
+//! Places, where the part's centre is tried, are [`PITCH`] pixels apart. Pixels are therefore kept in one table for
+//! each remainder of x and y: neighbouring places look at neighbouring bytes.
+//!
+//! Spreading lets places and turns stand further apart than an edge is wide, while directions are still read where a
+//! thin part shows both its edges.
+//!
+//! # Source
+//! The idea of spread directions, response maps and their order in memory is LINE-2D's (Hinterstoisser et al.,
+//! *Gradient Response Maps for Real-Time Detection of Textureless Objects*, 2012). Here the tables are filled from the
+//! directions themselves instead of from bit masks, so that an edge's strength and sharpness count.
+
+use std::f32::consts::TAU;
+
+use crate::gradient_field::GradientLevel;
+use crate::parallel;
+
+/// Directions over half a turn; neighbours are 11.25° apart, which costs at most 2 % of the cosine.
+pub(crate) const NUM_DIRECTIONS: usize = 16;
+/// Response of an edge of exactly the table's direction. Small, so that 16 of them add up within a byte.
+pub(crate) const FULL: u8 = 15;
+
+/// The direction nearest to `(cos 2φ, sin 2φ)`.
+pub(crate) fn direction_idx(double: [f32; 2]) -> usize {
+    let step = TAU / NUM_DIRECTIONS as f32;
+    (double[1].atan2(double[0]) / step).round().rem_euclid(NUM_DIRECTIONS as f32) as usize % NUM_DIRECTIONS
+}
+
+/// Level pixels from one place to the next.
+pub(crate) const PITCH: usize = 2;
+/// How far responses are spread, in level pixels to every side.
+pub(crate) const SPREAD: usize = 2;
+
+/// The table of direction `k` that holds pixels whose x and y leave these remainders by [`PITCH`].
+pub(crate) fn table_idx(k: usize, x: usize, y: usize) -> usize {
+    (k * PITCH + y % PITCH) * PITCH + x % PITCH
+}
+
+/// The tables of one pyramid level, padded with zeros so that templates may hang over the border.
+///
+/// # Shapes
+/// A table is flat; the pixels of place `(x, y)` stand at [`Responses::idx_of`]. Rows share the padding between them.
+pub(crate) struct Responses {
+    /// Places in a row, and rows of places.
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pad: usize,
+    tables: Vec<Vec<u8>>,
+}
+
+impl Responses {
+    /// Fills the tables; templates may reach `pad` places out of the image.
+    pub(crate) fn new(level: &GradientLevel, pad: usize) -> Self {
+        let pad = pad + 1;
+        let mut made = Self {
+            width: level.width().div_ceil(PITCH),
+            height: level.height().div_ceil(PITCH),
+            pad,
+            tables: Vec::new(),
+        };
+        let directions: Vec<usize> = (0..NUM_DIRECTIONS).collect();
+        let tables = parallel::map(&directions, |&k| {
+            let (sin, cos) = (k as f32 * TAU / NUM_DIRECTIONS as f32).sin_cos();
+            made.split(&spread(level, [cos, sin]), level.width())
+        });
+        made.tables = tables.into_iter().flatten().collect();
+        made
+    }
+
+    /// Places from one row of a table to the next.
+    pub(crate) fn stride(&self) -> usize {
+        self.width + self.pad
+    }
+
+    /// Where place `(x, y)` stands in a table.
+    pub(crate) fn idx_of(&self, x: usize, y: usize) -> usize {
+        (y + self.pad) * self.stride() + self.pad + x
+    }
+
+    /// One table; see [`table_idx`].
+    pub(crate) fn table(&self, idx: usize) -> &[u8] {
+        &self.tables[idx]
+    }
+
+    /// One direction's responses, row by row, in the order of [`table_idx`].
+    fn split(&self, responses: &[u8], level_width: usize) -> Vec<Vec<u8>> {
+        let len = (self.height + 2 * self.pad) * self.stride() + self.pad;
+        let mut tables = vec![vec![0u8; len]; PITCH * PITCH];
+        for (y, row) in responses.chunks_exact(level_width).enumerate() {
+            for right in 0..PITCH {
+                let at = self.idx_of(0, y / PITCH);
+                let out = &mut tables[table_idx(0, right, y)][at..at + self.width];
+                for (out, &value) in out.iter_mut().zip(row.iter().skip(right).step_by(PITCH)) {
+                    *out = value;
+                }
+            }
+        }
+        tables
+    }
+}
+
+/// The responses of one direction at every pixel of the level, row by row.
+fn spread(level: &GradientLevel, direction: [f32; 2]) -> Vec<u8> {
+    let (width, height) = (level.width(), level.height());
+    let mut across = vec![0u8; width * height];
+    let mut plain = vec![0u8; width + 2 * SPREAD];
+    for (row, out) in across.chunks_exact_mut(width).enumerate() {
+        for (out, sample) in plain[SPREAD..SPREAD + width].iter_mut().zip(level.row(row)) {
+            let cosine = sample[0] * direction[0] + sample[1] * direction[1];
+            *out = (cosine.max(0.0) * f32::from(FULL) + 0.5) as u8;
+        }
+        for shift in 0..=2 * SPREAD {
+            raise(out, &plain[shift..shift + width]);
+        }
+    }
+    let mut spread = vec![0u8; width * height];
+    for (row, out) in spread.chunks_exact_mut(width).enumerate() {
+        for near in row.saturating_sub(SPREAD)..(row + SPREAD + 1).min(height) {
+            raise(out, &across[near * width..][..width]);
+        }
+    }
+    spread
+}
+
+/// Raises every value to at least its counterpart.
+fn raise(values: &mut [u8], to: &[u8]) {
+    for (value, &other) in values.iter_mut().zip(to) {
+        *value = (*value).max(other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::GradientField;
+    use image::{Rgb, RgbImage};
+
+    #[test]
+    fn directions_are_numbered_at_twice_their_angle() {
+        assert_eq!(direction_idx([1.0, 0.0]), 0);
+        assert_eq!(direction_idx([0.0, 1.0]), NUM_DIRECTIONS / 4);
+        assert_eq!(direction_idx([-1.0, -1e-6]), NUM_DIRECTIONS / 2);
+        assert_eq!(direction_idx([1.0, -1e-6]), 0);
+    }
+
+    #[test]
+    fn an_upright_edge_answers_in_its_own_table_beside_itself_and_not_across() {
+        let image = RgbImage::from_fn(64, 48, |x, _| Rgb(if x < 32 { [30; 3] } else { [220; 3] }));
+        let field = GradientField::new(&image);
+        let responses = Responses::new(field.level(0), 5);
+        let at = |k: usize, x: usize| responses.table(table_idx(k, x, 21))[responses.idx_of(x / PITCH, 10)];
+        // The gradient runs along x: direction 0; across is half of the tables away.
+        assert_eq!(at(0, 32), FULL);
+        assert_eq!(at(0, 31), FULL);
+        assert_eq!(at(NUM_DIRECTIONS / 2, 32), 0);
+        assert_eq!(at(0, 10), 0);
+        // cos 45° (half of that in angle) of 15 is 10.6.
+        assert_eq!(at(2, 32), 11);
+    }
+
+    #[test]
+    fn every_pixel_stands_in_one_table_and_outside_is_zero() {
+        let image = RgbImage::from_fn(51, 49, |x, y| Rgb([(x * x) as u8, (y * 5 + x) as u8, 0]));
+        let field = GradientField::new(&image);
+        let responses = Responses::new(field.level(0), 3);
+        let (k, plain) = (4, spread(field.level(0), [0.0, 1.0]));
+        for y in 0..49 {
+            for x in 0..51 {
+                let kept = responses.table(table_idx(k, x, y))[responses.idx_of(x / PITCH, y / PITCH)];
+                assert_eq!(kept, plain[y * 51 + x], "{x}, {y}");
+            }
+        }
+        let sum = |values: &[u8]| values.iter().map(|&v| u64::from(v)).sum::<u64>();
+        let kept: u64 = (0..PITCH * PITCH).map(|i| sum(responses.table(table_idx(k, i % PITCH, i / PITCH)))).sum();
+        assert_eq!(kept, sum(&plain));
+    }
+}
