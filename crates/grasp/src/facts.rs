@@ -7,20 +7,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::GraspError;
 
-/// The grasp models of the paper. This version teaches C; the letters of the others are kept free for them.
+/// The grasp models of the paper, by their letters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ModelKind {
+    /// Keypoint R-CNN; position from the box, angle from the keypoints (paper, section IV-B).
+    B,
     /// Keypoint R-CNN; position and angle from the keypoints (paper, section IV-C).
     C,
 }
 
 impl ModelKind {
     /// Every model that this version teaches.
-    pub const ALL: [Self; 1] = [Self::C];
+    pub const ALL: [Self; 2] = [Self::B, Self::C];
 
     /// The letter, as on the command line and in the file.
     pub fn letter(self) -> &'static str {
         match self {
+            Self::B => "B",
             Self::C => "C",
         }
     }
@@ -71,6 +74,6 @@ mod tests {
     fn letters_round_trip_and_others_are_refused() {
         assert_eq!("c".parse::<ModelKind>().unwrap(), ModelKind::C);
         let refused = "Z".parse::<ModelKind>().unwrap_err().to_string();
-        assert_eq!(refused, "expected a grasp model out of C, found \"Z\"");
+        assert_eq!(refused, "expected a grasp model out of B, C, found \"Z\"");
     }
 }

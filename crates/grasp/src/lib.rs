@@ -41,6 +41,7 @@ mod safetensors_file;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;
+mod verification;
 
 pub use burn::tensor::Device;
 pub use calibration::Calibration;

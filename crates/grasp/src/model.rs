@@ -9,13 +9,14 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_detection::{Detections, GeneralizedRcnn};
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::GradientField;
+use sdg_shape::{GradientField, Match};
 
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model_file::Calibrations;
 use crate::reading::{self, Candidate};
 use crate::taught::TaughtDemonstration;
+use crate::verification::verify;
 
 /// No part can be told in an image with a shorter side.
 const LEAST_SIDE_PX: u32 = 32;
@@ -111,12 +112,16 @@ impl GraspModel {
             return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
         }
         let detections = self.look(image)?;
-        let candidates = reading::candidates(&detections, &self.demonstrations);
+        let candidates = reading::candidates(self.kind, &detections, &self.demonstrations);
         let mut found: Vec<GraspDetection> = match verification {
             Verification::Off => candidates.iter().map(|c| self.unverified(c)).collect(),
             Verification::ByShape => {
                 let field = GradientField::new(image);
-                candidates.iter().map(|c| self.verified(c, image, &field)).collect()
+                let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, image, &field)).collect();
+                if !found.iter().any(GraspDetection::is_accepted) {
+                    found.extend(self.second_opinion(image, &field));
+                }
+                found
             }
         };
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -142,26 +147,49 @@ impl GraspModel {
         }
     }
 
-    /// Lays the demonstration over the image where the network proposes, both ways round: a network that mistakes one
-    /// end of a part for the other is half a turn off, and the demonstration sees which end it is.
+    /// Lays the demonstration over the image where the network proposes.
     fn verified(&self, candidate: &Candidate, image: &RgbImage, field: &GradientField) -> GraspDetection {
         let demonstration = &self.demonstrations[candidate.demonstration_idx];
-        let (pose, agreement) = reading::verify(demonstration, candidate, image, field);
-        let outline = demonstration.outline(&pose);
-        let keypoints = demonstration
-            .keypoints()
-            .iter()
-            .zip(&candidate.keypoints)
-            .map(|(taught, (_, score))| (pose.apply(&taught.point()), *score))
-            .collect();
+        let (pose, agreement) = verify(demonstration, candidate, image, field);
+        let scores = candidate.keypoints.iter().map(|(_, score)| *score).collect();
+        self.laid_over(demonstration, &pose, agreement, candidate.network_score, scores, field)
+    }
+
+    /// Where the demonstration itself is found when the network finds nothing that it agrees with: looked for in the
+    /// whole image. The network's score of such a detection is zero.
+    fn second_opinion(&self, image: &RgbImage, field: &GradientField) -> Vec<GraspDetection> {
+        let mut found = Vec::new();
+        for demonstration in &self.demonstrations {
+            for Match { image_from_demonstration: pose, agreement, .. } in demonstration.search(image, field) {
+                let scores = match self.kind {
+                    ModelKind::B | ModelKind::C => vec![0.0; crate::NUM_KEYPOINTS],
+                };
+                found.push(self.laid_over(demonstration, &pose, agreement, 0.0, scores, field));
+            }
+        }
+        found
+    }
+
+    /// A detection as the demonstration says, where it lies; a keypoint for each score.
+    fn laid_over(
+        &self,
+        demonstration: &TaughtDemonstration,
+        pose: &PlanarSimilarity,
+        agreement: f64,
+        network_score: f64,
+        keypoint_scores: Vec<f64>,
+        field: &GradientField,
+    ) -> GraspDetection {
+        let outline = demonstration.outline(pose);
+        let taught = demonstration.keypoints();
         GraspDetection {
             score: self.calibrations.agreement.apply(agreement),
-            network_score: candidate.network_score,
+            network_score,
             agreement: Some(agreement),
             bbox: outline.bounds().clip(field.width() as f64, field.height() as f64),
-            keypoints,
+            keypoints: taught.iter().zip(keypoint_scores).map(|(k, score)| (pose.apply(&k.point()), score)).collect(),
             outline: Some(outline),
-            grasp: demonstration.grasp(&pose),
+            grasp: demonstration.grasp(pose),
         }
     }
 }
@@ -176,14 +204,4 @@ fn drop_repeated(found: &mut Vec<GraspDetection>) {
         }
     }
     *found = kept;
-}
-
-/// Where the demonstration lies in an image, as a candidate's keypoints say.
-pub(crate) fn pose_from_keypoints(
-    demonstration: &TaughtDemonstration,
-    keypoints: &[(Point2<f64>, f64)],
-) -> Option<PlanarSimilarity> {
-    let from: Vec<_> = demonstration.keypoints().iter().map(|k| k.point()).collect();
-    let to: Vec<_> = keypoints.iter().map(|(point, _)| *point).collect();
-    PlanarSimilarity::fit(&from, &to)
 }

@@ -4,13 +4,17 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, Refinement, ShapeConfig, ShapeTemplate, Surface};
+use sdg_shape::{GradientField, InstantSearch, Match, Refinement, SearchConfig, ShapeConfig, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
 
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides.
 const MARGIN_PX: f64 = 16.0;
+
+/// What the second opinion looks for: about the size that was taught, as the camera hovers about as high.
+const SECOND_OPINION: SearchConfig =
+    SearchConfig { scales: 0.88..=1.14, least_agreement: 0.2, max_matches: 3, shape: ShapeConfig::DEFAULT };
 
 /// The marks, in pixels of the kept cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,6 +40,7 @@ pub struct TaughtDemonstration {
     pub marks: TaughtMarks,
     template: ShapeTemplate,
     surface: Surface,
+    search: InstantSearch,
 }
 
 impl TaughtDemonstration {
@@ -84,7 +89,8 @@ impl TaughtDemonstration {
         let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
         let template = ShapeTemplate::new(&cutout, &outline, &ShapeConfig::default())?;
         let surface = Surface::new(&cutout, &outline);
-        Ok(Self { cutout, marks, template, surface })
+        let search = InstantSearch::new(&cutout, &outline, &SECOND_OPINION)?;
+        Ok(Self { cutout, marks, template, surface, search })
     }
 
     /// The twelve keypoints, in pixels of the cut-out.
@@ -109,6 +115,11 @@ impl TaughtDemonstration {
     /// Lays the cut-out over an image near `initial` and lets it climb to where its edges agree best.
     pub fn refine(&self, field: &GradientField, initial: &PlanarSimilarity) -> Refinement {
         self.template.refine(field, initial)
+    }
+
+    /// Looks for the part in the whole image, with no network's help.
+    pub fn search(&self, image: &RgbImage, field: &GradientField) -> Vec<Match> {
+        self.search.search_field(image, field)
     }
 
     /// How much the part's surface looks like the image there, in `[0, 1]`; see [`Surface`].

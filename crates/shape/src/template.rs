@@ -24,15 +24,20 @@ pub struct ShapeConfig {
     pub scale: ScaleRange,
 }
 
+impl ShapeConfig {
+    /// What [`Default`] gives.
+    pub const DEFAULT: Self = Self {
+        max_points: 300,
+        outline_weight: 2.0,
+        capture_shift: 0.02,
+        capture_angle_rad: 14.0 * std::f64::consts::PI / 180.0,
+        scale: ScaleRange::Within(0.12),
+    };
+}
+
 impl Default for ShapeConfig {
     fn default() -> Self {
-        Self {
-            max_points: 300,
-            outline_weight: 2.0,
-            capture_shift: 0.02,
-            capture_angle_rad: 14f64.to_radians(),
-            scale: ScaleRange::Within(0.12),
-        }
+        Self::DEFAULT
     }
 }
 

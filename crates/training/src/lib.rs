@@ -32,7 +32,8 @@ mod schedule;
 mod trainer;
 mod validation;
 
-pub use config::{EarlyStop, TrainingConfig, ValidationConfig};
+pub use batch::SampleSource;
+pub use config::{EarlyStop, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
 pub use progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
 pub use schedule::OneCycle;

@@ -34,6 +34,8 @@ impl LossValues {
 pub struct StepRecord {
     /// From zero.
     pub step: usize,
+    /// Samples that it learnt from.
+    pub samples: usize,
     /// Learning rate of this step.
     pub learning_rate: f64,
     /// Losses before the update.

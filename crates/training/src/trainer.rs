@@ -6,10 +6,9 @@ use std::time::Instant;
 use burn::grad_clipping::GradientClippingConfig;
 use burn::module::Module;
 use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer};
-use sdg_demonstration::Sample;
 use sdg_detection::{GeneralizedRcnn, Losses};
 
-use crate::batch::{Batch, with_batches};
+use crate::batch::{Batch, BatchRequest, Batches, SampleSource, View, with_batches};
 use crate::config::TrainingConfig;
 use crate::error::TrainingError;
 use crate::pace::Pace;
@@ -25,7 +24,7 @@ pub struct Trained {
     pub history: History,
 }
 
-/// Trains `detector` on the samples that `sample` gives by their index.
+/// Trains `detector` on the samples that `source` gives by their index.
 ///
 /// `examine` looks at the held-back samples with the detector as it is and says what became of each; `observe` hears
 /// of every step and every validation and may end the run, which then keeps the best checkpoint so far.
@@ -35,12 +34,12 @@ pub struct Trained {
 pub fn train(
     detector: GeneralizedRcnn,
     config: &TrainingConfig,
-    sample: &(dyn Fn(u64) -> Sample + Sync),
+    source: SampleSource<'_>,
     examine: &mut dyn FnMut(&GeneralizedRcnn) -> Result<Vec<Outcome>, TrainingError>,
     observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
 ) -> Result<Trained, TrainingError> {
     config.check()?;
-    let transform = detector.image_transform();
+    let transform = detector.config().input.clone();
     let clipping = GradientClippingConfig::Norm(config.max_gradient_norm);
     let optimizer = AdamWConfig::new()
         .with_weight_decay(config.weight_decay as f32)
@@ -57,7 +56,7 @@ pub fn train(
         validations: Vec::new(),
         best: None,
     };
-    with_batches(config.batch_size, &transform, sample, |next| run.run(next, examine, observe))
+    with_batches(&transform, source, |batches| run.run(batches, examine, observe))
 }
 
 struct Run<'a> {
@@ -74,7 +73,7 @@ struct Run<'a> {
 impl Run<'_> {
     fn run(
         mut self,
-        next: &mut dyn FnMut() -> Result<Batch, TrainingError>,
+        batches: &mut Batches,
         examine: &mut dyn FnMut(&GeneralizedRcnn) -> Result<Vec<Outcome>, TrainingError>,
         observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
     ) -> Result<Trained, TrainingError> {
@@ -87,7 +86,8 @@ impl Run<'_> {
                 }
                 break ending;
             }
-            let interrupted = self.step(step, next()?, observe)?.is_break();
+            let batch = batches.next(self.request(step))?;
+            let interrupted = self.step(step, batch, observe)?.is_break();
             step += 1;
             if interrupted {
                 break Ending::Interrupted;
@@ -106,6 +106,16 @@ impl Run<'_> {
         Ok(Trained { detector, history })
     }
 
+    /// What the next step learns from.
+    fn request(&self, step: usize) -> BatchRequest {
+        match self.config.windows {
+            Some(windows) if self.pace.progress(step, self.elapsed_secs()) < windows.share => {
+                BatchRequest { step, view: View::Window, size: windows.batch_size }
+            }
+            _ => BatchRequest { step, view: View::Frame, size: self.config.batch_size },
+        }
+    }
+
     fn step(
         &mut self,
         step: usize,
@@ -115,7 +125,7 @@ impl Run<'_> {
         let learning_rate = self.config.schedule.learning_rate(self.pace.progress(step, self.elapsed_secs()));
         let losses = self.detector.losses(&batch.images, &batch.targets, step_seed(self.config.seed, step))?;
         let total = losses.total();
-        let record = StepRecord { step, learning_rate, losses: values(&losses) };
+        let record = StepRecord { step, samples: batch.images.len(), learning_rate, losses: values(&losses) };
         if !record.losses.total().is_finite() {
             return Err(TrainingError::Diverged { step, loss: record.losses.total(), learning_rate });
         }

@@ -91,6 +91,9 @@ impl SampleObject {
     }
 }
 
+/// Width and height of a window against the part's largest diameter. With less the part fits only at some turns.
+const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
+
 /// Makes samples from demonstrations: sample *i* of seed *s* is always the same, whoever asks and in whatever order.
 ///
 /// Everything that does not depend on the sample is worked out by [`new`](Self::new); a sample then takes `&self`
@@ -98,6 +101,9 @@ impl SampleObject {
 pub struct Augmenter {
     parts: Vec<Prepared>,
     config: AugmentationConfig,
+    /// Of the whole frame.
+    frame: [u32; 2],
+    /// Of the samples: the frame, or a window of it.
     size: [u32; 2],
     seed: u64,
     noises: NoiseBank,
@@ -119,12 +125,30 @@ impl Augmenter {
             });
         };
         demonstrations.iter().try_for_each(Demonstration::check)?;
-        let size = config.output_size.unwrap_or([first.image.width(), first.image.height()]);
-        check_output_size(size)?;
+        let frame = config.output_size.unwrap_or([first.image.width(), first.image.height()]);
+        check_output_size(frame)?;
         let mut rng = sample_rng(seed, Stream::Preparation, 0);
-        let parts = demonstrations.iter().map(|one| Prepared::new(one, size, &mut rng)).collect();
+        let parts = demonstrations.iter().map(|one| Prepared::new(one, frame, &mut rng)).collect();
         let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));
-        Ok(Self { parts, config, size, seed, noises, normal })
+        Ok(Self { parts, config, frame, size: frame, seed, noises, normal })
+    }
+
+    /// Shows only windows of the frame, just large enough for the part at any turn and size: the same scale, tables,
+    /// things and light in a smaller picture, so that most of what a network computes is about the part. Sides are
+    /// multiples of `multiple` pixels and never exceed the frame; the paper's samples stay whole.
+    pub fn with_windows(mut self, multiple: u32) -> Self {
+        if let AugmentationStyle::Scenes(style) = &self.config.style {
+            let most_scale = f64::from(style.scale[1]);
+            let diameter = self.parts.iter().map(|p| 2.0 * p.radius * p.nominal_scale * most_scale).fold(0.0, f64::max);
+            let side = |share: f64, frame: u32| {
+                let least = (share * diameter).ceil().min(f64::from(frame)) as u32;
+                (least.div_ceil(multiple) * multiple).min(frame)
+            };
+            // A little wider than high, as frames are; a pixel of room on each side where the part fits tightly.
+            let [width, height] = self.frame;
+            self.size = [side(WINDOW_OVER_PART[0], width), side(WINDOW_OVER_PART[1], height)];
+        }
+        self
     }
 
     /// Sample `index` of the training stream.
@@ -166,8 +190,14 @@ impl Augmenter {
                 Sample { image: draw.paint(part, width, height), objects: vec![SampleObject { bbox, ..object }] }
             }
             AugmentationStyle::Scenes(style) => {
-                let studio =
-                    Studio { parts: &self.parts, style, noises: &self.noises, normal: &self.normal, size: self.size };
+                let studio = Studio {
+                    parts: &self.parts,
+                    style,
+                    noises: &self.noises,
+                    normal: &self.normal,
+                    size: self.size,
+                    frame: self.frame,
+                };
                 studio.compose(&mut rng)
             }
         }

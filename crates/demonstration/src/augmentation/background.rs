@@ -45,7 +45,7 @@ impl Frame {
 
 /// Paints the whole canvas with one surface, or with two that meet at an edge.
 ///
-/// `per_px` is the size of the canvas against a canvas of 320 pixels' width, so that textures look alike at any size.
+/// Texture sizes follow the frame's width, so that textures look alike at any size and in any window of it.
 pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &mut SampleRng) {
     paint_surface(canvas, bank, part, rng);
     if chance(rng, 0.3) {
@@ -71,8 +71,8 @@ pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepa
 }
 
 fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &mut SampleRng) {
-    // Texture sizes are given for a canvas 320 pixels wide.
-    let px = 320.0 / canvas.width as f32;
+    // Texture sizes are given for a frame 320 pixels wide.
+    let px = 320.0 / canvas.frame_width as f32;
     let frame = Frame::draw(rng);
     let [dark, light] = draw_colours(part, rng);
     match index_below(rng, 12) {
@@ -192,7 +192,7 @@ fn paint_patches(canvas: &mut Raster, part: &Prepared, rng: &mut SampleRng) {
     let cell = canvas.width as f32 * uniform(rng, 0.15, 0.5);
     let columns = (canvas.width as f32 / cell).ceil() as usize + 1;
     let rows = (canvas.height as f32 / cell).ceil() as usize + 1;
-    let scale = part.background.width as f32 / canvas.width as f32;
+    let scale = part.background.width as f32 / canvas.frame_width as f32;
     let pieces: Vec<(Frame, f32)> = (0..columns * rows)
         .map(|_| {
             let mut frame = Frame::draw(rng);

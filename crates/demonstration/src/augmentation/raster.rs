@@ -10,11 +10,13 @@ pub(crate) struct Raster {
     pub width: usize,
     pub height: usize,
     pub pixels: Vec<[f32; 4]>,
+    /// Width of the whole frame that this may be a window of: what sizes in pixels are measured by.
+    pub frame_width: usize,
 }
 
 impl Raster {
     pub fn filled(width: usize, height: usize, pixel: [f32; 4]) -> Self {
-        Self { width, height, pixels: vec![pixel; width * height] }
+        Self { width, height, pixels: vec![pixel; width * height], frame_width: width }
     }
 
     pub fn from_image(image: &RgbImage) -> Self {
@@ -23,6 +25,7 @@ impl Raster {
             width: image.width() as usize,
             height: image.height() as usize,
             pixels: pixels.map(|[r, g, b]| [r, g, b, 0.0]).collect(),
+            frame_width: image.width() as usize,
         }
     }
 

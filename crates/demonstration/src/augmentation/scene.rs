@@ -24,7 +24,10 @@ pub(crate) struct Studio<'a> {
     pub style: &'a SceneStyle,
     pub noises: &'a NoiseBank,
     pub normal: &'a NormalTable,
+    /// Width and height of what is painted.
     pub size: [u32; 2],
+    /// Width and height of the frame that it is a window of.
+    pub frame: [u32; 2],
 }
 
 impl Studio<'_> {
@@ -35,7 +38,8 @@ impl Studio<'_> {
         let positive = chance(rng, self.style.positive_share);
         let [width, height] = self.size;
         let mut canvas = Raster::filled(width as usize, height as usize, [0.0; 4]);
-        let lamp = Lamp::draw(rng, width as f32 / 320.0);
+        canvas.frame_width = self.frame[0] as usize;
+        let lamp = Lamp::draw(rng, self.frame[0] as f32 / 320.0);
         let pose = draw_pose(part, self.style, f64::from(width), f64::from(height), rng);
 
         // Without an outline there is no cut-out to lay on another table.
@@ -74,6 +78,9 @@ impl Studio<'_> {
         let least = if positive { 0 } else { 1 };
         let most =
             if positive && own_table { self.style.max_distractors.div_ceil(2) } else { self.style.max_distractors };
+        // As many on a length as in the whole frame: in a window, fewer, but still some beside the part.
+        let share = f64::from(self.size[0] * self.size[1]) / f64::from(self.frame[0] * self.frame[1]);
+        let most = ((most as f64 * share.sqrt()).ceil() as usize).max(least);
         let count = least + index_below(rng, most + 1 - least);
         let part_radius = (part.radius * part.nominal_scale) as f32;
         for _ in 0..count {
@@ -84,8 +91,8 @@ impl Studio<'_> {
                 let scale = part.nominal_scale as f32 * log_uniform(rng, low, high);
                 paint_mutant(canvas, part, &mutant, center, scale, lamp, rng);
             } else {
-                let smallest = 0.04 * canvas.width as f32;
-                let size = (part_radius * log_uniform(rng, 0.3, 1.4)).clamp(smallest, 0.45 * canvas.width as f32);
+                let smallest = 0.04 * canvas.frame_width as f32;
+                let size = (part_radius * log_uniform(rng, 0.3, 1.4)).clamp(smallest, 0.45 * canvas.frame_width as f32);
                 let figure = Figure::draw(rng);
                 Distractor::new(figure, center, size, part, rng).paint(canvas, lamp, &self.noises.rough);
             }

@@ -16,7 +16,7 @@ pub(crate) fn blur(canvas: &mut Raster, style: &SceneStyle, rng: &mut SampleRng)
     if !chance(rng, style.blur_probability) {
         return;
     }
-    let px = canvas.width as f32 / 320.0;
+    let px = canvas.frame_width as f32 / 320.0;
     if chance(rng, 0.65) {
         gaussian(canvas, uniform(rng, 0.4, 1.4) * px);
     } else {

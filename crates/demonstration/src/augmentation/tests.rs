@@ -255,3 +255,23 @@ fn settings_and_demonstrations_are_checked() {
     outside.annotation.grasp = Some(GraspLine::new(Point2::new(f64::NAN, 3.0), Point2::new(9.0, 9.0)));
     assert!(refuse(&[outside]).contains("grasp of `L`"));
 }
+
+#[test]
+fn windows_keep_the_scale_and_hold_the_part() {
+    let (frames, windows) = (augmenter(plain()), augmenter(plain()).with_windows(32));
+    let [width, height] = windows.output_size();
+    // The L's vertices are up to 129 photo pixels from its centre: 65 in the frame, 155 across at the largest scale.
+    assert_eq!([width, height], [224, 192]);
+    assert_eq!((windows.sample(0).image.width(), windows.sample(0).image.height()), (width, height));
+    let mean_scale = |augmenter: &Augmenter| {
+        let scales = (0..40).map(|i| augmenter.sample(i).objects[0].image_from_demonstration.scale);
+        scales.sum::<f64>() / 40.0
+    };
+    assert!((mean_scale(&windows) / mean_scale(&frames) - 1.0).abs() < 0.05);
+    assert!(check_dots(&windows, 30) > 40);
+    let whole = (0..40).filter(|&i| {
+        let object = &windows.sample(i).objects[0];
+        object.keypoints.iter().all(|keypoint| keypoint.is_labelled())
+    });
+    assert!(whole.count() > 30);
+}

@@ -85,7 +85,7 @@ pub fn edge_of(kind: RcnnKind) -> RcnnConfig {
                     pooler: pooler(14),
                     conv_channels: vec![128; 4],
                     num_keypoints,
-                    max_train_rois_per_image: Some(6),
+                    max_train_rois_per_image: Some(2),
                     loss_weight: 1.0,
                     readout: KeypointReadout::LocalMean { radius: 3 },
                     score: KeypointScore::NormalisedPeak,

@@ -1,0 +1,63 @@
+//! Where the demonstration lies, when its turn and its box are known.
+
+use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
+
+use crate::taught::TaughtDemonstration;
+
+/// The demonstration turned by `turn`, so large and so placed that its outline fills `bbox`.
+///
+/// The middle of a turned part's upright box is not the turned middle of its box: the outline is turned first, and
+/// what is then its box is laid over the detected one. With that the grasp's offset from the box's middle is the
+/// taught one at any angle.
+pub(super) fn fill_box(demonstration: &TaughtDemonstration, bbox: &BoundingBox, turn: Angle) -> PlanarSimilarity {
+    let pivot = demonstration.marks.bbox.center();
+    let turned = PlanarSimilarity::about(pivot, pivot, turn, 1.0);
+    let bounds = demonstration.outline(&turned).bounds();
+    let scale = (bbox.area() / bounds.area()).sqrt();
+    PlanarSimilarity::about(bounds.center(), bbox.center(), Angle::ZERO, scale).compose(&turned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::taught::TaughtMarks;
+    use image::{Rgb, RgbImage};
+    use nalgebra::Point2;
+    use sdg_geometry::{GraspLine, Polygon};
+
+    /// A bright L on a dark cut-out, grasped at its longer leg, away from the middle of its box.
+    fn demonstration() -> TaughtDemonstration {
+        let corners = [(20.0, 20.0), (120.0, 20.0), (120.0, 40.0), (40.0, 40.0), (40.0, 90.0), (20.0, 90.0)];
+        let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };
+        let cutout = RgbImage::from_fn(140, 110, |x, y| {
+            let inside = outline.contains(&Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            Rgb([if inside { 220 } else { 40 }; 3])
+        });
+        let marks = TaughtMarks {
+            label: "L".into(),
+            bbox: outline.bounds(),
+            grasp: GraspLine::new(Point2::new(80.0, 30.0), Point2::new(110.0, 30.0)),
+            outline: Some(outline),
+            width_px: 20.0,
+        };
+        TaughtDemonstration::from_parts(cutout, marks).unwrap()
+    }
+
+    #[test]
+    fn the_box_and_the_turn_give_the_pose_back() {
+        let demonstration = demonstration();
+        for degrees in [0.0, 30.0, 137.0, -100.0] {
+            let truth = PlanarSimilarity::about(
+                Point2::new(70.0, 55.0),
+                Point2::new(300.0, 200.0),
+                Angle::from_degrees(degrees),
+                1.2,
+            );
+            let bbox = demonstration.outline(&truth).bounds();
+            let found = fill_box(&demonstration, &bbox, Angle::from_degrees(degrees));
+            let (grasp, expected) = (demonstration.grasp(&found), demonstration.grasp(&truth));
+            assert!((grasp.center() - expected.center()).norm() < 1e-6, "{degrees}: {grasp:?} {expected:?}");
+            assert!(grasp.angle.distance(expected.angle) < 1e-9 && (grasp.width - expected.width).abs() < 1e-6);
+        }
+    }
+}
