@@ -18,7 +18,7 @@ use crate::files;
 /// More than any configuration takes.
 const MOST_CONFIG_BYTES: u64 = 1 << 20;
 /// The presets that checkpoints are imported into.
-const PRESETS: [&str; 1] = ["r50-detectron2"];
+const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
 
 /// Reads a configuration file of either form.
 ///
@@ -47,6 +47,7 @@ pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
     };
     match name {
         "r50-detectron2" => Ok(presets::r50_detectron2(kind)),
+        "r50-torchvision" => Ok(presets::r50_torchvision(kind)),
         other => {
             Err(Usage(format!("--preset: expected a preset out of {}, found \"{other}\"", PRESETS.join(", "))).into())
         }

@@ -120,13 +120,16 @@ impl RcnnConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::presets::{RcnnKind, edge, edge_of, r50_detectron2};
+    use crate::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchvision};
 
     #[test]
     fn presets_pass_and_survive_serialisation() {
         let keypoint = RcnnKind::Keypoint { num_keypoints: 17 };
         let (faster, mask) = (RcnnKind::Faster { num_classes: 80 }, RcnnKind::Mask { num_classes: 2 });
-        for config in [keypoint, faster, mask].into_iter().flat_map(|kind| [edge_of(kind), r50_detectron2(kind)]) {
+        for config in [keypoint, faster, mask]
+            .into_iter()
+            .flat_map(|kind| [edge_of(kind), r50_detectron2(kind), r50_torchvision(kind)])
+        {
             assert_eq!(config.validate(), Ok(()));
             let json = serde_json::to_string(&config).unwrap();
             assert_eq!(serde_json::from_str::<RcnnConfig>(&json).unwrap(), config);

@@ -5,7 +5,7 @@ use serde::de::IgnoredAny;
 
 use crate::config::{BlockKind, RcnnConfig, ResizeRule};
 use crate::error::{DetectionError, Result};
-use crate::presets::{RcnnKind, r50_detectron2};
+use crate::presets::{RcnnKind, r50_detectron2, r50_torchvision};
 
 /// What differs from a preset, in the words of the reference outputs' `config.json`.
 #[derive(Debug, Deserialize)]
@@ -13,6 +13,8 @@ use crate::presets::{RcnnKind, r50_detectron2};
 struct PresetChanges {
     /// `faster`, `keypoint` or `mask`.
     kind: String,
+    /// `detectron2` (where absent) or `torchvision`.
+    numerics: Option<String>,
     classes: Option<usize>,
     keypoints: Option<usize>,
     /// Short side of the network's input, pixels.
@@ -45,7 +47,8 @@ struct PresetChanges {
 
 impl RcnnConfig {
     /// Reads a configuration: either every value, as this type serialises, or an object with `kind` (`faster`,
-    /// `keypoint`, `mask`) and what differs from [`r50_detectron2`] of that kind, such as `fpn_channels`.
+    /// `keypoint`, `mask`), `numerics` (`detectron2`, `torchvision`) and what differs from [`r50_detectron2`] or
+    /// [`r50_torchvision`] of that kind, such as `fpn_channels`.
     ///
     /// # Errors
     /// [`DetectionError::ConfigFile`] names the place of what cannot be read; [`DetectionError::Config`] the
@@ -85,7 +88,17 @@ impl PresetChanges {
                 });
             }
         };
-        let mut config = r50_detectron2(kind);
+        let mut config = match self.numerics.as_deref() {
+            None | Some("detectron2") => r50_detectron2(kind),
+            Some("torchvision") => r50_torchvision(kind),
+            Some(found) => {
+                return Err(DetectionError::Config {
+                    field: "numerics",
+                    expected: "detectron2 or torchvision".to_owned(),
+                    found: found.to_owned(),
+                });
+            }
+        };
         if let ResizeRule::ShortSide { short_px, max_long_px, .. } = &mut config.input.resize {
             set(short_px, self.min_size_test);
             set(max_long_px, self.max_size_test);
@@ -145,6 +158,7 @@ mod tests {
         assert!(misspelt.contains("fpn_chanels") && misspelt.contains("fpn_channels"), "{misspelt}");
         let kind = error(r#"{"kind": "masks"}"#);
         assert!(kind.contains("faster, keypoint or mask") && kind.contains("masks"), "{kind}");
+        assert!(error(r#"{"kind": "mask", "numerics": "mmdet"}"#).contains("detectron2 or torchvision"));
         assert!(error("{}").contains("missing field `input`"), "{}", error("{}"));
         assert!(error(r#"{"kind": "mask", "classes": 0}"#).contains("roi_heads.num_classes"));
     }

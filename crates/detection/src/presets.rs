@@ -2,11 +2,13 @@
 
 mod detectron2;
 mod edge;
+mod torchvision;
 
 use crate::config::BoxCoderConfig;
 
 pub use detectron2::r50_detectron2;
 pub use edge::{edge, edge_of};
+pub use torchvision::r50_torchvision;
 
 const UNIT_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [1.0, 1.0, 1.0, 1.0] };
 const ROI_WEIGHTS: BoxCoderConfig = BoxCoderConfig { weights: [10.0, 10.0, 5.0, 5.0] };

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! The reference is a list of tensors by these names. What it lacks is not compared. Detections are in pixels of the
-//! image as given, targets in those of the resized image; polygons are x0 y0 x1 y1 …, one a box; masks 0 or 1.
+//! image as given, targets in those of the resized image; polygons are x0 y0 x1 y1 …, one a
+//! box; masks 0 or 1.
 
 use std::fmt;
 
@@ -229,7 +230,11 @@ impl Comparer<'_> {
         };
         let values: Vec<f32> =
             found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect();
-        let shape = [found.keypoints.len(), found.keypoints.first().map_or(0, Vec::len), 3];
+        let shape = [
+            found.keypoints.len(),
+            found.keypoints.first().map_or(expected.shape.get(1).copied().unwrap_or(0), Vec::len),
+            3,
+        ];
         let parts = [("places", 0..2, Tolerance::Absolute(0.05)), ("scores", 2..3, Tolerance::Relative(1e-4))];
         for (part, columns, tolerance) in parts {
             let wanted =
@@ -265,6 +270,30 @@ impl Comparer<'_> {
         Ok(())
     }
 
+    /// Masks of `count` objects: `targets.masks`, as large as the resized image, or else `targets.polygons`.
+    fn target_masks(&self, count: usize) -> Result<Vec<ObjectMask>> {
+        let named = |name| self.reference.get(name).filter(|tensor| tensor.shape.first() == Some(&count));
+        if let Some(WeightTensor { shape, values }) = named("targets.masks")
+            && let [_, height, width] = shape[..]
+        {
+            let bitmap = |pixels: &[f32]| {
+                Mask::from_fn(width as u32, height as u32, |x, y| pixels[y as usize * width + x as usize] >= 0.5)
+            };
+            return Ok(values.chunks_exact(height * width).map(|pixels| bitmap(pixels).into()).collect());
+        }
+        let Some(WeightTensor { values, .. }) = named("targets.polygons") else {
+            return Err(DetectionError::Target {
+                image_idx: 0,
+                field: "targets.polygons",
+                expected: format!("polygons or targets.masks of {count} objects"),
+                found: "neither".to_owned(),
+            });
+        };
+        let vertex = |xy: &[f32]| [f64::from(xy[0]), f64::from(xy[1])].into();
+        let polygon = |row: &[f32]| Polygon { vertices: row.chunks_exact(2).map(vertex).collect() };
+        Ok(values.chunks_exact((values.len() / count).max(1)).map(|row| polygon(row).into()).collect())
+    }
+
     /// The objects that the reference was trained on for one step.
     fn target(&self, config: &RcnnConfig) -> Result<ResizedTarget> {
         let get = |name: &'static str, columns: usize| -> Result<&[f32]> {
@@ -296,11 +325,7 @@ impl Comparer<'_> {
             target.keypoints = rows.map(|row| row.chunks_exact(3).map(keypoint).collect()).collect();
         }
         if config.roi_heads.mask_head.is_some() {
-            let values = get("targets.polygons", 2 * count)?;
-            let vertex = |xy: &[f32]| [f64::from(xy[0]), f64::from(xy[1])].into();
-            let polygon = |row: &[f32]| Polygon { vertices: row.chunks_exact(2).map(vertex).collect() };
-            let rows = values.chunks_exact(values.len() / count);
-            target.masks = rows.map(|row| ObjectMask::from(polygon(row))).collect();
+            target.masks = self.target_masks(count)?;
         }
         let broken = |field, found: usize| DetectionError::Target {
             image_idx: 0,

@@ -1,9 +1,11 @@
-//! Every stage against what Detectron2 itself gave for small random networks of all three kinds.
+//! Every stage against what Detectron2 and torchvision themselves gave for small random networks of all three kinds.
 //!
-//! The files and the script that made them stand in `tests/golden/detectron2`.
+//! The files and the scripts that made them stand in `tests/golden`. With `SDG_TORCH_PYTHON` naming a Python that has
+//! torch and torchvision, a whole R50 network is compared, too.
 #![allow(clippy::unwrap_used)]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
@@ -12,30 +14,30 @@ use sdg_detection::verification::{VerificationReport, verify};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 
 fn golden(path: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden/detectron2").join(path)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(path)
 }
 
-fn read(path: &str, rename: fn(&str) -> String) -> StateDict {
-    let bytes = std::fs::read(golden(path)).unwrap();
+fn read(path: &Path) -> StateDict {
+    let bytes = std::fs::read(path).unwrap();
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
     let values = |dtype, data: &[u8]| -> Vec<f32> {
         match dtype {
             Dtype::F32 => data.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
             Dtype::I64 => data.as_chunks().0.iter().map(|b| i64::from_le_bytes(*b) as f32).collect(),
             Dtype::U8 => data.iter().map(|b| f32::from(*b)).collect(),
-            other => panic!("{path} holds {other:?}"),
+            other => panic!("{} holds {other:?}", path.display()),
         }
     };
     tensors
         .iter()
         .map(|(name, view)| {
             let tensor = WeightTensor { shape: view.shape().to_vec(), values: values(view.dtype(), view.data()) };
-            (rename(name), tensor)
+            (renamed(name), tensor)
         })
         .collect()
 }
 
-/// Detectron2's names in this project's words.
+/// Detectron2's and torchvision's names in this project's words.
 fn renamed(name: &str) -> String {
     let mut name = name.replace("backbone.fpn_", "backbone.fpn.fpn_");
     for number in 1..=8 {
@@ -43,57 +45,119 @@ fn renamed(name: &str) -> String {
             name = name.replace(&format!("{layer}{number}."), &format!("{layer}.{}.", number - 1));
         }
     }
+    for (theirs, ours) in [
+        ("backbone.body.conv1.", "backbone.bottom_up.stem.conv1."),
+        ("backbone.body.bn1.", "backbone.bottom_up.stem.conv1.norm."),
+        ("backbone.body.layer1.", "backbone.bottom_up.res2."),
+        ("backbone.body.layer2.", "backbone.bottom_up.res3."),
+        ("backbone.body.layer3.", "backbone.bottom_up.res4."),
+        ("backbone.body.layer4.", "backbone.bottom_up.res5."),
+        (".downsample.0.", ".shortcut."),
+        (".downsample.1.", ".shortcut.norm."),
+        (".bn1.", ".conv1.norm."),
+        (".bn2.", ".conv2.norm."),
+        (".bn3.", ".conv3.norm."),
+        ("rpn.head.conv.0.0.", "proposal_generator.rpn_head.conv."),
+        ("rpn.head.cls_logits.", "proposal_generator.rpn_head.objectness_logits."),
+        ("rpn.head.bbox_pred.", "proposal_generator.rpn_head.anchor_deltas."),
+        ("box_head.fc6.", "box_head.fc1."),
+        ("box_head.fc7.", "box_head.fc2."),
+        ("keypoint_predictor.kps_score_lowres.", "keypoint_head.score_lowres."),
+        ("mask_predictor.conv5_mask.", "mask_head.deconv."),
+        ("mask_predictor.mask_fcn_logits.", "mask_head.predictor."),
+    ] {
+        name = name.replace(theirs, ours);
+    }
+    for level in 0..4 {
+        let (inner, outer) = (format!("fpn.inner_blocks.{level}.0."), format!("fpn.layer_blocks.{level}.0."));
+        name = name.replace(&inner, &format!("fpn.fpn_lateral{}.", level + 2));
+        name = name.replace(&outer, &format!("fpn.fpn_output{}.", level + 2));
+        name = name.replace(&format!("mask_head.{level}.0."), &format!("mask_head.mask_fcn.{level}."));
+    }
+    for layer in 0..8 {
+        // torchvision numbers the activations in between, too.
+        let theirs = format!("keypoint_head.{}.", 2 * layer);
+        name = name.replace(&theirs, &format!("keypoint_head.conv_fcn.{layer}."));
+    }
     name
 }
 
-fn detector(kind: &str) -> GeneralizedRcnn {
-    let text = std::fs::read_to_string(golden(&format!("{kind}/config.json"))).unwrap();
+fn detector(folder: &Path) -> GeneralizedRcnn {
+    let text = std::fs::read_to_string(folder.join("config.json")).unwrap();
     let config = RcnnConfig::from_json(&text).unwrap().without_sampling();
     let detector = config.init(&Device::flex().autodiff(), 1).unwrap();
-    let weights = read(&format!("{kind}/weights.safetensors"), renamed);
-    let (detector, report) = state_dict::import(detector, &weights);
+    let (detector, report) = state_dict::import(detector, &read(&folder.join("weights.safetensors")));
     assert!(report.is_complete(), "{report:?}");
     detector
 }
 
-fn compared(detector: &GeneralizedRcnn, kind: &str) -> VerificationReport {
-    let image = image::open(golden("input.png")).unwrap().to_rgb8();
-    verify(detector, &image, &read(&format!("{kind}/expected.safetensors"), renamed)).unwrap()
+fn compared(detector: &GeneralizedRcnn, folder: &Path) -> VerificationReport {
+    let image = image::open(golden("detectron2/input.png")).unwrap().to_rgb8();
+    verify(detector, &image, &read(&folder.join("expected.safetensors"))).unwrap()
 }
 
-fn agrees(kind: &str) {
-    let report = compared(&detector(kind), kind);
-    println!("{kind}\n{report}");
+fn agrees(folder: &Path) {
+    let report = compared(&detector(folder), folder);
+    println!("{}\n{report}", folder.display());
     assert!(report.passed(), "{report}");
     // Every tensor was compared: all but the targets, and keypoints twice.
-    let reference = read(&format!("{kind}/expected.safetensors"), renamed);
+    let reference = read(&folder.join("expected.safetensors"));
     for name in reference.keys().filter(|name| !name.starts_with("targets.")) {
         assert!(report.stages.iter().any(|stage| stage.name.starts_with(name)), "{name} was passed over");
     }
 }
 
 #[test]
-fn faster_agrees_at_every_stage() {
-    agrees("faster");
+fn detectron2_faster_agrees_at_every_stage() {
+    agrees(&golden("detectron2/faster"));
 }
 
 #[test]
-fn keypoint_agrees_at_every_stage() {
-    agrees("keypoint");
+fn detectron2_keypoint_agrees_at_every_stage() {
+    agrees(&golden("detectron2/keypoint"));
 }
 
 #[test]
-fn mask_agrees_at_every_stage() {
-    agrees("mask");
+fn detectron2_mask_agrees_at_every_stage() {
+    agrees(&golden("detectron2/mask"));
+}
+
+#[test]
+fn torchvision_faster_agrees_at_every_stage() {
+    agrees(&golden("torchvision/faster"));
+}
+
+#[test]
+fn torchvision_keypoint_agrees_at_every_stage() {
+    agrees(&golden("torchvision/keypoint"));
+}
+
+#[test]
+fn torchvision_mask_agrees_at_every_stage() {
+    agrees(&golden("torchvision/mask"));
+}
+
+#[test]
+fn a_whole_torchvision_network_agrees_where_torch_is_present() {
+    let Ok(python) = std::env::var("SDG_TORCH_PYTHON") else {
+        println!("SDG_TORCH_PYTHON is not set: nothing compared");
+        return;
+    };
+    let folder = std::env::temp_dir().join(format!("sdg-whole-torchvision-{}", std::process::id()));
+    let script = golden("torchvision/export.py");
+    let status = Command::new(python).arg(script).arg("--whole").arg(&folder).status().unwrap();
+    assert!(status.success(), "the exporter ended with {status}");
+    agrees(&folder);
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
 fn another_weight_is_noticed() {
-    let (kind, name) = ("faster", "roi_heads.box_head.fc1.bias");
-    let mut weights = read(&format!("{kind}/weights.safetensors"), renamed);
-    weights.get_mut(name).unwrap().values[3] += 0.05;
-    let (detector, _) = state_dict::import(detector(kind), &weights);
-    let report = compared(&detector, kind);
+    let folder = golden("detectron2/faster");
+    let mut weights = read(&folder.join("weights.safetensors"));
+    weights.get_mut("roi_heads.box_head.fc1.bias").unwrap().values[3] += 0.05;
+    let (detector, _) = state_dict::import(detector(&folder), &weights);
+    let report = compared(&detector, &folder);
     let failed: Vec<&str> =
         report.stages.iter().filter(|stage| !stage.passed).map(|stage| stage.name.as_str()).collect();
     assert!(!report.passed() && failed.contains(&"detections.scores"), "{report}");
