@@ -1,0 +1,43 @@
+//! Keypoints with their descriptors.
+
+use nalgebra::Point2;
+use sdg_geometry::Angle;
+
+use crate::DESCRIPTOR_LENGTH;
+
+/// A blob of the image, with its size and a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SiftKeypoint {
+    /// Place in pixels; the centre of the first pixel is at (0.5, 0.5).
+    pub position: Point2<f64>,
+    /// Scale: σ of the Gaussian at which the blob answers most strongly, in pixels of the image.
+    pub sigma: f64,
+    /// Direction of the strongest gradients around it; positive is clockwise as seen, because y points down.
+    pub angle: Angle,
+    /// Contrast of the blob, as a fraction of the range from black to white, times the intervals of an octave.
+    pub contrast: f64,
+}
+
+/// A unit vector of 4 × 4 cells, row by row, of 8 directions each.
+pub type Descriptor = [f32; DESCRIPTOR_LENGTH];
+
+/// The features of an image: keypoint `i` has descriptor `i`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Features {
+    /// Where.
+    pub keypoints: Vec<SiftKeypoint>,
+    /// What it looks like there.
+    pub descriptors: Vec<Descriptor>,
+}
+
+impl Features {
+    /// The number of features.
+    pub fn len(&self) -> usize {
+        self.keypoints.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.keypoints.is_empty()
+    }
+}

@@ -1,0 +1,168 @@
+//! Pairs of features that look alike, by comparing each with each.
+//!
+//! A kd-tree does not help in 128 dimensions: a query visits nearly every leaf. Measured against it in the crate's
+//! README; `examples/matching_bench.rs` makes the figures.
+
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+use crate::features::Descriptor;
+use crate::{DESCRIPTOR_LENGTH, Features};
+
+/// Queries that share one reading of the other side.
+const TILE: usize = 4;
+/// Partial sums of a dot product, so that it runs in the widest registers there are. Their number fixes the rounding.
+const LANES: usize = 16;
+
+/// A feature of one image and the feature of another that looks most like it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FeatureMatch {
+    /// Index in the first set of features.
+    pub query_idx: usize,
+    /// Index in the second.
+    pub train_idx: usize,
+    /// Euclidean distance of the two descriptors, from 0 to √2.
+    pub distance: f32,
+    /// `distance` over the distance to the second nearest descriptor; 0 where the two agree exactly.
+    pub ratio: f32,
+}
+
+/// For each feature of `query` the nearest of `train`, where that is nearer than `ratio` times the second nearest.
+///
+/// In the order of `query`. Several queries may share a feature of `train`. Where `train` has fewer than two features
+/// nothing can be compared and nothing is matched.
+///
+/// # Source
+/// Lowe 2004, section 7.1, who takes a ratio of 0.8.
+pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<FeatureMatch> {
+    if train.len() < 2 {
+        return Vec::new();
+    }
+    let arch = Arch::new();
+    let tiles: Vec<Vec<FeatureMatch>> = query
+        .descriptors
+        .par_chunks(TILE)
+        .enumerate()
+        .map(|(tile, queries)| {
+            let nearest = arch.dispatch(NearestTwo { queries, train: &train.descriptors });
+            let pairs = queries.iter().zip(nearest).enumerate();
+            pairs
+                .map(|(i, (descriptor, [first, second]))| {
+                    let to = |train_idx: usize| distance(descriptor, &train.descriptors[train_idx]);
+                    let (near, far) = (to(first), to(second));
+                    FeatureMatch {
+                        query_idx: tile * TILE + i,
+                        train_idx: first,
+                        distance: near,
+                        // Two descriptors like the query's own tell nothing: that ratio is one.
+                        ratio: if far > 0.0 { near / far } else { 1.0 },
+                    }
+                })
+                .filter(|found| found.ratio < ratio)
+                .collect()
+        })
+        .collect();
+    tiles.into_iter().flatten().collect()
+}
+
+/// Euclidean distance.
+pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> f32 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
+}
+
+/// The indices of the two descriptors nearest to each query, nearest first. All are unit vectors, so the largest dot
+/// product is the least distance.
+struct NearestTwo<'a> {
+    queries: &'a [Descriptor],
+    train: &'a [Descriptor],
+}
+
+impl WithSimd for NearestTwo<'_> {
+    type Output = Vec<[usize; 2]>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<[usize; 2]> {
+        let last = self.queries.len() - 1;
+        // A tile that is not full repeats its last query.
+        let queries: [&Descriptor; TILE] = std::array::from_fn(|i| &self.queries[i.min(last)]);
+        let mut best = [[(f32::MIN, 0usize); 2]; TILE];
+        for (train_idx, train) in self.train.iter().enumerate() {
+            let products = dots(queries, train);
+            for (best, product) in best.iter_mut().zip(products) {
+                if product > best[1].0 {
+                    let found = (product, train_idx);
+                    *best = if product > best[0].0 { [found, best[0]] } else { [best[0], found] };
+                }
+            }
+        }
+        best[..self.queries.len()].iter().map(|best| best.map(|(_, train_idx)| train_idx)).collect()
+    }
+}
+
+#[inline(always)]
+fn dots(queries: [&Descriptor; TILE], train: &Descriptor) -> [f32; TILE] {
+    let mut sums = [[0.0f32; LANES]; TILE];
+    for start in (0..DESCRIPTOR_LENGTH).step_by(LANES) {
+        for (sums, query) in sums.iter_mut().zip(queries) {
+            for lane in 0..LANES {
+                sums[lane] += query[start + lane] * train[start + lane];
+            }
+        }
+    }
+    sums.map(|sums| sums.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Point2;
+    use sdg_geometry::Angle;
+
+    use super::*;
+    use crate::SiftKeypoint;
+
+    /// Features whose descriptors are the given angles on a circle in the first two dimensions.
+    fn features(angles: &[f32]) -> Features {
+        let descriptor = |angle: &f32| {
+            let mut made = [0.0; DESCRIPTOR_LENGTH];
+            (made[0], made[1]) = (angle.cos(), angle.sin());
+            made
+        };
+        let anywhere = SiftKeypoint { position: Point2::origin(), sigma: 1.0, angle: Angle::ZERO, contrast: 1.0 };
+        Features { keypoints: vec![anywhere; angles.len()], descriptors: angles.iter().map(descriptor).collect() }
+    }
+
+    #[test]
+    fn the_ratio_test_refuses_the_undecided() {
+        // 0.1 from one and 0.9 from another; then half way between the two.
+        let found = match_features(&features(&[0.1, 0.5]), &features(&[0.0, 1.0]), 0.8);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].query_idx, found[0].train_idx), (0, 0));
+        let chord = |angle: f32| 2.0 * (angle / 2.0).sin();
+        assert!((found[0].distance - chord(0.1)).abs() < 1e-6);
+        assert!((found[0].ratio - chord(0.1) / chord(0.9)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn agrees_with_a_search_one_by_one() {
+        let spread = |n: usize, step: f32| features(&(0..n).map(|i| (i as f32 * step).rem_euclid(1.5)).collect::<Vec<_>>());
+        for (n, m) in [(1, 2), (4, 9), (7, 30), (33, 5)] {
+            let (query, train) = (spread(n, 0.7301), spread(m, 0.3137));
+            let found = match_features(&query, &train, 1.0);
+            for found in found {
+                let to = |i: usize| distance(&query.descriptors[found.query_idx], &train.descriptors[i]);
+                let nearest = (0..m).map(to).fold(f32::MAX, f32::min);
+                assert!(to(found.train_idx) <= nearest + 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_to_compare_is_no_match() {
+        let (none, one, two) = (features(&[]), features(&[0.3]), features(&[0.3, 0.9]));
+        assert_eq!(match_features(&none, &two, 0.8), []);
+        assert_eq!(match_features(&two, &none, 0.8), []);
+        assert_eq!(match_features(&two, &one, 0.8), []);
+        // A twin makes a match undecidable.
+        assert_eq!(match_features(&one, &features(&[0.3, 0.3]), 0.8), []);
+    }
+}
