@@ -29,7 +29,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = folder.ok_or("expected a folder of PNG pictures")?;
     let sift = Sift::new(config)?;
 
-    let mut pictures: Vec<PathBuf> = std::fs::read_dir(&folder)?.map(|e| Ok(e?.path())).collect::<std::io::Result<_>>()?;
+    let mut pictures: Vec<PathBuf> =
+        std::fs::read_dir(&folder)?.map(|e| Ok(e?.path())).collect::<std::io::Result<_>>()?;
     pictures.retain(|path| path.extension().is_some_and(|extension| extension == "png"));
     pictures.sort();
     let mut seconds = BTreeMap::new();

@@ -197,8 +197,8 @@ mod tests {
                     for dy in -radius..=radius {
                         for dx in -radius..=radius {
                             let weight = kernel.half[dx.unsigned_abs()] * kernel.half[dy.unsigned_abs()];
-                            sum += weight
-                                * source.at(mirrored(x + dx, width as usize), mirrored(y + dy, height as usize));
+                            sum +=
+                                weight * source.at(mirrored(x + dx, width as usize), mirrored(y + dy, height as usize));
                         }
                     }
                     assert!((fast.at(x as usize, y as usize) - sum).abs() < ROUNDING, "({x}, {y})");

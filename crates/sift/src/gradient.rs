@@ -60,7 +60,8 @@ mod tests {
             let angle = (f64::from(i) / 10.0).to_radians();
             for length in [1e-30, 1e-3, 1.0, 1e6] {
                 let found = f64::from(direction_of((length * angle.cos()) as f32, (length * angle.sin()) as f32));
-                let error = (found - angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+                let error =
+                    (found - angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
                 assert!(error.abs() < 2e-5, "{found} for {angle} at length {length}");
             }
         }

@@ -144,7 +144,8 @@ mod tests {
 
     #[test]
     fn agrees_with_a_search_one_by_one() {
-        let spread = |n: usize, step: f32| features(&(0..n).map(|i| (i as f32 * step).rem_euclid(1.5)).collect::<Vec<_>>());
+        let spread =
+            |n: usize, step: f32| features(&(0..n).map(|i| (i as f32 * step).rem_euclid(1.5)).collect::<Vec<_>>());
         for (n, m) in [(1, 2), (4, 9), (7, 30), (33, 5)] {
             let (query, train) = (spread(n, 0.7301), spread(m, 0.3137));
             let found = match_features(&query, &train, 1.0);

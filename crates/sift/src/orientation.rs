@@ -82,9 +82,7 @@ impl WithSimd for FindOrientations<'_> {
 fn smoothed(histogram: &[f32; NUM_BINS]) -> [f32; NUM_BINS] {
     let at = |i: usize, shift: usize| histogram[(i + shift) % NUM_BINS];
     std::array::from_fn(|i| {
-        (at(i, NUM_BINS - 2) + at(i, 2)) / 16.0
-            + (at(i, NUM_BINS - 1) + at(i, 1)) / 4.0
-            + histogram[i] * (3.0 / 8.0)
+        (at(i, NUM_BINS - 2) + at(i, 2)) / 16.0 + (at(i, NUM_BINS - 1) + at(i, 1)) / 4.0 + histogram[i] * (3.0 / 8.0)
     })
 }
 

@@ -53,7 +53,8 @@ impl Plane {
     /// # Source
     /// ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B.
     pub fn from_rgb(image: &RgbImage) -> Self {
-        let luma = |p: &image::Rgb<u8>| (299 * u32::from(p[0]) + 587 * u32::from(p[1]) + 114 * u32::from(p[2]) + 500) / 1000;
+        let luma =
+            |p: &image::Rgb<u8>| (299 * u32::from(p[0]) + 587 * u32::from(p[1]) + 114 * u32::from(p[2]) + 500) / 1000;
         let data = image.pixels().map(|p| luma(p) as f32 / 255.0).collect();
         Self { width: image.width() as usize, height: image.height() as usize, data }
     }
