@@ -108,8 +108,8 @@ impl WithSimd for ScanBand<'_> {
                 spread(&column_max, &mut largest[s], larger);
                 spread(&column_min, &mut smallest[s], smaller);
             }
-            for s in 1..num_differences - 1 {
-                let value = &differences[center % 3][s][..width];
+            for (s, value) in differences[center % 3].iter().enumerate().take(num_differences - 1).skip(1) {
+                let value = &value[..width];
                 let high = [s - 1, s, s + 1].map(|s| &largest[s][..width]);
                 let low = [s - 1, s, s + 1].map(|s| &smallest[s][..width]);
                 let flags = &mut is_extremum[..width];

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 use crate::features::Descriptor;
 use crate::{DESCRIPTOR_LENGTH, Features};
 
-/// Queries that share one reading of the other side.
+/// Queries compared at a time, and candidates that each is compared with at a time: their products fill half of the
+/// registers that AVX2 has.
 const TILE: usize = 4;
-/// Partial sums of a dot product, so that it runs in the widest registers there are. Their number fixes the rounding.
 const LANES: usize = 16;
 
 /// A feature of one image and the feature of another that looks most like it.
@@ -39,12 +39,13 @@ pub fn match_features(query: &Features, train: &Features, ratio: f32) -> Vec<Fea
         return Vec::new();
     }
     let arch = Arch::new();
+    let panels = panels(&train.descriptors);
     let tiles: Vec<Vec<FeatureMatch>> = query
         .descriptors
         .par_chunks(TILE)
         .enumerate()
         .map(|(tile, queries)| {
-            let nearest = arch.dispatch(NearestTwo { queries, train: &train.descriptors });
+            let nearest = arch.dispatch(NearestTwo { queries, panels: &panels, num_train: train.len() });
             let pairs = queries.iter().zip(nearest).enumerate();
             pairs
                 .map(|(i, (descriptor, [first, second]))| {
@@ -70,11 +71,29 @@ pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>().sqrt()
 }
 
+/// Sixteen descriptors side by side: number by number, so that no product is summed across a register.
+type Panel = [[f32; LANES]; DESCRIPTOR_LENGTH];
+
+/// All descriptors in panels; the last panel is filled up with zeros.
+fn panels(descriptors: &[Descriptor]) -> Vec<Panel> {
+    let panel = |descriptors: &[Descriptor]| {
+        let mut panel = [[0.0; LANES]; DESCRIPTOR_LENGTH];
+        for (lane, descriptor) in descriptors.iter().enumerate() {
+            for (row, &value) in panel.iter_mut().zip(descriptor) {
+                row[lane] = value;
+            }
+        }
+        panel
+    };
+    descriptors.chunks(LANES).map(panel).collect()
+}
+
 /// The indices of the two descriptors nearest to each query, nearest first. All are unit vectors, so the largest dot
 /// product is the least distance.
 struct NearestTwo<'a> {
     queries: &'a [Descriptor],
-    train: &'a [Descriptor],
+    panels: &'a [Panel],
+    num_train: usize,
 }
 
 impl WithSimd for NearestTwo<'_> {
@@ -86,12 +105,15 @@ impl WithSimd for NearestTwo<'_> {
         // A tile that is not full repeats its last query.
         let queries: [&Descriptor; TILE] = std::array::from_fn(|i| &self.queries[i.min(last)]);
         let mut best = [[(f32::MIN, 0usize); 2]; TILE];
-        for (train_idx, train) in self.train.iter().enumerate() {
-            let products = dots(queries, train);
-            for (best, product) in best.iter_mut().zip(products) {
-                if product > best[1].0 {
-                    let found = (product, train_idx);
-                    *best = if product > best[0].0 { [found, best[0]] } else { [best[0], found] };
+        for (i, panel) in self.panels.iter().enumerate() {
+            let first = i * LANES;
+            let filled = LANES.min(self.num_train - first);
+            for (best, products) in best.iter_mut().zip(products(queries, panel)) {
+                for (lane, &product) in products[..filled].iter().enumerate() {
+                    if product > best[1].0 {
+                        let found = (product, first + lane);
+                        *best = if product > best[0].0 { [found, best[0]] } else { [best[0], found] };
+                    }
                 }
             }
         }
@@ -99,17 +121,21 @@ impl WithSimd for NearestTwo<'_> {
     }
 }
 
+/// The dot products of each query with each descriptor of a panel.
 #[inline(always)]
-fn dots(queries: [&Descriptor; TILE], train: &Descriptor) -> [f32; TILE] {
-    let mut sums = [[0.0f32; LANES]; TILE];
-    for start in (0..DESCRIPTOR_LENGTH).step_by(LANES) {
-        for (sums, query) in sums.iter_mut().zip(queries) {
-            for lane in 0..LANES {
-                sums[lane] += query[start + lane] * train[start + lane];
-            }
+fn products(queries: [&Descriptor; TILE], panel: &Panel) -> [[f32; LANES]; TILE] {
+    // Four names for four arrays: as one array of arrays they would live in memory.
+    let [mut a, mut b, mut c, mut d] = [[0.0f32; LANES]; TILE];
+    for (k, row) in panel.iter().enumerate() {
+        let [qa, qb, qc, qd] = queries.map(|query| query[k]);
+        for lane in 0..LANES {
+            a[lane] += qa * row[lane];
+            b[lane] += qb * row[lane];
+            c[lane] += qc * row[lane];
+            d[lane] += qd * row[lane];
         }
     }
-    sums.map(|sums| sums.iter().sum())
+    [a, b, c, d]
 }
 
 #[cfg(test)]

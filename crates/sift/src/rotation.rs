@@ -146,7 +146,7 @@ impl RotationEstimator {
         let outlines = template.silhouette.as_ref().zip(silhouette.as_ref());
         let pixels = mask.map_or(image.width() * image.height(), Mask::area);
 
-        if let Some((pose, method)) = self.from_features(&template.features, &features, pixels as f64) {
+        if let Some((pose, method)) = self.pose_by_features(&template.features, &features, pixels as f64) {
             let overlap = outlines.map(|(ours, theirs)| ours.overlap(theirs, &pose));
             return Ok(Some(RotationEstimate { angle: pose.angle, image_from_template: pose, method, overlap }));
         }
@@ -165,7 +165,7 @@ impl RotationEstimator {
         self.sift.detect_and_describe(image, widened.as_ref())
     }
 
-    fn from_features(
+    fn pose_by_features(
         &self,
         template: &Features,
         image: &Features,

@@ -1,5 +1,7 @@
 //! What turning, scaling and relighting leave as it was, in numbers, on the repository's pictures.
 
+#![allow(clippy::unwrap_used)]
+
 mod support;
 
 use nalgebra::Point2;
@@ -44,7 +46,7 @@ fn keypoints_return_and_match_after_known_warps() {
     // Degrees, scale, least share repeated, least share matched rightly, over the three parts together: some five
     // points below what was measured.
     for (degrees, scale, least_repeated, least_matched) in
-        [(90.0, 1.0, 0.88, 0.88), (37.0, 1.0, 0.64, 0.64), (-140.0, 0.8, 0.45, 0.45), (12.0, 1.3, 0.45, 0.45)]
+        [(90.0, 1.0, 0.88, 0.88), (37.0, 1.0, 0.64, 0.64), (-140.0, 0.8, 0.39, 0.39), (12.0, 1.3, 0.45, 0.45)]
     {
         let (mut repeated, mut matched) = (0.0, 0.0);
         for part in PARTS {
@@ -73,7 +75,7 @@ fn a_quarter_turn_turns_directions_and_keeps_descriptors() {
     let sift = Sift::new(config).unwrap();
     let (before, after) =
         (sift.detect_and_describe(&image, None).unwrap(), sift.detect_and_describe(&turned, None).unwrap());
-    assert!(before.len() > 30 && before.len() == after.len(), "{} and {} features", before.len(), after.len());
+    assert!(before.len() > 20 && before.len() == after.len(), "{} and {} features", before.len(), after.len());
     for (k, descriptor) in before.keypoints.iter().zip(&before.descriptors) {
         let expected = Point2::new(f64::from(height) - k.position.y, k.position.x);
         let twin = after.keypoints.iter().position(|other| {

@@ -1,5 +1,7 @@
 //! The turn of the repository's parts against their demonstrations.
 
+#![allow(clippy::unwrap_used)]
+
 mod support;
 
 use nalgebra::Point2;
