@@ -32,7 +32,7 @@ fn texture_tells_the_turn_of_every_part() {
     for part in PARTS {
         let (image, outline) = (Plane::from_rgb(&picture(part)), outline(part));
         let template = estimator.template(&image, Some(&mask(&outline, &image))).unwrap();
-        for (i, degrees) in [-170.0, -95.0, -40.0, 15.0, 60.0, 125.0, 180.0].into_iter().enumerate() {
+        for (i, degrees) in [-170.0, -95.0, 15.0, 125.0].into_iter().enumerate() {
             let scale = [1.0, 0.85, 1.2][i % 3];
             let truth = pose(&outline, degrees, scale, 280.0 + 15.0 * i as f64, 200.0 + 10.0 * i as f64);
             let seen = warped(&image, &truth, 640, 480);
