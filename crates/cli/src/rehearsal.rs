@@ -4,8 +4,7 @@ use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
 use image::RgbImage;
-use nalgebra::Vector3;
-use sdg_geometry::Angle;
+use nalgebra::Isometry3;
 use sdg_grasp::{GraspDetection, GraspModel, GraspPlane, GraspPose, Verification};
 use sdg_report::{Attempt, DetectionError, Step};
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
@@ -115,15 +114,13 @@ impl Rehearsal<'_> {
             object_mm = [tcp.x * 1e3, tcp.y * 1e3];
             object_angle_deg = direction_rad.to_degrees();
             // The last look decides where the hand goes.
-            detection_error = report.targets.iter().rev().flatten().next().map(|target| {
-                let found = target.base_from_tcp.translation.vector;
-                let along = target.base_from_tcp * Vector3::x();
-                let turn = Angle::from_direction(along.x, along.y).distance(Angle::from_radians(direction_rad));
-                DetectionError {
-                    distance_mm: (found.x - tcp.x).hypot(found.y - tcp.y) * 1e3,
-                    angle_deg: turn.to_degrees(),
-                }
-            });
+            detection_error = report
+                .targets
+                .iter()
+                .rev()
+                .flatten()
+                .next()
+                .map(|target| grasp_error(self.object, base_from_object, &target.base_from_tcp));
         }
         Attempt {
             number,
@@ -141,6 +138,16 @@ impl Rehearsal<'_> {
 /// A seed of its own for every attempt of every rehearsal.
 fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
+}
+
+/// How far a found grasp lies beside the true one, as reports give it.
+pub fn grasp_error(
+    object: &ObjectSpec,
+    base_from_object: &Isometry3<f64>,
+    base_from_tcp: &Isometry3<f64>,
+) -> DetectionError {
+    let error = object.grasp_error(base_from_object, base_from_tcp);
+    DetectionError { distance_mm: error.distance_m * 1e3, angle_deg: error.angle_rad.to_degrees() }
 }
 
 /// The heights of a part's grasp, which no photo shows.

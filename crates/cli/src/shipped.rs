@@ -14,7 +14,16 @@ macro_rules! shipped {
 }
 
 /// Name, photo, annotation.
-const SHIPPED: [(&str, &[u8], &[u8]); 3] = shipped!["pendulum", "fuel_line", "rod_end"];
+const SHIPPED: [(&str, &[u8], &[u8]); 8] = shipped![
+    "pendulum",
+    "fuel_line",
+    "rod_end",
+    "housing",
+    "pneumatic_cylinder",
+    "ball_bearing",
+    "common_line",
+    "cranfield_face"
+];
 
 /// The demonstration of a shipped object.
 pub fn demonstration(object: &str) -> Result<Demonstration> {
@@ -44,6 +53,10 @@ mod tests {
     #[test]
     fn an_unknown_object_is_told_the_known_ones() {
         let error = demonstration("teapot").unwrap_err().to_string();
-        assert_eq!(error, "expected an object out of pendulum, fuel_line, rod_end, found \"teapot\"");
+        assert_eq!(
+            error,
+            "expected an object out of pendulum, fuel_line, rod_end, housing, pneumatic_cylinder, ball_bearing, \
+             common_line, cranfield_face, found \"teapot\""
+        );
     }
 }

@@ -2,14 +2,13 @@
 
 use anyhow::Result;
 use image::RgbImage;
-use sdg_geometry::Angle;
 use sdg_grasp::{GraspDetection, GraspModel, GraspPose, Verification};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
 use sdg_simulation::scene::test_views;
 
 use crate::pictures;
-use crate::rehearsal::grasp_plane;
+use crate::rehearsal::{grasp_error, grasp_plane};
 
 /// Largest distance at which a detection counts as right, in millimetres.
 pub const RIGHT_MM: f64 = 10.0;
@@ -69,13 +68,7 @@ pub fn try_views(
                 let plane = grasp_plane(object);
                 let pose =
                     GraspPose::from_planar(&seen.view.camera, &detection.grasp, &plane, LARGEST_JAW_WIDTH_M).ok()?;
-                let found = pose.base_from_tcp.translation.vector;
-                let along = pose.base_from_tcp * nalgebra::Vector3::x();
-                let turn = Angle::from_direction(along.x, along.y).distance(Angle::from_radians(truth.direction_rad));
-                Some(DetectionError {
-                    distance_mm: (found.x - truth.tcp.x).hypot(found.y - truth.tcp.y) * 1e3,
-                    angle_deg: turn.to_degrees(),
-                })
+                Some(grasp_error(object, &truth.base_from_object, &pose.base_from_tcp))
             };
             let best_error = best.and_then(error);
             Ok(Trial {

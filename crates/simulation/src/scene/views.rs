@@ -74,7 +74,12 @@ pub struct TestView {
 /// # Errors
 /// As [`Workcell::new`] and [`Workcell::view_from`].
 pub fn test_view(scene: SceneVariation) -> Result<TestView> {
-    let mut workcell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
+    test_view_drawn(WorkcellConfig::new(scene))
+}
+
+fn test_view_drawn(config: WorkcellConfig) -> Result<TestView> {
+    let mut workcell = Workcell::new(&config)?;
+    let scene = config.scene;
     let view = workcell.view_from(&base_from_look_camera())?;
     let truth = scene.object.as_ref().and_then(|object| GraspTruth::new(object, &view.camera));
     Ok(TestView { scene, view, truth })
@@ -116,9 +121,17 @@ pub struct DemonstrationView {
 /// # Errors
 /// As [`Workcell::new`]; [`SimulationError::Configuration`] when the camera does not see the part.
 pub fn demonstration_view(spec: &ObjectSpec) -> Result<DemonstrationView> {
+    demonstration_view_drawn(&WorkcellConfig::new(demonstration_scene(spec)))
+}
+
+fn demonstration_scene(spec: &ObjectSpec) -> SceneVariation {
     let (x, y, yaw_rad) = DEMONSTRATION_PLACE;
-    let scene = SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad))));
-    let mut workcell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
+    SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad))))
+}
+
+fn demonstration_view_drawn(config: &WorkcellConfig) -> Result<DemonstrationView> {
+    let scene = &config.scene;
+    let mut workcell = Workcell::new(config)?;
     let view = workcell.view_from(&base_from_look_camera())?;
     let segmentation = workcell.wrist_segmentation()?;
     let model = workcell.data().model();
@@ -129,7 +142,7 @@ pub fn demonstration_view(spec: &ObjectSpec) -> Result<DemonstrationView> {
     let unseen = || SimulationError::Configuration {
         field: "DEMONSTRATION_PLACE",
         expected: "a place that the wrist camera sees".to_owned(),
-        found: format!("({x}, {y})"),
+        found: format!("{DEMONSTRATION_PLACE:?}"),
     };
     let outline = outer_outline(&mask).ok_or_else(unseen)?;
     let truth = scene.object.as_ref().and_then(|object| GraspTruth::new(object, &view.camera)).ok_or_else(unseen)?;
@@ -145,6 +158,7 @@ pub fn in_picture(camera: &PosedCamera, point: &Point2<f64>, margin_px: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::RenderConfig;
 
     /// Pixels between a mark's projection and the part's drawn middle: marks lie on the axis of what is drawn.
     const MARK_TOLERANCE_PX: f64 = 1.5;
@@ -152,20 +166,28 @@ mod tests {
     /// Pixels by which a careful person's outline runs beside the true one on average.
     const MEAN_OUTLINE_OFFSET_PX: f64 = 0.4;
 
+    /// Without shadows and smooth edges: what is checked here is where things are.
+    fn drawn_fast(scene: SceneVariation) -> WorkcellConfig {
+        let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
+        WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }
+    }
+
     #[test]
     fn demonstration_marks_lie_along_the_middle_of_the_drawn_part() {
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
-            let shown = demonstration_view(&spec).unwrap();
+            let shown = demonstration_view_drawn(&drawn_fast(demonstration_scene(&spec))).unwrap();
             let line = shown.truth.line;
             let across = nalgebra::Vector2::new(-(line.end - line.start).y, (line.end - line.start).x).normalize();
-            // From the grasp's centre to the part's edge on either side, in tenths of a pixel.
+            // From the grasp's centre to the part's outer edge on either side, in tenths of a pixel; the centre itself
+            // may be open, as a bearing's is.
             let reach = |side: f64| {
                 (0..400)
+                    .rev()
                     .map(|step| f64::from(step) * 0.1)
                     .find(|distance| {
                         let at = line.center() + across * (side * distance);
-                        !shown.mask.get(at.x as u32, at.y as u32)
+                        shown.mask.get(at.x as u32, at.y as u32)
                     })
                     .unwrap()
             };
@@ -175,7 +197,7 @@ mod tests {
             assert!((left + right - width).abs() < 2.5, "{name}: {} px drawn, {width} px expected", left + right);
             let bounds = shown.outline.bounds();
             let length = (bounds.x2 - bounds.x1).hypot(bounds.y2 - bounds.y1);
-            assert!((110.0..230.0).contains(&length), "{name}: {length} px");
+            assert!((60.0..230.0).contains(&length), "{name}: {length} px");
             // Area between the clicked and the true outline over the outline's length: how far it is off on average.
             let (clicked, shown_filled) = (shown.outline.rasterize(640, 480), filled(&shown.mask));
             let differing = (0..480u32)
@@ -206,8 +228,9 @@ mod tests {
     #[test]
     fn test_views_show_the_whole_part_or_none() {
         let spec = ObjectSpec::by_name("fuel_line").unwrap();
-        for seen in test_views(&spec, true, 3, 40) {
-            let seen = seen.unwrap();
+        for seed in [40, 41, 42] {
+            let scene = SceneVariation::sample(Some(&spec), &VariationConfig::default(), seed);
+            let seen = test_view_drawn(drawn_fast(scene)).unwrap();
             let object = seen.scene.object.unwrap();
             for corner in object.footprint() {
                 let pixel = seen.view.camera.project(&Point3::new(corner.x, corner.y, 0.01)).unwrap();

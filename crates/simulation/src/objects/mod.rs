@@ -8,16 +8,25 @@
 //! along the part's axis where the gripper holds it: the jaws close across the line between them, and the tool
 //! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
 
+mod embedded;
+mod metadata;
+mod symmetry;
+
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
-use serde::Deserialize;
+use sdg_geometry::Angle;
 
 use crate::error::{Result, SimulationError};
 use crate::model::Asset;
 use crate::scene::MjcfFragment;
 use crate::scene::pose_attributes;
+
+use embedded::EMBEDDED;
+use metadata::Metadata;
+
+pub use symmetry::RotationalSymmetry;
 
 /// Version of `object.json` that this reader understands.
 pub const OBJECT_FORMAT: u32 = 1;
@@ -56,76 +65,22 @@ pub struct ObjectSpec {
     pub mark_height_m: f64,
     /// Height of the object frame's origin over the table as the part rests.
     pub rest_height_m: f64,
-    /// Which turns about z leave the part looking the same.
-    pub symmetry: Symmetry,
+    /// Which turns about z leave look and grasp of the part the same.
+    pub symmetry: RotationalSymmetry,
     /// The convex hull of the part from above, counter-clockwise, in the object frame.
     pub footprint: Vec<Point2<f64>>,
     mjcf: String,
     files: Vec<Asset>,
 }
 
-/// Turns about the vertical that cannot be seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[non_exhaustive]
-pub enum Symmetry {
-    /// Every direction looks different.
-    None,
+/// How far a grasp lies beside the true one, seen from above.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GraspError {
+    /// Distance of the tool centre points in x and y, in metres.
+    pub distance_m: f64,
+    /// Angle between the lines across which the jaws close, in radians, modulo the part's symmetry.
+    pub angle_rad: f64,
 }
-
-/// `object.json` as it is written.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Metadata {
-    format: u32,
-    name: String,
-    title: String,
-    description: String,
-    mass_kg: f64,
-    friction: f64,
-    grasp_start: [f64; 3],
-    grasp_end: [f64; 3],
-    jaw_width_m: f64,
-    grasp_height_m: f64,
-    mark_height_m: f64,
-    rest_height_m: f64,
-    symmetry: Symmetry,
-    footprint: Vec<[f64; 2]>,
-    mjcf: String,
-}
-
-macro_rules! embedded {
-    ($($name:literal: [$($file:literal),* $(,)?]),* $(,)?) => {
-        &[$(($name, &[$((
-            $file,
-            include_bytes!(concat!("../../../datasets/objects/", $name, "/", $file)),
-        )),*])),*]
-    };
-}
-
-/// A file's name and bytes, compiled in.
-type EmbeddedFile = (&'static str, &'static [u8]);
-
-/// Name and files of every part that is compiled in.
-const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
-    "pendulum": [
-        "object.json", "object.xml",
-        "pendulum_body.obj", "pendulum_raised.obj", "pendulum_bushing.obj", "pendulum_slug.obj",
-        "pendulum_printed.png", "pendulum_steel.png", "pendulum_brass.png",
-    ],
-    "fuel_line": [
-        "object.json", "object.xml",
-        "fuel_line_tube.obj", "fuel_line_nuts.obj", "fuel_line_ends.obj", "fuel_line_clip.obj",
-        "fuel_line_tube.png", "fuel_line_zinc.png", "fuel_line_steel.png", "fuel_line_plastic.png",
-    ],
-    "rod_end": [
-        "object.json", "object.xml",
-        "rod_end_housing.obj", "rod_end_liner.obj", "rod_end_ball.obj",
-        "rod_end_neck.obj", "rod_end_screw.obj", "rod_end_plated.obj",
-        "rod_end_forged.png", "rod_end_bronze.png", "rod_end_polished.png",
-        "rod_end_rolled.png", "rod_end_plated.png",
-    ],
-};
 
 impl ObjectSpec {
     /// The names of the parts that are compiled in.
@@ -225,41 +180,23 @@ impl ObjectSpec {
         (Point3::new(middle.x, middle.y, self.grasp_height_m), along.y.atan2(along.x))
     }
 
+    /// How far a grasp lies beside the marked one, for a part at rest; turns that the part's symmetry hides do not count.
+    ///
+    /// `base_from_tcp` has its x along the line across which the jaws close.
+    pub fn grasp_error(&self, base_from_object: &Isometry3<f64>, base_from_tcp: &Isometry3<f64>) -> GraspError {
+        let (marked, direction_rad) = self.grasp_in_base(base_from_object);
+        let along = base_from_tcp * Vector3::x();
+        let found = Angle::from_direction(along.x, along.y);
+        GraspError {
+            distance_m: (base_from_tcp.translation.vector.xy() - marked.coords.xy()).norm(),
+            angle_rad: self.symmetry.distance(found, Angle::from_radians(direction_rad)),
+        }
+    }
+
     /// The part's MJCF at a pose: body `object`, joint `object_joint`, geoms `object_visual_*` and `object_collision_*`.
     pub fn fragment(&self, base_from_object: &Isometry3<f64>) -> MjcfFragment {
         let placed = format!("<body name=\"object\" {}>", pose_attributes(base_from_object));
         MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }
-    }
-}
-
-impl Metadata {
-    /// Checks what the types leave open; the error names the field, what was expected and what was found.
-    fn check(&self) -> std::result::Result<(), String> {
-        if self.format != OBJECT_FORMAT {
-            return Err(format!("format: expected {OBJECT_FORMAT}, found {}", self.format));
-        }
-        let ranges = [
-            ("mass_kg", self.mass_kg, 1e-4, 3.0),
-            ("friction", self.friction, 0.01, 5.0),
-            ("jaw_width_m", self.jaw_width_m, 1e-3, LARGEST_JAW_WIDTH_M),
-            ("grasp_height_m", self.grasp_height_m, 0.0, 0.5),
-            ("mark_height_m", self.mark_height_m, 0.0, 0.5),
-            ("rest_height_m", self.rest_height_m, -0.5, 0.5),
-        ];
-        for (field, value, low, high) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(format!("{field}: expected {low} to {high}, found {value}"));
-            }
-        }
-        let (start, end) = (Point3::from(self.grasp_start), Point3::from(self.grasp_end));
-        let length = (end.xy() - start.xy()).norm();
-        if length.is_nan() || length < 1e-3 {
-            return Err(format!("grasp_start, grasp_end: expected marks at least 0.001 m apart, found {length} m"));
-        }
-        if self.footprint.len() < 3 || self.footprint.iter().flatten().any(|value| !value.is_finite()) {
-            return Err(format!("footprint: expected three or more finite points, found {:?}", self.footprint));
-        }
-        Ok(())
     }
 }
 
@@ -304,11 +241,11 @@ mod tests {
 
     #[test]
     fn every_part_compiled_in_reads_and_equals_its_folder() {
-        assert_eq!(ObjectSpec::names().collect::<Vec<_>>(), ["pendulum", "fuel_line", "rod_end"]);
+        assert_eq!(ObjectSpec::names().count(), 8);
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
             assert_eq!(spec.name, name);
-            assert!(spec.mass_kg < 1.0 && spec.jaw_width_m < 0.03);
+            assert!(spec.mass_kg < 1.0 && spec.jaw_width_m < 0.055, "{name}");
             assert_eq!(spec, ObjectSpec::from_folder(&source_folder().join(name)).unwrap());
         }
     }
@@ -324,20 +261,45 @@ mod tests {
         assert!(start.y < end.y && (start.z - spec.mark_height_m).abs() < 1e-12);
     }
 
+    /// How far a part reaches from its grasp in a direction of the object frame.
+    fn reach_m(spec: &ObjectSpec, direction: f64) -> f64 {
+        let (sin, cos) = direction.sin_cos();
+        spec.footprint.iter().map(|p| p.x * cos + p.y * sin).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     #[test]
-    fn no_part_looks_the_same_after_half_a_turn() {
+    fn outlines_are_as_symmetric_as_declared() {
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
-            // The outline reaches clearly further on one side of the grasp than the half-turned outline does.
-            let reach = |direction: f64| {
-                let (sin, cos) = direction.sin_cos();
-                spec.footprint.iter().map(|p| p.x * cos + p.y * sin).fold(f64::NEG_INFINITY, f64::max)
+            // The widest difference that a turn makes to the outline.
+            let change_m = |turn: f64| {
+                (0..180)
+                    .map(|degrees| f64::from(2 * degrees).to_radians())
+                    .map(|angle| (reach_m(&spec, angle) - reach_m(&spec, angle + turn)).abs())
+                    .fold(0.0, f64::max)
             };
-            let widest = (0..180)
-                .map(|degrees| f64::from(degrees).to_radians())
-                .map(|angle| (reach(angle) - reach(angle + std::f64::consts::PI)).abs())
-                .fold(0.0, f64::max);
-            assert!(widest > 0.004, "{name}: outline differs by {widest} m only");
+            // These turns stand for all others.
+            for turn in [2.0, 3.0, 4.0].map(|parts| std::f64::consts::TAU / parts) {
+                let hidden = spec.symmetry.distance(Angle::from_radians(turn), Angle::ZERO) < 1e-9;
+                let change_m = change_m(turn);
+                assert_eq!(change_m < 0.0005, hidden, "{name} turned by {turn} rad: {change_m} m");
+                assert!(hidden || change_m > 0.004, "{name} turned by {turn} rad: {change_m} m");
+            }
+        }
+    }
+
+    #[test]
+    fn grasp_error_leaves_out_turns_that_cannot_be_seen() {
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        let base_from_object = spec.base_from_object(0.5, -0.1, 2.0);
+        let turned = spec.base_from_object(0.503, -0.104, 2.0 - 0.25);
+        let beside = crate::oracle::marked_grasp(&spec, &turned).base_from_tcp;
+        let error = spec.grasp_error(&base_from_object, &beside);
+        assert_relative_eq!(error.distance_m, 0.005, epsilon = 1e-9);
+        assert_relative_eq!(error.angle_rad, 0.25, epsilon = 1e-9);
+        for (symmetry, expected) in [(RotationalSymmetry::Fold(24), 0.25 - 0.261799), (RotationalSymmetry::Full, 0.0)] {
+            let error = ObjectSpec { symmetry, ..spec.clone() }.grasp_error(&base_from_object, &beside);
+            assert_relative_eq!(error.angle_rad, f64::abs(expected), epsilon = 1e-5);
         }
     }
 
@@ -345,26 +307,6 @@ mod tests {
     fn unknown_name_lists_the_parts() {
         let message = ObjectSpec::by_name("piston").unwrap_err().to_string();
         assert!(message.contains("piston") && message.contains("rod_end"), "{message}");
-    }
-
-    #[test]
-    fn bad_metadata_names_the_field() {
-        let good = std::fs::read_to_string(source_folder().join("pendulum/object.json")).unwrap();
-        for (from, to, expected) in [
-            ("\"format\": 1", "\"format\": 7", "format: expected 1, found 7"),
-            ("\"jaw_width_m\": 0.016", "\"jaw_width_m\": 0.09", "jaw_width_m: expected 0.001 to 0.08, found 0.09"),
-            ("\"symmetry\": \"none\"", "\"symmetry\": \"some\"", "some"),
-            ("\"mass_kg\"", "\"mass\"", "mass"),
-            ("\"object.xml\"", "\"absent.xml\"", "absent.xml"),
-        ] {
-            assert!(good.contains(from), "{from}");
-            let folder = std::env::temp_dir().join(format!("sdg-object-{}-{}", std::process::id(), to.len()));
-            std::fs::create_dir_all(&folder).unwrap();
-            std::fs::write(folder.join("object.json"), good.replace(from, to)).unwrap();
-            let message = ObjectSpec::from_folder(&folder).unwrap_err().to_string();
-            std::fs::remove_dir_all(&folder).unwrap();
-            assert!(message.contains(expected), "{message}");
-        }
     }
 
     #[test]
