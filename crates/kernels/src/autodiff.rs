@@ -10,33 +10,66 @@ use burn::backend::flex::FlexTensor;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Flex};
 
-use crate::composed;
-use crate::conv::Conv2dParams;
-use crate::conv::kernel::{self as conv, ConvShape};
+use crate::conv::direct::Maps;
+use crate::conv::filters::Direction;
+use crate::conv::kernel::ConvShape;
 use crate::conv::weight_gradient::weight_gradient;
+use crate::conv::{Conv2dParams, FusedConv2dParams};
 use crate::extension::KernelBackend;
-use crate::flex::{all_f32, shape4, tensor, values};
-use crate::group_norm::GroupNormParams;
+use crate::flex::{all_f32, channels_last, convolved, last_values, shape4, tensor, tensor_channels_last, values};
 use crate::group_norm::kernel::{self as norm, Statistics};
+use crate::group_norm::{Activation, FusedGroupNormParams, GroupNormParams};
+use crate::packed::Keep;
+use crate::product::Epilogue;
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
+use crate::{composed, elementwise};
 
 impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
-        params: Conv2dParams,
+        scale: FloatTensor<Self>,
+        residual: FloatTensor<Self>,
+        params: FusedConv2dParams,
     ) -> FloatTensor<Self> {
-        if !all_f32([x.primitive(), weight.primitive(), bias.primitive()]) {
-            return composed::conv2d::<Self>(x, weight, bias, params);
+        let primitives = [&x, &weight, &bias, &scale, &residual].map(|operand| operand.primitive());
+        if !all_f32(primitives) {
+            return composed::conv2d::<Self>(x, weight, bias, scale, residual, params);
         }
-        let shape = ConvShape::forward(shape4(x.primitive()), shape4(weight.primitive()), params);
-        let prepared = Conv2dBackward.prepare::<C>([x.node(), weight.node(), bias.node()]).compute_bound().stateful();
-        let kept = Operands::keep::<C>(&x, &weight);
-        let output = Flex::kernel_conv2d(x.into_primitive(), weight.into_primitive(), bias.into_primitive(), params);
+        let shape = ConvShape::forward(shape4(x.primitive()), shape4(weight.primitive()), params.conv);
+        let prepared = Conv2dBackward
+            .prepare::<C>([x.node(), weight.node(), bias.node(), residual.node()])
+            .compute_bound()
+            .stateful();
+        let keep = if weight.is_tracked() { Keep::No } else { Keep::Yes };
+        let (x_tracked, weight_tracked) = (x.is_tracked(), weight.is_tracked());
+        let x = channels_last(x.into_primitive());
+        let residual = params.added.then(|| channels_last(residual.into_primitive()));
+        let (weight, bias) = (weight.into_primitive(), bias.into_primitive().to_contiguous());
+        let scale = params.scaled.then(|| scale.into_primitive().to_contiguous());
+        let relu = params.activation == Activation::Relu;
+        let epilogue = Epilogue {
+            scale: scale.as_ref().map(values),
+            bias: Some(values(&bias)),
+            residual: residual.as_ref().map(last_values),
+            relu,
+        };
+        let output = convolved(Direction::Forward, &x, weight.clone(), epilogue, &shape, keep);
         match prepared {
-            OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
+            OpsKind::Tracked(prep) => {
+                // Each operand is kept only where the other's gradient is wanted.
+                let kept = Conv2dKept {
+                    x: weight_tracked.then_some(x),
+                    weight: x_tracked.then_some(weight),
+                    scale,
+                    output: relu.then(|| output.clone()),
+                    shape,
+                    keep,
+                };
+                prep.finish(kept, output)
+            }
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -53,11 +86,24 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         let shape = ConvShape::transposed(shape4(x.primitive()), shape4(weight.primitive()), params);
         let prepared =
             ConvTranspose2dBackward.prepare::<C>([x.node(), weight.node(), bias.node()]).compute_bound().stateful();
-        let kept = Operands::keep::<C>(&x, &weight);
-        let output =
-            Flex::kernel_conv_transpose2d(x.into_primitive(), weight.into_primitive(), bias.into_primitive(), params);
+        let keep = if weight.is_tracked() { Keep::No } else { Keep::Yes };
+        let (x_tracked, weight_tracked) = (x.is_tracked(), weight.is_tracked());
+        let x = channels_last(x.into_primitive());
+        let (weight, bias) = (weight.into_primitive(), bias.into_primitive().to_contiguous());
+        let epilogue = Epilogue { bias: Some(values(&bias)), ..Epilogue::default() };
+        let output = convolved(Direction::Backward, &x, weight.clone(), epilogue, &shape, keep);
         match prepared {
-            OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
+            OpsKind::Tracked(prep) => {
+                let kept = Conv2dKept {
+                    x: weight_tracked.then_some(x),
+                    weight: x_tracked.then_some(weight),
+                    scale: None,
+                    output: None,
+                    shape,
+                    keep,
+                };
+                prep.finish(kept, output)
+            }
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -85,20 +131,34 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         x: FloatTensor<Self>,
         gamma: FloatTensor<Self>,
         beta: FloatTensor<Self>,
-        params: GroupNormParams,
+        residual: FloatTensor<Self>,
+        params: FusedGroupNormParams,
     ) -> FloatTensor<Self> {
-        if !all_f32([x.primitive(), gamma.primitive(), beta.primitive()]) {
-            return composed::group_norm::<Self>(x, gamma, beta, params);
+        if !all_f32([&x, &gamma, &beta, &residual].map(|operand| operand.primitive())) {
+            return composed::group_norm::<Self>(x, gamma, beta, residual, params);
         }
         let shape = shape4(x.primitive());
-        let prepared = GroupNormBackward.prepare::<C>([x.node(), gamma.node(), beta.node()]).compute_bound().stateful();
-        let operands = [x, gamma, beta].map(|operand| operand.into_primitive().to_contiguous());
-        let [x, gamma, beta] = operands.each_ref().map(values);
-        let (output, statistics) = norm::forward(Isa::detect(), x, shape, gamma, beta, &params);
-        let output = tensor(output, shape);
+        let prepared = GroupNormBackward
+            .prepare::<C>([x.node(), gamma.node(), beta.node(), residual.node()])
+            .compute_bound()
+            .stateful();
+        let x = channels_last(x.into_primitive());
+        let residual = params.added.then(|| channels_last(residual.into_primitive()));
+        let [gamma, beta] = [gamma, beta].map(|operand| operand.into_primitive().to_contiguous());
+        let (output, statistics) = norm::forward(
+            Isa::detect(),
+            last_values(&x),
+            shape,
+            values(&gamma),
+            values(&beta),
+            residual.as_ref().map(last_values),
+            &params.norm,
+        );
+        let output = tensor_channels_last(output, shape);
         match prepared {
             OpsKind::Tracked(prep) => {
-                let kept = GroupNormKept { operands, statistics: Arc::new(statistics), params };
+                let statistics = Arc::new(statistics);
+                let kept = GroupNormKept { x, gamma, output: output.clone(), statistics, params: params.norm };
                 prep.finish(kept, output)
             }
             OpsKind::UnTracked(prep) => prep.finish(output),
@@ -106,51 +166,61 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     }
 }
 
-/// What a convolution's gradients need: each operand only where the other's gradient is wanted.
+const KEPT: &str = "an operand is kept where the other is tracked";
+
+/// What a convolution's gradients need.
 #[derive(Clone, Debug)]
-struct Operands {
+struct Conv2dKept {
     x: Option<FlexTensor>,
     weight: Option<FlexTensor>,
+    scale: Option<FlexTensor>,
+    /// Where a ReLU follows.
+    output: Option<FlexTensor>,
+    shape: ConvShape,
+    keep: Keep,
 }
-
-impl Operands {
-    fn keep<C: CheckpointStrategy>(
-        x: &FloatTensor<Autodiff<Flex, C>>,
-        weight: &FloatTensor<Autodiff<Flex, C>>,
-    ) -> Self {
-        Self {
-            x: weight.is_tracked().then(|| x.primitive().clone()),
-            weight: x.is_tracked().then(|| weight.primitive().clone()),
-        }
-    }
-}
-
-const KEPT: &str = "an operand is kept where the other is tracked";
 
 #[derive(Debug)]
 struct Conv2dBackward;
 
-impl Backward<Flex, 3> for Conv2dBackward {
-    type State = (Operands, ConvShape);
+impl Backward<Flex, 4> for Conv2dBackward {
+    type State = Conv2dKept;
 
-    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
-        let (kept, shape) = ops.state;
-        let output_grad = values(&output_grad);
-        let [x, weight, bias] = ops.parents;
-        if let Some(x) = x {
-            let weight = kept.weight.expect(KEPT).to_contiguous();
-            let grad = conv::input_gradient(Isa::detect(), output_grad, values(&weight), None, &shape);
-            grads.register::<Flex>(x.id, tensor(grad, shape.input()));
-        }
-        if let Some(weight) = weight {
-            let x = kept.x.expect(KEPT).to_contiguous();
-            let grad = weight_gradient(Isa::detect(), values(&x), output_grad, &shape);
-            grads.register::<Flex>(weight.id, tensor(grad, shape.weight()));
+    fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let isa = Isa::detect();
+        let mut output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let Conv2dKept { x: kept_x, weight: kept_weight, scale, output, shape, keep } = ops.state;
+        let [x, weight, bias, residual] = ops.parents;
+        let mut bias_grad = None;
+        if let Some(output) = output {
+            let (masked, sums) =
+                elementwise::relu_gradient(isa, last_values(&output_grad), last_values(&output), shape.out_channels);
+            output_grad = tensor_channels_last(masked, shape.output());
+            bias_grad = Some(sums);
         }
         if let Some(bias) = bias {
-            let grad = conv::channel_sums(output_grad, shape.num_images, shape.out_channels);
-            grads.register::<Flex>(bias.id, tensor(grad, [shape.out_channels]));
+            let sums = || elementwise::channel_sums(isa, last_values(&output_grad), shape.out_channels);
+            grads.register::<Flex>(bias.id, tensor(bias_grad.unwrap_or_else(sums), [shape.out_channels]));
+        }
+        if let Some(residual) = residual {
+            grads.register::<Flex>(residual.id, output_grad.clone());
+        }
+        if let Some(scale) = scale
+            && (x.is_some() || weight.is_some())
+        {
+            let mut scaled = last_values(&output_grad).to_vec();
+            elementwise::scale_channels(isa, &mut scaled, values(&scale));
+            output_grad = tensor_channels_last(scaled, shape.output());
+        }
+        if let Some(x) = x {
+            let weight = kept_weight.expect(KEPT);
+            let grad = convolved(Direction::Backward, &output_grad, weight, Epilogue::default(), &shape, keep);
+            grads.register::<Flex>(x.id, grad);
+        }
+        if let Some(weight) = weight {
+            let x = kept_x.expect(KEPT);
+            let grad = weight_gradient(isa, input_maps(&x, &shape), output_maps(&output_grad, &shape), &shape);
+            grads.register::<Flex>(weight.id, tensor(grad, shape.weight()));
         }
     }
 }
@@ -161,28 +231,38 @@ impl Backward<Flex, 3> for Conv2dBackward {
 struct ConvTranspose2dBackward;
 
 impl Backward<Flex, 3> for ConvTranspose2dBackward {
-    type State = (Operands, ConvShape);
+    type State = Conv2dKept;
 
     fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
-        let (kept, shape) = ops.state;
-        let output_grad = values(&output_grad);
+        let isa = Isa::detect();
+        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let Conv2dKept { x: kept_x, weight: kept_weight, shape, keep, .. } = ops.state;
         let [x, weight, bias] = ops.parents;
         if let Some(x) = x {
-            let weight = kept.weight.expect(KEPT).to_contiguous();
-            let grad = conv::forward(Isa::detect(), output_grad, values(&weight), None, &shape);
-            grads.register::<Flex>(x.id, tensor(grad, shape.output()));
+            let weight = kept_weight.expect(KEPT);
+            let grad = convolved(Direction::Forward, &output_grad, weight, Epilogue::default(), &shape, keep);
+            grads.register::<Flex>(x.id, grad);
         }
         if let Some(weight) = weight {
-            let x = kept.x.expect(KEPT).to_contiguous();
-            let grad = weight_gradient(Isa::detect(), output_grad, values(&x), &shape);
+            let x = kept_x.expect(KEPT);
+            let grad = weight_gradient(isa, input_maps(&output_grad, &shape), output_maps(&x, &shape), &shape);
             grads.register::<Flex>(weight.id, tensor(grad, shape.weight()));
         }
         if let Some(bias) = bias {
-            let grad = conv::channel_sums(output_grad, shape.num_images, shape.in_channels);
+            let grad = elementwise::channel_sums(isa, last_values(&output_grad), shape.in_channels);
             grads.register::<Flex>(bias.id, tensor(grad, [shape.in_channels]));
         }
     }
+}
+
+fn input_maps<'a>(tensor: &'a FlexTensor, shape: &ConvShape) -> Maps<'a> {
+    let (num_images, size, channels) = (shape.num_images, shape.in_size, shape.in_channels);
+    Maps { values: last_values(tensor), num_images, size, channels }
+}
+
+fn output_maps<'a>(tensor: &'a FlexTensor, shape: &ConvShape) -> Maps<'a> {
+    let (num_images, size, channels) = (shape.num_images, shape.out_size, shape.out_channels);
+    Maps { values: last_values(tensor), num_images, size, channels }
 }
 
 #[derive(Debug)]
@@ -193,11 +273,11 @@ impl Backward<Flex, 1> for RoiAlignBackward {
     type State = (FlexTensor, [usize; 4], RoiAlignParams);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let crop_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let crop_grad = channels_last(grads.consume::<Flex>(&ops.node));
         let (rois, shape, params) = ops.state;
         if let [Some(features)] = ops.parents {
-            let grad = roi_align::kernel::backward(values(&crop_grad), shape, values(&rois), &params);
-            grads.register::<Flex>(features.id, tensor(grad, shape));
+            let grad = roi_align::kernel::backward(last_values(&crop_grad), shape, values(&rois), &params);
+            grads.register::<Flex>(features.id, tensor_channels_last(grad, shape));
         }
     }
 }
@@ -205,8 +285,9 @@ impl Backward<Flex, 1> for RoiAlignBackward {
 /// What the gradients of a group normalisation need.
 #[derive(Clone, Debug)]
 struct GroupNormKept {
-    /// x, gamma and beta.
-    operands: [FlexTensor; 3],
+    x: FlexTensor,
+    gamma: FlexTensor,
+    output: FlexTensor,
     statistics: Arc<Statistics>,
     params: GroupNormParams,
 }
@@ -214,32 +295,36 @@ struct GroupNormKept {
 #[derive(Debug)]
 struct GroupNormBackward;
 
-impl Backward<Flex, 3> for GroupNormBackward {
+impl Backward<Flex, 4> for GroupNormBackward {
     type State = GroupNormKept;
 
-    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+    fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
         let kept = ops.state;
-        let shape = shape4(&kept.operands[0]);
-        let [x, gamma, beta] = kept.operands.each_ref().map(values);
+        let shape = shape4(&kept.x);
         let found = norm::backward(
             Isa::detect(),
-            values(&output_grad),
-            x,
+            last_values(&output_grad),
+            last_values(&kept.output),
+            last_values(&kept.x),
             shape,
-            [gamma, beta],
+            values(&kept.gamma),
             &kept.statistics,
             &kept.params,
         );
-        let [x, gamma, beta] = ops.parents;
+        let [x, gamma, beta, residual] = ops.parents;
         if let Some(x) = x {
-            grads.register::<Flex>(x.id, tensor(found.x, shape));
+            grads.register::<Flex>(x.id, tensor_channels_last(found.x, shape));
         }
         if let Some(gamma) = gamma {
             grads.register::<Flex>(gamma.id, tensor(found.gamma, [shape[1]]));
         }
         if let Some(beta) = beta {
             grads.register::<Flex>(beta.id, tensor(found.beta, [shape[1]]));
+        }
+        if let Some(residual) = residual {
+            let grad = found.masked.map_or(output_grad, |masked| tensor_channels_last(masked, shape));
+            grads.register::<Flex>(residual.id, grad);
         }
     }
 }

@@ -8,19 +8,39 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata, read_sync};
 use burn::tensor::{Shape, Slice, TensorData};
 
-use crate::conv::Conv2dParams;
-use crate::group_norm::{Activation, GroupNormParams};
+use crate::conv::{Conv2dParams, FusedConv2dParams};
+use crate::group_norm::{Activation, FusedGroupNormParams};
 use crate::roi_align::{RoiAlignParams, RoiBins};
 
-/// [`conv2d`](crate::conv2d) by burn's `conv2d`.
+/// [`conv2d_fused`](crate::conv2d_fused) by burn's `conv2d`.
 pub fn conv2d<B: Backend>(
     x: FloatTensor<B>,
     weight: FloatTensor<B>,
     bias: FloatTensor<B>,
-    params: Conv2dParams,
+    scale: FloatTensor<B>,
+    residual: FloatTensor<B>,
+    params: FusedConv2dParams,
 ) -> FloatTensor<B> {
-    let options = ConvOptions::new(params.stride, params.padding, [1, 1], 1);
-    B::conv2d(x, weight, Some(bias), options)
+    let FusedConv2dParams { conv, scaled, added, activation } = params;
+    let channels = weight.shape()[0];
+    let per_channel = |values| B::float_reshape(values, Shape::from(vec![1, channels, 1, 1]));
+    let options = ConvOptions::new(conv.stride, conv.padding, [1, 1], 1);
+    let mut output = B::conv2d(x, weight, None, options);
+    if scaled {
+        output = B::float_mul(output, per_channel(scale));
+    }
+    output = B::float_add(output, per_channel(bias));
+    if added {
+        output = B::float_add(output, residual);
+    }
+    activated::<B>(output, activation)
+}
+
+fn activated<B: Backend>(x: FloatTensor<B>, activation: Activation) -> FloatTensor<B> {
+    match activation {
+        Activation::Identity => x,
+        Activation::Relu => B::relu(x),
+    }
 }
 
 /// [`conv_transpose2d`](crate::conv_transpose2d) by burn's `conv_transpose2d`.
@@ -98,13 +118,15 @@ pub fn roi_align<B: Backend>(features: FloatTensor<B>, rois: FloatTensor<B>, par
     B::float_select(crops, 0, B::int_from_data(order, &device))
 }
 
-/// [`group_norm`](crate::group_norm()) by means over a reshaped tensor.
+/// [`group_norm_residual`](crate::group_norm_residual) by means over a reshaped tensor.
 pub fn group_norm<B: Backend>(
     x: FloatTensor<B>,
     gamma: FloatTensor<B>,
     beta: FloatTensor<B>,
-    params: GroupNormParams,
+    residual: FloatTensor<B>,
+    params: FusedGroupNormParams,
 ) -> FloatTensor<B> {
+    let FusedGroupNormParams { norm: params, added } = params;
     let shape = x.shape();
     let [num_images, channels] = [shape[0], shape[1]];
     let values = channels / params.num_groups * shape[2] * shape[3];
@@ -117,8 +139,6 @@ pub fn group_norm<B: Backend>(
     let per_channel = |values| B::float_reshape(values, Shape::from(vec![1, channels, 1, 1]));
     let x = B::float_mul(x, per_channel(gamma));
     let x = B::float_add(x, per_channel(beta));
-    match params.activation {
-        Activation::Identity => x,
-        Activation::Relu => B::relu(x),
-    }
+    let x = if added { B::float_add(x, residual) } else { x };
+    activated::<B>(x, params.activation)
 }

@@ -1,23 +1,29 @@
 //! Two-dimensional convolution and its transpose.
 //!
+//! Results stand channels last in memory, whatever their shape says: what is convolved again, normalised, pooled or
+//! cropped by this crate is then read where it stands. Operations of burn take them as they take any permuted tensor.
+//!
 //! Shapes: N images, Ci channels in, Co channels out, a kernel of Kh × Kw, maps of Hi × Wi and Ho × Wo.
 
 use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
 use crate::extension::KernelBackend;
+use crate::group_norm::Activation;
 
-mod gather;
+pub(crate) mod direct;
+pub(crate) mod filters;
 pub(crate) mod kernel;
 mod params;
 pub(crate) mod weight_gradient;
+mod winograd;
 
 #[cfg(test)]
 mod kernel_tests;
 #[cfg(test)]
 mod tests;
 
-pub use params::Conv2dParams;
+pub use params::{Conv2dParams, FusedConv2dParams};
 
 /// Convolves `x` with `weight` (cross-correlation, as everywhere in deep learning) and adds `bias`.
 ///
@@ -29,6 +35,34 @@ pub use params::Conv2dParams;
 /// Where the shapes do not fit each other, a dimension or stride is 0, or the kernel is larger than the
 /// padded input.
 pub fn conv2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: Conv2dParams) -> Tensor<4> {
+    conv2d_fused(x, weight, bias, params, Conv2dEpilogue::default())
+}
+
+/// What else is done to a convolution's result before it is written: `activation(scale · conv + bias + residual)`.
+#[derive(Clone, Debug, Default)]
+pub struct Conv2dEpilogue {
+    /// A factor for each channel, `[Co]`, such as that of a frozen batch norm. A constant: no gradient reaches it.
+    pub scale: Option<Tensor<1>>,
+    /// A summand of the result's shape.
+    pub residual: Option<Tensor<4>>,
+    /// What follows.
+    pub activation: Activation,
+}
+
+/// [`conv2d`] with what follows it, in one pass over the result.
+///
+/// # Shapes
+/// As for [`conv2d`].
+///
+/// # Panics
+/// As [`conv2d`], and where the epilogue's shapes are others.
+pub fn conv2d_fused(
+    x: Tensor<4>,
+    weight: Tensor<4>,
+    bias: Option<Tensor<1>>,
+    params: Conv2dParams,
+    epilogue: Conv2dEpilogue,
+) -> Tensor<4> {
     let [num_images, in_channels, in_height, in_width] = x.dims();
     let [out_channels, weight_channels, kernel_height, kernel_width] = weight.dims();
     check_parameters("conv2d", x.dims(), weight.dims(), params);
@@ -38,19 +72,43 @@ pub fn conv2d(x: Tensor<4>, weight: Tensor<4>, bias: Option<Tensor<1>>, params: 
         x.dims(),
         weight.dims(),
     );
+    let out_size = params.output_size([in_height, in_width], [kernel_height, kernel_width]);
     assert!(
-        params.output_size([in_height, in_width], [kernel_height, kernel_width]).is_some(),
+        out_size.is_some(),
         "conv2d: expected a padded input of at least the kernel's {kernel_height} x {kernel_width}, found \
          {num_images} maps of {in_height} x {in_width} with padding {:?}",
         params.padding,
     );
     let bias = bias_or_zeros("conv2d", bias, out_channels, &x);
+    let Conv2dEpilogue { scale, residual, activation } = epilogue;
+    let scaled = scale.is_some();
+    let added = residual.is_some();
+    let scale = scale.unwrap_or_else(|| absent(&x));
+    assert!(
+        !scaled || scale.dims() == [out_channels],
+        "conv2d: expected a scale of [{out_channels}], found {:?}",
+        scale.dims()
+    );
+    let residual = residual.unwrap_or_else(|| absent(&x));
+    let out_dims = out_size.map(|[height, width]| [num_images, out_channels, height, width]);
+    assert!(
+        !added || Some(residual.dims()) == out_dims,
+        "conv2d: expected a residual of the result's shape {out_dims:?}, found {:?}",
+        residual.dims()
+    );
     Tensor::from_dispatch(Dispatch::kernel_conv2d(
         x.into_dispatch(),
         weight.into_dispatch(),
         bias.into_dispatch(),
-        params,
+        scale.into_dispatch(),
+        residual.into_dispatch(),
+        FusedConv2dParams { conv: params, scaled, added, activation },
     ))
+}
+
+/// Stands where the extension's methods want a tensor that there is not.
+fn absent<const D: usize>(x: &Tensor<4>) -> Tensor<D> {
+    Tensor::zeros([1; D], (&x.device(), x.dtype()))
 }
 
 /// Transposed convolution: the map whose gradient with respect to its input is [`conv2d`].

@@ -4,8 +4,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
 use crate::composed;
-use crate::conv::Conv2dParams;
-use crate::group_norm::GroupNormParams;
+use crate::conv::{Conv2dParams, FusedConv2dParams};
+use crate::group_norm::FusedGroupNormParams;
 use crate::roi_align::RoiAlignParams;
 
 /// Backends that run this crate's operations.
@@ -15,14 +15,17 @@ use crate::roi_align::RoiAlignParams;
 /// [`Tensor`](burn::tensor::Tensor) that call these methods.
 #[backend_extension(Flex, Autodiff: cfg(feature = "autodiff"))]
 pub trait KernelBackend: Backend {
-    /// See [`conv2d`](crate::conv2d).
+    /// See [`conv2d_fused`](crate::conv2d_fused). Where `params` say that there is no scale or residual, those are
+    /// tensors of one zero.
     fn kernel_conv2d(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
         bias: FloatTensor<Self>,
-        params: Conv2dParams,
+        scale: FloatTensor<Self>,
+        residual: FloatTensor<Self>,
+        params: FusedConv2dParams,
     ) -> FloatTensor<Self> {
-        composed::conv2d::<Self>(x, weight, bias, params)
+        composed::conv2d::<Self>(x, weight, bias, scale, residual, params)
     }
 
     /// See [`conv_transpose2d`](crate::conv_transpose2d).
@@ -44,13 +47,15 @@ pub trait KernelBackend: Backend {
         composed::roi_align::<Self>(features, rois, params)
     }
 
-    /// See [`group_norm`](crate::group_norm()).
+    /// See [`group_norm_residual`](crate::group_norm_residual). Where `params` say that there is no residual, it is a
+    /// tensor of one zero.
     fn kernel_group_norm(
         x: FloatTensor<Self>,
         gamma: FloatTensor<Self>,
         beta: FloatTensor<Self>,
-        params: GroupNormParams,
+        residual: FloatTensor<Self>,
+        params: FusedGroupNormParams,
     ) -> FloatTensor<Self> {
-        composed::group_norm::<Self>(x, gamma, beta, params)
+        composed::group_norm::<Self>(x, gamma, beta, residual, params)
     }
 }

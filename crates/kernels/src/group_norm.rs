@@ -35,6 +35,15 @@ pub struct GroupNormParams {
     pub activation: Activation,
 }
 
+/// A group normalisation, and whether there is a residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FusedGroupNormParams {
+    /// The normalisation.
+    pub norm: GroupNormParams,
+    /// Whether there is a residual.
+    pub added: bool,
+}
+
 /// Normalises each group of channels of each image to mean 0 and variance 1, then scales by `gamma` and shifts
 /// by `beta`.
 ///
@@ -44,6 +53,23 @@ pub struct GroupNormParams {
 /// # Panics
 /// Where the shapes do not fit each other, a dimension is 0, or the groups do not divide the channels.
 pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: GroupNormParams) -> Tensor<4> {
+    group_norm_residual(x, gamma, beta, None, params)
+}
+
+/// [`group_norm`] with a summand of the shape of `x` added before the activation: the end of a residual block.
+///
+/// # Shapes
+/// As for [`group_norm`].
+///
+/// # Panics
+/// As [`group_norm`], and where the residual has another shape.
+pub fn group_norm_residual(
+    x: Tensor<4>,
+    gamma: Tensor<1>,
+    beta: Tensor<1>,
+    residual: Option<Tensor<4>>,
+    params: GroupNormParams,
+) -> Tensor<4> {
     let channels = x.dims()[1];
     assert!(x.dims().iter().all(|&size| size > 0), "group_norm: expected no empty dimension, found {:?}", x.dims());
     assert!(
@@ -57,10 +83,19 @@ pub fn group_norm(x: Tensor<4>, gamma: Tensor<1>, beta: Tensor<1>, params: Group
         gamma.dims(),
         beta.dims()
     );
+    let added = residual.is_some();
+    let residual = residual.unwrap_or_else(|| Tensor::zeros([1; 4], (&x.device(), x.dtype())));
+    assert!(
+        !added || residual.dims() == x.dims(),
+        "group_norm: expected a residual of {:?}, found {:?}",
+        x.dims(),
+        residual.dims()
+    );
     Tensor::from_dispatch(Dispatch::kernel_group_norm(
         x.into_dispatch(),
         gamma.into_dispatch(),
         beta.into_dispatch(),
-        params,
+        residual.into_dispatch(),
+        FusedGroupNormParams { norm: params, added },
     ))
 }

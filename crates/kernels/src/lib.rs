@@ -42,19 +42,22 @@
 mod autodiff;
 pub mod composed;
 mod conv;
+mod elementwise;
 mod extension;
 mod flex;
 mod group_norm;
 mod nms;
+mod packed;
 mod parallel;
+mod product;
 #[cfg(test)]
 mod reference;
 mod roi_align;
 mod scratch;
 mod simd;
 
-pub use conv::{Conv2dParams, conv_transpose2d, conv2d};
+pub use conv::{Conv2dEpilogue, Conv2dParams, FusedConv2dParams, conv_transpose2d, conv2d, conv2d_fused};
 pub use extension::KernelBackend;
-pub use group_norm::{Activation, GroupNormParams, group_norm};
+pub use group_norm::{Activation, FusedGroupNormParams, GroupNormParams, group_norm, group_norm_residual};
 pub use nms::{batched_nms, nms};
 pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};

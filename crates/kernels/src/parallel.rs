@@ -19,6 +19,15 @@ pub(crate) fn for_each_unit(num_units: usize, unit: impl Fn(usize) + Sync + Send
     (0..num_units).for_each(unit);
 }
 
+/// [`for_each_unit`] where `parallel`, else one after the other.
+pub(crate) fn for_each_unit_if(parallel: bool, num_units: usize, unit: impl Fn(usize) + Sync + Send) {
+    if parallel {
+        for_each_unit(num_units, unit);
+    } else {
+        (0..num_units).for_each(unit);
+    }
+}
+
 /// A slice of which several units write disjoint parts at the same time.
 pub(crate) struct SharedSlice<'a> {
     start: *mut f32,
@@ -37,6 +46,11 @@ impl<'a> SharedSlice<'a> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), slice: PhantomData }
     }
 
+    /// The whole of it, for kernels that write in place.
+    pub(crate) fn raw(&self) -> Raw {
+        Raw { start: self.start, len: self.len }
+    }
+
     /// The `len` elements from `start`.
     ///
     /// # Safety
@@ -48,6 +62,27 @@ impl<'a> SharedSlice<'a> {
         unsafe { std::slice::from_raw_parts_mut(self.start.add(start), len) }
     }
 }
+
+/// Where kernels write that share an output: a place and its length, without a lifetime.
+#[derive(Clone, Copy)]
+pub(crate) struct Raw {
+    start: *mut f32,
+    pub(crate) len: usize,
+}
+
+impl Raw {
+    /// The place of an element.
+    pub(crate) fn at(&self, element: usize) -> *mut f32 {
+        assert!(element <= self.len, "element {element} of {}", self.len);
+        // SAFETY: inside, or one past the end, by the assertion.
+        unsafe { self.start.add(element) }
+    }
+}
+
+// SAFETY: no access by itself; kernels that write through it are unsafe and promise disjoint parts.
+unsafe impl Sync for Raw {}
+// SAFETY: as above; `f32` is `Send`.
+unsafe impl Send for Raw {}
 
 /// A vector being filled by several units at once, without being zeroed first.
 pub(crate) struct Output {
@@ -64,6 +99,11 @@ impl Output {
     pub(crate) fn new(len: usize) -> Self {
         let mut values = Vec::with_capacity(len);
         Self { start: values.as_mut_ptr(), values, len }
+    }
+
+    /// The whole of it, for kernels that write in place.
+    pub(crate) fn raw(&self) -> Raw {
+        Raw { start: self.start, len: self.len }
     }
 
     /// Copies `run` to `at`, and every `stride` from there.

@@ -12,6 +12,19 @@ pub(crate) fn random_values(len: usize, seed: u64) -> Vec<f32> {
     (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
 }
 
+/// `[N, C, H, W]` to `[N, H, W, C]`.
+pub(crate) fn to_last(values: &[f32], [num_images, channels, height, width]: [usize; 4]) -> Vec<f32> {
+    let pixels = height * width;
+    (0..num_images * pixels * channels)
+        .map(|at| values[(at / channels / pixels * channels + at % channels) * pixels + at / channels % pixels])
+        .collect()
+}
+
+/// `[N, H, W, C]` to `[N, C, H, W]`, which is the shape given.
+pub(crate) fn to_first(values: &[f32], [num_images, channels, height, width]: [usize; 4]) -> Vec<f32> {
+    to_last(values, [num_images, height * width, channels, 1])
+}
+
 /// Sums in another order differ by a few units in the last place of their largest terms.
 pub(crate) fn assert_close(found: &[f32], expected: &[f32], what: &str) {
     const TOLERANCE: f32 = 2e-5;

@@ -1,8 +1,13 @@
 //! Convolution forwards, its input's gradient, and its bias's gradient, on `f32` slices.
+//!
+//! Maps stand channels last, `[N, H, W, C]`.
 
 use super::Conv2dParams;
-use super::gather::{GatherConv, PackedFilters, Source, Tap, Target};
-use crate::parallel::{Output, for_each_unit};
+use super::direct::{DirectConv, Maps, Target};
+use super::filters::{Direction, Filters, Panels};
+use super::winograd;
+use crate::parallel::{Output, Raw};
+use crate::product::Epilogue;
 use crate::simd::Isa;
 
 /// The sizes of one convolution, however it is computed.
@@ -75,142 +80,167 @@ impl ConvShape {
     }
 }
 
-/// The convolution of `x` with `weight`, plus `bias`: `[N, Co, Ho, Wo]`.
-pub(crate) fn forward(isa: Isa, x: &[f32], weight: &[f32], bias: Option<&[f32]>, shape: &ConvShape) -> Vec<f32> {
-    let [kernel_height, kernel_width] = shape.kernel;
-    let [padding_y, padding_x] = shape.params.padding;
-    let taps: Vec<Tap> = (0..kernel_height)
-        .flat_map(|y| (0..kernel_width).map(move |x| (y, x)))
-        .map(|(y, x)| Tap { dy: y as isize - padding_y as isize, dx: x as isize - padding_x as isize })
-        .collect();
-    let depth = shape.in_channels * taps.len();
-    let offsets: Vec<usize> = (0..depth).collect();
-    let filters = PackedFilters::new(weight, shape.out_channels, depth, &offsets);
-    let output = Output::new(shape.output().iter().product());
-    let conv = GatherConv {
-        source: Source {
-            values: x,
-            num_images: shape.num_images,
-            channels: shape.in_channels,
-            height: shape.in_size[0],
-            width: shape.in_size[1],
-        },
-        taps: &taps,
-        stride: shape.params.stride,
-        grid: shape.out_size,
-        filters: &filters,
-        bias,
-        target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
-    };
-    conv.run(isa, &output);
-    // SAFETY: the grid is the whole output.
-    unsafe { output.into_vec() }
-}
-
-/// The gradient with respect to the input, `[N, Ci, Hi, Wi]`, from that of the output; `bias` is added to it.
-///
-/// Input pixel i is reached by output pixel o through kernel cell k where `i + padding = o·stride + k`. Pixels
-/// with the same remainder of `i + padding` share the cells that reach them: each such *phase* is a
-/// convolution of stride 1 over the output gradient, with those cells only.
-pub(crate) fn input_gradient(
+/// Runs a convolution in either direction: `[N, Ho, Wo, Co]` from `x` going forwards, `[N, Hi, Wi, Ci]` from the
+/// output's gradient going back. `filters` packs the weight, for Winograd's way or directly.
+pub(crate) fn convolve(
     isa: Isa,
-    output_grad: &[f32],
-    weight: &[f32],
-    bias: Option<&[f32]>,
+    direction: Direction,
+    source: &[f32],
+    filters: &dyn Fn(bool) -> Filters,
+    epilogue: Epilogue<'_>,
     shape: &ConvShape,
 ) -> Vec<f32> {
-    let [step_y, step_x] = shape.params.stride;
-    let [kernel_height, kernel_width] = shape.kernel;
-    let output = Output::new(shape.input().iter().product());
-    let source = Source {
-        values: output_grad,
-        num_images: shape.num_images,
-        channels: shape.out_channels,
-        height: shape.out_size[0],
-        width: shape.out_size[1],
+    let [from, to] = match direction {
+        Direction::Forward => [shape.input(), shape.output()],
+        Direction::Backward => [shape.output(), shape.input()],
     };
-    for phase_y in 0..step_y.min(shape.in_size[0]) {
-        for phase_x in 0..step_x.min(shape.in_size[1]) {
-            let cells_y = cells_of_phase(phase_y, kernel_height, step_y, shape.params.padding[0]);
-            let cells_x = cells_of_phase(phase_x, kernel_width, step_x, shape.params.padding[1]);
-            let mut taps = Vec::new();
-            let mut cells = Vec::new();
-            for &(cell_y, dy) in &cells_y {
-                for &(cell_x, dx) in &cells_x {
-                    taps.push(Tap { dy, dx });
-                    cells.push(cell_y * kernel_width + cell_x);
-                }
-            }
-            let target = Target { size: shape.in_size, origin: [phase_y, phase_x], step: [step_y, step_x] };
-            let grid = [(shape.in_size[0] - phase_y).div_ceil(step_y), (shape.in_size[1] - phase_x).div_ceil(step_x)];
-            if taps.is_empty() {
-                fill_phase(&output, shape, target, grid, bias);
-                continue;
-            }
-            // Weight [Co, Ci, Kh·Kw]: filters are input channels, K runs over output channels and cells.
-            let num_cells = kernel_height * kernel_width;
-            let offsets: Vec<usize> = (0..shape.out_channels)
-                .flat_map(|channel| {
-                    let base = channel * shape.in_channels * num_cells;
-                    cells.iter().map(move |cell| base + cell)
-                })
-                .collect();
-            let filters = PackedFilters::new(weight, shape.in_channels, num_cells, &offsets);
-            let conv = GatherConv { source, taps: &taps, stride: [1, 1], grid, filters: &filters, bias, target };
-            conv.run(isa, &output);
+    let source = Maps { values: source, num_images: from[0], size: [from[2], from[3]], channels: from[1] };
+    let output = Output::new(to.iter().product());
+    if winograd::suits(shape)
+        && let Filters::Winograd(panels) = filters(true)
+    {
+        let padding = match direction {
+            Direction::Forward => shape.params.padding,
+            Direction::Backward => shape.params.padding.map(|padding| 2 - padding),
+        };
+        // SAFETY: nothing else has the output.
+        if unsafe { winograd::run(isa, source, padding, [to[2], to[3]], &panels, epilogue, output.raw()) } {
+            // SAFETY: the tiles together are the whole output.
+            return unsafe { output.into_vec() };
         }
     }
-    // SAFETY: the phases together are the whole input.
+    if let Filters::Direct(products) = filters(false) {
+        // SAFETY: nothing else has the output.
+        unsafe { run_direct(isa, direction, source, &products, epilogue, shape, output.raw()) };
+    }
+    // SAFETY: the grid, or the phases together, are the whole output.
     unsafe { output.into_vec() }
 }
 
-/// Kernel cells that reach input pixels `phase + q·stride`, each with its output pixel relative to q.
-fn cells_of_phase(phase: usize, kernel: usize, stride: usize, padding: usize) -> Vec<(usize, isize)> {
-    (0..kernel)
-        .filter(|cell| (phase + padding) % stride == cell % stride)
-        .map(|cell| {
-            let distance = (phase + padding) as isize - cell as isize;
-            (cell, distance / stride as isize)
+/// # Safety
+/// Nothing else touches `output`.
+unsafe fn run_direct(
+    isa: Isa,
+    direction: Direction,
+    source: Maps<'_>,
+    products: &[Panels],
+    epilogue: Epilogue<'_>,
+    shape: &ConvShape,
+    output: Raw,
+) {
+    if direction == Direction::Forward {
+        let conv = DirectConv {
+            source,
+            first: shape.params.padding.map(|padding| -(padding as isize)),
+            window: shape.kernel,
+            stride: shape.params.stride,
+            grid: shape.out_size,
+            filters: &products[0],
+            epilogue,
+            target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
+        };
+        // SAFETY: the caller's promise.
+        unsafe { conv.run(isa, output) };
+        return;
+    }
+    for (phase, filters) in phases(shape).iter().zip(products) {
+        let target = Target { size: shape.in_size, origin: phase.origin, step: shape.params.stride };
+        let window = [phase.cells_y.len(), phase.cells_x.len()];
+        if window.contains(&0) {
+            // SAFETY: the caller's promise; the phase has its own pixels.
+            unsafe { fill_phase(shape, target, phase.grid, epilogue, output) };
+            continue;
+        }
+        let conv = DirectConv {
+            source,
+            first: phase.first,
+            window,
+            stride: [1, 1],
+            grid: phase.grid,
+            filters,
+            epilogue,
+            target,
+        };
+        // SAFETY: the caller's promise; the phase has its own pixels.
+        unsafe { conv.run(isa, output) };
+    }
+}
+
+/// Input pixels with the same remainder of `i + padding`, which share the kernel cells that reach them.
+///
+/// Input pixel i is reached by output pixel o through kernel cell k where `i + padding = o·stride + k`: each phase is
+/// a convolution of stride 1 over the output's gradient, with those cells only.
+pub(super) struct Phase {
+    /// First pixel.
+    pub(super) origin: [usize; 2],
+    /// Pixels.
+    pub(super) grid: [usize; 2],
+    /// Output pixel that the first of the cells comes from, at the first pixel.
+    pub(super) first: [isize; 2],
+    /// Rows of the kernel, by ascending output pixel.
+    pub(super) cells_y: Vec<usize>,
+    /// Columns of the kernel, by ascending output pixel.
+    pub(super) cells_x: Vec<usize>,
+}
+
+/// The phases that have pixels.
+pub(super) fn phases(shape: &ConvShape) -> Vec<Phase> {
+    let axis = |axis: usize| -> Vec<(usize, isize, Vec<usize>)> {
+        let (stride, padding) = (shape.params.stride[axis], shape.params.padding[axis]);
+        (0..stride.min(shape.in_size[axis]))
+            .map(|phase| {
+                let cells: Vec<usize> =
+                    (0..shape.kernel[axis]).rev().filter(|cell| (phase + padding) % stride == cell % stride).collect();
+                let from = |cell: usize| ((phase + padding) as isize - cell as isize) / stride as isize;
+                let first = cells.first().map_or(0, |cell| from(*cell));
+                (phase, first, cells)
+            })
+            .collect()
+    };
+    let columns = axis(1);
+    let phases = axis(0).into_iter().flat_map(|(phase_y, first_y, cells_y)| {
+        columns.iter().map(move |(phase_x, first_x, cells_x)| {
+            let origin = [phase_y, *phase_x];
+            let pixels = |axis: usize| (shape.in_size[axis] - origin[axis]).div_ceil(shape.params.stride[axis]);
+            Phase {
+                origin,
+                grid: [pixels(0), pixels(1)],
+                first: [first_y, *first_x],
+                cells_y: cells_y.clone(),
+                cells_x: cells_x.clone(),
+            }
         })
-        .collect()
+    });
+    phases.collect()
 }
 
 /// Writes pixels that no kernel cell reaches.
-fn fill_phase(output: &Output, shape: &ConvShape, target: Target, grid: [usize; 2], bias: Option<&[f32]>) {
-    let [height, width] = target.size;
-    for plane in 0..shape.num_images * shape.in_channels {
-        let value = bias.map_or(0.0, |bias| bias[plane % shape.in_channels]);
-        let row = vec![value; grid[1]];
+///
+/// # Safety
+/// Nothing else touches the phase's pixels of `output`.
+unsafe fn fill_phase(shape: &ConvShape, target: Target, grid: [usize; 2], epilogue: Epilogue<'_>, output: Raw) {
+    let channels = shape.in_channels;
+    for image in 0..shape.num_images {
         for y in 0..grid[0] {
-            let y = target.origin[0] + y * target.step[0];
-            let at = (plane * height + y) * width + target.origin[1];
-            // SAFETY: one thread, and no other phase has these pixels.
-            unsafe { output.write(at, target.step[1], &row) };
-        }
-    }
-}
-
-/// Sums over images and pixels, the gradient with respect to a bias: `[C]` from `[N, C, P]`.
-pub(crate) fn channel_sums(values: &[f32], num_images: usize, channels: usize) -> Vec<f32> {
-    const LANES: usize = 16;
-    let pixels = values.len() / (num_images * channels).max(1);
-    let output = Output::new(channels);
-    for_each_unit(channels, |channel| {
-        let mut lanes = [0.0_f32; LANES];
-        let mut rest = 0.0;
-        for image in 0..num_images {
-            let plane = &values[(image * channels + channel) * pixels..][..pixels];
-            let blocks = plane.chunks_exact(LANES);
-            rest += blocks.remainder().iter().sum::<f32>();
-            for block in blocks {
-                for (lane, value) in lanes.iter_mut().zip(block) {
-                    *lane += value;
+            for x in 0..grid[1] {
+                let y = target.origin[0] + y * target.step[0];
+                let x = target.origin[1] + x * target.step[1];
+                let at = ((image * target.size[0] + y) * target.size[1] + x) * channels;
+                assert!(at + channels <= output.len);
+                // SAFETY: inside the output, and the phase's own pixel.
+                let pixel = unsafe { std::slice::from_raw_parts_mut(output.at(at), channels) };
+                match epilogue.bias {
+                    Some(bias) => pixel.copy_from_slice(&bias[..channels]),
+                    None => pixel.fill(0.0),
+                }
+                if let Some(residual) = epilogue.residual {
+                    let residual = &residual[at..at + channels];
+                    pixel.iter_mut().zip(residual).for_each(|(value, residual)| *value += residual);
+                }
+                if epilogue.relu {
+                    pixel.iter_mut().filter(|value| **value <= 0.0).for_each(|value| *value = 0.0);
                 }
             }
         }
-        // SAFETY: every unit has its own channel.
-        unsafe { output.write(channel, 1, &[lanes.iter().sum::<f32>() + rest]) };
-    });
-    // SAFETY: one unit for each channel.
-    unsafe { output.into_vec() }
+    }
 }

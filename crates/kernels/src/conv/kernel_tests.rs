@@ -3,10 +3,69 @@
 use proptest::prelude::*;
 
 use super::Conv2dParams;
-use super::kernel::{ConvShape, channel_sums, forward, input_gradient};
-use super::weight_gradient::weight_gradient;
-use crate::reference::{assert_close, conv_forward, conv_input_gradient, conv_weight_gradient, random_values};
+use super::direct::Maps;
+use super::filters::{Direction, Filters};
+use super::kernel::{ConvShape, convolve};
+use super::weight_gradient as gradient;
+use crate::elementwise::{channel_sums, channels_last, relu_gradient};
+use crate::product::Epilogue;
+use crate::reference::{
+    assert_close, conv_forward, conv_input_gradient, conv_weight_gradient, random_values, to_first, to_last,
+};
 use crate::simd::Isa;
+
+/// Which way a 3×3 convolution of stride 1 may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Any,
+    Direct,
+}
+
+const WAYS: [Way; 2] = [Way::Any, Way::Direct];
+
+/// The kernels on maps that stand channels first, as the plain loops have them.
+fn run(
+    isa: Isa,
+    way: Way,
+    direction: Direction,
+    source: &[f32],
+    weight: &[f32],
+    epilogue: Epilogue<'_>,
+    shape: &ConvShape,
+) -> Vec<f32> {
+    let [from, to] = match direction {
+        Direction::Forward => [shape.input(), shape.output()],
+        Direction::Backward => [shape.output(), shape.input()],
+    };
+    let filters = |winograd| Filters::new(isa, weight, shape, direction, winograd && way == Way::Any);
+    let residual = epilogue.residual.map(|residual| to_last(residual, to));
+    let epilogue = Epilogue { residual: residual.as_deref(), ..epilogue };
+    to_first(&convolve(isa, direction, &to_last(source, from), &filters, epilogue, shape), to)
+}
+
+fn forward(isa: Isa, way: Way, x: &[f32], weight: &[f32], bias: Option<&[f32]>, shape: &ConvShape) -> Vec<f32> {
+    let epilogue = Epilogue { bias, ..Epilogue::default() };
+    run(isa, way, Direction::Forward, x, weight, epilogue, shape)
+}
+
+fn input_gradient(isa: Isa, way: Way, output_grad: &[f32], weight: &[f32], shape: &ConvShape) -> Vec<f32> {
+    run(isa, way, Direction::Backward, output_grad, weight, Epilogue::default(), shape)
+}
+
+fn weight_gradient(isa: Isa, way: Way, x: &[f32], output_grad: &[f32], shape: &ConvShape) -> Vec<f32> {
+    let maps = |values, [num_images, channels, height, width]: [usize; 4]| Maps {
+        values,
+        num_images,
+        size: [height, width],
+        channels,
+    };
+    let (x, output_grad) = (to_last(x, shape.input()), to_last(output_grad, shape.output()));
+    let (x, output_grad) = (maps(&x, shape.input()), maps(&output_grad, shape.output()));
+    match way {
+        Way::Any => gradient::weight_gradient(isa, x, output_grad, shape),
+        Way::Direct => gradient::direct_weight_gradient(isa, x, output_grad, shape),
+    }
+}
 
 struct ConvCase {
     x: [usize; 4],
@@ -33,13 +92,15 @@ fn check(case: ConvCase, seed: u64) {
     let expected_x = conv_input_gradient(&output_grad, &weight, &shape);
     let expected_weight = conv_weight_gradient(&x, &output_grad, &shape);
     for isa in Isa::available() {
-        let about = format!("{isa:?} {shape:?}");
-        let found = forward(isa, &x, &weight, Some(&bias), &shape);
-        assert_close(&found, &expected, &format!("output, {about}"));
-        let found = input_gradient(isa, &output_grad, &weight, None, &shape);
-        assert_close(&found, &expected_x, &format!("input gradient, {about}"));
-        let found = weight_gradient(isa, &x, &output_grad, &shape);
-        assert_close(&found, &expected_weight, &format!("weight gradient, {about}"));
+        for way in WAYS {
+            let about = format!("{isa:?} {way:?} {shape:?}");
+            let found = forward(isa, way, &x, &weight, Some(&bias), &shape);
+            assert_close(&found, &expected, &format!("output, {about}"));
+            let found = input_gradient(isa, way, &output_grad, &weight, &shape);
+            assert_close(&found, &expected_x, &format!("input gradient, {about}"));
+            let found = weight_gradient(isa, way, &x, &output_grad, &shape);
+            assert_close(&found, &expected_weight, &format!("weight gradient, {about}"));
+        }
     }
 }
 
@@ -73,6 +134,13 @@ fn every_path_agrees_with_plain_loops() {
         // Several units of work and several blocks of K.
         ([1, 24, 40, 70], [8, 3, 3], [1, 1], [1, 1]),
         ([3, 9, 30, 41], [11, 3, 3], [1, 1], [1, 1]),
+        // Winograd's way: whole and cut tiles, every padding, one panel and several, many tiles and few.
+        ([1, 16, 3, 3], [16, 3, 3], [1, 1], [1, 1]),
+        ([2, 16, 8, 9], [48, 3, 3], [1, 1], [1, 1]),
+        ([1, 48, 10, 7], [16, 3, 3], [1, 1], [0, 2]),
+        ([1, 16, 5, 6], [16, 3, 3], [1, 1], [2, 0]),
+        ([3, 16, 50, 45], [32, 3, 3], [1, 1], [1, 1]),
+        ([1, 80, 12, 13], [96, 3, 3], [1, 1], [1, 1]),
     ];
     for (seed, (x, [out_channels, kernel_height, kernel_width], stride, padding)) in cases.into_iter().enumerate() {
         let case = ConvCase {
@@ -111,9 +179,9 @@ proptest! {
 fn results_do_not_depend_on_the_number_of_threads() {
     let isa = Isa::detect();
     // Large maps, and small maps whose filters are shared out.
-    for x in [[2, 12, 50, 70], [3, 40, 6, 5]] {
+    for x in [[2, 12, 50, 70], [3, 40, 6, 5], [2, 16, 70, 70], [1, 96, 9, 9]] {
         for stride in [1, 2] {
-            let case = ConvCase { x, out_channels: 36, kernel: [3, 3], params: Conv2dParams::square(stride, 1) };
+            let case = ConvCase { x, out_channels: 48, kernel: [3, 3], params: Conv2dParams::square(stride, 1) };
             let shape = case.shape();
             let x = random_values(shape.input().iter().product(), 1);
             let weight = random_values(shape.weight().iter().product(), 2);
@@ -122,10 +190,10 @@ fn results_do_not_depend_on_the_number_of_threads() {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let all = pool.install(|| {
                     [
-                        forward(isa, &x, &weight, None, &shape),
-                        input_gradient(isa, &grad, &weight, None, &shape),
-                        weight_gradient(isa, &x, &grad, &shape),
-                        channel_sums(&grad, shape.num_images, shape.out_channels),
+                        forward(isa, Way::Any, &x, &weight, None, &shape),
+                        input_gradient(isa, Way::Any, &grad, &weight, &shape),
+                        weight_gradient(isa, Way::Any, &x, &grad, &shape),
+                        channel_sums(isa, &grad, shape.out_channels),
                     ]
                 });
                 all.map(|values| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
@@ -140,44 +208,122 @@ fn results_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn nan_and_infinity_reach_what_they_touch_and_nothing_else() {
-    let case = ConvCase { x: [1, 2, 6, 60], out_channels: 3, kernel: [3, 3], params: Conv2dParams::square(1, 1) };
-    let shape = case.shape();
-    let mut x = random_values(720, 1);
-    // Channel 0, y 2, x 50; channel 1, y 5, x 0.
-    x[2 * 60 + 50] = f32::NAN;
-    x[360 + 5 * 60] = f32::INFINITY;
-    let weight = random_values(54, 2);
-    for isa in Isa::available() {
-        let output = forward(isa, &x, &weight, None, &shape);
-        for (idx, value) in output.iter().enumerate() {
-            let (y, x) = (idx % 360 / 60, idx % 60);
-            let near_nan = (1..=3).contains(&y) && (49..=51).contains(&x);
-            let near_infinity = y >= 4 && x <= 1;
-            assert_eq!(value.is_nan(), near_nan, "{isa:?}: {value} at {y}, {x}");
-            assert_eq!(value.is_infinite(), near_infinity, "{isa:?}: {value} at {y}, {x}");
-        }
-        let grad = weight_gradient(isa, &x, &vec![1.0; 1080], &shape);
-        // Every cell of channel 0 passes over the NaN. The infinity stands in the corner below on the left,
-        // which only the cells of kernel rows 1, 2 and columns 0, 1 reach.
-        assert!(grad[..9].iter().all(|value| value.is_nan()));
-        for (cell, value) in grad[9..18].iter().enumerate() {
-            let reaches = cell / 3 >= 1 && cell % 3 <= 1;
-            assert_eq!(*value == f32::INFINITY, reaches, "{isa:?}: cell {cell}");
-            assert_eq!(value.is_finite(), !reaches, "{isa:?}: cell {cell}");
+    // Two channels are convolved directly; sixteen Winograd's way, which has to notice.
+    for channels in [2, 16] {
+        let x = [1, channels, 6, 60];
+        let case = ConvCase { x, out_channels: channels, kernel: [3, 3], params: Conv2dParams::square(1, 1) };
+        let shape = case.shape();
+        let mut x = random_values(channels * 360, 1);
+        // Channel 0, y 2, x 50; channel 1, y 5, x 0.
+        x[2 * 60 + 50] = f32::NAN;
+        x[360 + 5 * 60] = f32::INFINITY;
+        let weight = random_values(channels * channels * 9, 2);
+        for isa in Isa::available() {
+            let output = forward(isa, Way::Any, &x, &weight, None, &shape);
+            for (idx, value) in output.iter().enumerate() {
+                let (y, x) = (idx % 360 / 60, idx % 60);
+                let near_nan = (1..=3).contains(&y) && (49..=51).contains(&x);
+                let near_infinity = y >= 4 && x <= 1;
+                assert_eq!(value.is_nan(), near_nan, "{isa:?}: {value} at {y}, {x}");
+                assert_eq!(value.is_infinite(), near_infinity, "{isa:?}: {value} at {y}, {x}");
+            }
+            let grad = weight_gradient(isa, Way::Any, &x, &vec![1.0; channels * 360], &shape);
+            // Every cell of channel 0 passes over the NaN. The infinity stands in the corner below on the left,
+            // which only the cells of kernel rows 1, 2 and columns 0, 1 reach.
+            assert!(grad[..9].iter().all(|value| value.is_nan()));
+            for (cell, value) in grad[9..18].iter().enumerate() {
+                let reaches = cell / 3 >= 1 && cell % 3 <= 1;
+                assert_eq!(*value == f32::INFINITY, reaches, "{isa:?}: cell {cell}");
+                assert_eq!(value.is_finite(), !reaches, "{isa:?}: cell {cell}");
+            }
         }
     }
 }
 
 #[test]
-fn channel_sums_by_hand() {
-    // Two images, two channels, three pixels.
-    let values = [1.0, 2.0, 3.0, 10.0, 20.0, 30.0, 4.0, 5.0, 6.0, 40.0, 50.0, 60.0];
-    assert_eq!(channel_sums(&values, 2, 2), [21.0, 210.0]);
-    let long = random_values(2 * 3 * 101, 5);
-    let shape_of = |channel: usize| {
-        (0..2).flat_map(|image| &long[(image * 3 + channel) * 101..][..101]).map(|&v| f64::from(v)).sum::<f64>() as f32
-    };
-    assert_close(&channel_sums(&long, 2, 3), &[shape_of(0), shape_of(1), shape_of(2)], "channel sums");
+fn what_follows_is_done_to_every_element() {
+    // Directly in one piece and in windows, and Winograd's way; backwards with pixels that nothing reaches.
+    let cases = [
+        ([2, 16, 9, 10], [48, 1, 1], 1, 0),
+        ([1, 3, 9, 10], [37, 3, 3], 2, 1),
+        ([2, 16, 9, 10], [48, 3, 3], 1, 1),
+        ([1, 4, 9, 10], [6, 2, 2], 3, 0),
+    ];
+    for (x, [out_channels, height, width], stride, padding) in cases {
+        let case = ConvCase { x, out_channels, kernel: [height, width], params: Conv2dParams::square(stride, padding) };
+        let shape = case.shape();
+        let weight = random_values(shape.weight().iter().product(), 1);
+        for direction in [Direction::Forward, Direction::Backward] {
+            let [from, to] = match direction {
+                Direction::Forward => [shape.input(), shape.output()],
+                Direction::Backward => [shape.output(), shape.input()],
+            };
+            let source = random_values(from.iter().product(), 2);
+            let residual = random_values(to.iter().product(), 3);
+            let (scale, bias) = (random_values(to[1], 4), random_values(to[1], 5));
+            for isa in Isa::available() {
+                let plain = run(isa, Way::Direct, direction, &source, &weight, Epilogue::default(), &shape);
+                let expected: Vec<f32> = plain
+                    .iter()
+                    .zip(&residual)
+                    .enumerate()
+                    .map(|(at, (value, residual))| {
+                        let channel = at / (to[2] * to[3]) % to[1];
+                        (value * scale[channel] + bias[channel] + residual).max(0.0)
+                    })
+                    .collect();
+                let epilogue =
+                    Epilogue { scale: Some(&scale), bias: Some(&bias), residual: Some(&residual), relu: true };
+                let found = run(isa, Way::Any, direction, &source, &weight, epilogue, &shape);
+                assert_close(&found, &expected, &format!("{isa:?} {direction:?} {shape:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rectified_nan_stays_one() {
+    for kernel in [1, 3] {
+        let params = Conv2dParams::square(1, kernel / 2);
+        let shape = ConvCase { x: [1, 16, 4, 4], out_channels: 16, kernel: [kernel; 2], params }.shape();
+        let mut x = vec![0.0; 256];
+        x[0] = f32::NAN;
+        for isa in Isa::available() {
+            let epilogue = Epilogue { relu: true, ..Epilogue::default() };
+            let weight = vec![1.0; 256 * kernel * kernel];
+            let output = run(isa, Way::Any, Direction::Forward, &x, &weight, epilogue, &shape);
+            let touched = if kernel == 1 { 1 } else { 4 };
+            assert_eq!(output.iter().filter(|value| value.is_nan()).count(), 16 * touched, "{isa:?}");
+        }
+    }
+}
+
+#[test]
+fn sums_over_positions_by_hand() {
+    // Three positions, two channels.
+    let values = [1.0, 10.0, 2.0, 20.0, 3.0, 30.0];
+    let isa = Isa::detect();
+    assert_eq!(channel_sums(isa, &values, 2), [6.0, 60.0]);
+    // The second position's first channel, and the third's second, were cut.
+    let output = [1.0, 1.0, 0.0, 1.0, f32::NAN, -0.0];
+    let (masked, sums) = relu_gradient(isa, &values, &output, 2);
+    assert_eq!(masked, [1.0, 10.0, 0.0, 20.0, 3.0, 0.0]);
+    assert_eq!(sums, [4.0, 30.0]);
+    let long = random_values(1100 * 3, 5);
+    let of_channel = |channel: usize| long.iter().skip(channel).step_by(3).map(|&v| f64::from(v)).sum::<f64>() as f32;
+    assert_close(&channel_sums(isa, &long, 3), &[of_channel(0), of_channel(1), of_channel(2)], "channel sums");
+}
+
+#[test]
+fn channels_go_last_and_back() {
+    for shape in [[2, 3, 5, 30], [1, 17, 4, 4], [3, 64, 1, 1]] {
+        let values = random_values(shape.iter().product(), 1);
+        let [num_images, channels, height, width] = shape;
+        let isa = Isa::detect();
+        let moved = channels_last(isa, &values, num_images, channels, height * width);
+        assert_eq!(moved, to_last(&values, shape));
+        assert_eq!(channels_last(isa, &moved, num_images, height * width, channels), values);
+    }
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! What a convolution does besides its weights, and the sizes that follow.
 
+use crate::group_norm::Activation;
+
 /// How a convolution's kernel moves over its input. Every pair is `[vertical, horizontal]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Conv2dParams {
@@ -49,4 +51,17 @@ impl Default for Conv2dParams {
     fn default() -> Self {
         Self::UNIT
     }
+}
+
+/// A convolution and which parts of its [epilogue](crate::Conv2dEpilogue) there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FusedConv2dParams {
+    /// How the kernel moves.
+    pub conv: Conv2dParams,
+    /// Whether there is a scale.
+    pub scaled: bool,
+    /// Whether there is a residual.
+    pub added: bool,
+    /// What follows.
+    pub activation: Activation,
 }

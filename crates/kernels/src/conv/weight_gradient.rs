@@ -1,33 +1,46 @@
 //! The gradient of a convolution with respect to its weight.
 //!
-//! `grad[m, ky, kx, c] = Σ_p output_grad[m, p] · x[c, position(p)·stride + (ky, kx) − padding]`
+//! `grad[m, ky, kx, c] = Σ_p output_grad[p, m] · x[position(p)·stride + (ky, kx) − padding, c]`
 //!
-//! With x copied channels-last and zeros around it, the values that a kernel row ky needs of a position are
-//! one run of Kw·C floats, and the next position's begin stride·C later: the product's right-hand side is read
-//! where it stands, nothing is gathered. The left-hand side is the output gradient with 8 channels interleaved.
+//! Maps stand channels last, so the values that a kernel row ky needs of a position are one run of Kw·C floats, and
+//! the next position's begin stride·C later: rows of the product are output channels, columns run along (kx, c), and
+//! its depth is the positions, all read where they stand (x after zeros were put around it, where it is padded).
 //!
 //! Sums over positions are cut into chunks by the shapes alone, computed apart and added in order.
 
+use super::direct::{Maps, copy_row};
 use super::kernel::ConvShape;
 use crate::parallel::{SharedSlice, for_each_unit};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;
-use crate::simd::{COLUMNS, GROUP, Isa, ROWS, Rows, multiply_tile, transpose};
+use crate::simd::lanes::LANES;
+use crate::simd::{Isa, transpose};
 
-/// Positions a tile sums at a time, at most: 208 rows of 48 floats are 39 KB.
-const BLOCK_POSITIONS: usize = 208;
+/// Positions summed at a time, at most, so that they are read from a near cache again and again.
+const BLOCK_POSITIONS: usize = 256;
 /// Positions that are worth a chunk of their own.
 const CHUNK_POSITIONS: usize = 2048;
 /// Units to aim at, so that no thread waits long for the last.
 const MIN_UNITS: usize = 8;
-const TILE: usize = ROWS * COLUMNS;
+/// Rows that a product works off at a time.
+const TILE_ROWS: usize = 12;
 
 /// The gradient with respect to the weight, `[Co, Ci, Kh, Kw]`.
-pub(crate) fn weight_gradient(isa: Isa, x: &[f32], output_grad: &[f32], shape: &ConvShape) -> Vec<f32> {
-    let padded = PaddedInput::new(isa, x, shape);
-    let left = interleave_channels(isa, output_grad, shape);
+pub(crate) fn weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_>, shape: &ConvShape) -> Vec<f32> {
+    if super::winograd::suits(shape)
+        && let Some(grad) = super::winograd::weight_gradient(isa, x, output_grad, shape)
+    {
+        return grad;
+    }
+    direct_weight_gradient(isa, x, output_grad, shape)
+}
+
+/// The same by plain sums over positions.
+pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_>, shape: &ConvShape) -> Vec<f32> {
+    let padded = PaddedInput::new(x, shape);
     let [out_height, out_width] = shape.out_size;
     let [kernel_height, kernel_width] = shape.kernel;
-    let channels = shape.in_channels;
+    let (in_channels, out_channels) = (shape.in_channels, shape.out_channels);
     let positions = shape.num_images * out_height * out_width;
 
     // Blocks of whole output rows of one image, as even as they come.
@@ -37,95 +50,101 @@ pub(crate) fn weight_gradient(isa: Isa, x: &[f32], output_grad: &[f32], shape: &
     let num_blocks = shape.num_images * blocks_per_image;
     let num_chunks = (positions / CHUNK_POSITIONS).clamp(1, MIN_UNITS).min(num_blocks);
 
-    // Tiles of the gradient: [⌈Co/8⌉, Kh, ⌈Kw·C/48⌉].
-    let filter_blocks = shape.out_channels.div_ceil(ROWS);
-    let filter_chunks = MIN_UNITS.div_ceil(num_chunks).min(filter_blocks);
-    let chunk_filters = filter_blocks.div_ceil(filter_chunks);
-    let filter_chunks = filter_blocks.div_ceil(chunk_filters);
-    let run = kernel_width * channels;
-    let panels = run.div_ceil(COLUMNS);
-    let filter_len = kernel_height * panels * TILE;
+    let tiles = out_channels.div_ceil(TILE_ROWS);
+    let groups = MIN_UNITS.div_ceil(num_chunks).min(tiles);
+    let group_rows = tiles.div_ceil(groups) * TILE_ROWS;
+    let groups = out_channels.div_ceil(group_rows);
+    let run = kernel_width * in_channels;
+    let per_filter = kernel_height * run;
+    let len = out_channels * per_filter;
 
-    let mut partial = Scratch::take(num_chunks * filter_blocks * filter_len);
-    let shared = SharedSlice::new(&mut partial);
-    for_each_unit(num_chunks * filter_chunks, |unit| {
-        let chunk = unit / filter_chunks;
-        let first_filter = unit % filter_chunks * chunk_filters;
-        let filters = first_filter..(first_filter + chunk_filters).min(filter_blocks);
-        let start = (chunk * filter_blocks + first_filter) * filter_len;
-        // SAFETY: every unit has its own chunk and filters.
-        let tiles = unsafe { shared.range(start, filters.len() * filter_len) };
+    // [chunk, Co, Kh, Kw·Ci]
+    let mut partial = Scratch::take(num_chunks * len);
+    let raw = SharedSlice::new(&mut partial).raw();
+    for_each_unit(num_chunks * groups, |unit| {
+        let (chunk, group) = (unit / groups, unit % groups);
+        let filters = group * group_rows..out_channels.min((group + 1) * group_rows);
         let first_block = chunk * num_blocks / num_chunks;
         let end_block = (chunk + 1) * num_blocks / num_chunks;
         for block in first_block..end_block {
-            let image = block / blocks_per_image;
-            let y = block % blocks_per_image * block_rows;
+            let (image, y) = (block / blocks_per_image, block % blocks_per_image * block_rows);
             let rows = block_rows.min(out_height - y);
+            let position = (image * out_height + y) * out_width;
+            let left = Operand {
+                values: &output_grad.values[position * out_channels + filters.start..],
+                step: 1,
+                inner: out_channels,
+                outer: out_width * out_channels,
+            };
             for kernel_y in 0..kernel_height {
-                for panel in 0..panels {
-                    let right = padded.rows(image, y, kernel_y, rows, panel * COLUMNS);
-                    let groups = (run - panel * COLUMNS).min(COLUMNS).div_ceil(GROUP);
-                    for (slot, filter) in filters.clone().enumerate() {
-                        let position = (image * out_height + y) * out_width;
-                        let at = (filter * positions + position) * ROWS;
-                        let left = &left[at..at + rows * out_width * ROWS];
-                        let tile = (slot * kernel_height + kernel_y) * panels + panel;
-                        let tile = &mut tiles[tile * TILE..][..TILE];
-                        multiply_tile(isa, left, right, groups, tile, block > first_block);
-                    }
+                for first_column in (0..run).step_by(PANEL) {
+                    let product = PanelProduct {
+                        rows: filters.len(),
+                        columns: PANEL.min(run - first_column),
+                        depth: [rows, out_width],
+                        left,
+                        right: padded.rows(image, y, kernel_y, first_column),
+                        at: chunk * len + filters.start * per_filter + kernel_y * run + first_column,
+                        row_step: per_filter,
+                        first_column: 0,
+                        epilogue: Epilogue::default(),
+                        accumulate: block > first_block,
+                    };
+                    // SAFETY: every unit has its own chunk and filters.
+                    unsafe { product.run(isa, raw) };
                 }
             }
         }
     });
 
-    let mut grad = vec![0.0; shape.weight().iter().product()];
-    let per_filter = channels * kernel_height * kernel_width;
+    let mut grad = vec![0.0; len];
     let shared_grad = SharedSlice::new(&mut grad);
     let shared = SharedSlice::new(&mut partial);
-    for_each_unit(filter_blocks, |block| {
-        // SAFETY: every unit has its own filters, of all chunks.
-        let sum = unsafe { shared.range(block * filter_len, filter_len) };
+    for_each_unit(out_channels, |filter| {
+        // SAFETY: every unit has its own filter, of all chunks.
+        let sum = unsafe { shared.range(filter * per_filter, per_filter) };
         for chunk in 1..num_chunks {
-            let start = (chunk * filter_blocks + block) * filter_len;
             // SAFETY: as above; another chunk than `sum`.
-            let other = unsafe { shared.range(start, filter_len) };
+            let other = unsafe { shared.range(chunk * len + filter * per_filter, per_filter) };
             for (sum, other) in sum.iter_mut().zip(other) {
                 *sum += *other;
             }
         }
-        for row in 0..ROWS.min(shape.out_channels - block * ROWS) {
-            let start = (block * ROWS + row) * per_filter;
-            // SAFETY: every unit has its own filters.
-            let grad = unsafe { shared_grad.range(start, per_filter) };
-            for kernel_y in 0..kernel_height {
-                for column in 0..run {
-                    let tile = (kernel_y * panels + column / COLUMNS) * TILE;
-                    let value = sum[tile + row * COLUMNS + column % COLUMNS];
-                    let (kernel_x, channel) = (column / channels, column % channels);
-                    grad[(channel * kernel_height + kernel_y) * kernel_width + kernel_x] = value;
-                }
-            }
-        }
+        // SAFETY: every unit has its own filter.
+        let grad = unsafe { shared_grad.range(filter * per_filter, per_filter) };
+        // [cells, channels] to [channels, cells]
+        let cells = kernel_height * kernel_width;
+        transpose(isa, sum, in_channels, grad, cells, cells, in_channels);
     });
     grad
 }
 
-/// x as `[N, Hp, Wp, C]`, zeros around it, and room to read past the end.
-struct PaddedInput {
-    values: Scratch,
+/// x with zeros around it, `[N, Hp, Wp, C]`, and room to read past the end.
+struct PaddedInput<'a> {
+    values: PaddedValues<'a>,
     height: usize,
     width: usize,
     channels: usize,
-    out_width: usize,
     /// From one output pixel to the next, in padded pixels.
     stride: [usize; 2],
 }
 
-impl PaddedInput {
-    fn new(isa: Isa, x: &[f32], shape: &ConvShape) -> Self {
+enum PaddedValues<'a> {
+    InPlace(&'a [f32]),
+    Copied(Scratch),
+}
+
+impl<'a> PaddedInput<'a> {
+    fn new(x: Maps<'a>, shape: &ConvShape) -> Self {
         let [in_height, in_width] = shape.in_size;
         let [out_height, out_width] = shape.out_size;
         let channels = shape.in_channels;
+        // Kernel rows that end between two vectors read on; in the last pixel that would leave the maps.
+        let whole = (shape.kernel[1] * channels).is_multiple_of(LANES);
+        if shape.params.padding == [0, 0] && whole {
+            let values = PaddedValues::InPlace(x.values);
+            return Self { values, height: in_height, width: in_width, channels, stride: shape.params.stride };
+        }
         // A 1 × 1 kernel looks at every stride-th pixel only, so only those are copied.
         let pointwise = shape.kernel == [1, 1] && shape.params.padding == [0, 0];
         let (sampling, stride) = if pointwise { (shape.params.stride, [1, 1]) } else { ([1, 1], shape.params.stride) };
@@ -133,7 +152,7 @@ impl PaddedInput {
         let width = (out_width - 1) * stride[1] + shape.kernel[1];
         let [padding_y, padding_x] = shape.params.padding;
         let row_len = width * channels;
-        let mut values = Scratch::take(shape.num_images * height * row_len + COLUMNS);
+        let mut values = Scratch::take(shape.num_images * height * row_len + PANEL);
         let shared = SharedSlice::new(&mut values);
         for_each_unit(shape.num_images * height, |unit| {
             let (image, padded_y) = (unit / height, unit % height);
@@ -144,66 +163,34 @@ impl PaddedInput {
                 row.fill(0.0);
                 return;
             };
-            let image = &x[image * channels * in_height * in_width..];
+            let source = &x.values[(image * in_height + y) * in_width * channels..][..in_width * channels];
             if sampling[1] > 1 {
-                for (at, pixel) in row.chunks_exact_mut(channels).enumerate() {
-                    for (channel, value) in pixel.iter_mut().enumerate() {
-                        *value = image[(channel * in_height + y) * in_width + at * sampling[1]];
-                    }
+                for (target, pixel) in row.chunks_exact_mut(channels).zip(source.chunks(channels * sampling[1])) {
+                    target.copy_from_slice(&pixel[..channels]);
                 }
                 return;
             }
-            let before = padding_x.min(width);
-            let inside = in_width.min(width - before);
-            row[..before * channels].fill(0.0);
-            row[(before + inside) * channels..].fill(0.0);
-            transpose(
-                isa,
-                &image[y * in_width..],
-                in_height * in_width,
-                &mut row[before * channels..],
-                channels,
-                channels,
-                inside,
-            );
+            copy_row(row, source, -((padding_x * channels) as isize));
         });
         // What lies past the end is multiplied into columns that nobody reads.
-        let end = values.len() - COLUMNS;
+        let end = values.len() - PANEL;
         values[end..].fill(0.0);
-        Self { values, height, width, channels, out_width, stride }
+        Self { values: PaddedValues::Copied(values), height, width, channels, stride }
     }
 
-    /// What kernel row `kernel_y` sees from `rows` output rows, from column `first` of its run on.
-    fn rows(&self, image: usize, y: usize, kernel_y: usize, rows: usize, first: usize) -> Rows<'_> {
+    /// What kernel row `kernel_y` sees from output row `y` of an image on, from column `first` of its run on.
+    fn rows(&self, image: usize, y: usize, kernel_y: usize, first: usize) -> Operand<'_> {
+        let values: &[f32] = match &self.values {
+            PaddedValues::InPlace(values) => values,
+            PaddedValues::Copied(values) => values,
+        };
         let row_len = self.width * self.channels;
         let start = (image * self.height + y * self.stride[0] + kernel_y) * row_len + first;
-        Rows {
-            values: &self.values[start..],
-            inner: self.out_width,
-            inner_step: self.stride[1] * self.channels,
-            outer: rows,
-            outer_step: self.stride[0] * row_len,
+        Operand {
+            values: &values[start..],
+            step: 1,
+            inner: self.stride[1] * self.channels,
+            outer: self.stride[0] * row_len,
         }
     }
-}
-
-/// `[N, Co, P]` to `[⌈Co/8⌉, N·P, 8]`, zeros where Co ends.
-fn interleave_channels(isa: Isa, output_grad: &[f32], shape: &ConvShape) -> Scratch {
-    let pixels = shape.out_size[0] * shape.out_size[1];
-    let channels = shape.out_channels;
-    let blocks = channels.div_ceil(ROWS);
-    let mut values = Scratch::take(blocks * shape.num_images * pixels * ROWS);
-    let shared = SharedSlice::new(&mut values);
-    for_each_unit(blocks * shape.num_images, |unit| {
-        let (block, image) = (unit / shape.num_images, unit % shape.num_images);
-        // SAFETY: every unit has its own channels and image.
-        let target = unsafe { shared.range(unit * pixels * ROWS, pixels * ROWS) };
-        let rows = ROWS.min(channels - block * ROWS);
-        if rows < ROWS {
-            target.fill(0.0);
-        }
-        let source = &output_grad[(image * channels + block * ROWS) * pixels..];
-        transpose(isa, source, pixels, target, ROWS, rows, pixels);
-    });
-    values
 }

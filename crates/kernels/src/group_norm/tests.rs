@@ -3,8 +3,8 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::kernel::{backward, forward};
-use super::{Activation, GroupNormParams, group_norm};
-use crate::reference::{assert_close, random_values};
+use super::{Activation, GroupNormParams, group_norm, group_norm_residual};
+use crate::reference::{assert_close, random_values, to_first, to_last};
 use crate::simd::Isa;
 
 const ACTIVATIONS: [Activation; 2] = [Activation::Identity, Activation::Relu];
@@ -15,7 +15,7 @@ fn to_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
 }
 
 /// Output and gradients of `Σ output · pattern`; `DType::F64` takes the composed default.
-fn run(shape: [usize; 4], params: GroupNormParams, dtype: DType) -> [Vec<f32>; 4] {
+fn run(shape: [usize; 4], params: GroupNormParams, added: bool, dtype: DType) -> Vec<Vec<f32>> {
     let device = Device::flex().autodiff();
     let make = |len: usize, seed: u64, offset: f32| {
         let values = Tensor::<1>::from_floats(random_values(len, seed).as_slice(), &device);
@@ -26,19 +26,24 @@ fn run(shape: [usize; 4], params: GroupNormParams, dtype: DType) -> [Vec<f32>; 4
     let x = make(len, 1, 20.0).reshape(shape).require_grad();
     let gamma = make(shape[1], 2, 1.0).require_grad();
     let beta = make(shape[1], 3, 0.0).require_grad();
-    let output = group_norm(x.clone(), gamma.clone(), beta.clone(), params);
+    let residual = make(len, 5, 0.0).reshape(shape).require_grad();
+    let summand = added.then(|| residual.clone());
+    let output = group_norm_residual(x.clone(), gamma.clone(), beta.clone(), summand.clone(), params);
     let pattern = make(len, 4, 0.0).reshape(shape);
     // At the ReLU's kink rounding decides: outputs within 1e-3 of it weigh nothing.
     let identity = GroupNormParams { activation: Activation::Identity, ..params };
-    let before = group_norm(x.clone(), gamma.clone(), beta.clone(), identity).detach();
+    let before = group_norm_residual(x.clone(), gamma.clone(), beta.clone(), summand, identity).detach();
     let pattern = pattern.mask_fill(before.abs().lower_elem(1e-3), 0.0);
     let grads = (output.clone() * pattern).sum().backward();
-    [
+    let mut found = vec![
         to_vec(output.inner()),
         to_vec(x.grad(&grads).unwrap()),
         to_vec(gamma.grad(&grads).unwrap()),
         to_vec(beta.grad(&grads).unwrap()),
-    ]
+    ];
+    found.extend(residual.grad(&grads).map(to_vec));
+    assert_eq!(found.len(), if added { 5 } else { 4 });
+    found
 }
 
 #[test]
@@ -48,16 +53,18 @@ fn agrees_with_the_composed_default_and_its_gradients() {
     for activation in ACTIVATIONS {
         for (shape, num_groups) in [([2, 6, 5, 7], 3), ([1, 4, 1, 2], 1), ([3, 8, 9, 33], 8), ([2, 5, 40, 53], 1)] {
             let params = GroupNormParams { num_groups, epsilon: 1e-5, activation };
-            let found = run(shape, params, DType::F32);
-            let expected = run(shape, params, DType::F64);
-            let names = ["output", "x.grad", "gamma.grad", "beta.grad"];
-            for ((found, expected), name) in found.iter().zip(&expected).zip(names) {
-                let scale = expected.iter().fold(1.0_f32, |max, v| max.max(v.abs()));
-                for (idx, (found, expected)) in found.iter().zip(expected).enumerate() {
-                    assert!(
-                        (found - expected).abs() < TOLERANCE * scale,
-                        "{name} {idx} of {shape:?}, {activation:?}: {found}, expected {expected}"
-                    );
+            for added in [false, true] {
+                let found = run(shape, params, added, DType::F32);
+                let expected = run(shape, params, added, DType::F64);
+                let names = ["output", "x.grad", "gamma.grad", "beta.grad", "residual.grad"];
+                for ((found, expected), name) in found.iter().zip(&expected).zip(names) {
+                    let scale = expected.iter().fold(1.0_f32, |max, v| max.max(v.abs()));
+                    for (idx, (found, expected)) in found.iter().zip(expected).enumerate() {
+                        assert!(
+                            (found - expected).abs() < TOLERANCE * scale,
+                            "{name} {idx} of {shape:?}, {activation:?}: {found}, expected {expected}"
+                        );
+                    }
                 }
             }
         }
@@ -75,10 +82,10 @@ fn gradients_agree_with_finite_differences() {
     let gamma = random_values(4, 2);
     let beta = random_values(4, 3);
     let pattern = random_values(24, 4);
-    let (_, statistics) = forward(isa, &x, shape, &gamma, &beta, &params);
-    let grads = backward(isa, &pattern, &x, shape, [&gamma, &beta], &statistics, &params);
+    let (output, statistics) = forward(isa, &x, shape, &gamma, &beta, None, &params);
+    let grads = backward(isa, &pattern, &output, &x, shape, &gamma, &statistics, &params);
     let loss = |x: &[f32], gamma: &[f32], beta: &[f32]| {
-        let (output, _) = forward(isa, x, shape, gamma, beta, &params);
+        let (output, _) = forward(isa, x, shape, gamma, beta, None, &params);
         output.iter().zip(&pattern).map(|(o, p)| o * p).sum::<f32>()
     };
     let difference = |values: &[f32], at: usize, loss: &dyn Fn(&[f32]) -> f32| {
@@ -106,11 +113,11 @@ fn two_values_by_hand() {
     // Mean 2, variance 1: x̂ is -1 and 1.
     let params = GroupNormParams { num_groups: 1, epsilon: 0.0, activation: Activation::Identity };
     for isa in Isa::available() {
-        let (output, statistics) = forward(isa, &[1.0, 3.0], [1, 2, 1, 1], &[2.0, 5.0], &[0.5, 0.0], &params);
+        let (output, statistics) = forward(isa, &[1.0, 3.0], [1, 2, 1, 1], &[2.0, 5.0], &[0.5, 0.0], None, &params);
         assert_eq!(output, [-1.5, 5.0]);
         assert_eq!(statistics, [[2.0, 1.0]]);
         let relu = GroupNormParams { activation: Activation::Relu, ..params };
-        let (output, _) = forward(isa, &[1.0, 3.0], [1, 2, 1, 1], &[2.0, 5.0], &[0.5, 0.0], &relu);
+        let (output, _) = forward(isa, &[1.0, 3.0], [1, 2, 1, 1], &[2.0, 5.0], &[0.5, 0.0], None, &relu);
         assert_eq!(output, [0.0, 5.0]);
     }
 }
@@ -125,8 +132,8 @@ fn every_instruction_set_and_thread_count_gives_the_same_bits() {
     let run = |isa: Isa, threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
-            let (output, statistics) = forward(isa, &x, shape, &gamma, &beta, &params);
-            let grads = backward(isa, &g, &x, shape, [&gamma, &beta], &statistics, &params);
+            let (output, statistics) = forward(isa, &x, shape, &gamma, &beta, Some(&g), &params);
+            let grads = backward(isa, &g, &output, &x, shape, &gamma, &statistics, &params);
             [output, grads.x, grads.gamma, grads.beta]
                 .map(|values| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
         })
@@ -145,7 +152,9 @@ fn not_a_number_spoils_its_group_only() {
     let mut x = random_values(2 * 4 * 6, 1);
     x[0] = f32::NAN;
     let isa = Isa::detect();
-    let (output, _) = forward(isa, &x, [2, 4, 2, 3], &[1.0; 4], &[0.0; 4], &params);
+    let shape = [2, 4, 2, 3];
+    let (output, _) = forward(isa, &to_last(&x, shape), shape, &[1.0; 4], &[0.0; 4], None, &params);
+    let output = to_first(&output, shape);
     assert!(output[..12].iter().all(|value| value.is_nan()));
     assert!(output[12..].iter().all(|value| value.is_finite()));
 }

@@ -1,0 +1,221 @@
+//! A convolution as one matrix product whose left side is read where it stands.
+//!
+//! Maps stand channels last, so what a row of the kernel sees at a position is one run of floats, and the next
+//! position's begins `stride · C` later: rows of the product are positions, its depth is (row of the kernel, run).
+//! Where the kernel looks past the edges, a unit first copies its rows with zeros around them.
+
+use super::filters::Panels;
+use crate::parallel::{Raw, for_each_unit};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
+use crate::scratch::Scratch;
+use crate::simd::Isa;
+
+/// Positions a unit of work has, roughly: 96 rows of 256 floats are 98 KB.
+const UNIT_POSITIONS: usize = 96;
+/// The same where a unit copies what its rows share, which pays for larger ones.
+const COPYING_UNIT_POSITIONS: usize = 240;
+/// Units to aim at, so that no thread waits long for the last.
+const MIN_UNITS: usize = 8;
+
+/// Maps that stand channels last, `[N, H, W, C]`.
+#[derive(Clone, Copy)]
+pub(crate) struct Maps<'a> {
+    pub(crate) values: &'a [f32],
+    pub(crate) num_images: usize,
+    pub(crate) size: [usize; 2],
+    pub(crate) channels: usize,
+}
+
+/// Where grid positions land in the output maps.
+#[derive(Clone, Copy)]
+pub(crate) struct Target {
+    /// Size of the output maps.
+    pub(crate) size: [usize; 2],
+    /// Pixel of the first grid position.
+    pub(crate) origin: [usize; 2],
+    /// From one grid position to the next.
+    pub(crate) step: [usize; 2],
+}
+
+/// One product.
+pub(crate) struct DirectConv<'a> {
+    pub(crate) source: Maps<'a>,
+    /// Pixel that the window's first cell sees from the first position.
+    pub(crate) first: [isize; 2],
+    /// Cells of the window.
+    pub(crate) window: [usize; 2],
+    pub(crate) stride: [usize; 2],
+    /// Positions computed.
+    pub(crate) grid: [usize; 2],
+    pub(crate) filters: &'a Panels,
+    pub(crate) epilogue: Epilogue<'a>,
+    pub(crate) target: Target,
+}
+
+impl DirectConv<'_> {
+    /// Computes all positions and writes them to `output`, `[N, H, W, M]` of the target's size.
+    ///
+    /// # Safety
+    /// Nothing else touches the grid's pixels of `output`.
+    pub(crate) unsafe fn run(&self, isa: Isa, output: Raw) {
+        let pointwise = self.window == [1, 1]
+            && self.stride == [1, 1]
+            && self.first == [0, 0]
+            && self.grid == self.source.size
+            && self.grid == self.target.size;
+        if pointwise {
+            // SAFETY: the caller's promise.
+            unsafe { self.run_pointwise(isa, output) };
+        } else {
+            // SAFETY: the caller's promise.
+            unsafe { self.run_window(isa, output) };
+        }
+    }
+
+    fn num_panels(&self) -> usize {
+        self.filters.columns.div_ceil(PANEL)
+    }
+
+    unsafe fn run_pointwise(&self, isa: Isa, output: Raw) {
+        let Maps { values, num_images, size, channels } = self.source;
+        let rows = num_images * size[0] * size[1];
+        let chunks = rows.div_ceil(UNIT_POSITIONS).max(MIN_UNITS.min(rows.div_ceil(12)));
+        let chunk = rows.div_ceil(chunks).next_multiple_of(12);
+        let chunks = rows.div_ceil(chunk);
+        let groups = MIN_UNITS.div_ceil(chunks).min(self.num_panels());
+        for_each_unit(chunks * groups, |unit| {
+            let (first, group) = (unit / groups * chunk, unit % groups);
+            let end = rows.min(first + chunk);
+            prefetch(&values[first * channels..end * channels]);
+            for panel in self.panels_of(group, groups) {
+                let left = Operand { values: &values[first * channels..], step: channels, inner: 1, outer: 0 };
+                let product = self.product(panel, chunk.min(rows - first), left, [1, channels], first);
+                // SAFETY: a unit has its own rows and panels.
+                unsafe { product.run(isa, output) };
+            }
+        });
+    }
+
+    unsafe fn run_window(&self, isa: Isa, output: Raw) {
+        let Maps { values, num_images, size: [height, width], channels } = self.source;
+        let [grid_height, grid_width] = self.grid;
+        let [step_y, step_x] = self.stride;
+        let last = |axis: usize| {
+            let window = self.window[axis] - 1 + (self.grid[axis] - 1) * self.stride[axis];
+            self.first[axis] + window as isize
+        };
+        let in_place =
+            self.first[0] >= 0 && self.first[1] >= 0 && last(0) < height as isize && last(1) < width as isize;
+        let unit_positions = if in_place { UNIT_POSITIONS } else { COPYING_UNIT_POSITIONS };
+        let unit_rows = (unit_positions / grid_width).clamp(1, grid_height);
+        let bands = grid_height.div_ceil(unit_rows).max(MIN_UNITS.div_ceil(num_images).min(grid_height));
+        let unit_rows = grid_height.div_ceil(bands);
+        let bands = grid_height.div_ceil(unit_rows);
+        let groups = MIN_UNITS.div_ceil(num_images * bands).min(self.num_panels());
+        for_each_unit(num_images * bands * groups, |unit| {
+            let (image, band, group) = (unit / groups / bands, unit / groups % bands, unit % groups);
+            let rows = band * unit_rows..grid_height.min((band + 1) * unit_rows);
+            let copied;
+            let (source, row_len) = if in_place {
+                let y = image * height + rows.start * step_y + self.first[0] as usize;
+                (&values[(y * width + self.first[1] as usize) * channels..], width * channels)
+            } else {
+                copied = self.copy_band(image, rows.clone());
+                (&copied[..], ((grid_width - 1) * step_x + self.window[1]) * channels)
+            };
+            for panel in self.panels_of(group, groups) {
+                for y in rows.clone() {
+                    let left = Operand {
+                        values: &source[(y - rows.start) * step_y * row_len..],
+                        step: step_x * channels,
+                        inner: 1,
+                        outer: row_len,
+                    };
+                    let Target { size, origin, step } = self.target;
+                    let pixel = (image * size[0] + origin[0] + y * step[0]) * size[1] + origin[1];
+                    let depth = [self.window[0], self.window[1] * channels];
+                    let product = self.product(panel, grid_width, left, depth, pixel);
+                    // SAFETY: a unit has its own rows and panels.
+                    unsafe { product.run(isa, output) };
+                }
+            }
+        });
+    }
+
+    /// Panels of one of several groups.
+    fn panels_of(&self, group: usize, groups: usize) -> std::ops::Range<usize> {
+        let panels = self.num_panels();
+        group * panels / groups..(group + 1) * panels / groups
+    }
+
+    fn product<'a>(
+        &'a self,
+        panel: usize,
+        rows: usize,
+        left: Operand<'a>,
+        depth: [usize; 2],
+        pixel: usize,
+    ) -> PanelProduct<'a> {
+        let filters = self.filters;
+        let (values, width) = filters.panel(0, panel);
+        let first_column = panel * PANEL;
+        PanelProduct {
+            rows,
+            columns: PANEL.min(filters.columns - first_column),
+            depth,
+            left,
+            right: Operand { values, step: 1, inner: width, outer: depth[1] * width },
+            at: pixel * filters.columns + first_column,
+            row_step: self.target.step[1] * filters.columns,
+            first_column,
+            epilogue: self.epilogue,
+            accumulate: false,
+        }
+    }
+
+    /// What the window sees from the grid rows `rows` of an image, zeros outside the map.
+    fn copy_band(&self, image: usize, rows: std::ops::Range<usize>) -> Scratch {
+        let Maps { values, size: [height, width], channels, .. } = self.source;
+        let band_width = (self.grid[1] - 1) * self.stride[1] + self.window[1];
+        let band_height = (rows.len() - 1) * self.stride[0] + self.window[0];
+        let mut band = Scratch::take(band_width * band_height * channels);
+        let first_y = (rows.start * self.stride[0]) as isize + self.first[0];
+        for (row, target) in band.chunks_exact_mut(band_width * channels).enumerate() {
+            let y = first_y + row as isize;
+            if y < 0 || y >= height as isize {
+                target.fill(0.0);
+                continue;
+            }
+            let source = &values[(image * height + y as usize) * width * channels..][..width * channels];
+            copy_row(target, source, self.first[1] * channels as isize);
+        }
+        band
+    }
+}
+
+/// Fetches values that are about to be read in twelve streams at once, more than processors foresee.
+#[inline]
+fn prefetch(values: &[f32]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in values.chunks(16) {
+        // SAFETY: a hint, which reads nothing; every x86-64 has it.
+        unsafe {
+            use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+            _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = values;
+}
+
+/// `target[i] = source[first + i]`, zeros outside the source.
+pub(super) fn copy_row(target: &mut [f32], source: &[f32], first: isize) {
+    let before = if first < 0 { first.unsigned_abs().min(target.len()) } else { 0 };
+    let from = first.max(0) as usize;
+    let inside = source.len().saturating_sub(from).min(target.len() - before);
+    target[..before].fill(0.0);
+    if inside > 0 {
+        target[before..before + inside].copy_from_slice(&source[from..from + inside]);
+    }
+    target[before + inside..].fill(0.0);
+}

@@ -1,0 +1,237 @@
+//! Convolution 3×3 of stride 1 with a quarter of the multiplications: Winograd's F(4×4, 3×3).
+//!
+//! An output *tile* of 4×4 pixels sees 6×6 input pixels d. With the transforms B, G, A of [`transform`],
+//!
+//! `y = Aᵀ [(G g Gᵀ) ⊙ (Bᵀ d B)] A`
+//!
+//! so that for each of the 36 *frequencies* the sum over channels is a matrix product of all tiles with all
+//! filters. The weight's gradient is the adjoint: `Gᵀ [Σ_tiles (Bᵀ d B) ⊙ (A ȳ Aᵀ)] G`.
+//!
+//! The points are 0, ±1/√2, ±√2, ∞: with those the error grows several times less than with 0, ±1, ±2, ∞. Values
+//! that are not finite would spread over their tile, so each result is looked at, and computed directly if it has
+//! one.
+//!
+//! Source: Lavin and Gray, Fast Algorithms for Convolutional Neural Networks (2015); the points after Barabasz et
+//! al., Error Analysis and Improving the Accuracy of Winograd Convolution (2018).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::direct::Maps;
+use super::filters::{Direction, Panels, gather};
+use super::kernel::ConvShape;
+use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, packed_len, panel_width};
+use crate::scratch::Scratch;
+use crate::simd::Isa;
+use crate::simd::lanes::LANES;
+
+pub(super) mod transform;
+mod weight_gradient;
+
+pub(super) use weight_gradient::weight_gradient;
+
+/// Side of an output tile.
+pub(super) const OUTPUT_TILE: usize = 4;
+/// Side of an input tile.
+pub(super) const INPUT_TILE: usize = 6;
+/// Products of a tile and channel.
+pub(super) const FREQUENCIES: usize = INPUT_TILE * INPUT_TILE;
+/// Tiles a unit of work has: the transformed values of 48 tiles and 64 channels are 442 KB.
+const UNIT_TILES: usize = 48;
+/// Units to aim at, so that no thread waits long for the last.
+const MIN_UNITS: usize = 8;
+
+/// Whether a convolution is computed this way.
+///
+/// Channels are worked off sixteen at a time; on tiny maps most of a tile would lie outside.
+pub(crate) fn suits(shape: &ConvShape) -> bool {
+    let [height, width] = shape.out_size;
+    shape.kernel == [3, 3]
+        && shape.params.stride == [1, 1]
+        && shape.params.padding[0] <= 2
+        && shape.params.padding[1] <= 2
+        && shape.in_channels.is_multiple_of(LANES)
+        && shape.out_channels.is_multiple_of(LANES)
+        && height.min(width) >= 3
+        && shape.in_size[0].min(shape.in_size[1]) >= 3
+}
+
+/// The tiles of all output maps in a row: tile t covers pixels from (4·ty, 4·tx) of image n.
+#[derive(Clone, Copy)]
+pub(super) struct Tiling {
+    pub(super) num_images: usize,
+    /// Tiles of an image, down and across.
+    pub(super) tiles: [usize; 2],
+}
+
+impl Tiling {
+    pub(super) fn new(num_images: usize, out_size: [usize; 2]) -> Self {
+        Self { num_images, tiles: out_size.map(|size| size.div_ceil(OUTPUT_TILE)) }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.num_images * self.tiles[0] * self.tiles[1]
+    }
+
+    /// Image, and pixel of the first output.
+    #[inline(always)]
+    pub(super) fn place(&self, tile: usize) -> (usize, [usize; 2]) {
+        let [down, across] = self.tiles;
+        let (image, tile) = (tile / (down * across), tile % (down * across));
+        (image, [tile / across * OUTPUT_TILE, tile % across * OUTPUT_TILE])
+    }
+}
+
+/// Transformed values of some tiles, `[36, tiles, C]`.
+///
+/// A line of floats stands between frequencies: without it, powers of two would put a tile's 36 values into one
+/// set of the cache.
+pub(super) struct Frequencies {
+    pub(super) values: Scratch,
+    pub(super) channels: usize,
+    pub(super) step: usize,
+}
+
+impl Frequencies {
+    pub(super) fn new(tiles: usize, channels: usize) -> Self {
+        let step = tiles * channels + LANES;
+        Self { values: Scratch::take(FREQUENCIES * step), channels, step }
+    }
+}
+
+/// Transformed weights: panels for each frequency, `[36, ⌈columns/32⌉, channels, 32]`.
+pub(super) fn pack(isa: Isa, weight: &[f32], shape: &ConvShape, direction: Direction) -> Scratch {
+    let [columns, channels] = match direction {
+        Direction::Forward => [shape.out_channels, shape.in_channels],
+        Direction::Backward => [shape.in_channels, shape.out_channels],
+    };
+    let frequency_len = packed_len(columns, channels);
+    let mut packed = Scratch::take(FREQUENCIES * frequency_len);
+    let raw = SharedSlice::new(&mut packed).raw();
+    for_each_unit(columns.div_ceil(PANEL), |panel| {
+        let mut gathered = Scratch::take(channels * 9 * PANEL);
+        gather(isa, weight, shape, direction, panel, &mut gathered);
+        let width = panel_width(columns, panel);
+        let flipped = direction == Direction::Backward;
+        assert!(raw.len >= FREQUENCIES * frequency_len);
+        // SAFETY: a unit writes its own panel of every frequency, inside `packed`.
+        unsafe {
+            let target = raw.at(panel * PANEL * channels);
+            transform::filters(isa, &gathered, channels, width, flipped, target, frequency_len);
+        }
+    });
+    packed
+}
+
+/// Convolves `source` and writes all of `output`, `[N, H, W, M]`; false where a sum is not finite.
+///
+/// # Safety
+/// Nothing else touches `output`.
+pub(super) unsafe fn run(
+    isa: Isa,
+    source: Maps<'_>,
+    padding: [usize; 2],
+    out_size: [usize; 2],
+    filters: &Panels,
+    epilogue: Epilogue<'_>,
+    output: Raw,
+) -> bool {
+    let tiling = Tiling::new(source.num_images, out_size);
+    let num_tiles = tiling.len();
+    let finite = AtomicBool::new(true);
+    let conv = Winograd { isa, source, padding, out_size, filters, epilogue, output, tiling, finite: &finite };
+    // Many tiles: each unit takes some through all steps. Few: they go together, and the steps are shared out.
+    let units = num_tiles.div_ceil(UNIT_TILES);
+    if units >= MIN_UNITS {
+        let per_unit = num_tiles.div_ceil(units);
+        for_each_unit(num_tiles.div_ceil(per_unit), |unit| {
+            // SAFETY: a unit has its own tiles.
+            unsafe { conv.tiles(unit * per_unit, per_unit.min(num_tiles - unit * per_unit), false) };
+        });
+    } else {
+        // SAFETY: the caller's promise.
+        unsafe { conv.tiles(0, num_tiles, true) };
+    }
+    finite.load(Ordering::Relaxed)
+}
+
+struct Winograd<'a> {
+    isa: Isa,
+    source: Maps<'a>,
+    padding: [usize; 2],
+    out_size: [usize; 2],
+    filters: &'a Panels,
+    epilogue: Epilogue<'a>,
+    output: Raw,
+    tiling: Tiling,
+    finite: &'a AtomicBool,
+}
+
+impl Winograd<'_> {
+    /// Takes `count` tiles from `first` on through all steps.
+    ///
+    /// # Safety
+    /// Nothing else touches these tiles of the output.
+    unsafe fn tiles(&self, first: usize, count: usize, shared_out: bool) {
+        let (channels, columns) = (self.source.channels, self.filters.columns);
+        let mut seen = Frequencies::new(count, channels);
+        let mut products = Frequencies::new(count, columns);
+        let (seen_step, products_step) = (seen.step, products.step);
+        // Parts of the tiles that are transformed apart.
+        let part = if shared_out { count.div_ceil(MIN_UNITS) } else { count };
+        let parts = count.div_ceil(part);
+
+        let raw = SharedSlice::new(&mut seen.values).raw();
+        for_each_unit_if(shared_out, parts, |unit| {
+            let range = unit * part..count.min((unit + 1) * part);
+            // SAFETY: a unit has its own tiles.
+            unsafe {
+                let target = raw.at(range.start * channels);
+                let tiles = first + range.start..first + range.end;
+                transform::see(self.isa, self.source, self.padding, self.tiling, tiles, target, seen_step);
+            }
+        });
+
+        let raw = SharedSlice::new(&mut products.values).raw();
+        let panels = columns.div_ceil(PANEL);
+        for_each_unit_if(shared_out, FREQUENCIES, |frequency| {
+            for panel in 0..panels {
+                let (right, width) = self.filters.panel(frequency, panel);
+                let first_column = panel * PANEL;
+                let product = PanelProduct {
+                    rows: count,
+                    columns: PANEL.min(columns - first_column),
+                    depth: [1, channels],
+                    left: Operand { values: &seen.values[frequency * seen_step..], step: channels, inner: 1, outer: 0 },
+                    right: Operand { values: right, step: 1, inner: width, outer: 0 },
+                    at: frequency * products_step + first_column,
+                    row_step: columns,
+                    first_column,
+                    epilogue: Epilogue::default(),
+                    accumulate: false,
+                };
+                // SAFETY: a unit has its own frequency.
+                unsafe { product.run(self.isa, raw) };
+            }
+        });
+
+        for_each_unit_if(shared_out, parts, |unit| {
+            let range = unit * part..count.min((unit + 1) * part);
+            let tiles = first + range.start..first + range.end;
+            let values = &products.values[range.start * columns..];
+            let place = transform::OutputPlace {
+                tiling: self.tiling,
+                size: self.out_size,
+                channels: columns,
+                epilogue: self.epilogue,
+                output: self.output,
+            };
+            let mut finite = true;
+            // SAFETY: a unit has its own tiles of the output.
+            unsafe { transform::show(self.isa, values, products_step, &place, tiles, &mut finite) };
+            if !finite {
+                self.finite.store(false, Ordering::Relaxed);
+            }
+        });
+    }
+}

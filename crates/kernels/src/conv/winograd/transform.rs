@@ -1,0 +1,534 @@
+//! Winograd's transforms on sixteen channels at a time.
+//!
+//! Each is one-dimensional, applied down the columns of a tile and then along its rows. With a = 1/√2, b = √2:
+//!
+//! ```text
+//! Bᵀ: p₀ = d₀ − 2.5 d₂ + d₄             Aᵀ: y₀ = m₀ + (m₁ + m₂) + (m₃ + m₄)
+//!     p₁,₂ = (d₄ − 2 d₂) ± a (d₃ − 2 d₁)     y₁ = a (m₁ − m₂) + b (m₃ − m₄)
+//!     p₃,₄ = (d₄ − d₂/2) ± b (d₃ − d₁/2)     y₂ = a² (m₁ + m₂) + b² (m₃ + m₄)
+//!     p₅ = d₁ − 2.5 d₃ + d₅                  y₃ = a³ (m₁ − m₂) + b³ (m₃ − m₄) + m₅
+//!
+//! G:  u₀ = g₀, u₁,₂ = −⅔ (g₀ ± a g₁ + a² g₂), u₃,₄ = ⅙ (g₀ ± b g₁ + b² g₂), u₅ = g₂
+//! ```
+
+#![allow(clippy::needless_range_loop)] // Rows and columns of a tile are numbers, here and in the sources.
+
+use std::ops::Range;
+
+use super::{FREQUENCIES, INPUT_TILE, OUTPUT_TILE, Tiling};
+use crate::conv::direct::Maps;
+use crate::parallel::Raw;
+use crate::product::{Epilogue, PANEL};
+use crate::scratch::Scratch;
+use crate::simd::lanes::{LANES, Lanes};
+use crate::simd::{Isa, lanes_kernel};
+
+const A: f32 = std::f32::consts::FRAC_1_SQRT_2;
+const A2: f32 = 0.5;
+const A3: f32 = A * A2;
+const B: f32 = std::f32::consts::SQRT_2;
+const B2: f32 = 2.0;
+const B3: f32 = B * B2;
+const NA: f32 = -2.0 / 3.0;
+const NB: f32 = 1.0 / 6.0;
+
+/// Bᵀ d.
+#[inline(always)]
+unsafe fn see_line<L: Lanes>(d: [L; 6]) -> [L; 6] {
+    // SAFETY: registers only.
+    unsafe {
+        let minus_two = L::splat(-2.0);
+        let minus_half = L::splat(-0.5);
+        let minus_sum = L::splat(-2.5);
+        let (a, b) = (L::splat(A), L::splat(B));
+        let (minus_a, minus_b) = (L::splat(-A), L::splat(-B));
+        let even_a = d[2].mul_add(minus_two, d[4]);
+        let odd_a = d[1].mul_add(minus_two, d[3]);
+        let even_b = d[2].mul_add(minus_half, d[4]);
+        let odd_b = d[1].mul_add(minus_half, d[3]);
+        [
+            d[2].mul_add(minus_sum, d[0].add(d[4])),
+            odd_a.mul_add(a, even_a),
+            odd_a.mul_add(minus_a, even_a),
+            odd_b.mul_add(b, even_b),
+            odd_b.mul_add(minus_b, even_b),
+            d[3].mul_add(minus_sum, d[1].add(d[5])),
+        ]
+    }
+}
+
+/// Aᵀ m.
+#[inline(always)]
+unsafe fn show_line<L: Lanes>(m: [L; 6]) -> [L; 4] {
+    // SAFETY: registers only.
+    unsafe {
+        let (sum_a, difference_a) = (m[1].add(m[2]), m[1].sub(m[2]));
+        let (sum_b, difference_b) = (m[3].add(m[4]), m[3].sub(m[4]));
+        [
+            m[0].add(sum_a).add(sum_b),
+            difference_a.mul_add(L::splat(A), difference_b.mul(L::splat(B))),
+            sum_a.mul_add(L::splat(A2), sum_b.mul(L::splat(B2))),
+            difference_a.mul_add(L::splat(A3), difference_b.mul_add(L::splat(B3), m[5])),
+        ]
+    }
+}
+
+/// A y, the adjoint of [`show_line`].
+#[inline(always)]
+unsafe fn show_line_adjoint<L: Lanes>(y: [L; 4]) -> [L; 6] {
+    // SAFETY: registers only.
+    unsafe {
+        let even_a = y[2].mul_add(L::splat(A2), y[0]);
+        let odd_a = y[1].mul(L::splat(A)).add(y[3].mul(L::splat(A3)));
+        let even_b = y[2].mul_add(L::splat(B2), y[0]);
+        let odd_b = y[1].mul(L::splat(B)).add(y[3].mul(L::splat(B3)));
+        [y[0], even_a.add(odd_a), even_a.sub(odd_a), even_b.add(odd_b), even_b.sub(odd_b), y[3]]
+    }
+}
+
+/// G g.
+#[inline(always)]
+unsafe fn filter_line<L: Lanes>(g: [L; 3]) -> [L; 6] {
+    // SAFETY: registers only.
+    unsafe {
+        let even_a = g[0].mul(L::splat(NA)).add(g[2].mul(L::splat(NA * A2)));
+        let odd_a = g[1].mul(L::splat(NA * A));
+        let even_b = g[0].mul(L::splat(NB)).add(g[2].mul(L::splat(NB * B2)));
+        let odd_b = g[1].mul(L::splat(NB * B));
+        [g[0], even_a.add(odd_a), even_a.sub(odd_a), even_b.add(odd_b), even_b.sub(odd_b), g[2]]
+    }
+}
+
+/// Gᵀ u, the adjoint of [`filter_line`].
+#[inline(always)]
+unsafe fn filter_line_adjoint<L: Lanes>(u: [L; 6]) -> [L; 3] {
+    // SAFETY: registers only.
+    unsafe {
+        let (sum_a, difference_a) = (u[1].add(u[2]), u[1].sub(u[2]));
+        let (sum_b, difference_b) = (u[3].add(u[4]), u[3].sub(u[4]));
+        [
+            sum_a.mul_add(L::splat(NA), sum_b.mul_add(L::splat(NB), u[0])),
+            difference_a.mul_add(L::splat(NA * A), difference_b.mul(L::splat(NB * B))),
+            sum_a.mul_add(L::splat(NA * A2), sum_b.mul_add(L::splat(NB * B2), u[5])),
+        ]
+    }
+}
+
+// No closures below: a closure has none of the instructions that its function has switched on.
+
+/// `Bᵀ d B` of the input tiles of some output tiles, zeros outside the maps: `[36, tiles, C]`.
+///
+/// # Safety
+/// `target` is good for all tiles of every frequency, which stand `step` apart.
+pub(super) unsafe fn see(
+    isa: Isa,
+    source: Maps<'_>,
+    padding: [usize; 2],
+    tiling: Tiling,
+    tiles: Range<usize>,
+    target: *mut f32,
+    step: usize,
+) {
+    assert!(source.channels.is_multiple_of(LANES));
+    assert!(source.values.len() >= source.num_images * source.size[0] * source.size[1] * source.channels);
+    let mut zeros = Scratch::take(source.channels);
+    zeros.fill(0.0);
+    // SAFETY: pixels are inside the maps or the zeros; the target is the caller's promise.
+    unsafe { see_input(isa, source, padding, tiling, tiles, target, step, &zeros) };
+}
+
+/// `A ȳ Aᵀ` of tiles of the output's gradient: `[36, tiles, C]`.
+///
+/// # Safety
+/// As for [`see`].
+pub(super) unsafe fn see_gradient(
+    isa: Isa,
+    gradient: Maps<'_>,
+    tiling: Tiling,
+    tiles: Range<usize>,
+    target: *mut f32,
+    step: usize,
+) {
+    assert!(gradient.channels.is_multiple_of(LANES));
+    assert!(gradient.values.len() >= gradient.num_images * gradient.size[0] * gradient.size[1] * gradient.channels);
+    let mut zeros = Scratch::take(gradient.channels);
+    zeros.fill(0.0);
+    // SAFETY: as in `see`.
+    unsafe { see_output(isa, gradient, [0, 0], tiling, tiles, target, step, &zeros) };
+}
+
+lanes_kernel! {
+    unsafe fn see_input(
+        source: Maps<'_>,
+        padding: [usize; 2],
+        tiling: Tiling,
+        tiles: Range<usize>,
+        target: *mut f32,
+        step: usize,
+        zeros: &[f32],
+    ) = see_input_lanes
+}
+
+lanes_kernel! {
+    unsafe fn see_output(
+        source: Maps<'_>,
+        padding: [usize; 2],
+        tiling: Tiling,
+        tiles: Range<usize>,
+        target: *mut f32,
+        step: usize,
+        zeros: &[f32],
+    ) = see_output_lanes
+}
+
+#[inline(always)]
+unsafe fn see_input_lanes<L: Lanes>(
+    source: Maps<'_>,
+    padding: [usize; 2],
+    tiling: Tiling,
+    tiles: Range<usize>,
+    target: *mut f32,
+    step: usize,
+    zeros: &[f32],
+) {
+    let channels = source.channels;
+    for (slot, tile) in tiles.enumerate() {
+        let mut pixels = [[zeros.as_ptr(); INPUT_TILE]; INPUT_TILE];
+        point_at_pixels(&mut pixels, &source, padding, tiling.place(tile));
+        for channel in (0..channels).step_by(LANES) {
+            // SAFETY: sixteen channels of a pixel or of the zeros; the target is the caller's promise.
+            unsafe {
+                let target = target.add(slot * channels + channel);
+                let mut middle = [[L::splat(0.0); INPUT_TILE]; INPUT_TILE];
+                for column in 0..INPUT_TILE {
+                    let mut values = [L::splat(0.0); INPUT_TILE];
+                    for row in 0..INPUT_TILE {
+                        values[row] = L::load(pixels[row][column].add(channel));
+                    }
+                    let values = see_line(values);
+                    for row in 0..INPUT_TILE {
+                        middle[row][column] = values[row];
+                    }
+                }
+                store_frequencies(middle, target, step);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn see_output_lanes<L: Lanes>(
+    source: Maps<'_>,
+    padding: [usize; 2],
+    tiling: Tiling,
+    tiles: Range<usize>,
+    target: *mut f32,
+    step: usize,
+    zeros: &[f32],
+) {
+    let channels = source.channels;
+    for (slot, tile) in tiles.enumerate() {
+        let mut pixels = [[zeros.as_ptr(); OUTPUT_TILE]; OUTPUT_TILE];
+        point_at_pixels(&mut pixels, &source, padding, tiling.place(tile));
+        for channel in (0..channels).step_by(LANES) {
+            // SAFETY: sixteen channels of a pixel or of the zeros; the target is the caller's promise.
+            unsafe {
+                let target = target.add(slot * channels + channel);
+                let mut middle = [[L::splat(0.0); OUTPUT_TILE]; INPUT_TILE];
+                for column in 0..OUTPUT_TILE {
+                    let mut values = [L::splat(0.0); OUTPUT_TILE];
+                    for row in 0..OUTPUT_TILE {
+                        values[row] = L::load(pixels[row][column].add(channel));
+                    }
+                    let values = show_line_adjoint(values);
+                    for row in 0..INPUT_TILE {
+                        middle[row][column] = values[row];
+                    }
+                }
+                for row in 0..INPUT_TILE {
+                    let values = show_line_adjoint(middle[row]);
+                    for column in 0..INPUT_TILE {
+                        values[column].store(target.add((row * INPUT_TILE + column) * step));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where a tile's pixels stand; those outside the maps keep what they have.
+#[inline(always)]
+fn point_at_pixels<const SIDE: usize>(
+    pixels: &mut [[*const f32; SIDE]; SIDE],
+    source: &Maps<'_>,
+    padding: [usize; 2],
+    (image, [y, x]): (usize, [usize; 2]),
+) {
+    let Maps { values, size: [height, width], channels, .. } = *source;
+    for (dy, pixels) in pixels.iter_mut().enumerate() {
+        let y = (y + dy).wrapping_sub(padding[0]);
+        for (dx, pixel) in pixels.iter_mut().enumerate() {
+            let x = (x + dx).wrapping_sub(padding[1]);
+            if y < height && x < width {
+                *pixel = values.as_ptr().wrapping_add(((image * height + y) * width + x) * channels);
+            }
+        }
+    }
+}
+
+/// [`see_line`] along the rows, to every frequency.
+#[inline(always)]
+unsafe fn store_frequencies<L: Lanes>(middle: [[L; INPUT_TILE]; INPUT_TILE], target: *mut f32, step: usize) {
+    for row in 0..INPUT_TILE {
+        // SAFETY: the target is the caller's promise.
+        unsafe {
+            let values = see_line(middle[row]);
+            for column in 0..INPUT_TILE {
+                values[column].store(target.add((row * INPUT_TILE + column) * step));
+            }
+        }
+    }
+}
+
+/// Where finished tiles go.
+pub(super) struct OutputPlace<'a> {
+    pub(super) tiling: Tiling,
+    pub(super) size: [usize; 2],
+    pub(super) channels: usize,
+    pub(super) epilogue: Epilogue<'a>,
+    pub(super) output: Raw,
+}
+
+/// `Aᵀ m A` and the epilogue, written to the output; `finite` becomes false where a sum is not finite.
+///
+/// # Safety
+/// Nothing else touches these tiles of the output.
+pub(super) unsafe fn show(
+    isa: Isa,
+    products: &[f32],
+    step: usize,
+    place: &OutputPlace<'_>,
+    tiles: Range<usize>,
+    finite: &mut bool,
+) {
+    let [height, width] = place.size;
+    assert!(place.channels.is_multiple_of(LANES));
+    assert!(products.len() >= (FREQUENCIES - 1) * step + tiles.len() * place.channels);
+    let len = place.tiling.num_images * height * width * place.channels;
+    assert!(place.output.len >= len);
+    assert!(place.epilogue.residual.is_none_or(|residual| residual.len() >= len));
+    for vector in [place.epilogue.scale, place.epilogue.bias].into_iter().flatten() {
+        assert!(vector.len() >= place.channels);
+    }
+    // SAFETY: asserted above.
+    unsafe { show_tiles(isa, products, step, place, tiles, finite) };
+}
+
+lanes_kernel! {
+    unsafe fn show_tiles(
+        products: &[f32],
+        step: usize,
+        place: &OutputPlace<'_>,
+        tiles: Range<usize>,
+        finite: &mut bool,
+    ) = show_lanes
+}
+
+#[inline(always)]
+unsafe fn show_lanes<L: Lanes>(
+    products: &[f32],
+    step: usize,
+    place: &OutputPlace<'_>,
+    tiles: Range<usize>,
+    finite: &mut bool,
+) {
+    let [height, width] = place.size;
+    let channels = place.channels;
+    let epilogue = place.epilogue;
+    // SAFETY: elements of the products, of the output and of the epilogue's vectors, by the caller's assertions.
+    unsafe {
+        // Stays 0 as long as every sum is finite: 0 · ∞ and 0 · NaN are NaN.
+        let mut watch = L::splat(0.0);
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        for (slot, tile) in tiles.enumerate() {
+            let (image, [y, x]) = place.tiling.place(tile);
+            let rows = (height - y).min(OUTPUT_TILE);
+            let columns = (width - x).min(OUTPUT_TILE);
+            let first = ((image * height + y) * width + x) * channels;
+            for channel in (0..channels).step_by(LANES) {
+                let from = products.as_ptr().add(slot * channels + channel);
+                let mut middle = [[zero; INPUT_TILE]; OUTPUT_TILE];
+                for column in 0..INPUT_TILE {
+                    let mut values = [zero; INPUT_TILE];
+                    for row in 0..INPUT_TILE {
+                        values[row] = L::load(from.add((row * INPUT_TILE + column) * step));
+                    }
+                    let values = show_line(values);
+                    for row in 0..OUTPUT_TILE {
+                        middle[row][column] = values[row];
+                    }
+                }
+                let scale = match epilogue.scale {
+                    Some(scale) => L::load(scale.as_ptr().add(channel)),
+                    None => one,
+                };
+                let bias = match epilogue.bias {
+                    Some(bias) => L::load(bias.as_ptr().add(channel)),
+                    None => zero,
+                };
+                for row in 0..OUTPUT_TILE {
+                    if row >= rows {
+                        break;
+                    }
+                    let values = show_line(middle[row]);
+                    for column in 0..OUTPUT_TILE {
+                        if column >= columns {
+                            break;
+                        }
+                        watch = values[column].mul_add(zero, watch);
+                        let at = first + (row * width + column) * channels + channel;
+                        let mut value = values[column].mul_add(scale, bias);
+                        if let Some(residual) = epilogue.residual {
+                            value = value.add(L::load(residual.as_ptr().add(at)));
+                        }
+                        if epilogue.relu {
+                            value = value.relu();
+                        }
+                        value.store(place.output.at(at));
+                    }
+                }
+            }
+        }
+        let mut watched = [0.0_f32; LANES];
+        watch.store(watched.as_mut_ptr());
+        *finite = watched.iter().all(|value| *value == 0.0);
+    }
+}
+
+/// `G g Gᵀ` of a panel of weights `[channels, 9, 32]`, rows `width` floats long, to `target` at every frequency.
+///
+/// # Safety
+/// `target` is good for `channels · width` floats at each frequency, which stand `step` apart.
+pub(super) unsafe fn filters(
+    isa: Isa,
+    gathered: &[f32],
+    channels: usize,
+    width: usize,
+    flipped: bool,
+    target: *mut f32,
+    step: usize,
+) {
+    assert!(gathered.len() >= channels * 9 * PANEL && width.is_multiple_of(LANES) && width <= PANEL);
+    // SAFETY: asserted above; the target is the caller's promise.
+    unsafe { filter_panel(isa, gathered, channels, width, flipped, target, step) };
+}
+
+lanes_kernel! {
+    unsafe fn filter_panel(
+        gathered: &[f32],
+        channels: usize,
+        width: usize,
+        flipped: bool,
+        target: *mut f32,
+        step: usize,
+    ) = filter_lanes
+}
+
+#[inline(always)]
+unsafe fn filter_lanes<L: Lanes>(
+    gathered: &[f32],
+    channels: usize,
+    width: usize,
+    flipped: bool,
+    target: *mut f32,
+    step: usize,
+) {
+    // SAFETY: elements of the panel and of the target, by the caller's promise.
+    unsafe {
+        for channel in 0..channels {
+            for column in (0..width).step_by(LANES) {
+                let from = gathered.as_ptr().add(channel * 9 * PANEL + column);
+                let target = target.add(channel * width + column);
+                let mut middle = [[L::splat(0.0); 3]; INPUT_TILE];
+                for column in 0..3 {
+                    let mut values = [L::splat(0.0); 3];
+                    for row in 0..3 {
+                        let cell = row * 3 + column;
+                        values[row] = L::load(from.add(if flipped { 8 - cell } else { cell } * PANEL));
+                    }
+                    let values = filter_line(values);
+                    for row in 0..INPUT_TILE {
+                        middle[row][column] = values[row];
+                    }
+                }
+                for row in 0..INPUT_TILE {
+                    let values = filter_line(middle[row]);
+                    for column in 0..INPUT_TILE {
+                        values[column].store(target.add((row * INPUT_TILE + column) * step));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// `Gᵀ ū G` of sixteen filters and all channels: `[channels, 9, 16]` from `[36, channels, M]`.
+///
+/// # Safety
+/// `source` is good for reading sixteen floats at every frequency and channel.
+pub(super) unsafe fn filter_gradients(
+    isa: Isa,
+    source: *const f32,
+    step: usize,
+    channels: usize,
+    channel_step: usize,
+    target: &mut [f32],
+) {
+    assert!(target.len() >= channels * 9 * LANES);
+    // SAFETY: asserted above; the source is the caller's promise.
+    unsafe { filter_gradient_panel(isa, source, step, channels, channel_step, target.as_mut_ptr()) };
+}
+
+lanes_kernel! {
+    unsafe fn filter_gradient_panel(
+        source: *const f32,
+        step: usize,
+        channels: usize,
+        channel_step: usize,
+        target: *mut f32,
+    ) = filter_gradient_lanes
+}
+
+#[inline(always)]
+unsafe fn filter_gradient_lanes<L: Lanes>(
+    source: *const f32,
+    step: usize,
+    channels: usize,
+    channel_step: usize,
+    target: *mut f32,
+) {
+    // SAFETY: elements of source and target, by the caller's promise.
+    unsafe {
+        for channel in 0..channels {
+            let from = source.add(channel * channel_step);
+            let target = target.add(channel * 9 * LANES);
+            let mut middle = [[L::splat(0.0); INPUT_TILE]; 3];
+            for column in 0..INPUT_TILE {
+                let mut values = [L::splat(0.0); INPUT_TILE];
+                for row in 0..INPUT_TILE {
+                    values[row] = L::load(from.add((row * INPUT_TILE + column) * step));
+                }
+                let values = filter_line_adjoint(values);
+                for row in 0..3 {
+                    middle[row][column] = values[row];
+                }
+            }
+            for row in 0..3 {
+                let values = filter_line_adjoint(middle[row]);
+                for column in 0..3 {
+                    values[column].store(target.add((row * 3 + column) * LANES));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The weight's gradient in the frequencies: sums over tiles instead of pixels, then back to 3×3.
+
+use super::transform::{filter_gradients, see, see_gradient};
+use super::{FREQUENCIES, Frequencies, Tiling};
+use crate::conv::direct::Maps;
+use crate::conv::kernel::ConvShape;
+use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
+use crate::scratch::Scratch;
+use crate::simd::lanes::LANES;
+use crate::simd::{Isa, transpose};
+
+/// Most floats of a gradient in the frequencies that every chunk of tiles has for itself, 36 · 64 · 64 and some.
+const OWN_GRADIENT: usize = 160 << 10;
+/// Chunks of tiles, each summed by itself.
+const CHUNKS: usize = 8;
+/// Tiles transformed before they are multiplied, where a chunk works alone.
+const BLOCK_TILES: usize = 96;
+/// Floats that the transformed values of a block take, where all threads work on it together: 12 MB.
+const BLOCK_FLOATS: usize = 3 << 20;
+
+/// The gradient with respect to the weight, `[Co, Ci, 3, 3]`, from maps that stand channels last; none where a sum is
+/// not finite.
+pub(in crate::conv) fn weight_gradient(
+    isa: Isa,
+    x: Maps<'_>,
+    output_grad: Maps<'_>,
+    shape: &ConvShape,
+) -> Option<Vec<f32>> {
+    let tiling = Tiling::new(shape.num_images, shape.out_size);
+    let sums = Sums { isa, x, output_grad, padding: shape.params.padding, tiling };
+    let len = FREQUENCIES * sums.step();
+    let num_tiles = tiling.len();
+    let chunks = if len <= OWN_GRADIENT { CHUNKS.min(num_tiles.div_ceil(24)) } else { 1 };
+    let mut partial = Scratch::take(chunks * len);
+    let raw = SharedSlice::new(&mut partial).raw();
+    if chunks > 1 {
+        for_each_unit(chunks, |chunk| {
+            let tiles = chunk * num_tiles / chunks..(chunk + 1) * num_tiles / chunks;
+            // SAFETY: every chunk has its own sums.
+            unsafe { sums.add(tiles, BLOCK_TILES, chunk * len, raw, false) };
+        });
+        let shared = SharedSlice::new(&mut partial);
+        for_each_unit(FREQUENCIES, |frequency| {
+            let start = frequency * sums.step();
+            // SAFETY: every unit has its own frequency, of all chunks.
+            let total = unsafe { shared.range(start, sums.step()) };
+            for chunk in 1..chunks {
+                // SAFETY: as above; another chunk than `total`.
+                let other = unsafe { shared.range(chunk * len + start, sums.step()) };
+                for (total, other) in total.iter_mut().zip(other) {
+                    *total += *other;
+                }
+            }
+        });
+    } else {
+        let block = BLOCK_FLOATS / (FREQUENCIES * (x.channels + output_grad.channels));
+        // SAFETY: nothing else has the sums.
+        unsafe { sums.add(0..num_tiles, block.max(24), 0, raw, true) };
+    }
+
+    let (in_channels, out_channels) = (shape.in_channels, shape.out_channels);
+    let run = in_channels * 9;
+    let mut grad = vec![0.0; out_channels * run];
+    let shared = SharedSlice::new(&mut grad);
+    let total = &partial[..len];
+    for_each_unit(out_channels / LANES, |unit| {
+        let mut cells = Scratch::take(run * LANES);
+        // SAFETY: the sums hold sixteen filters from here at every frequency and channel.
+        unsafe {
+            let source = total.as_ptr().add(unit * LANES);
+            filter_gradients(isa, source, sums.step(), in_channels, out_channels, &mut cells);
+        }
+        // SAFETY: every unit has its own filters.
+        let grad = unsafe { shared.range(unit * LANES * run, LANES * run) };
+        transpose(isa, &cells, LANES, grad, run, run, LANES);
+    });
+    let watch: f32 = grad.iter().map(|value| value * 0.0).sum();
+    (watch == 0.0).then_some(grad)
+}
+
+struct Sums<'a> {
+    isa: Isa,
+    x: Maps<'a>,
+    output_grad: Maps<'a>,
+    padding: [usize; 2],
+    tiling: Tiling,
+}
+
+impl Sums<'_> {
+    /// From one frequency's `[Ci, Co]` to the next.
+    fn step(&self) -> usize {
+        self.x.channels * self.output_grad.channels
+    }
+
+    /// Sums over `tiles`, a block at a time, into `[36, Ci, Co]` from `at` on.
+    ///
+    /// # Safety
+    /// Nothing else touches these sums.
+    unsafe fn add(&self, tiles: std::ops::Range<usize>, block: usize, at: usize, sums: Raw, shared_out: bool) {
+        let (rows, columns) = (self.x.channels, self.output_grad.channels);
+        let most = block.min(tiles.len());
+        let mut seen = Frequencies::new(most, rows);
+        let mut shown = Frequencies::new(most, columns);
+        // Rows of a product that are worked off together, so that small products are shared out too.
+        let row_groups = if shared_out { (rows / 96).max(1) } else { 1 };
+        let mut start = tiles.start;
+        while start < tiles.end {
+            let count = most.min(tiles.end - start);
+            let part = if shared_out { count.div_ceil(CHUNKS) } else { count };
+            let (seen_step, shown_step) = (seen.step, shown.step);
+            let raw_seen = SharedSlice::new(&mut seen.values).raw();
+            let raw_shown = SharedSlice::new(&mut shown.values).raw();
+            for_each_unit_if(shared_out, count.div_ceil(part), |unit| {
+                let range = unit * part..count.min((unit + 1) * part);
+                let tiles = start + range.start..start + range.end;
+                // SAFETY: a unit has its own tiles.
+                unsafe {
+                    let target = raw_seen.at(range.start * rows);
+                    see(self.isa, self.x, self.padding, self.tiling, tiles.clone(), target, seen_step);
+                    let target = raw_shown.at(range.start * columns);
+                    see_gradient(self.isa, self.output_grad, self.tiling, tiles, target, shown_step);
+                }
+            });
+            for_each_unit_if(shared_out, FREQUENCIES * row_groups, |unit| {
+                let (frequency, group) = (unit / row_groups, unit % row_groups);
+                let group = group * rows / row_groups..(group + 1) * rows / row_groups;
+                for first_column in (0..columns).step_by(PANEL) {
+                    let product = PanelProduct {
+                        rows: group.len(),
+                        columns: PANEL.min(columns - first_column),
+                        depth: [1, count],
+                        left: Operand {
+                            values: &seen.values[frequency * seen_step + group.start..],
+                            step: 1,
+                            inner: rows,
+                            outer: 0,
+                        },
+                        right: Operand {
+                            values: &shown.values[frequency * shown_step + first_column..],
+                            step: 1,
+                            inner: columns,
+                            outer: 0,
+                        },
+                        at: at + frequency * self.step() + group.start * columns + first_column,
+                        row_step: columns,
+                        first_column: 0,
+                        epilogue: Epilogue::default(),
+                        accumulate: start > tiles.start,
+                    };
+                    // SAFETY: a unit has its own frequency and rows.
+                    unsafe { product.run(self.isa, sums) };
+                }
+            });
+            start += count;
+        }
+    }
+}

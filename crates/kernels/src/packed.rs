@@ -1,0 +1,90 @@
+//! Packed weights, kept for as long as the weights they were packed from.
+//!
+//! In inference a network's weights never change, so they are packed on first use. An entry is found by the address of
+//! the weight's storage and holds a weak reference to it: the address cannot be given to another tensor while the
+//! entry stands, and who wants to change the values in place must first move them (`Arc::make_mut`), which kills the
+//! weak reference.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+use burn::backend::flex::FlexTensor;
+use burn::tensor::Bytes;
+
+use crate::conv::filters::{Direction, Filters};
+use crate::conv::kernel::ConvShape;
+use crate::flex::values;
+use crate::simd::Isa;
+
+/// What a packing depends on.
+#[derive(Clone, PartialEq, Eq, Hash)]
+struct Key {
+    address: usize,
+    start: usize,
+    weight: [usize; 4],
+    direction: Direction,
+    winograd: bool,
+    /// Phases of the stride, which going back has a product each.
+    phases: [[usize; 2]; 3],
+}
+
+struct Entry {
+    storage: Weak<Bytes>,
+    filters: Filters,
+}
+
+static CACHE: Mutex<Option<HashMap<Key, Entry>>> = Mutex::new(None);
+
+/// Whether weights are packed anew or looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Keep {
+    /// The weights change with the next step.
+    No,
+    /// The weights may well be used again.
+    Yes,
+}
+
+/// The packed form of a contiguous weight `[Co, Ci, Kh, Kw]`.
+pub(crate) fn filters(
+    isa: Isa,
+    weight: &FlexTensor,
+    shape: &ConvShape,
+    direction: Direction,
+    winograd: bool,
+    keep: Keep,
+) -> Filters {
+    let pack = || Filters::new(isa, values(weight), shape, direction, winograd);
+    if keep == Keep::No {
+        return pack();
+    }
+    let storage = weight.data_arc();
+    let phases = match direction {
+        Direction::Forward => [[0; 2]; 3],
+        Direction::Backward => {
+            let stride = shape.params.stride;
+            let present = [0, 1].map(|axis| stride[axis].min(shape.in_size[axis]));
+            [stride, shape.params.padding, present]
+        }
+    };
+    let key = Key {
+        address: Arc::as_ptr(&storage).addr(),
+        start: weight.layout().start_offset(),
+        weight: shape.weight(),
+        direction,
+        winograd,
+        phases,
+    };
+    let cache = || CACHE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(entry) = cache().get_or_insert_default().get(&key)
+        && entry.storage.strong_count() > 0
+    {
+        return entry.filters.clone();
+    }
+    // Packed without the lock: two threads may both do it, and then have the same.
+    let filters = pack();
+    let mut cache = cache();
+    let entries = cache.get_or_insert_default();
+    entries.retain(|_, entry| entry.storage.strong_count() > 0);
+    entries.insert(key, Entry { storage: Arc::downgrade(&storage), filters: filters.clone() });
+    filters
+}

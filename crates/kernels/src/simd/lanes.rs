@@ -1,0 +1,305 @@
+//! Sixteen floats at a time, as one AVX-512 register, two AVX2 registers, or an array.
+//!
+//! Kernels are written once over [`Lanes`] and compiled for every instruction set by
+//! [`lanes_kernel!`](super::lanes_kernel), inside functions that have the instructions switched on: only
+//! there do these methods become single instructions.
+
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
+
+/// Floats in a [`Lanes`].
+pub(crate) const LANES: usize = 16;
+
+/// Sixteen floats.
+///
+/// # Safety
+/// Pointers must be good for as many floats as a method reads or writes, and the machine must have the
+/// implementation's instructions.
+pub(crate) trait Lanes: Copy {
+    /// Rows of a tile whose sums, with [`Self::VECTORS`] columns of lanes, stay in registers.
+    const ROWS: usize;
+    /// Lanes side by side in a tile, 1 or 2.
+    const VECTORS: usize;
+
+    unsafe fn splat(value: f32) -> Self;
+    unsafe fn load(from: *const f32) -> Self;
+    /// The first `len` of sixteen, zeros behind them.
+    unsafe fn load_first(from: *const f32, len: usize) -> Self;
+    unsafe fn store(self, to: *mut f32);
+    unsafe fn store_first(self, to: *mut f32, len: usize);
+    unsafe fn add(self, other: Self) -> Self;
+    unsafe fn sub(self, other: Self) -> Self;
+    unsafe fn mul(self, other: Self) -> Self;
+    /// `self · factor + summand`, fused where that is one instruction.
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
+    /// `max(self, 0)`; a NaN stays one.
+    unsafe fn relu(self) -> Self;
+    /// `self` where `of` is above 0 or NaN, 0 elsewhere.
+    unsafe fn where_positive(self, of: Self) -> Self;
+    /// `max(self, other)`; `self` where they compare neither way, `other` being NaN included.
+    unsafe fn max(self, other: Self) -> Self;
+}
+
+/// One AVX-512 register.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+pub(crate) struct Zmm(__m512);
+
+// SAFETY of the unsafe blocks below: each intrinsic needs the instruction set, which the trait's caller
+// promises, and pointers that are good, which it promises too. Masked accesses touch the first `len` only.
+#[cfg(target_arch = "x86_64")]
+impl Lanes for Zmm {
+    const ROWS: usize = 12;
+    const VECTORS: usize = 2;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_set1_ps(value)) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_loadu_ps(from)) }
+    }
+    #[inline(always)]
+    unsafe fn load_first(from: *const f32, len: usize) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_maskz_loadu_ps(first_mask(len), from)) }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: see above.
+        unsafe { _mm512_storeu_ps(to, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn store_first(self, to: *mut f32, len: usize) {
+        // SAFETY: see above.
+        unsafe { _mm512_mask_storeu_ps(to, first_mask(len), self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_add_ps(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_sub_ps(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_mul_ps(self.0, other.0)) }
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
+    }
+    #[inline(always)]
+    unsafe fn relu(self) -> Self {
+        // The second operand is what comes out where either is NaN.
+        // SAFETY: see above.
+        unsafe { Self(_mm512_max_ps(_mm512_setzero_ps(), self.0)) }
+    }
+    #[inline(always)]
+    unsafe fn where_positive(self, of: Self) -> Self {
+        // SAFETY: see above.
+        unsafe {
+            let positive = _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(of.0, _mm512_setzero_ps());
+            Self(_mm512_maskz_mov_ps(positive, self.0))
+        }
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        // SAFETY: see above.
+        unsafe { Self(_mm512_max_ps(other.0, self.0)) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn first_mask(len: usize) -> __mmask16 {
+    ((1_u32 << len) - 1) as __mmask16
+}
+
+/// Two AVX2 registers.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+pub(crate) struct Ymm2([__m256; 2]);
+
+#[cfg(target_arch = "x86_64")]
+impl Ymm2 {
+    #[inline(always)]
+    fn zip(self, other: Self, with: impl Fn(__m256, __m256) -> __m256) -> Self {
+        Self([with(self.0[0], other.0[0]), with(self.0[1], other.0[1])])
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for Ymm2 {
+    const ROWS: usize = 6;
+    const VECTORS: usize = 1;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        // SAFETY: as for `Zmm`.
+        unsafe { Self([_mm256_set1_ps(value); 2]) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: as for `Zmm`.
+        unsafe { Self([_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))]) }
+    }
+    #[inline(always)]
+    unsafe fn load_first(from: *const f32, len: usize) -> Self {
+        let mut values = [0.0_f32; LANES];
+        // SAFETY: as for `Zmm`; `len` is at most 16.
+        unsafe {
+            std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
+            Self::load(values.as_ptr())
+        }
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: as for `Zmm`.
+        unsafe {
+            _mm256_storeu_ps(to, self.0[0]);
+            _mm256_storeu_ps(to.add(8), self.0[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_first(self, to: *mut f32, len: usize) {
+        let mut values = [0.0_f32; LANES];
+        // SAFETY: as for `Zmm`; `len` is at most 16.
+        unsafe {
+            self.store(values.as_mut_ptr());
+            std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
+        }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(other, |a, b| unsafe { _mm256_add_ps(a, b) })
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(other, |a, b| unsafe { _mm256_sub_ps(a, b) })
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(other, |a, b| unsafe { _mm256_mul_ps(a, b) })
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        unsafe {
+            Self([
+                _mm256_fmadd_ps(self.0[0], factor.0[0], summand.0[0]),
+                _mm256_fmadd_ps(self.0[1], factor.0[1], summand.0[1]),
+            ])
+        }
+    }
+    #[inline(always)]
+    unsafe fn relu(self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(self, |a, _| unsafe { _mm256_max_ps(_mm256_setzero_ps(), a) })
+    }
+    #[inline(always)]
+    unsafe fn where_positive(self, of: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(of, |a, of| unsafe { _mm256_and_ps(a, _mm256_cmp_ps::<_CMP_NLE_UQ>(of, _mm256_setzero_ps())) })
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        // SAFETY: as for `Zmm`.
+        self.zip(other, |a, b| unsafe { _mm256_max_ps(b, a) })
+    }
+}
+
+/// An array, which compilers turn into what vectors a machine has.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain([f32; LANES]);
+
+impl Plain {
+    #[inline(always)]
+    fn zip(self, other: Self, with: impl Fn(f32, f32) -> f32) -> Self {
+        let mut values = self.0;
+        for (value, other) in values.iter_mut().zip(other.0) {
+            *value = with(*value, other);
+        }
+        Self(values)
+    }
+}
+
+impl Lanes for Plain {
+    const ROWS: usize = 4;
+    const VECTORS: usize = 1;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: good for 16 floats by the caller's promise; arrays of floats need no more alignment.
+        unsafe { Self(*from.cast::<[f32; LANES]>()) }
+    }
+    #[inline(always)]
+    unsafe fn load_first(from: *const f32, len: usize) -> Self {
+        let mut values = [0.0_f32; LANES];
+        // SAFETY: good for `len` floats, which is at most 16.
+        unsafe { std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len) };
+        Self(values)
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: good for 16 floats by the caller's promise.
+        unsafe { *to.cast::<[f32; LANES]>() = self.0 };
+    }
+    #[inline(always)]
+    unsafe fn store_first(self, to: *mut f32, len: usize) {
+        // SAFETY: good for `len` floats, which is at most 16.
+        unsafe { std::ptr::copy_nonoverlapping(self.0.as_ptr(), to, len) };
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
+        let mut values = summand.0;
+        for (idx, value) in values.iter_mut().enumerate() {
+            // Elsewhere `mul_add` would be a call into the C library.
+            *value = if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
+                self.0[idx].mul_add(factor.0[idx], *value)
+            } else {
+                self.0[idx] * factor.0[idx] + *value
+            };
+        }
+        Self(values)
+    }
+    #[inline(always)]
+    unsafe fn relu(self) -> Self {
+        self.zip(self, |a, _| if a <= 0.0 { 0.0 } else { a })
+    }
+    #[inline(always)]
+    unsafe fn where_positive(self, of: Self) -> Self {
+        self.zip(of, |a, of| if of <= 0.0 { 0.0 } else { a })
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if b > a { b } else { a })
+    }
+}
