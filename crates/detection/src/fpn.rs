@@ -9,10 +9,11 @@
 
 use burn::module::Module;
 use burn::tensor::{Tensor, s};
+use sdg_kernels::{Activation, upsample_nearest_2x};
 
 use crate::config::FpnConfig;
 use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, upsample_nearest_2x};
+use crate::layers::{Conv2d, Conv2dShape};
 
 /// The convolutions of the pyramid.
 #[derive(Module, Debug)]
@@ -62,10 +63,13 @@ impl Fpn {
     /// - output: `[N, C, H/s, W/s]`, strides 4 to 64 (rounded up at 64)
     pub fn forward(&self, stages: [Tensor<4>; 4]) -> [Tensor<4>; 5] {
         let [res2, res3, res4, res5] = stages;
+        let lateral = |conv: &Conv2d, x: Tensor<4>, coarser: Tensor<4>| {
+            conv.forward_then(x, Some(upsample_nearest_2x(coarser)), Activation::Identity)
+        };
         let merged5 = self.fpn_lateral5.forward(res5);
-        let merged4 = self.fpn_lateral4.forward(res4) + upsample_nearest_2x(merged5.clone());
-        let merged3 = self.fpn_lateral3.forward(res3) + upsample_nearest_2x(merged4.clone());
-        let merged2 = self.fpn_lateral2.forward(res2) + upsample_nearest_2x(merged3.clone());
+        let merged4 = lateral(&self.fpn_lateral4, res4, merged5.clone());
+        let merged3 = lateral(&self.fpn_lateral3, res3, merged4.clone());
+        let merged2 = lateral(&self.fpn_lateral2, res2, merged3.clone());
         let p5 = self.fpn_output5.forward(merged5);
         // Max pooling with a kernel of one cell and stride 2.
         let p6 = p5.clone().slice(s![.., .., ..;2, ..;2]);

@@ -4,7 +4,9 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Tensor, activation};
-use sdg_kernels::{Conv2dParams, conv2d};
+use sdg_kernels::{
+    Activation, Conv2dEpilogue, Conv2dParams, GroupNormParams, conv2d, conv2d_fused, group_norm_residual,
+};
 
 use crate::config::NormKind;
 use crate::initialization::{Distribution, Initializer};
@@ -25,7 +27,7 @@ pub struct Norm {
 }
 
 /// Added to a group's variance.
-const GROUP_NORM_EPS: f64 = 1e-5;
+const GROUP_NORM_EPS: f32 = 1e-5;
 
 impl Norm {
     /// A norm of `channels` channels, or `None` for [`NormKind::Identity`].
@@ -58,26 +60,6 @@ impl Norm {
         let scale = self.weight.val() / (var.val() + eps).sqrt();
         let shift = self.bias.val() - mean.val() * scale.clone();
         Some([scale, shift])
-    }
-
-    /// Normalises groups of channels of each image.
-    ///
-    /// # Shapes
-    /// - `x`, output: `[N, C, H, W]`
-    fn group_norm(&self, x: Tensor<4>, num_groups: usize) -> Tensor<4> {
-        let [n, c, h, w] = x.dims();
-        let grouped: Tensor<3> = x.clone().reshape([n, num_groups, c / num_groups * h * w]);
-        let mean = grouped.clone().mean_dim(2);
-        let mean_square = grouped.square().mean_dim(2);
-        let variance = (mean_square - mean.clone().square()).clamp_min(0.0);
-        let rstd = (variance + GROUP_NORM_EPS).sqrt().recip();
-        // Scale and shift are small, [N, C, 1, 1]: the image is passed over twice, not six times.
-        let spread = |per_group: Tensor<3>| -> Tensor<4> {
-            per_group.expand([n, num_groups, c / num_groups]).reshape([n, c, 1, 1])
-        };
-        let scale = spread(rstd) * self.weight.val().reshape([1, c, 1, 1]);
-        let shift = self.bias.val().reshape([1, c, 1, 1]) - spread(mean) * scale.clone();
-        x * scale + shift
     }
 }
 
@@ -148,20 +130,39 @@ impl Conv2d {
     /// - `x`: `[N, C_in, H, W]`
     /// - output: `[N, C_out, ⌈H / stride⌉, ⌈W / stride⌉]`
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        self.forward_then(x, None, Activation::Identity)
+    }
+
+    /// Convolves, normalises and rectifies.
+    ///
+    /// # Shapes
+    /// As for [`Self::forward`].
+    pub fn forward_relu(&self, x: Tensor<4>) -> Tensor<4> {
+        self.forward_then(x, None, Activation::Relu)
+    }
+
+    /// Convolves and normalises, adds `residual` and activates, all in one pass over the result.
+    ///
+    /// # Shapes
+    /// As for [`Self::forward`]; `residual` has the output's.
+    pub fn forward_then(&self, x: Tensor<4>, residual: Option<Tensor<4>>, activation: Activation) -> Tensor<4> {
         let params = Conv2dParams::square(self.stride, self.padding);
         let weight = self.weight.val();
         let bias = self.bias.as_ref().map(|b| b.val());
         let Some(norm) = &self.norm else {
-            return conv2d(x, weight, bias, params);
+            return conv2d_fused(x, weight, bias, params, Conv2dEpilogue { scale: None, residual, activation });
         };
         match (norm.kind, norm.as_affine()) {
-            // A stored norm is a factor on the kernel: no pass over the image.
             (_, Some([scale, shift])) => {
-                let [c_out, ..] = weight.dims();
-                conv2d(x, weight * scale.reshape([c_out, 1, 1, 1]), Some(shift), params)
+                let epilogue = Conv2dEpilogue { scale: Some(scale), residual, activation };
+                conv2d_fused(x, weight, Some(shift), params, epilogue)
             }
-            (NormKind::Group { num_groups }, None) => norm.group_norm(conv2d(x, weight, None, params), num_groups),
-            _ => conv2d(x, weight, None, params),
+            (NormKind::Group { num_groups }, None) => {
+                let x = conv2d(x, weight, None, params);
+                let params = GroupNormParams { num_groups, epsilon: GROUP_NORM_EPS, activation };
+                group_norm_residual(x, norm.weight.val(), norm.bias.val(), residual, params)
+            }
+            _ => conv2d_fused(x, weight, None, params, Conv2dEpilogue { scale: None, residual, activation }),
         }
     }
 }
@@ -228,16 +229,6 @@ impl ConvTranspose2x {
     }
 }
 
-/// Doubles height and width by repeating each cell.
-///
-/// # Shapes
-/// - `x`: `[N, C, H, W]`
-/// - output: `[N, C, 2H, 2W]`
-pub fn upsample_nearest_2x(x: Tensor<4>) -> Tensor<4> {
-    let [n, c, h, w] = x.dims();
-    x.reshape([n, c, h, 1, w, 1]).expand([n, c, h, 2, w, 2]).reshape([n, c, 2 * h, 2 * w])
-}
-
 /// Doubles height and width of square maps by linear interpolation along each axis, edges
 /// repeated: PyTorch's bilinear interpolation with `align_corners=False`.
 ///
@@ -281,13 +272,6 @@ mod tests {
     }
 
     #[test]
-    fn nearest_upsampling_repeats() {
-        let x = tensor(&[1.0, 2.0, 3.0, 4.0], [1, 1, 2, 2]);
-        let expected = [1, 1, 2, 2, 1, 1, 2, 2, 3, 3, 4, 4, 3, 3, 4, 4].map(|v| v as f32);
-        assert_eq!(upsample_nearest_2x(x).into_data().try_to_vec_as::<f32>().unwrap(), expected);
-    }
-
-    #[test]
     fn bilinear_upsampling_by_hand() {
         // Rows [0, 4] become [0, 1, 3, 4]; columns 0 and 8 apart likewise.
         let x = tensor(&[0.0, 4.0, 8.0, 12.0], [1, 1, 2, 2]);
@@ -298,11 +282,19 @@ mod tests {
     #[test]
     fn group_norm_standardises_each_group() {
         let mut init = Initializer::new(&Device::flex(), 1);
-        let norm = Norm::init(NormKind::Group { num_groups: 2 }, 4, &mut init).unwrap();
+        let kind = NormKind::Group { num_groups: 2 };
+        let mut conv = Conv2dShape::new(4, 4, 1).init(Distribution::Constant(0.0), kind, &mut init);
+        let identity = (0..16).map(|at| f32::from(u8::from(at % 5 == 0))).collect::<Vec<_>>();
+        conv.weight = Param::from_tensor(tensor(&identity, [4, 4, 1, 1]));
         // Group 1 holds 1, 3 (mean 2, deviation 1), group 2 holds 10, 30 (mean 20, deviation 10).
         let x = tensor(&[1.0, 3.0, 10.0, 30.0], [1, 4, 1, 1]);
         let expected = tensor(&[-1.0, 1.0, -1.0, 1.0], [1, 4, 1, 1]);
-        norm.group_norm(x, 2).into_data().assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
+        let found = conv.forward(x.clone()).into_data();
+        found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
+        // With half of itself added: -0.5, 2.5, 4, 16, and what is negative cut.
+        let expected = tensor(&[0.0, 2.5, 4.0, 16.0], [1, 4, 1, 1]);
+        let found = conv.forward_then(x.clone(), Some(x / 2.0), Activation::Relu).into_data();
+        found.assert_approx_eq::<f32>(&expected.into_data(), Tolerance::absolute(1e-4));
     }
 
     #[test]
@@ -316,7 +308,12 @@ mod tests {
         norm.running_mean = Some(init.frozen([1], 7.0));
         norm.running_var = Some(init.frozen([1], 4.0));
         // (9 - 7) / √4 · 3 + 5 = 8.
-        let y: f32 = conv.forward(tensor(&[9.0], [1, 1, 1, 1])).into_scalar();
+        let x = tensor(&[9.0], [1, 1, 1, 1]);
+        let y: f32 = conv.forward(x.clone()).into_scalar();
         assert!((y - 8.0).abs() < 1e-5);
+        // With -10 added the ReLU cuts it.
+        let residual = tensor(&[-10.0], [1, 1, 1, 1]);
+        let y: f32 = conv.forward_then(x, Some(residual), Activation::Relu).into_scalar();
+        assert_eq!(y, 0.0);
     }
 }

@@ -10,12 +10,11 @@
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
-use burn::tensor::module::max_pool2d;
-use burn::tensor::ops::MaxPoolOptions;
+use sdg_kernels::{Activation, MaxPool2dParams, max_pool2d};
 
 use crate::config::{BlockKind, Freeze, ResNetConfig, StrideIn};
 use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, relu};
+use crate::layers::{Conv2d, Conv2dShape};
 
 /// The first convolution and pooling.
 #[derive(Module, Debug)]
@@ -27,9 +26,7 @@ pub struct Stem {
 impl Stem {
     /// `[N, 3, H, W]` to `[N, C, H/4, W/4]`.
     fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let x = relu(self.conv1.forward(x));
-        let pool = MaxPoolOptions::new([3, 3]).with_stride([2, 2]).with_padding([1, 1]);
-        max_pool2d(x, pool)
+        max_pool2d(self.conv1.forward_relu(x), MaxPool2dParams { kernel: [3, 3], stride: [2, 2], padding: [1, 1] })
     }
 }
 
@@ -80,12 +77,11 @@ impl ResidualBlock {
             Some(shortcut) => shortcut.forward(x.clone()),
             None => x.clone(),
         };
-        let inner = self.conv2.forward(relu(self.conv1.forward(x)));
-        let residual = match &self.conv3 {
-            Some(conv3) => conv3.forward(relu(inner)),
-            None => inner,
-        };
-        relu(residual + identity)
+        let inner = self.conv1.forward_relu(x);
+        match &self.conv3 {
+            Some(conv3) => conv3.forward_then(self.conv2.forward_relu(inner), Some(identity), Activation::Relu),
+            None => self.conv2.forward_then(inner, Some(identity), Activation::Relu),
+        }
     }
 }
 

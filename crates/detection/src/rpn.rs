@@ -16,7 +16,7 @@ use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{AnchorConfig, NormKind, RpnConfig, RpnNormaliser};
 use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, relu};
+use crate::layers::{Conv2d, Conv2dShape};
 use crate::losses;
 use crate::matcher::{Match, match_boxes};
 use crate::sampler::sample;
@@ -109,7 +109,7 @@ impl RegionProposalNetwork {
         let mut logits = Vec::with_capacity(5);
         let mut deltas = Vec::with_capacity(5);
         for feature in features {
-            let hidden = relu(self.rpn_head.conv.forward(feature.clone()));
+            let hidden = self.rpn_head.conv.forward_relu(feature.clone());
             let objectness = self.rpn_head.objectness_logits.forward(hidden.clone());
             let level_deltas = self.rpn_head.anchor_deltas.forward(hidden);
             let [n, a, h, w] = objectness.dims();

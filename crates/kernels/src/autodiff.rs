@@ -7,6 +7,7 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::flex::FlexTensor;
+use burn::backend::ops::ModuleOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Flex};
 
@@ -21,6 +22,8 @@ use crate::group_norm::kernel::{self as norm, Statistics};
 use crate::group_norm::{Activation, FusedGroupNormParams, GroupNormParams};
 use crate::packed::Keep;
 use crate::product::Epilogue;
+use crate::resize::kernel::PoolShape;
+use crate::resize::{self, MaxPool2dParams};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
 use crate::{composed, elementwise};
@@ -161,6 +164,33 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
                 let kept = GroupNormKept { x, gamma, output: output.clone(), statistics, params: params.norm };
                 prep.finish(kept, output)
             }
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_max_pool2d(x: FloatTensor<Self>, params: MaxPool2dParams) -> FloatTensor<Self> {
+        if !all_f32([x.primitive()]) {
+            return Self::max_pool2d(x, params.kernel, params.stride, params.padding, [1, 1], false);
+        }
+        let shape = PoolShape::new(shape4(x.primitive()), params);
+        let prepared = MaxPoolBackward.prepare::<C>([x.node()]).compute_bound().stateful();
+        let x = channels_last(x.into_primitive());
+        let output = Flex::kernel_max_pool2d(x.clone(), params);
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish((x, output.clone(), shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        if !all_f32([x.primitive()]) {
+            return composed::upsample_nearest_2x::<Self>(x);
+        }
+        let shape = shape4(x.primitive());
+        let prepared = UpsampleBackward.prepare::<C>([x.node()]).compute_bound().stateful();
+        let output = Flex::kernel_upsample_nearest_2x(x.into_primitive());
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish(shape, output),
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -325,6 +355,40 @@ impl Backward<Flex, 4> for GroupNormBackward {
         if let Some(residual) = residual {
             let grad = found.masked.map_or(output_grad, |masked| tensor_channels_last(masked, shape));
             grads.register::<Flex>(residual.id, grad);
+        }
+    }
+}
+
+#[derive(Debug)]
+struct MaxPoolBackward;
+
+impl Backward<Flex, 1> for MaxPoolBackward {
+    /// x and output.
+    type State = (FlexTensor, FlexTensor, PoolShape);
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let (kept_x, output, shape) = ops.state;
+        if let [Some(x)] = ops.parents {
+            let [output_grad, kept_x, output] = [&output_grad, &kept_x, &output].map(last_values);
+            let grad = resize::kernel::max_pool_gradient(Isa::detect(), output_grad, kept_x, output, &shape);
+            grads.register::<Flex>(x.id, tensor_channels_last(grad, shape.input()));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct UpsampleBackward;
+
+impl Backward<Flex, 1> for UpsampleBackward {
+    /// Shape of the input.
+    type State = [usize; 4];
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        if let [Some(x)] = ops.parents {
+            let grad = resize::kernel::upsample_gradient(Isa::detect(), last_values(&output_grad), ops.state);
+            grads.register::<Flex>(x.id, tensor_channels_last(grad, ops.state));
         }
     }
 }

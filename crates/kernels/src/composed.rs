@@ -142,3 +142,12 @@ pub fn group_norm<B: Backend>(
     let x = if added { B::float_add(x, residual) } else { x };
     activated::<B>(x, params.activation)
 }
+
+/// [`upsample_nearest_2x`](crate::upsample_nearest_2x) by repeating along two new axes.
+pub fn upsample_nearest_2x<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
+    let shape = x.shape();
+    let [n, c, h, w] = [shape[0], shape[1], shape[2], shape[3]];
+    let x = B::float_reshape(x, Shape::from(vec![n, c, h, 1, w, 1]));
+    let x = B::float_expand(x, Shape::from(vec![n, c, h, 2, w, 2]));
+    B::float_reshape(x, Shape::from(vec![n, c, 2 * h, 2 * w]))
+}

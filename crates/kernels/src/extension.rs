@@ -6,6 +6,7 @@ use burn::backend::{Backend, backend_extension};
 use crate::composed;
 use crate::conv::{Conv2dParams, FusedConv2dParams};
 use crate::group_norm::FusedGroupNormParams;
+use crate::resize::MaxPool2dParams;
 use crate::roi_align::RoiAlignParams;
 
 /// Backends that run this crate's operations.
@@ -57,5 +58,15 @@ pub trait KernelBackend: Backend {
         params: FusedGroupNormParams,
     ) -> FloatTensor<Self> {
         composed::group_norm::<Self>(x, gamma, beta, residual, params)
+    }
+
+    /// See [`max_pool2d`](crate::max_pool2d).
+    fn kernel_max_pool2d(x: FloatTensor<Self>, params: MaxPool2dParams) -> FloatTensor<Self> {
+        Self::max_pool2d(x, params.kernel, params.stride, params.padding, [1, 1], false)
+    }
+
+    /// See [`upsample_nearest_2x`](crate::upsample_nearest_2x).
+    fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        composed::upsample_nearest_2x::<Self>(x)
     }
 }

@@ -1,6 +1,7 @@
 //! The extension on `Flex`: tensors to slices and back, and which kernel runs.
 
 use burn::backend::flex::{FlexTensor, Layout};
+use burn::backend::ops::ModuleOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
 use burn::tensor::{Bytes, DType, Shape};
@@ -12,6 +13,8 @@ use crate::extension::KernelBackend;
 use crate::group_norm::{self, Activation, FusedGroupNormParams};
 use crate::packed::{self, Keep};
 use crate::product::Epilogue;
+use crate::resize::kernel::PoolShape;
+use crate::resize::{self, MaxPool2dParams};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
 use crate::{composed, elementwise};
@@ -91,6 +94,24 @@ impl KernelBackend for Flex {
         let x = last_values(&x);
         let (output, _) = group_norm::kernel::forward(Isa::detect(), x, shape, gamma, beta, residual, &params.norm);
         tensor_channels_last(output, shape)
+    }
+
+    fn kernel_max_pool2d(x: FloatTensor<Self>, params: MaxPool2dParams) -> FloatTensor<Self> {
+        if !all_f32([&x]) {
+            return Self::max_pool2d(x, params.kernel, params.stride, params.padding, [1, 1], false);
+        }
+        let shape = PoolShape::new(shape4(&x), params);
+        let x = channels_last(x);
+        tensor_channels_last(resize::kernel::max_pool(Isa::detect(), last_values(&x), &shape), shape.output())
+    }
+
+    fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        if !all_f32([&x]) {
+            return composed::upsample_nearest_2x::<Self>(x);
+        }
+        let [n, c, h, w] = shape4(&x);
+        let x = channels_last(x);
+        tensor_channels_last(resize::kernel::upsample(last_values(&x), [n, c, h, w]), [n, c, 2 * h, 2 * w])
     }
 }
 

@@ -52,6 +52,7 @@ mod parallel;
 mod product;
 #[cfg(test)]
 mod reference;
+mod resize;
 mod roi_align;
 mod scratch;
 mod simd;
@@ -60,4 +61,5 @@ pub use conv::{Conv2dEpilogue, Conv2dParams, FusedConv2dParams, conv_transpose2d
 pub use extension::KernelBackend;
 pub use group_norm::{Activation, FusedGroupNormParams, GroupNormParams, group_norm, group_norm_residual};
 pub use nms::{batched_nms, nms};
+pub use resize::{MaxPool2dParams, max_pool2d, upsample_nearest_2x};
 pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};

@@ -91,7 +91,7 @@ pub(crate) struct Output {
     len: usize,
 }
 
-// SAFETY: the only access is through `write` and `range`, whose callers promise disjoint parts.
+// SAFETY: the only access is through `range` and `raw`, whose callers promise disjoint parts.
 unsafe impl Sync for Output {}
 
 impl Output {
@@ -106,34 +106,10 @@ impl Output {
         Raw { start: self.start, len: self.len }
     }
 
-    /// Copies `run` to `at`, and every `stride` from there.
-    ///
-    /// # Safety
-    /// No two threads write the same element.
-    #[inline]
-    pub(crate) unsafe fn write(&self, at: usize, stride: usize, run: &[f32]) {
-        let Some(last) = run.len().checked_sub(1) else {
-            return;
-        };
-        assert!(at + last * stride < self.len, "write past the end of {}", self.len);
-        // SAFETY: in bounds by the assertion; not written elsewhere by the caller's promise; `run` is a
-        // borrowed slice and cannot be this vector, which nothing can borrow yet.
-        unsafe {
-            let target = self.start.add(at);
-            if stride == 1 {
-                std::ptr::copy_nonoverlapping(run.as_ptr(), target, run.len());
-            } else {
-                for (idx, value) in run.iter().enumerate() {
-                    target.add(idx * stride).write(*value);
-                }
-            }
-        }
-    }
-
     /// The `len` elements from `start`, to be written.
     ///
     /// # Safety
-    /// No two ranges that live at the same time overlap, each other or a `write`.
+    /// No two ranges that live at the same time overlap.
     #[allow(clippy::mut_from_ref)] // As in `SharedSlice`.
     pub(crate) unsafe fn range(&self, start: usize, len: usize) -> &mut [MaybeUninit<f32>] {
         assert!(start <= self.len && len <= self.len - start, "range {start}+{len} of {}", self.len);

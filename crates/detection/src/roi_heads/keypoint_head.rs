@@ -11,7 +11,7 @@ use burn::tensor::Tensor;
 
 use crate::config::{KeypointHeadConfig, NormKind};
 use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, relu, upsample_bilinear_2x};
+use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, upsample_bilinear_2x};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::host_values;
@@ -59,7 +59,7 @@ impl KeypointHead {
     /// Gives heatmap logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
-        let hidden = self.conv_fcn.iter().fold(pooled, |x, conv| relu(conv.forward(x)));
+        let hidden = self.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
         upsample_bilinear_2x(self.score_lowres.forward(hidden))
     }
 

@@ -88,14 +88,13 @@ impl Tiling {
 /// set of the cache.
 pub(super) struct Frequencies {
     pub(super) values: Scratch,
-    pub(super) channels: usize,
     pub(super) step: usize,
 }
 
 impl Frequencies {
     pub(super) fn new(tiles: usize, channels: usize) -> Self {
         let step = tiles * channels + LANES;
-        Self { values: Scratch::take(FREQUENCIES * step), channels, step }
+        Self { values: Scratch::take(FREQUENCIES * step), step }
     }
 }
 

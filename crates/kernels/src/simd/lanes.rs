@@ -34,10 +34,6 @@ pub(crate) trait Lanes: Copy {
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
     /// `max(self, 0)`; a NaN stays one.
     unsafe fn relu(self) -> Self;
-    /// `self` where `of` is above 0 or NaN, 0 elsewhere.
-    unsafe fn where_positive(self, of: Self) -> Self;
-    /// `max(self, other)`; `self` where they compare neither way, `other` being NaN included.
-    unsafe fn max(self, other: Self) -> Self;
 }
 
 /// One AVX-512 register.
@@ -103,19 +99,6 @@ impl Lanes for Zmm {
         // SAFETY: see above.
         unsafe { Self(_mm512_max_ps(_mm512_setzero_ps(), self.0)) }
     }
-    #[inline(always)]
-    unsafe fn where_positive(self, of: Self) -> Self {
-        // SAFETY: see above.
-        unsafe {
-            let positive = _mm512_cmp_ps_mask::<_CMP_NLE_UQ>(of.0, _mm512_setzero_ps());
-            Self(_mm512_maskz_mov_ps(positive, self.0))
-        }
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        // SAFETY: see above.
-        unsafe { Self(_mm512_max_ps(other.0, self.0)) }
-    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -129,12 +112,13 @@ fn first_mask(len: usize) -> __mmask16 {
 #[derive(Clone, Copy)]
 pub(crate) struct Ymm2([__m256; 2]);
 
+/// An intrinsic on both halves; no closure, which would have none of the instructions switched on.
 #[cfg(target_arch = "x86_64")]
-impl Ymm2 {
-    #[inline(always)]
-    fn zip(self, other: Self, with: impl Fn(__m256, __m256) -> __m256) -> Self {
-        Self([with(self.0[0], other.0[0]), with(self.0[1], other.0[1])])
-    }
+macro_rules! halves {
+    ($intrinsic:ident, $a:expr, $b:expr) => {
+        // SAFETY: as for `Zmm`.
+        unsafe { Ymm2([$intrinsic($a[0], $b[0]), $intrinsic($a[1], $b[1])]) }
+    };
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -180,18 +164,15 @@ impl Lanes for Ymm2 {
     }
     #[inline(always)]
     unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: as for `Zmm`.
-        self.zip(other, |a, b| unsafe { _mm256_add_ps(a, b) })
+        halves!(_mm256_add_ps, self.0, other.0)
     }
     #[inline(always)]
     unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: as for `Zmm`.
-        self.zip(other, |a, b| unsafe { _mm256_sub_ps(a, b) })
+        halves!(_mm256_sub_ps, self.0, other.0)
     }
     #[inline(always)]
     unsafe fn mul(self, other: Self) -> Self {
-        // SAFETY: as for `Zmm`.
-        self.zip(other, |a, b| unsafe { _mm256_mul_ps(a, b) })
+        halves!(_mm256_mul_ps, self.0, other.0)
     }
     #[inline(always)]
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
@@ -206,17 +187,8 @@ impl Lanes for Ymm2 {
     #[inline(always)]
     unsafe fn relu(self) -> Self {
         // SAFETY: as for `Zmm`.
-        self.zip(self, |a, _| unsafe { _mm256_max_ps(_mm256_setzero_ps(), a) })
-    }
-    #[inline(always)]
-    unsafe fn where_positive(self, of: Self) -> Self {
-        // SAFETY: as for `Zmm`.
-        self.zip(of, |a, of| unsafe { _mm256_and_ps(a, _mm256_cmp_ps::<_CMP_NLE_UQ>(of, _mm256_setzero_ps())) })
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        // SAFETY: as for `Zmm`.
-        self.zip(other, |a, b| unsafe { _mm256_max_ps(b, a) })
+        let zeros = unsafe { [_mm256_setzero_ps(); 2] };
+        halves!(_mm256_max_ps, zeros, self.0)
     }
 }
 
@@ -293,13 +265,5 @@ impl Lanes for Plain {
     #[inline(always)]
     unsafe fn relu(self) -> Self {
         self.zip(self, |a, _| if a <= 0.0 { 0.0 } else { a })
-    }
-    #[inline(always)]
-    unsafe fn where_positive(self, of: Self) -> Self {
-        self.zip(of, |a, of| if of <= 0.0 { 0.0 } else { a })
-    }
-    #[inline(always)]
-    unsafe fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if b > a { b } else { a })
     }
 }

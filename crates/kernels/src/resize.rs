@@ -1,0 +1,66 @@
+//! Max pooling, and doubling by repetition: the two changes of resolution besides strides.
+//!
+//! Results stand channels last in memory, as those of [`conv2d`](crate::conv2d).
+
+use burn::backend::Dispatch;
+use burn::tensor::Tensor;
+
+use crate::extension::KernelBackend;
+
+pub(crate) mod kernel;
+#[cfg(test)]
+mod tests;
+
+/// How a pooling's window moves. Every pair is `[vertical, horizontal]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaxPool2dParams {
+    /// Size of the window, at most 255 pixels in all.
+    pub kernel: [usize; 2],
+    /// Step of the window from one output pixel to the next, at least 1.
+    pub stride: [usize; 2],
+    /// Pixels added before and after each axis, which are never the largest; at most half the window.
+    pub padding: [usize; 2],
+}
+
+impl MaxPool2dParams {
+    /// Size of the output map, or `None` where the padded input is smaller than the window.
+    pub(crate) fn output_size(&self, input: [usize; 2]) -> Option<[usize; 2]> {
+        let conv = crate::Conv2dParams { stride: self.stride, padding: self.padding };
+        conv.output_size(input, self.kernel)
+    }
+}
+
+/// The largest value in every window. A NaN is larger than any number; of equals the first gets the gradient.
+///
+/// # Shapes
+/// `x` `[N, C, Hi, Wi]`; the result is `[N, C, Ho, Wo]` with `Ho = (Hi + 2·padding − Kh) / stride + 1`, rounded down.
+///
+/// # Panics
+/// Where a dimension, stride or side of the window is 0, the window has more than 255 pixels, the padding is more than
+/// half of it, or it is larger than the padded input.
+pub fn max_pool2d(x: Tensor<4>, params: MaxPool2dParams) -> Tensor<4> {
+    let [_, _, height, width] = x.dims();
+    let MaxPool2dParams { kernel, stride, padding } = params;
+    assert!(x.dims().iter().all(|&size| size > 0), "max_pool2d: expected no empty dimension, found {:?}", x.dims());
+    assert!(
+        kernel.iter().chain(&stride).all(|&size| size > 0) && kernel[0] * kernel[1] <= 255,
+        "max_pool2d: expected strides of at least 1 and a window of 1 to 255 pixels, found {params:?}"
+    );
+    assert!(
+        (0..2).all(|axis| 2 * padding[axis] <= kernel[axis]),
+        "max_pool2d: expected padding of at most half the window, found {params:?}"
+    );
+    assert!(
+        params.output_size([height, width]).is_some(),
+        "max_pool2d: expected a padded input of at least the window's {kernel:?}, found {height} x {width}"
+    );
+    Tensor::from_dispatch(Dispatch::kernel_max_pool2d(x.into_dispatch(), params))
+}
+
+/// Doubles height and width by repeating each pixel.
+///
+/// # Shapes
+/// `x` `[N, C, H, W]`; the result is `[N, C, 2H, 2W]`.
+pub fn upsample_nearest_2x(x: Tensor<4>) -> Tensor<4> {
+    Tensor::from_dispatch(Dispatch::kernel_upsample_nearest_2x(x.into_dispatch()))
+}
