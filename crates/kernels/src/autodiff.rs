@@ -334,8 +334,7 @@ impl Backward<Flex, 4> for GroupNormBackward {
         let shape = shape4(&kept.x);
         let found = norm::backward(
             Isa::detect(),
-            last_values(&output_grad),
-            last_values(&kept.output),
+            [last_values(&output_grad), last_values(&kept.output)],
             last_values(&kept.x),
             shape,
             values(&kept.gamma),

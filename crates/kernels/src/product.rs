@@ -102,7 +102,7 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let mut row = 0;
     for tile in 0..tiles {
         // As even as they come: short tiles wait for their sums.
-        let rows = (product.rows - row) / (tiles - tile) + usize::from((product.rows - row) % (tiles - tile) > 0);
+        let rows = (product.rows - row).div_ceil(tiles - tile);
         let step = LANES * L::VECTORS;
         let mut column = 0;
         while column < product.columns {

@@ -133,8 +133,7 @@ pub(crate) struct GroupNormGrads {
 /// The gradients, from that of the output and the output itself.
 pub(crate) fn backward(
     isa: Isa,
-    output_grad: &[f32],
-    output: &[f32],
+    [output_grad, output]: [&[f32]; 2],
     x: &[f32],
     shape: [usize; 4],
     gamma: &[f32],

@@ -83,7 +83,7 @@ fn gradients_agree_with_finite_differences() {
     let beta = random_values(4, 3);
     let pattern = random_values(24, 4);
     let (output, statistics) = forward(isa, &x, shape, &gamma, &beta, None, &params);
-    let grads = backward(isa, &pattern, &output, &x, shape, &gamma, &statistics, &params);
+    let grads = backward(isa, [&pattern, &output], &x, shape, &gamma, &statistics, &params);
     let loss = |x: &[f32], gamma: &[f32], beta: &[f32]| {
         let (output, _) = forward(isa, x, shape, gamma, beta, None, &params);
         output.iter().zip(&pattern).map(|(o, p)| o * p).sum::<f32>()
@@ -133,7 +133,7 @@ fn every_instruction_set_and_thread_count_gives_the_same_bits() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let (output, statistics) = forward(isa, &x, shape, &gamma, &beta, Some(&g), &params);
-            let grads = backward(isa, &g, &output, &x, shape, &gamma, &statistics, &params);
+            let grads = backward(isa, [&g, &output], &x, shape, &gamma, &statistics, &params);
             [output, grads.x, grads.gamma, grads.beta]
                 .map(|values| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())
         })
