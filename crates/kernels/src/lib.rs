@@ -1,7 +1,9 @@
 //! CPU kernels for the operations on which a detector spends its time, behind burn's backend extension.
 //!
 //! burn's CPU backend `Flex` runs a convolution forwards at a fair speed and backwards through a generic
-//! fallback, and it has no ROIAlign. This crate adds both, and what else training was seen to wait for.
+//! fallback, and it has no ROIAlign. This crate adds both, and what else training was seen to wait for:
+//! 3×3 convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps where
+//! they stand, group norm, max pooling, doubling, and non-maximum suppression.
 //!
 //! ```text
 //! conv2d(x, w, b)                         the function a model calls, on `burn::tensor::Tensor`
@@ -11,8 +13,9 @@
 //!        └─ any other backend             the default body: burn's own tensor operations
 //! ```
 //!
-//! Tensors are `[N, C, H, W]`, contiguous or not. The kernels are for `f32`; any other float type takes the
-//! composed default. Results do not depend on the number of threads, to the last bit.
+//! Tensors are `[N, C, H, W]`, contiguous or not; results stand channels last in memory (`[N, H, W, C]`, told by their
+//! strides), in which form the next operation here reads them where they stand. The kernels are for `f32`; any other
+//! float type takes the composed default. Results do not depend on the number of threads, to the last bit.
 //!
 //! Left out on purpose: groups and dilation (no detector here has them), gradients with respect to ROI
 //! coordinates (the R-CNN family treats proposals as constants), and non-CPU kernels.

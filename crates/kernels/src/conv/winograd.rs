@@ -25,6 +25,7 @@ use crate::scratch::Scratch;
 use crate::simd::Isa;
 use crate::simd::lanes::LANES;
 
+mod filter_transform;
 pub(super) mod transform;
 mod weight_gradient;
 
@@ -116,7 +117,7 @@ pub(super) fn pack(isa: Isa, weight: &[f32], shape: &ConvShape, direction: Direc
         // SAFETY: a unit writes its own panel of every frequency, inside `packed`.
         unsafe {
             let target = raw.at(panel * PANEL * channels);
-            transform::filters(isa, &gathered, channels, width, flipped, target, frequency_len);
+            filter_transform::filters(isa, &gathered, channels, width, flipped, target, frequency_len);
         }
     });
     packed

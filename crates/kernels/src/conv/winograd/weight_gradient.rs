@@ -1,6 +1,7 @@
 //! The weight's gradient in the frequencies: sums over tiles instead of pixels, then back to 3×3.
 
-use super::transform::{filter_gradients, see, see_gradient};
+use super::filter_transform::filter_gradients;
+use super::transform::{see, see_gradient};
 use super::{FREQUENCIES, Frequencies, Tiling};
 use crate::conv::direct::Maps;
 use crate::conv::kernel::ConvShape;
