@@ -4,7 +4,7 @@ use burn::tensor::module;
 use burn::tensor::ops::{ConvOptions, ConvTransposeOptions};
 use burn::tensor::{DType, Device, Tensor};
 
-use super::{Conv2dParams, conv_transpose2d, conv2d};
+use super::{Conv2dEpilogue, Conv2dParams, conv_transpose2d, conv2d, conv2d_fused};
 use crate::reference::{assert_close, random_values};
 
 fn tensor<const D: usize>(shape: [usize; D], seed: u64, device: &Device) -> Tensor<D> {
@@ -152,6 +152,73 @@ fn transposed_and_sliced_tensors_are_read_as_what_they_show() {
     };
     let (x, weight) = ([2, 5, 10, 8], [3, 4, 3, 3]);
     assert_all_close(&run(ours, x, weight, 4), &run(burns, x, weight, 4));
+}
+
+/// Output and gradients of `Σ output · pattern` of a convolution and all that may follow it, or, with `in_steps`, of
+/// the same in operations of their own.
+fn run_fused(x: [usize; 4], weight: [usize; 4], params: Conv2dParams, in_steps: bool) -> Vec<Vec<f32>> {
+    let device = Device::flex().autodiff();
+    let channels = weight[0];
+    let x = tensor(x, 1, &device).require_grad();
+    let weight = tensor(weight, 2, &device).require_grad();
+    let bias = tensor([channels], 3, &device).require_grad();
+    let scale: Tensor<1> = tensor([channels], 4, &device);
+    let plain = conv2d(x.clone(), weight.clone(), None, params);
+    let residual = tensor(plain.dims(), 5, &device).require_grad();
+    let per_channel = |vector: Tensor<1>| vector.reshape([1, channels, 1, 1]);
+    let before = plain * per_channel(scale.clone()) + per_channel(bias.clone()) + residual.clone();
+    // At the ReLU's kink rounding decides: outputs within 1e-3 of it weigh nothing.
+    let pattern = tensor(before.dims(), 6, &device).mask_fill(before.clone().detach().abs().lower_elem(1e-3), 0.0);
+    let output = if in_steps {
+        burn::tensor::activation::relu(before)
+    } else {
+        let epilogue = Conv2dEpilogue {
+            scale: Some(scale),
+            residual: Some(residual.clone()),
+            activation: crate::Activation::Relu,
+        };
+        conv2d_fused(x.clone(), weight.clone(), Some(bias.clone()), params, epilogue)
+    };
+    let grads = (output.clone() * pattern).sum().backward();
+    vec![
+        to_vec(output.inner()),
+        to_vec(x.grad(&grads).unwrap()),
+        to_vec(weight.grad(&grads).unwrap()),
+        to_vec(bias.grad(&grads).unwrap()),
+        to_vec(residual.grad(&grads).unwrap()),
+    ]
+}
+
+#[test]
+fn a_fused_convolution_has_the_gradients_of_its_steps() {
+    // Winograd's way, directly in one piece, and directly with a stride.
+    for (x, weight, stride, padding) in
+        [([2, 16, 9, 10], [32, 16, 3, 3], 1, 1), ([2, 5, 6, 7], [9, 5, 1, 1], 1, 0), ([1, 5, 9, 8], [9, 5, 3, 3], 2, 1)]
+    {
+        let params = Conv2dParams::square(stride, padding);
+        let found = run_fused(x, weight, params, false);
+        let expected = run_fused(x, weight, params, true);
+        let names = ["output", "x.grad", "weight.grad", "bias.grad", "residual.grad"];
+        for ((found, expected), name) in found.iter().zip(&expected).zip(names) {
+            assert_close(found, expected, &format!("{name}, {weight:?}"));
+        }
+    }
+}
+
+#[test]
+fn packed_weights_are_forgotten_with_the_weights() {
+    let device = Device::flex();
+    let x = tensor([1, 16, 6, 6], 1, &device);
+    let params = Conv2dParams::square(1, 1);
+    // The same network twice, then changed in place and as a new tensor at what may well be the same address.
+    for seed in 2..6 {
+        let mut weight: Tensor<4> = tensor([16, 16, 3, 3], seed, &device);
+        let first = to_vec(conv2d(x.clone(), weight.clone(), None, params));
+        assert_eq!(to_vec(conv2d(x.clone(), weight.clone(), None, params)), first);
+        weight = weight * 2.0;
+        let doubled: Vec<f32> = first.iter().map(|value| 2.0 * value).collect();
+        assert_close(&to_vec(conv2d(x.clone(), weight, None, params)), &doubled, "doubled");
+    }
 }
 
 #[test]
