@@ -86,7 +86,7 @@ impl MaskHead {
     /// Gives mask logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
-        let hidden = self.mask_fcn.iter().fold(pooled, |x, conv| relu(conv.forward(x)));
+        let hidden = self.mask_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
         self.predictor.forward(relu(self.deconv.forward(hidden)))
     }
 
