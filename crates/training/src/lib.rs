@@ -35,6 +35,7 @@ mod validation;
 pub use batch::SampleSource;
 pub use config::{EarlyStop, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
+pub use pace::Pace;
 pub use progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
 pub use schedule::OneCycle;
 pub use trainer::{Trained, train};

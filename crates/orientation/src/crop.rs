@@ -1,0 +1,216 @@
+//! The square around a detected box that the network looks at.
+//!
+//! **Square**, because a crop of the box's own shape, stretched to the network's square input, would shear the part:
+//! a bar at 30° in a wide box comes out at another angle, by an amount that depends on the angle itself.
+//!
+//! **Its side is the box's diagonal**, with a margin. A part turned in place changes its box; the longer side of a
+//! bar's box is the bar's length times cos θ, so a crop by the longer side would show the bar 1.4 times as large at 45°
+//! as at 0°. The diagonal of a bar's box is the bar's length at every angle, and the whole part is inside, whatever the
+//! box's error within the margin.
+
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{Angle, BoundingBox};
+
+use crate::error::{OrientationError, Result};
+
+/// Side of the crop over the diagonal of the box: room for a box that is a little off.
+const SIDE_PER_DIAGONAL: f64 = 1.1;
+
+/// What a crop shows where it reaches beyond the image: the mean colour of photos, which the network sees as zero.
+pub const OUTSIDE: [u8; 3] = [124, 116, 104];
+
+/// Most places that are averaged for one pixel of a crop, along each axis: a reduction of eight.
+const MOST_TAPS: usize = 8;
+
+/// A square of an image, at times turned: what a crop shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CropWindow {
+    /// Centre, in pixels of the image.
+    pub center: Point2<f64>,
+    /// Side, in pixels of the image.
+    pub side: f64,
+    /// Direction of the crop's x axis in the image; zero for detected boxes, anything in training.
+    pub turn: Angle,
+}
+
+impl CropWindow {
+    /// The square around a box.
+    ///
+    /// # Errors
+    /// [`OrientationError::BadBox`] for a box without area or with a corner that is not finite.
+    pub fn around(bbox: &BoundingBox) -> Result<Self> {
+        let &BoundingBox { x1, y1, x2, y2 } = bbox;
+        let usable = [x1, y1, x2, y2].iter().all(|value| value.is_finite()) && x1 < x2 && y1 < y2;
+        if !usable {
+            return Err(OrientationError::BadBox { x1, y1, x2, y2 });
+        }
+        let side = SIDE_PER_DIAGONAL * bbox.width().hypot(bbox.height());
+        Ok(Self { center: bbox.center(), side, turn: Angle::ZERO })
+    }
+
+    /// Where a direction of the image points in the crop.
+    pub fn crop_angle(&self, image_angle: Angle) -> Angle {
+        image_angle - self.turn
+    }
+
+    /// Where a place of a crop of `size_px` pixels a side lies in the image, both in pixels.
+    pub fn image_point(&self, in_crop: &Point2<f64>, size_px: u32) -> Point2<f64> {
+        let half = f64::from(size_px) / 2.0;
+        let scale = self.side / f64::from(size_px);
+        self.center + self.x_axis() * (scale * (in_crop.x - half)) + self.y_axis() * (scale * (in_crop.y - half))
+    }
+
+    /// Reads the window into `size_px` × `size_px` pixels. Where it shrinks, it averages over each pixel's whole area,
+    /// so that a crop of a large image looks like one of a small image.
+    pub fn read(&self, image: &RgbImage, size_px: u32) -> RgbImage {
+        let scale = self.side / f64::from(size_px);
+        let taps = (scale.ceil() as usize).clamp(1, MOST_TAPS);
+        let step = |axis: Vector2<f64>| axis * (scale / taps as f64);
+        let (right, down) = (step(self.x_axis()), step(self.y_axis()));
+        let share = 1.0 / (taps * taps) as f32;
+        RgbImage::from_fn(size_px, size_px, |column, row| {
+            let corner = self.image_point(&Point2::new(f64::from(column), f64::from(row)), size_px);
+            let mut sum = [0f32; 3];
+            for tap_y in 0..taps {
+                for tap_x in 0..taps {
+                    let at = corner + right * (tap_x as f64 + 0.5) + down * (tap_y as f64 + 0.5);
+                    let colour = bilinear(image, at.x as f32, at.y as f32);
+                    (0..3).for_each(|channel| sum[channel] += colour[channel]);
+                }
+            }
+            image::Rgb(sum.map(|value| (value * share).round() as u8))
+        })
+    }
+
+    fn x_axis(&self) -> Vector2<f64> {
+        let (sin, cos) = self.turn.radians().sin_cos();
+        Vector2::new(cos, sin)
+    }
+
+    fn y_axis(&self) -> Vector2<f64> {
+        let (sin, cos) = self.turn.radians().sin_cos();
+        Vector2::new(-sin, cos)
+    }
+}
+
+/// The colour between four pixels, whose centres are at halves; [`OUTSIDE`] beyond the image.
+fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
+    let (width, height) = (image.width() as i32, image.height() as i32);
+    let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
+    let (fx, fy) = (x - 0.5 - left, y - 0.5 - top);
+    let (left, top) = (left as i32, top as i32);
+    let mut sum = [0f32; 3];
+    for (column, row, weight) in [
+        (left, top, (1.0 - fx) * (1.0 - fy)),
+        (left.saturating_add(1), top, fx * (1.0 - fy)),
+        (left, top.saturating_add(1), (1.0 - fx) * fy),
+        (left.saturating_add(1), top.saturating_add(1), fx * fy),
+    ] {
+        let inside = (0..width).contains(&column) && (0..height).contains(&row);
+        let colour = if inside { image.get_pixel(column as u32, row as u32).0 } else { OUTSIDE };
+        (0..3).for_each(|channel| sum[channel] += weight * f32::from(colour[channel]));
+    }
+    sum
+}
+
+/// The crop of a detected box, as [`OrientationCnn::predict`](crate::OrientationCnn::predict) reads it: `size_px` ×
+/// `size_px` pixels of the square around the box's centre.
+///
+/// # Units and frames
+/// `bbox` in pixels of `image`, x right, y down, the centre of the first pixel at (0.5, 0.5); it may reach beyond the
+/// image, and what lies there is [`OUTSIDE`].
+///
+/// # Errors
+/// An image without pixels, a box without area or not finite, a size of zero.
+pub fn crop_for(image: &RgbImage, bbox: &BoundingBox, size_px: u32) -> Result<RgbImage> {
+    let (width, height) = image.dimensions();
+    if width == 0 || height == 0 {
+        return Err(OrientationError::EmptyImage { width, height });
+    }
+    if size_px == 0 {
+        let expected = "at least 1".to_owned();
+        return Err(OrientationError::Config { field: "size of the crop", expected, found: "0".to_owned() });
+    }
+    Ok(CropWindow::around(bbox)?.read(image, size_px))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    fn boxed(x1: f64, y1: f64, x2: f64, y2: f64) -> BoundingBox {
+        BoundingBox { x1, y1, x2, y2 }
+    }
+
+    #[test]
+    fn the_square_has_the_boxs_centre_and_its_diagonal() {
+        let window = CropWindow::around(&boxed(10.0, 20.0, 40.0, 60.0)).unwrap();
+        assert_eq!(window.center, Point2::new(25.0, 40.0));
+        // A 3-4-5 triangle: 50 px, and a tenth more.
+        assert!((window.side - 55.0).abs() < 1e-9);
+        let corner = window.image_point(&Point2::new(0.0, 0.0), 64);
+        assert!((corner - Point2::new(-2.5, 12.5)).norm() < 1e-9, "{corner}");
+    }
+
+    #[test]
+    fn a_bar_has_the_same_size_at_every_angle() {
+        for degrees in [0.0f64, 20.0, 45.0, 80.0, 90.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            // A line of 100 px with a little width, so that its box has an area.
+            let bar = boxed(0.0, 0.0, 100.0 * cos + 0.01, 100.0 * sin + 0.01);
+            let side = CropWindow::around(&bar).unwrap().side;
+            assert!((side - 110.0).abs() < 0.1, "{degrees}: {side}");
+        }
+    }
+
+    #[test]
+    fn a_crop_shows_what_the_window_covers() {
+        // Right half of the image red; the box's centre lies on the border between the halves.
+        let image = RgbImage::from_fn(80, 60, |x, _| Rgb(if x < 40 { [0, 0, 0] } else { [200, 0, 0] }));
+        let crop = crop_for(&image, &boxed(35.0, 25.0, 45.0, 35.0), 16).unwrap();
+        assert_eq!(crop.dimensions(), (16, 16));
+        assert!((0..16).all(|y| crop.get_pixel(0, y).0 == [0, 0, 0] && crop.get_pixel(15, y).0 == [200, 0, 0]));
+    }
+
+    #[test]
+    fn a_turned_window_turns_what_it_shows_back() {
+        // Brighter along +y: with the x axis of the crop along the image's +y, brighter along the crop's +x.
+        let image = RgbImage::from_fn(60, 60, |_, y| Rgb([4 * y as u8; 3]));
+        let window = CropWindow { center: Point2::new(30.0, 30.0), side: 20.0, turn: Angle::from_degrees(90.0) };
+        let crop = window.read(&image, 10);
+        assert_eq!(crop.get_pixel(2, 1), crop.get_pixel(2, 8));
+        assert!(crop.get_pixel(8, 5)[0] > crop.get_pixel(2, 5)[0] + 30);
+        // The image's direction "down" is the crop's direction "right".
+        assert!(window.crop_angle(Angle::from_degrees(90.0)).degrees().abs() < 1e-9);
+    }
+
+    #[test]
+    fn shrinking_averages() {
+        // Stripes of one pixel, shrunk to a quarter, become one grey.
+        let image = RgbImage::from_fn(200, 200, |x, _| Rgb([if x % 2 == 0 { 0 } else { 200 }; 3]));
+        let window = CropWindow { center: Point2::new(100.0, 100.0), side: 80.0, turn: Angle::ZERO };
+        let crop = window.read(&image, 20);
+        assert!(crop.pixels().all(|pixel| (98..=102).contains(&pixel[0])), "{:?}", crop.get_pixel(3, 3));
+    }
+
+    #[test]
+    fn beyond_the_image_lies_the_mean_colour() {
+        let crop = crop_for(&RgbImage::new(20, 20), &boxed(-10.0, -10.0, 10.0, 10.0), 8).unwrap();
+        assert_eq!(crop.get_pixel(0, 0).0, OUTSIDE);
+        assert_eq!(crop.get_pixel(6, 6).0, [0, 0, 0]);
+    }
+
+    #[test]
+    fn boxes_without_sense_are_errors() {
+        let image = RgbImage::new(20, 20);
+        for bad in [boxed(5.0, 5.0, 5.0, 9.0), boxed(5.0, 5.0, 3.0, 9.0), boxed(f64::NAN, 0.0, 9.0, 9.0)] {
+            assert!(matches!(crop_for(&image, &bad, 8), Err(OrientationError::BadBox { .. })), "{bad:?}");
+        }
+        let good = boxed(1.0, 1.0, 9.0, 9.0);
+        assert!(crop_for(&RgbImage::new(0, 5), &good, 8).is_err());
+        let error = crop_for(&image, &good, 0).unwrap_err().to_string();
+        assert_eq!(error, "orientation CNN: size of the crop must be at least 1, found 0");
+    }
+}

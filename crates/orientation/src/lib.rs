@@ -1,0 +1,53 @@
+//! The orientation CNN of grasp model A: from the crop of a detected box to the angle at which the part lies.
+//!
+//! ```text
+//! RgbImage, BoundingBox ─ CropWindow: a square around the box's centre ─ crop, S×S
+//!   ─ OrientationCnn: convolutions of stride 2, two fully connected layers ─ 360 logits
+//!   ─ AngleClasses: the peak, and the circular mean around it ─ AngleReading {angle, confidence}
+//! ```
+//!
+//! The angle is the direction of the marked grasp line, `atan2(dy, dx)` in pixels with y down, so that several
+//! demonstrations of one part agree on it however the part lay in each photo.
+//!
+//! With the feature `training`, [`training`] makes crops from a demonstration and teaches the network in seconds.
+//!
+//! Left out: finding the box (crate `detection`), parts that look the same at every angle (there is nothing to learn),
+//! files and clocks (but for the feature `training`, which measures its own time).
+//!
+//! # Measured
+//!
+//! See [`training`] for how well and how fast the network learns, with the commands.
+//!
+//! # Example
+//! ```
+//! use burn::tensor::Device;
+//! use image::RgbImage;
+//! use sdg_geometry::BoundingBox;
+//! use sdg_orientation::{OrientationConfig, crop_for};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let network = OrientationConfig::edge().init(&Device::flex(), 7)?;
+//! let detected = BoundingBox::new(200.0, 150.0, 330.0, 260.0)?;
+//! let crop = crop_for(&RgbImage::new(640, 480), &detected, network.config().input_px)?;
+//! let reading = network.predict(&crop)?;
+//! assert!(reading.angle.degrees().abs() <= 180.0);
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod angle_classes;
+mod config;
+mod crop;
+mod error;
+mod network;
+#[cfg(feature = "training")]
+pub mod training;
+
+pub use angle_classes::{AngleClasses, AngleReading, Labels};
+pub use config::{OrientationConfig, Readout};
+pub use crop::{CropWindow, OUTSIDE, crop_for};
+pub use error::{OrientationError, Result};
+pub use network::{ConvNormRelu, GroupNorm, OrientationCnn, Stage, crop_batch};
+pub use sdg_detection::state_dict::{ImportReport, StateDict, WeightTensor};

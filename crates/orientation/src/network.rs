@@ -1,0 +1,308 @@
+//! The network: a batch of crops in, logits of angle classes out, angles read off them.
+//!
+//! Shapes: N crops, C channels, S the input's side, M the last map's side, K angle classes.
+//!
+//! The last map is flattened, not averaged: where on the crop something is seen is what tells the angle.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData, activation};
+use image::RgbImage;
+use image::imageops::{rotate90, rotate180, rotate270};
+use sdg_detection::initialization::{Distribution, Initializer};
+use sdg_detection::layers::Linear;
+use sdg_detection::state_dict::{self, ImportReport, StateDict};
+use sdg_kernels::{Activation, Conv2dParams, GroupNormParams, conv2d, group_norm};
+
+use crate::angle_classes::AngleReading;
+use crate::config::OrientationConfig;
+use crate::crop::OUTSIDE;
+use crate::error::{OrientationError, Result};
+
+/// Grey values that make one unit of the network's input: about the deviation of photos.
+const GREY_VALUES_PER_UNIT: f32 = 58.0;
+/// Added to a group's variance.
+const GROUP_NORM_EPS: f32 = 1e-5;
+
+/// A group norm's parameters.
+#[derive(Module, Debug)]
+pub struct GroupNorm {
+    /// Factor, `[C]`.
+    pub weight: Param<Tensor<1>>,
+    /// Summand, `[C]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+/// A convolution without a bias, its group norm, and a ReLU.
+#[derive(Module, Debug)]
+pub struct ConvNormRelu {
+    /// Kernel, `[C_out, C_in, k, k]`.
+    pub weight: Param<Tensor<4>>,
+    /// Norm of the output.
+    pub norm: GroupNorm,
+    stride: usize,
+    num_groups: usize,
+}
+
+impl ConvNormRelu {
+    fn init(shape: [usize; 4], stride: usize, num_groups: usize, init: &mut Initializer) -> Self {
+        let [channels, in_channels, kernel, _] = shape;
+        let norm = GroupNorm {
+            weight: init.param([channels], Distribution::Constant(1.0)),
+            bias: init.param([channels], Distribution::Constant(0.0)),
+        };
+        let weight = init.param(shape, Distribution::he_normal(in_channels * kernel * kernel));
+        Self { weight, norm, stride, num_groups }
+    }
+
+    /// `[N, C_in, H, W]` to `[N, C_out, H / stride, W / stride]`.
+    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
+        let weight = self.weight.val();
+        let padding = weight.dims()[2] / 2;
+        let convolved = conv2d(x, weight, None, Conv2dParams::square(self.stride, padding));
+        let params =
+            GroupNormParams { num_groups: self.num_groups, epsilon: GROUP_NORM_EPS, activation: Activation::Relu };
+        group_norm(convolved, self.norm.weight.val(), self.norm.bias.val(), params)
+    }
+}
+
+/// Convolutions at one size of map; the first halves it.
+#[derive(Module, Debug)]
+pub struct Stage {
+    /// In their order.
+    pub convs: Vec<ConvNormRelu>,
+}
+
+/// The orientation CNN.
+#[derive(Module, Debug)]
+pub struct OrientationCnn {
+    /// From the crop to the last map.
+    pub stages: Vec<Stage>,
+    /// From the flat last map.
+    pub hidden: Linear,
+    /// To the logits.
+    pub classes: Linear,
+    #[module(skip)]
+    config: OrientationConfig,
+}
+
+impl OrientationConfig {
+    /// Builds the network with parameters drawn from a seed.
+    ///
+    /// For training the device must carry autodiff (`device.autodiff()`, feature `training`).
+    ///
+    /// # Errors
+    /// Where [`OrientationConfig::validate`] finds one.
+    pub fn init(&self, device: &Device, seed: u64) -> Result<OrientationCnn> {
+        self.validate()?;
+        let mut init = Initializer::new(device, seed);
+        let mut in_channels = 3;
+        let mut stages = Vec::with_capacity(self.stage_channels.len());
+        for (stage, (&channels, &num_convs)) in self.stage_channels.iter().zip(&self.stage_convs).enumerate() {
+            let convs = (0..num_convs)
+                .map(|conv| {
+                    let kernel = if stage == 0 && conv == 0 { self.stem_kernel } else { 3 };
+                    let stride = if conv == 0 { 2 } else { 1 };
+                    let shape = [channels, in_channels, kernel, kernel];
+                    in_channels = channels;
+                    ConvNormRelu::init(shape, stride, self.norm_groups, &mut init)
+                })
+                .collect();
+            stages.push(Stage { convs });
+        }
+        let flat = in_channels * self.last_map_px().pow(2);
+        let hidden = Linear::init(flat, self.hidden, Distribution::he_normal(flat), &mut init);
+        // Small first logits: every angle is as likely as any other.
+        let classes =
+            Linear::init(self.hidden, self.classes.num_classes, Distribution::Normal { std: 0.01 }, &mut init);
+        Ok(OrientationCnn { stages, hidden, classes, config: self.clone() })
+    }
+}
+
+impl OrientationCnn {
+    /// The configuration that the network was built from.
+    pub fn config(&self) -> &OrientationConfig {
+        &self.config
+    }
+
+    /// The device that the parameters are on, autodiff included.
+    pub fn device(&self) -> Device {
+        self.classes.weight.val().device()
+    }
+
+    /// Gives the logits of a batch from [`crop_batch`].
+    ///
+    /// # Shapes
+    /// - `crops`: `[N, 3, S, S]`
+    /// - output: `[N, K]`
+    pub fn forward(&self, crops: Tensor<4>) -> Tensor<2> {
+        let [n, channels, height, width] = crops.dims();
+        let side = self.config.input_px as usize;
+        assert_eq!([channels, height, width], [3, side, side], "crops are [N, 3, S, S]");
+        let convs = self.stages.iter().flat_map(|stage| &stage.convs);
+        let map = convs.fold(crops, |x, conv| conv.forward(x));
+        let flat: Tensor<2> = map.reshape([n as i64, -1]);
+        self.classes.forward(activation::relu(self.hidden.forward(flat)))
+    }
+
+    /// Reads the angle of the part on a crop.
+    ///
+    /// # Units and frames
+    /// The direction of the marked grasp line in the crop, `atan2(dy, dx)` with y down; within the part's symmetry.
+    /// Crops of detected boxes are not turned, so it is the direction in the image, too.
+    ///
+    /// # Errors
+    /// [`OrientationError::CropSize`] for a crop of another size than [`OrientationConfig::input_px`].
+    pub fn predict(&self, crop: &RgbImage) -> Result<AngleReading> {
+        let expected = self.config.input_px;
+        if crop.dimensions() != (expected, expected) {
+            let (width, height) = crop.dimensions();
+            return Err(OrientationError::CropSize { expected, width, height });
+        }
+        let readout = self.config.readout;
+        let logits = if readout.quarter_turns {
+            let turned = [crop.clone(), rotate90(crop), rotate180(crop), rotate270(crop)];
+            self.log_probabilities(&turned)
+        } else {
+            self.log_probabilities(std::slice::from_ref(crop))
+        };
+        Ok(self.config.classes.read(&self.combined(&logits), readout.window_classes))
+    }
+
+    /// Logarithms of the classes' probabilities on each crop.
+    fn log_probabilities(&self, crops: &[RgbImage]) -> Vec<Vec<f32>> {
+        let logits = self.forward(crop_batch(crops, &self.device()));
+        let values: Vec<f32> = activation::log_softmax(logits, 1).into_data().iter::<f32>().collect();
+        values.chunks_exact(self.config.classes.num_classes).map(<[f32]>::to_vec).collect()
+    }
+
+    /// One distribution from those of a crop in equal turns (clockwise as seen, which adds to the angle): the
+    /// normalised geometric mean, in which one turn's firm no outweighs another's weak yes.
+    fn combined(&self, log_probabilities: &[Vec<f32>]) -> Vec<f64> {
+        let (k, turns) = (self.config.classes.num_classes, log_probabilities.len());
+        let mean_log: Vec<f64> = (0..k)
+            .map(|class| {
+                let of_turn = |(turn, row): (usize, &Vec<f32>)| {
+                    f64::from(row[(class + turn * self.config.classes.symmetry * k / turns) % k])
+                };
+                log_probabilities.iter().enumerate().map(of_turn).sum::<f64>() / turns as f64
+            })
+            .collect();
+        let highest = mean_log.iter().copied().fold(f64::MIN, f64::max);
+        let weights: Vec<f64> = mean_log.iter().map(|log| (log - highest).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        weights.into_iter().map(|weight| weight / sum).collect()
+    }
+
+    /// Copies every parameter to the host, by name.
+    pub fn state_dict(&self) -> StateDict {
+        state_dict::export(self)
+    }
+
+    /// Sets every parameter that `dict` has with the right shape, and reports the rest.
+    pub fn with_state_dict(self, dict: &StateDict) -> (Self, ImportReport) {
+        state_dict::import(self, dict)
+    }
+}
+
+/// Crops as the network's input, `[N, 3, S, S]`: the colour of [`OUTSIDE`] becomes zero.
+///
+/// # Panics
+/// Without a crop, or with crops of several sizes.
+pub fn crop_batch(crops: &[RgbImage], device: &Device) -> Tensor<4> {
+    let (width, height) = crops.first().expect("a batch has a crop at least").dimensions();
+    let num_pixels = (width * height) as usize;
+    let mut values = vec![0f32; crops.len() * 3 * num_pixels];
+    for (crop, planes) in crops.iter().zip(values.chunks_exact_mut(3 * num_pixels)) {
+        assert_eq!(crop.dimensions(), (width, height), "crops of one batch have one size");
+        for (channel, plane) in planes.chunks_exact_mut(num_pixels).enumerate() {
+            let mean = f32::from(OUTSIDE[channel]);
+            for (value, rgb) in plane.iter_mut().zip(crop.as_raw().chunks_exact(3)) {
+                *value = (f32::from(rgb[channel]) - mean) / GREY_VALUES_PER_UNIT;
+            }
+        }
+    }
+    Tensor::from_data(TensorData::new(values, [crops.len(), 3, height as usize, width as usize]), device)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Readout;
+    use image::Rgb;
+    use sdg_geometry::Angle;
+
+    /// Bytes of the paper's orientation CNN, which ours may not exceed.
+    const PAPER_BYTES: usize = 8_000_000;
+
+    fn tiny(quarter_turns: bool) -> OrientationCnn {
+        let config = OrientationConfig {
+            input_px: 32,
+            stage_channels: vec![8, 16],
+            stage_convs: vec![1, 1],
+            hidden: 32,
+            readout: Readout { window_classes: 16, quarter_turns },
+            ..OrientationConfig::edge()
+        };
+        config.init(&Device::flex(), 5).unwrap()
+    }
+
+    fn pattern() -> RgbImage {
+        RgbImage::from_fn(32, 32, |x, y| Rgb([(x * 8) as u8, (y * 7) as u8, ((x * y) % 251) as u8]))
+    }
+
+    fn half_precision_bytes(config: &OrientationConfig) -> usize {
+        let network = config.init(&Device::flex(), 1).unwrap();
+        network.state_dict().values().map(|tensor| 2 * tensor.values.len()).sum()
+    }
+
+    #[test]
+    fn logits_have_a_row_a_crop() {
+        let network = tiny(false);
+        let logits = network.forward(crop_batch(&[pattern(), pattern(), pattern()], &Device::flex()));
+        assert_eq!(logits.dims(), [3, 360]);
+    }
+
+    #[test]
+    fn sizes_stay_below_the_papers() {
+        let paper = half_precision_bytes(&OrientationConfig::paper());
+        assert!((5_000_000..=PAPER_BYTES).contains(&paper), "{paper}");
+        let edge = half_precision_bytes(&OrientationConfig::edge());
+        assert!(edge < 2_000_000, "{edge}");
+    }
+
+    #[test]
+    fn four_quarter_turns_make_the_reading_turn_with_the_crop() {
+        // An untrained network answers anything, but answers to all four turns of a crop are the same four answers.
+        let network = tiny(true);
+        let straight = network.predict(&pattern()).unwrap().angle;
+        let clockwise = network.predict(&rotate90(&pattern())).unwrap().angle;
+        let turn = (clockwise - straight).distance(Angle::from_degrees(90.0));
+        assert!(turn.to_degrees() < 1e-3, "{straight:?} {clockwise:?}");
+    }
+
+    #[test]
+    fn parameters_go_out_and_come_back_by_name() {
+        let network = tiny(false);
+        let dict = network.state_dict();
+        assert_eq!(dict["stages.0.convs.0.weight"].shape, [8, 3, 5, 5]);
+        assert_eq!(dict["classes.bias"].shape, [360]);
+        let other = OrientationConfig { ..network.config().clone() }.init(&Device::flex(), 99).unwrap();
+        let before = other.predict(&pattern()).unwrap();
+        let (same, report) = other.with_state_dict(&dict);
+        assert!(report.is_complete(), "{report:?}");
+        let expected = network.predict(&pattern()).unwrap();
+        assert_eq!(same.predict(&pattern()).unwrap(), expected);
+        assert_ne!(before, expected);
+
+        let mut lacking = dict.clone();
+        lacking.remove("hidden.bias");
+        let (_, report) = same.with_state_dict(&lacking);
+        assert_eq!(report.missing, ["hidden.bias"]);
+    }
+
+    #[test]
+    fn a_crop_of_another_size_is_an_error() {
+        let error = tiny(false).predict(&RgbImage::new(32, 31)).unwrap_err().to_string();
+        assert_eq!(error, "the orientation CNN reads crops of 32x32 pixels, found 32x31");
+    }
+}

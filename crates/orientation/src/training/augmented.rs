@@ -1,0 +1,189 @@
+//! Crops with their true angle, made from demonstrations.
+
+use image::RgbImage;
+use nalgebra::{Point2, Rotation2};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_demonstration::{Augmenter, Demonstration, Sample, SampleObject};
+use sdg_geometry::{Angle, BoundingBox};
+
+use super::config::CropStyle;
+use crate::crop::CropWindow;
+use crate::error::Result;
+
+/// A crop and the angle of the part on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledCrop {
+    /// The crop, square.
+    pub crop: RgbImage,
+    /// Direction of the grasp line on the crop.
+    pub angle: Angle,
+}
+
+/// Makes crops from augmented scenes: those of scene *i* of a seed are always the same, whoever asks.
+pub struct AugmentedCrops {
+    augmenter: Augmenter,
+    style: CropStyle,
+    size_px: u32,
+    seed: u64,
+}
+
+/// Streams of one seed that never meet.
+#[derive(Clone, Copy)]
+enum Stream {
+    Training = 0x6f72_6965,
+    HeldOut = 0x6865_6c64,
+}
+
+impl AugmentedCrops {
+    /// Prepares the demonstrations for crops of `size_px` pixels a side.
+    ///
+    /// # Errors
+    /// No demonstration, or one that lacks a grasp line or does not lie on its image.
+    pub fn new(demonstrations: &[Demonstration], style: &CropStyle, size_px: u32, seed: u64) -> Result<Self> {
+        for demonstration in demonstrations {
+            demonstration.annotation.require_grasp()?;
+        }
+        let augmenter = Augmenter::new(demonstrations, style.augmentation.clone(), seed)?;
+        Ok(Self { augmenter, style: style.clone(), size_px, seed })
+    }
+
+    /// The crops of a scene of the training stream; none where the part is not to be seen.
+    pub fn scene(&self, scene_idx: u64) -> Vec<LabelledCrop> {
+        let scene_idx = self.style.distinct_scenes.map_or(scene_idx, |distinct| scene_idx % distinct);
+        let mut rng = self.rng(Stream::Training, scene_idx);
+        let sample = self.augmenter.sample(scene_idx);
+        (0..self.style.crops_per_scene).filter_map(|_| self.crop(&sample, &mut rng)).collect()
+    }
+
+    /// A crop of a scene that [`scene`](Self::scene) never shows; `None` where the part is not to be seen.
+    pub fn held_out(&self, scene_idx: u64) -> Option<LabelledCrop> {
+        self.crop(&self.augmenter.held_out(scene_idx), &mut self.rng(Stream::HeldOut, scene_idx))
+    }
+
+    fn rng(&self, stream: Stream, scene_idx: u64) -> Pcg64Mcg {
+        let address = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ ((stream as u64) << 32);
+        Pcg64Mcg::seed_from_u64(address.wrapping_add(scene_idx))
+    }
+
+    fn crop(&self, sample: &Sample, rng: &mut Pcg64Mcg) -> Option<LabelledCrop> {
+        let object = sample.objects.first()?;
+        // A window cannot be turned about a part of which only the box is known.
+        let turned = self.style.turned && object.outline.is_some();
+        let turn = Angle::from_degrees(if turned { rng.random_range(-180.0..180.0) } else { 0.0 });
+        let seen = self.style.jitter.apply(&box_in_turned_frame(object, turn, &sample.image)?, rng);
+        let straight = CropWindow::around(&seen).ok()?;
+        let window = CropWindow { center: image_from_turned(turn) * straight.center, turn, ..straight };
+        let (start, end) = (object.keypoints.first()?.point(), object.keypoints.last()?.point());
+        let direction = Angle::from_direction(end.x - start.x, end.y - start.y);
+        Some(LabelledCrop { crop: window.read(&sample.image, self.size_px), angle: window.crop_angle(direction) })
+    }
+}
+
+/// From the frame of a window turned by `turn`, with the image's origin, to the image.
+fn image_from_turned(turn: Angle) -> Rotation2<f64> {
+    Rotation2::new(turn.radians())
+}
+
+/// The part's tight box as it would be on the image turned back by `turn`; `None` without extent.
+fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> Option<BoundingBox> {
+    let Some(outline) = object.outline.as_ref().filter(|_| turn != Angle::ZERO) else {
+        return Some(object.bbox);
+    };
+    // Nothing is seen beyond the image's border.
+    let seen = outline.clip(f64::from(image.width()), f64::from(image.height()));
+    let turned_from_image = image_from_turned(turn).inverse();
+    BoundingBox::around(seen.vertices.iter().map(|vertex: &Point2<f64>| turned_from_image * vertex))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::{BoxJitter, OrientationTraining};
+    use image::Rgb;
+    use sdg_demonstration::Annotation;
+    use sdg_geometry::{GraspLine, Polygon};
+
+    /// Between the marked line and the one measured on a small, noisy crop.
+    const DIRECTION_TOLERANCE_DEGREES: f64 = 8.0;
+
+    /// A bar from red to green on dark grey, its grasp line from the red end to the green one.
+    fn bar() -> Demonstration {
+        let image = RgbImage::from_fn(320, 240, |x, y| {
+            let inside = (110..210).contains(&x) && (105..135).contains(&y);
+            Rgb(match (inside, x < 160) {
+                (true, true) => [230, 20, 20],
+                (true, false) => [20, 230, 20],
+                (false, _) => [40, 40, 40],
+            })
+        });
+        let bbox = BoundingBox { x1: 110.0, y1: 105.0, x2: 210.0, y2: 135.0 };
+        let grasp = Some(GraspLine::new([120.0, 120.0].into(), [200.0, 120.0].into()));
+        let annotation = Annotation { label: "bar".into(), bbox, grasp, outline: Some(Polygon::from_box(&bbox)) };
+        Demonstration { image, annotation }
+    }
+
+    /// From the mean place of what is red to that of what is green.
+    fn measured_direction(crop: &RgbImage) -> Angle {
+        let center = |wanted: usize, other: usize| {
+            let (mut x_sum, mut y_sum, mut weight_sum) = (0.0, 0.0, 0.0);
+            for (x, y, pixel) in crop.enumerate_pixels() {
+                let (this, that) = (f64::from(pixel[wanted]), f64::from(pixel[other]));
+                let weight = if this > 2.5 * that + 25.0 { 1.0 } else { 0.0 };
+                x_sum += weight * f64::from(x);
+                y_sum += weight * f64::from(y);
+                weight_sum += weight;
+            }
+            (x_sum / weight_sum, y_sum / weight_sum)
+        };
+        let ((red_x, red_y), (green_x, green_y)) = (center(0, 1), center(1, 0));
+        Angle::from_direction(green_x - red_x, green_y - red_y)
+    }
+
+    #[test]
+    fn the_label_is_what_the_crop_shows() {
+        let mut style = OrientationTraining::edge(1).crops;
+        // Only the part on its own table: no other red or green about.
+        if let sdg_demonstration::AugmentationStyle::Scenes(scenes) = &mut style.augmentation.style {
+            scenes.photo_background_share = 1.0;
+            scenes.max_distractors = 1;
+            scenes.occlusion_probability = 0.0;
+            scenes.max_noise = 0.0;
+        }
+        let crops = AugmentedCrops::new(&[bar()], &style, 48, 11).unwrap();
+        let mut errors: Vec<f64> = (0..12)
+            .flat_map(|scene| crops.scene(scene))
+            .map(|one| measured_direction(&one.crop).distance(one.angle).to_degrees())
+            .collect();
+        assert_eq!(errors.len(), 48);
+        // A distractor may be red, too, or a cast may hide the colours: not in most scenes.
+        errors.sort_by(f64::total_cmp);
+        assert!(errors[36] < DIRECTION_TOLERANCE_DEGREES, "{errors:?}");
+    }
+
+    #[test]
+    fn scenes_repeat_and_held_out_ones_differ() {
+        let style = CropStyle { distinct_scenes: Some(3), ..OrientationTraining::edge(1).crops };
+        let crops = AugmentedCrops::new(&[bar()], &style, 32, 11).unwrap();
+        assert_eq!(crops.scene(1), crops.scene(4));
+        let [one, two, ..] = &crops.scene(1)[..] else { panic!("four crops a scene") };
+        assert_ne!(one.angle, two.angle);
+        assert_ne!(crops.held_out(1).as_ref(), Some(one));
+    }
+
+    #[test]
+    fn without_an_outline_windows_stay_straight() {
+        let mut plain = bar();
+        plain.annotation.outline = None;
+        let style = CropStyle { jitter: BoxJitter::NONE, ..OrientationTraining::edge(1).crops };
+        let crops = AugmentedCrops::new(&[plain], &style, 32, 11).unwrap().scene(0);
+        assert!(crops.iter().all(|crop| crop == &crops[0]));
+    }
+
+    #[test]
+    fn a_demonstration_without_a_grasp_line_is_an_error() {
+        let mut unmarked = bar();
+        unmarked.annotation.grasp = None;
+        assert!(AugmentedCrops::new(&[unmarked], &OrientationTraining::edge(1).crops, 32, 1).is_err());
+    }
+}

@@ -1,0 +1,180 @@
+//! The settings of a run.
+
+use std::time::Duration;
+
+use sdg_demonstration::{AugmentationConfig, AugmentationStyle, SceneStyle};
+use sdg_training::OneCycle;
+
+use super::jitter::BoxJitter;
+use super::measured::AngleErrors;
+use crate::angle_classes::Labels;
+use crate::config::check;
+use crate::error::Result;
+
+/// How the orientation CNN is trained.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OrientationTraining {
+    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    pub steps: usize,
+    /// Crops a step.
+    pub batch_size: usize,
+    /// Learning rate over the run.
+    pub schedule: OneCycle,
+    /// AdamW's decoupled weight decay.
+    pub weight_decay: f64,
+    /// The gradient's norm is cut to this.
+    pub max_gradient_norm: f32,
+    /// What the network is to answer for an angle.
+    pub labels: Labels,
+    /// Where crops come from.
+    pub crops: CropStyle,
+    /// Held-back crops that a validation looks at.
+    pub validation_crops: usize,
+    /// When a run is good enough to end before its last step.
+    pub early_stop: Option<EarlyStop>,
+    /// Wall-clock time for the whole run; see [`sdg_training::TrainingConfig::time_budget`].
+    pub time_budget: Option<Duration>,
+    /// Decides the crops and their order.
+    pub seed: u64,
+}
+
+/// Where crops come from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CropStyle {
+    /// The scenes. Every scene needs the part.
+    pub augmentation: AugmentationConfig,
+    /// Crops of each scene; divides the batch size.
+    pub crops_per_scene: usize,
+    /// Whether windows are turned at random. Needs an outline: without one windows stay straight.
+    pub turned: bool,
+    /// How far boxes are off.
+    pub jitter: BoxJitter,
+    /// Scenes before the first comes round again; `None` for new ones for ever.
+    pub distinct_scenes: Option<u64>,
+}
+
+/// What is good enough. When a validation reaches it, the learning rate is brought down within `cool_down` steps and
+/// the run ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EarlyStop {
+    /// Steps between validations.
+    pub every: usize,
+    /// Share within [`HIT_DEGREES`](super::HIT_DEGREES).
+    pub hit_rate: f64,
+    /// Median error, in degrees.
+    pub median_degrees: f64,
+    /// Steps from the validation that was good enough to the end.
+    pub cool_down: usize,
+}
+
+impl EarlyStop {
+    /// Whether a validation is good enough.
+    pub fn is_reached(&self, errors: &AngleErrors) -> bool {
+        errors.hit_rate() >= self.hit_rate && errors.median_degrees() <= self.median_degrees
+    }
+}
+
+impl OrientationTraining {
+    /// The default for the `edge` network on two cores.
+    pub fn edge(seed: u64) -> Self {
+        let scenes = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
+        let style = AugmentationStyle::Scenes(scenes);
+        Self {
+            steps: 240,
+            batch_size: 32,
+            schedule: OneCycle { peak: 2e-3, warm_up: 0.2 },
+            weight_decay: 1e-4,
+            max_gradient_norm: 10.0,
+            labels: Labels::VonMises { sigma_classes: 4.0 },
+            crops: CropStyle {
+                augmentation: AugmentationConfig { output_size: Some([320, 240]), style },
+                crops_per_scene: 4,
+                turned: true,
+                jitter: BoxJitter { position: 0.06, size: 0.12 },
+                distinct_scenes: None,
+            },
+            validation_crops: 96,
+            early_stop: None,
+            time_budget: None,
+            seed,
+        }
+    }
+
+    /// The paper's: 5000 crops, batch 32, 15 epochs, categorical cross-entropy on whole degrees.
+    ///
+    /// # Source
+    /// Paper, section IV-A and Table II; optimiser and learning rate are not given and are ours.
+    pub fn paper(seed: u64) -> Self {
+        const CROPS: usize = 5000;
+        const EPOCHS: usize = 15;
+        const BATCH_SIZE: usize = 32;
+        Self {
+            steps: EPOCHS * CROPS.div_ceil(BATCH_SIZE),
+            batch_size: BATCH_SIZE,
+            schedule: OneCycle { peak: 1e-3, warm_up: 0.1 },
+            weight_decay: 0.0,
+            labels: Labels::Hard,
+            crops: CropStyle {
+                augmentation: AugmentationConfig::paper(),
+                crops_per_scene: 1,
+                turned: false,
+                jitter: BoxJitter::NONE,
+                distinct_scenes: Some(CROPS as u64),
+            },
+            ..Self::edge(seed)
+        }
+    }
+
+    /// Refuses settings that no run can have.
+    pub(crate) fn validate(&self) -> Result<()> {
+        check(self.steps > 0, "steps", "at least 1", self.steps)?;
+        check(
+            self.crops.crops_per_scene > 0 && self.batch_size.is_multiple_of(self.crops.crops_per_scene),
+            "crops_per_scene",
+            &format!("a divisor of the batch size {}", self.batch_size),
+            self.crops.crops_per_scene,
+        )?;
+        check(self.batch_size > 0, "batch_size", "at least 1", self.batch_size)?;
+        check(self.validation_crops > 0, "validation_crops", "at least 1", self.validation_crops)?;
+        check(self.crops.distinct_scenes != Some(0), "distinct_scenes", "at least 1", 0)?;
+        let OneCycle { peak, warm_up } = self.schedule;
+        check(peak > 0.0 && peak.is_finite(), "learning rate", "a positive number", peak)?;
+        check(warm_up > 0.0 && warm_up < 1.0, "warm-up", "a share between 0 and 1", warm_up)?;
+        if let Labels::VonMises { sigma_classes } = self.labels {
+            let usable = (0.5..=90.0).contains(&sigma_classes);
+            check(usable, "sigma_classes", "0.5 to 90 classes", sigma_classes)?;
+        }
+        if let AugmentationStyle::Scenes(scenes) = &self.crops.augmentation.style {
+            let share = scenes.positive_share;
+            check(share == 1.0, "positive_share", "1, since every crop needs the part", share)?;
+        }
+        if let Some(stop) = &self.early_stop {
+            check(stop.every > 0, "early_stop.every", "at least 1 step", stop.every)?;
+        }
+        self.crops.jitter.validate()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_can_be_run_and_others_are_refused() {
+        assert!(OrientationTraining::edge(1).validate().is_ok());
+        let paper = OrientationTraining::paper(1);
+        assert!(paper.validate().is_ok());
+        assert_eq!(paper.steps, 15 * 157);
+
+        let message = |change: fn(&mut OrientationTraining)| {
+            let mut config = OrientationTraining::edge(1);
+            change(&mut config);
+            config.validate().unwrap_err().to_string()
+        };
+        assert!(message(|c| c.steps = 0).contains("steps must be at least 1, found 0"));
+        assert!(message(|c| c.crops.crops_per_scene = 5).contains("a divisor of the batch size 32, found 5"));
+        assert!(message(|c| c.labels = Labels::VonMises { sigma_classes: f64::NAN }).contains("sigma_classes"));
+        assert!(message(|c| c.crops.augmentation = AugmentationConfig::default()).contains("positive_share must be 1"));
+        assert!(message(|c| c.crops.jitter.size = 3.0).contains("jitter.size"));
+    }
+}

@@ -1,0 +1,72 @@
+//! How far angles are off.
+
+use sdg_training::median;
+
+use super::augmented::LabelledCrop;
+use crate::error::Result;
+use crate::network::OrientationCnn;
+
+/// An angle farther from the truth than this spoils the grasp.
+pub const HIT_DEGREES: f64 = 10.0;
+
+/// Errors of a network on some crops, in degrees, within the part's symmetry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AngleErrors {
+    sorted: Vec<f64>,
+}
+
+impl AngleErrors {
+    /// Errors as they come.
+    pub fn new(mut degrees: Vec<f64>) -> Self {
+        degrees.sort_by(f64::total_cmp);
+        Self { sorted: degrees }
+    }
+
+    /// Shows the network crops whose truth is known.
+    ///
+    /// # Errors
+    /// A crop of another size than the network's input.
+    pub fn measure<'a>(network: &OrientationCnn, crops: impl IntoIterator<Item = &'a LabelledCrop>) -> Result<Self> {
+        let classes = network.config().classes;
+        let error = |crop: &LabelledCrop| -> Result<f64> {
+            Ok(classes.distance(network.predict(&crop.crop)?.angle, crop.angle).to_degrees())
+        };
+        Ok(Self::new(crops.into_iter().map(error).collect::<Result<_>>()?))
+    }
+
+    /// How many crops.
+    pub fn count(&self) -> usize {
+        self.sorted.len()
+    }
+
+    /// Share within [`HIT_DEGREES`]; zero without crops.
+    pub fn hit_rate(&self) -> f64 {
+        let hits = self.sorted.iter().filter(|error| **error <= HIT_DEGREES).count();
+        hits as f64 / self.sorted.len().max(1) as f64
+    }
+
+    /// Median in degrees; infinite without crops.
+    pub fn median_degrees(&self) -> f64 {
+        median(&mut self.sorted.clone()).unwrap_or(f64::INFINITY)
+    }
+
+    /// The error that `share` of the crops stay below, in degrees; infinite without crops.
+    pub fn quantile_degrees(&self, share: f64) -> f64 {
+        let last = self.sorted.len().saturating_sub(1);
+        self.sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::INFINITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_by_hand() {
+        let errors = AngleErrors::new(vec![3.0, 1.0, 170.0, 10.0]);
+        assert_eq!((errors.count(), errors.hit_rate(), errors.median_degrees()), (4, 0.75, 6.5));
+        assert_eq!(errors.quantile_degrees(1.0), 170.0);
+        let none = AngleErrors::new(vec![]);
+        assert_eq!((none.hit_rate(), none.median_degrees()), (0.0, f64::INFINITY));
+    }
+}
