@@ -31,8 +31,9 @@ lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
 
+# Together with sdg-cli: alone, sdg-benches would ask for fewer features, and burn would be compiled once more.
 bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
-	$(CARGO) build $(PROFILE) --locked -p sdg-benches
+	$(CARGO) build $(PROFILE) --locked -p sdg-cli -p sdg-benches
 	benches/peers/install.sh target/bench/venv
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 
