@@ -101,8 +101,7 @@ mod tests {
 
     #[test]
     fn lines_are_as_the_python_workers_write_them() {
-        let line =
-            r#"{"ready": {"seconds": 0.5, "facts": {"boxes": 100}, "gflop": null, "version": "torch 2.15.0"}}"#;
+        let line = r#"{"ready": {"seconds": 0.5, "facts": {"boxes": 100}, "gflop": null, "version": "torch 2.15.0"}}"#;
         let Answer::Ready(ready) = serde_json::from_str(line).unwrap() else { panic!("it is ready") };
         assert_eq!((ready.seconds, ready.facts["boxes"], ready.gflop), (Some(0.5), 100.0, None));
         assert_eq!(serde_json::from_str::<Answer>(r#"{"seconds": 0.25}"#).unwrap(), Answer::Seconds(0.25));

@@ -49,8 +49,7 @@ const fn compared(
 }
 
 /// Our own product of matrices, and the largest of what both reach is the machine's peak.
-pub const GEMM: WorkSpec =
-    compared("gemm", "product of two 2048×2048 matrices", None, &[also("pytorch", "PyTorch")]);
+pub const GEMM: WorkSpec = compared("gemm", "product of two 2048×2048 matrices", None, &[also("pytorch", "PyTorch")]);
 
 const TORCHVISION: &[Peer] = &[peer("pytorch", "torchvision", 2.0)];
 const TRAINING: &[Peer] = &[peer("pytorch", "PyTorch", 1.5)];
@@ -93,15 +92,9 @@ pub const WORKS: &[WorkSpec] = &[
         "augmentation",
         "augmentation, one sample of 480×640",
         None,
-        &[
-            peer("albumentations", "albumentations", 3.0),
-            also("albumentations-fused", "albumentations, one affine"),
-        ],
+        &[peer("albumentations", "albumentations", 3.0), also("albumentations-fused", "albumentations, one affine")],
     ),
-    WorkSpec {
-        long: true,
-        ..compared("teaching", "teaching with edge, demonstration to validated model", None, &[])
-    },
+    WorkSpec { long: true, ..compared("teaching", "teaching with edge, demonstration to validated model", None, &[]) },
     WorkSpec {
         needs_model: true,
         ..compared("edge-grasp", "edge detection with verification, 480×640 in, grasp out", None, &[])

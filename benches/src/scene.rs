@@ -39,9 +39,7 @@ pub fn target(columns: u32, rows: u32, num_keypoints: usize) -> Target {
 /// `count` points in the middles of as many equal parts of a box's diagonal.
 fn diagonal(of_part: &BoundingBox, count: usize) -> Vec<sdg_geometry::Keypoint> {
     let half = 0.5 / count as f64;
-    let at = |along: f64| {
-        Point2::new(of_part.x1 + along * of_part.width(), of_part.y1 + along * of_part.height())
-    };
+    let at = |along: f64| Point2::new(of_part.x1 + along * of_part.width(), of_part.y1 + along * of_part.height());
     GraspLine::new(at(half), at(1.0 - half)).keypoints(count)
 }
 

@@ -286,10 +286,7 @@ mod tests {
         let mut report = Report::new(machine, 2);
         report.set_peak(&[measured(Side::Ours, &[0.2, 0.1])]);
         let backbone = work("backbone");
-        let torch = Measured {
-            gflop: Some(43.0),
-            ..measured(Side::Peer(&backbone.peers[0]), &[1.0, 9.0, 2.0])
-        };
+        let torch = Measured { gflop: Some(43.0), ..measured(Side::Peer(&backbone.peers[0]), &[1.0, 9.0, 2.0]) };
         report.add(backbone, vec![measured(Side::Ours, &[0.5, 0.4, 0.7, 0.6]), torch]);
         report.add(work("teaching"), vec![measured(Side::Ours, &[90.0])]);
         report

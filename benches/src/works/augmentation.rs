@@ -13,10 +13,8 @@ const SAMPLES: usize = 64;
 
 pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {
     let demonstration = read_demonstration(demonstration)?;
-    let size = facts([
-        ("width", f64::from(demonstration.image.width())),
-        ("height", f64::from(demonstration.image.height())),
-    ]);
+    let size =
+        facts([("width", f64::from(demonstration.image.width())), ("height", f64::from(demonstration.image.height()))]);
     let augmenter = Augmenter::new(&[demonstration], AugmentationConfig::paper(), 1)?;
     let mut first = 0;
     let run = move || {

@@ -64,13 +64,8 @@ mod tests {
     #[test]
     fn every_registered_work_is_known_here() {
         for work in WORKS.iter().chain([&GEMM]) {
-            let args = WorkArgs {
-                name: work.name.to_owned(),
-                weights: None,
-                demonstration: None,
-                model: None,
-                threads: 2,
-            };
+            let args =
+                WorkArgs { name: work.name.to_owned(), weights: None, demonstration: None, model: None, threads: 2 };
             // Without its files a work is refused for them, not for its name.
             let refused = build(&args).err().map(|error| error.to_string());
             assert!(refused.is_none_or(|error| !error.contains("expected a work")), "{}", work.name);

@@ -54,10 +54,8 @@ pub fn inference(network: Network, weights: &Path) -> Result<Work> {
     let detector = network.load(&Device::flex(), weights)?;
     let (transform, picture) = (detector.image_transform(), scene::picture(0));
     let found = detector.detect(&[transform.apply(&picture)?]).pop().context("one image gives one answer")?;
-    let mut detection_facts = facts([
-        ("boxes", found.boxes.len() as f64),
-        ("mean_score", mean(found.scores.iter().copied())),
-    ]);
+    let mut detection_facts =
+        facts([("boxes", found.boxes.len() as f64), ("mean_score", mean(found.scores.iter().copied()))]);
     if network == Network::Keypoint {
         let scores = found.keypoints.iter().flatten().map(|keypoint| keypoint.score);
         detection_facts.insert("mean_keypoint_score".to_owned(), mean(scores));
