@@ -22,6 +22,8 @@ pub const POSITIVE_ROIS: usize = 32;
 pub enum Network {
     /// R50-FPN with boxes.
     Faster,
+    /// R50-FPN with boxes and masks.
+    Mask,
     /// R50-FPN with boxes and keypoints.
     Keypoint,
     /// The preset for two cores.
@@ -33,6 +35,7 @@ impl Network {
     pub fn name(self) -> &'static str {
         match self {
             Self::Faster => "faster",
+            Self::Mask => "mask",
             Self::Keypoint => "keypoint",
             Self::Edge => "edge",
         }
@@ -42,6 +45,7 @@ impl Network {
     pub fn config(self) -> RcnnConfig {
         match self {
             Self::Faster => with_torchvision_numerics(RcnnKind::Faster { num_classes: 1 }),
+            Self::Mask => with_torchvision_numerics(RcnnKind::Mask { num_classes: 1 }),
             Self::Keypoint => with_torchvision_numerics(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS }),
             Self::Edge => presets::edge(sdg_grasp::NUM_KEYPOINTS),
         }
@@ -127,6 +131,11 @@ fn with_torchvision_numerics(kind: RcnnKind) -> RcnnConfig {
     if let Some(head) = &mut heads.keypoint_head {
         legacy(&mut head.pooler);
         head.score = KeypointScore::Logit;
+    }
+    if let Some(head) = &mut heads.mask_head {
+        legacy(&mut head.pooler);
+        head.targets = MaskTargets::Pooled;
+        head.pasting = MaskPasting::WholePixels;
     }
     config
 }

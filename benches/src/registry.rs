@@ -68,8 +68,10 @@ pub const WORKS: &[WorkSpec] = &[
         ],
     ),
     compared("faster-inference", "Faster R-CNN R50 inference, 480×640", Some(Network::Faster), TORCHVISION),
+    compared("mask-inference", "Mask R-CNN R50 inference, 480×640", Some(Network::Mask), TORCHVISION),
     compared("keypoint-inference", "Keypoint R-CNN R50 inference, 480×640", Some(Network::Keypoint), TORCHVISION),
     compared("faster-training-step", "Faster R-CNN R50 training step, 2 × 480×640", Some(Network::Faster), TRAINING),
+    compared("mask-training-step", "Mask R-CNN R50 training step, 2 × 480×640", Some(Network::Mask), TRAINING),
     compared(
         "keypoint-training-step",
         "Keypoint R-CNN R50 training step, 2 × 480×640",

@@ -2,8 +2,8 @@
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
-use sdg_detection::Target;
-use sdg_geometry::{BoundingBox, GraspLine};
+use sdg_detection::{ObjectMask, Target};
+use sdg_geometry::{BoundingBox, GraspLine, Mask};
 
 /// Width of every picture, pixels.
 pub const WIDTH: u32 = 640;
@@ -29,11 +29,20 @@ pub fn boxes(columns: u32, rows: u32) -> Vec<BoundingBox> {
         .collect()
 }
 
-/// A part in each cell of a grid, with keypoints along its box's diagonal.
+/// A part in each cell of a grid, with keypoints along its box's diagonal; its mask is the box without its lower right
+/// quarter.
 pub fn target(columns: u32, rows: u32, num_keypoints: usize) -> Target {
     let boxes = boxes(columns, rows);
     let keypoints = boxes.iter().map(|of_part| diagonal(of_part, num_keypoints)).collect();
-    Target { labels: vec![0; boxes.len()], keypoints, boxes }
+    let masks = boxes.iter().map(mask).collect();
+    Target { labels: vec![0; boxes.len()], keypoints, masks, boxes }
+}
+
+fn mask(of_part: &BoundingBox) -> ObjectMask {
+    let [x1, y1, x2, y2] = [of_part.x1, of_part.y1, of_part.x2, of_part.y2].map(|v| v as u32);
+    let [x, y] = [(x1 + x2) / 2, (y1 + y2) / 2];
+    let inside = |u, v| (x1..x2).contains(&u) && (y1..y2).contains(&v) && (u < x || v < y);
+    Mask::from_fn(WIDTH, HEIGHT, inside).into()
 }
 
 /// `count` points in the middles of as many equal parts of a box's diagonal.

@@ -60,6 +60,11 @@ pub fn inference(network: Network, weights: &Path) -> Result<Work> {
         let scores = found.keypoints.iter().flatten().map(|keypoint| keypoint.score);
         detection_facts.insert("mean_keypoint_score".to_owned(), mean(scores));
     }
+    if network == Network::Mask {
+        let pixels = f64::from(scene::WIDTH * scene::HEIGHT);
+        detection_facts
+            .insert("mask_share".to_owned(), mean(found.masks.iter().map(|mask| mask.area() as f64 / pixels)));
+    }
     Ok(Work::new(detection_facts, move || {
         std::hint::black_box(detector.detect(&[transform.apply(&picture)?]));
         Ok(())
