@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test lint clean
+.PHONY: help setup build demo test lint bench clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -30,6 +30,12 @@ test: setup ## Runs every test
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
+
+# Together with sdg-cli: alone, sdg-benches would ask for fewer features, and burn would be compiled once more.
+bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
+	$(CARGO) build $(PROFILE) --locked -p sdg-cli -p sdg-benches
+	benches/peers/install.sh target/bench/venv
+	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 
 clean: ## Removes what was built and reported
 	$(CARGO) clean

@@ -1,0 +1,79 @@
+//! What the run was made on.
+
+use std::process::Command;
+
+/// The machine and the state of the repository.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    /// The processor's name.
+    pub processor: String,
+    /// Cores that this process may use.
+    pub cores: usize,
+    /// The widest instructions that matter here.
+    pub instructions: &'static str,
+    /// Main memory, GiB.
+    pub memory_gib: f64,
+    /// The commit that was measured, with a plus sign where files differ from it.
+    pub commit: String,
+}
+
+impl Machine {
+    /// Asks the system; what it does not tell is "unknown".
+    pub fn read() -> Self {
+        let processor = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let memory = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+        Self {
+            processor: processor_name(&processor),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            instructions: instructions(&processor),
+            memory_gib: value(&memory, "MemTotal").and_then(kib).unwrap_or(0.0) / f64::from(1 << 20),
+            commit: git(&["describe", "--always", "--dirty=+", "--abbrev=8"]).unwrap_or_else(|| "unknown".to_owned()),
+        }
+    }
+}
+
+fn git(arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// Value of the first line with that key.
+fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    let mut lines = text.lines().filter_map(|line| line.split_once(':'));
+    lines.find(|(found, _)| found.trim() == key).map(|(_, value)| value.trim())
+}
+
+fn kib(text: &str) -> Option<f64> {
+    text.strip_suffix("kB")?.trim().parse().ok()
+}
+
+/// The model's name, and family and model number, since virtual machines call many processors the same.
+fn processor_name(cpuinfo: &str) -> String {
+    let of = |key| value(cpuinfo, key).unwrap_or("unknown");
+    format!("{} (family {}, model {})", of("model name"), of("cpu family"), of("model"))
+}
+
+fn instructions(cpuinfo: &str) -> &'static str {
+    let has = |flag| value(cpuinfo, "flags").is_some_and(|flags| flags.split_whitespace().any(|one| one == flag));
+    if has("avx512f") {
+        "AVX-512"
+    } else if has("avx2") {
+        "AVX2"
+    } else {
+        "neither AVX-512 nor AVX2"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_the_first_processor() {
+        let cpuinfo = "processor\t: 0\ncpu family\t: 25\nmodel\t\t: 17\nmodel name\t: AMD EPYC\n\
+                       flags\t\t: fpu avx2 avx512f\n\nprocessor\t: 1\nmodel name\t: other\n";
+        assert_eq!(processor_name(cpuinfo), "AMD EPYC (family 25, model 17)");
+        assert_eq!(instructions(cpuinfo), "AVX-512");
+        assert_eq!(instructions("flags : avx avx2"), "AVX2");
+    }
+}

@@ -1,0 +1,69 @@
+//! How many rounds, and how often each side runs in its turn.
+
+/// How long to measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Rounds, where they fit.
+    pub rounds: usize,
+    /// Rounds, whether they fit or not.
+    pub least_rounds: usize,
+    /// A turn lasts at least this long: fast works run several times in it.
+    pub turn_secs: f64,
+    /// Rounds beyond the least ones end here.
+    pub budget_secs: f64,
+}
+
+/// What a work's warm-ups say about how to measure it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Rounds.
+    pub rounds: usize,
+    /// Runs of each side in its turn.
+    pub repeats: Vec<usize>,
+}
+
+impl Pace {
+    /// For figures to be published: all works in twelve minutes.
+    pub const FULL: Self = Self { rounds: 7, least_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
+    /// To see where we are.
+    pub const QUICK: Self = Self { rounds: 3, least_rounds: 1, turn_secs: 0.3, budget_secs: 10.0 };
+
+    /// Plans from the seconds of one run of each side.
+    pub fn plan(&self, warm_ups: &[Option<f64>]) -> Plan {
+        let repeats: Vec<usize> = warm_ups
+            .iter()
+            .map(|seconds| seconds.map_or(1, |seconds| (self.turn_secs / seconds.max(1e-6)).ceil().min(500.0) as usize))
+            .collect();
+        let round: f64 = warm_ups.iter().zip(&repeats).map(|(secs, &count)| secs.unwrap_or(0.0) * count as f64).sum();
+        let fit = (self.budget_secs / round.max(1e-6)) as usize;
+        // An order from outside for fewer rounds counts.
+        let least = self.least_rounds.min(self.rounds);
+        Plan { rounds: fit.clamp(least, self.rounds), repeats }
+    }
+
+    /// One run of each.
+    pub fn once(&self, warm_ups: &[Option<f64>]) -> Plan {
+        Plan { rounds: 1, repeats: vec![1; warm_ups.len()] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PACE: Pace = Pace { rounds: 7, least_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
+
+    #[test]
+    fn fast_works_fill_their_turn_and_slow_ones_have_few_rounds() {
+        assert_eq!(PACE.plan(&[Some(0.01), Some(0.2)]), Plan { rounds: 7, repeats: vec![50, 3] });
+        // 2 + 4 s a round: five fit into 30 s.
+        assert_eq!(PACE.plan(&[Some(2.0), Some(4.0)]), Plan { rounds: 5, repeats: vec![1, 1] });
+        assert_eq!(PACE.plan(&[Some(40.0), Some(60.0)]).rounds, 3);
+        assert_eq!(PACE.plan(&[Some(0.0)]).repeats, [500]);
+    }
+
+    #[test]
+    fn rounds_may_be_fewer_than_the_least_when_asked_for() {
+        assert_eq!(Pace { rounds: 1, ..PACE }.plan(&[Some(0.1)]).rounds, 1);
+    }
+}

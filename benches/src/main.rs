@@ -1,0 +1,86 @@
+//! `sdg-bench`: our speed against that of others, on the same work in one run.
+//!
+//! ```text
+//! sdg-bench compare ─┬─ sdg-bench work NAME ─────── ours          one computes at a time, turn by turn;
+//!                    ├─ python peers/worker.py ──── a peer        each is a process of its own, so that
+//!                    └─ …                                         its peak memory is its own too
+//!         │
+//!         └─ medians ─ target/bench/peers.json, a table, benches/RESULTS.md
+//! ```
+//!
+//! What is compared stands in [`registry`]; both sides load the same weights, see the same pictures and tell facts of
+//! what they computed (how many boxes, which scores), which must agree before anything is timed. Left out: installing
+//! the peers (`make bench`) and checking our kernels (their own tests).
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod compare;
+mod network;
+mod protocol;
+mod registry;
+mod scene;
+mod works;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args as ClapArgs, Parser, Subcommand};
+
+use crate::network::Network;
+
+/// Our speed against PyTorch, ONNX Runtime, OpenVINO and albumentations, on the same work in one run.
+#[derive(Debug, Parser)]
+#[command(name = "sdg-bench", version, arg_required_else_help = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Runs ours and theirs turn by turn and writes medians
+    Compare(compare::CompareArgs),
+    /// Runs one of our works when asked on standard input; `compare` starts it
+    Work(WorkArgs),
+    /// Writes a network's weights for both sides to load
+    Weights {
+        /// Which network
+        network: Network,
+        /// A safetensors file
+        out: PathBuf,
+    },
+}
+
+/// `sdg-bench work`
+#[derive(Debug, ClapArgs)]
+struct WorkArgs {
+    /// Which work; `compare --help` lists them
+    name: String,
+    /// Weights written by `sdg-bench weights`
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Folder with image.png and annotation.json
+    #[arg(long, value_name = "DIR")]
+    demonstration: Option<PathBuf>,
+    /// The grasp model that the work `teaching` writes and `edge-grasp` reads
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Threads, where a work starts some of its own
+    #[arg(long, default_value_t = 2, value_name = "N")]
+    threads: usize,
+}
+
+fn main() -> ExitCode {
+    let result = match Args::parse().command {
+        Command::Compare(args) => compare::run(&args),
+        Command::Work(args) => protocol::serve(|| works::build(&args)),
+        Command::Weights { network, out } => network.write_weights(&out),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("sdg-bench: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! The networks that are compared, and the weights that both sides load.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use burn::tensor::Device;
+use clap::ValueEnum;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use sdg_detection::config::*;
+use sdg_detection::presets::{self, RcnnKind};
+use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+
+/// Keypoints of a part for R50: COCO's number.
+pub const NUM_KEYPOINTS: usize = 17;
+/// Positive ROIs an image while training, of 512: as many as the pictures have parts, whose own boxes are among the
+/// candidates, so that the number is reached whatever the weights.
+pub const POSITIVE_ROIS: usize = 32;
+
+/// A network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Network {
+    /// R50-FPN with boxes.
+    Faster,
+    /// R50-FPN with boxes and masks.
+    Mask,
+    /// R50-FPN with boxes and keypoints.
+    Keypoint,
+    /// The preset for two cores.
+    Edge,
+}
+
+impl Network {
+    /// The name on the command line and of the weights' file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Faster => "faster",
+            Self::Mask => "mask",
+            Self::Keypoint => "keypoint",
+            Self::Edge => "edge",
+        }
+    }
+
+    /// The configuration: torchvision's numerics for R50, since it is torchvision that it is compared with.
+    pub fn config(self) -> RcnnConfig {
+        match self {
+            Self::Faster => with_torchvision_numerics(RcnnKind::Faster { num_classes: 1 }),
+            Self::Mask => with_torchvision_numerics(RcnnKind::Mask { num_classes: 1 }),
+            Self::Keypoint => with_torchvision_numerics(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS }),
+            Self::Edge => presets::edge(sdg_grasp::NUM_KEYPOINTS),
+        }
+    }
+
+    /// Writes weights drawn from a fixed seed, tamed so that values stay of order one through R50's sixteen blocks,
+    /// which have no trained norms to do that here.
+    pub fn write_weights(self, out: &Path) -> Result<()> {
+        let mut weights = state_dict::export(&self.config().init(&Device::flex(), SEED)?);
+        for (name, weight) in &mut weights {
+            if name.ends_with("conv3.norm.weight") {
+                weight.values.fill(RESIDUAL_GAIN);
+            }
+        }
+        let bytes: Vec<(&String, &WeightTensor, Vec<u8>)> = weights
+            .iter()
+            .map(|(name, weight)| (name, weight, weight.values.iter().flat_map(|v| v.to_le_bytes()).collect()))
+            .collect();
+        let views = bytes
+            .iter()
+            .map(|(name, weight, bytes)| Ok((*name, TensorView::new(Dtype::F32, weight.shape.clone(), bytes)?)))
+            .collect::<Result<Vec<_>>>()?;
+        let unfinished = out.with_extension("unfinished");
+        safetensors::serialize_to_file(views, None, &unfinished)?;
+        std::fs::rename(&unfinished, out).with_context(|| out.display().to_string())
+    }
+
+    /// Builds the network with the weights of a file.
+    pub fn load(self, device: &Device, weights: &Path) -> Result<GeneralizedRcnn> {
+        let bytes = std::fs::read(weights).with_context(|| weights.display().to_string())?;
+        let dict: StateDict = SafeTensors::deserialize(&bytes)?
+            .iter()
+            .map(|(name, view)| {
+                ensure!(view.dtype() == Dtype::F32, "{name}: expected F32, found {:?}", view.dtype());
+                let values = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+                Ok((name.to_owned(), WeightTensor { shape: view.shape().to_vec(), values: values.collect() }))
+            })
+            .collect::<Result<_>>()?;
+        drop(bytes);
+        let (network, report) = state_dict::import(self.config().init(device, SEED)?, &dict);
+        if !report.is_complete() {
+            bail!("{}: expected the weights of {}, found others: {report:?}", weights.display(), self.name());
+        }
+        Ok(network)
+    }
+}
+
+/// Draws the weights.
+const SEED: u64 = 11;
+/// Factor on the last convolution of every bottleneck.
+const RESIDUAL_GAIN: f32 = 0.2;
+
+/// Detectron2's detector with every difference to torchvision's settled torchvision's way, at short side 480.
+fn with_torchvision_numerics(kind: RcnnKind) -> RcnnConfig {
+    let mut config = presets::r50_detectron2(kind);
+    config.input = ImageTransformConfig {
+        resize: ResizeRule::ShortSide { short_px: 480, max_long_px: 1333, rounding: SizeRounding::Floor },
+        filter: ResizeFilter::Bilinear,
+        channel_order: ChannelOrder::Rgb,
+        pixel_range: PixelRange::Unit,
+        mean: [0.485, 0.456, 0.406],
+        std: [0.229, 0.224, 0.225],
+        size_divisibility: 32,
+    };
+    config.backbone.block = BlockKind::Bottleneck { inner_channels: 64, stride_in: StrideIn::Conv3x3 };
+    config.anchors.rounding = AnchorRounding::Rounded;
+    config.anchors.stride = AnchorStride::ImageOverGrid;
+    config.rpn.post_nms_top_n = PerMode { train: 2000, test: 1000 };
+    config.rpn.min_box_size_px = 1e-3;
+    config.rpn.regression_loss = RegressionLoss::SmoothL1 { beta: 1.0 / 9.0 };
+    config.rpn.normaliser = RpnNormaliser::DrawnSamples;
+    let heads = &mut config.roi_heads;
+    heads.sampler.positive_fraction = POSITIVE_ROIS as f64 / heads.sampler.batch_size_per_image as f64;
+    heads.box_head.background = BackgroundClass::First;
+    heads.box_head.regression_loss = RegressionLoss::SmoothL1 { beta: 1.0 / 9.0 };
+    heads.box_head.min_box_size_px = 1e-2;
+    let legacy = |pooler: &mut RoiPoolerConfig| {
+        pooler.alignment = RoiAlignment::Legacy;
+        pooler.sampling_ratio = SamplingRatio::Fixed(2);
+        pooler.level_epsilon = LevelEpsilon::OutsideLog(1e-6);
+    };
+    legacy(&mut heads.box_head.pooler);
+    if let Some(head) = &mut heads.keypoint_head {
+        legacy(&mut head.pooler);
+        head.score = KeypointScore::Logit;
+    }
+    if let Some(head) = &mut heads.mask_head {
+        legacy(&mut head.pooler);
+        head.targets = MaskTargets::Pooled;
+        head.pasting = MaskPasting::WholePixels;
+    }
+    config
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_configuration_is_sound() {
+        for network in Network::value_variants() {
+            assert!(network.config().validate().is_ok(), "{}", network.name());
+        }
+    }
+
+    #[test]
+    fn weights_come_back_from_their_file_and_others_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("edge.safetensors");
+        Network::Edge.write_weights(&file).unwrap();
+        let device = Device::flex();
+        let loaded = Network::Edge.load(&device, &file).unwrap();
+        let drawn = Network::Edge.config().init(&device, SEED).unwrap();
+        assert_eq!(state_dict::export(&loaded), state_dict::export(&drawn));
+        let error = Network::Faster.load(&device, &file).unwrap_err().to_string();
+        assert!(error.contains("expected the weights of faster"), "{error}");
+    }
+}

@@ -1,0 +1,110 @@
+//! The conversation between `compare` and those who work, a JSON object a line.
+//!
+//! ```text
+//! worker: {"ready": {"seconds": s, "facts": {…}, "gflop": g, "version": "…"}}   after one run that does not count
+//! driver: {"repeat": n}
+//! worker: {"seconds": s}                                                        n times
+//! ```
+//!
+//! The end of standard input ends a worker. `peers/protocol.py` is the same for Python.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+/// Numbers that tell what was computed: whoever does the same work has the same.
+pub type Facts = BTreeMap<String, f64>;
+
+/// What a worker says first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Ready {
+    /// Seconds of the run that does not count; `None` where there was none.
+    pub seconds: Option<f64>,
+    /// What was computed.
+    pub facts: Facts,
+    /// Multiplications and additions of the network's products, 1e9 of them, where the worker counts.
+    pub gflop: Option<f64>,
+    /// What it runs on.
+    pub version: String,
+}
+
+/// From worker to driver.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Answer {
+    /// Ready to be timed.
+    Ready(Ready),
+    /// Seconds of one run, divided by its pieces.
+    Seconds(f64),
+}
+
+/// From driver to worker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Request {
+    /// Runs to make.
+    pub repeat: usize,
+}
+
+/// Something to be timed.
+pub struct Work {
+    /// One run.
+    pub run: Box<dyn FnMut() -> Result<()>>,
+    /// What it computes.
+    pub facts: Facts,
+    /// How many pieces one run makes; times are told for one.
+    pub pieces: usize,
+    /// Whether one run goes before that does not count.
+    pub warm_up: bool,
+}
+
+impl Work {
+    /// One piece a run, with a warm-up.
+    pub fn new(facts: Facts, run: impl FnMut() -> Result<()> + 'static) -> Self {
+        Self { run: Box::new(run), facts, pieces: 1, warm_up: true }
+    }
+
+    fn timed(&mut self) -> Result<f64> {
+        let start = Instant::now();
+        (self.run)()?;
+        Ok(start.elapsed().as_secs_f64() / self.pieces as f64)
+    }
+}
+
+/// Builds the work, warms up and serves runs until standard input ends.
+pub fn serve(build: impl FnOnce() -> Result<Work>) -> Result<()> {
+    let mut work = build()?;
+    let mut out = std::io::stdout().lock();
+    let mut tell = |answer: &Answer| -> Result<()> {
+        writeln!(out, "{}", serde_json::to_string(answer)?)?;
+        Ok(out.flush()?)
+    };
+    let seconds = if work.warm_up { Some(work.timed()?) } else { None };
+    let version = concat!("sdg ", env!("CARGO_PKG_VERSION")).to_owned();
+    tell(&Answer::Ready(Ready { seconds, facts: work.facts.clone(), gflop: None, version }))?;
+    for line in std::io::stdin().lock().lines() {
+        let line = line?;
+        let request: Request =
+            serde_json::from_str(&line).with_context(|| format!("expected {{\"repeat\": n}}, found {line}"))?;
+        for _ in 0..request.repeat {
+            tell(&Answer::Seconds(work.timed()?))?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_as_the_python_workers_write_them() {
+        let line = r#"{"ready": {"seconds": 0.5, "facts": {"boxes": 100}, "gflop": null, "version": "torch 2.15.0"}}"#;
+        let Answer::Ready(ready) = serde_json::from_str(line).unwrap() else { panic!("it is ready") };
+        assert_eq!((ready.seconds, ready.facts["boxes"], ready.gflop), (Some(0.5), 100.0, None));
+        assert_eq!(serde_json::from_str::<Answer>(r#"{"seconds": 0.25}"#).unwrap(), Answer::Seconds(0.25));
+        assert_eq!(serde_json::to_string(&Request { repeat: 3 }).unwrap(), r#"{"repeat":3}"#);
+    }
+}

@@ -1,0 +1,36 @@
+//! The paper's augmentation: samples of one photo, with their boxes and keypoints.
+
+use std::path::Path;
+
+use anyhow::Result;
+use sdg_demonstration::{AugmentationConfig, Augmenter};
+
+use crate::protocol::Work;
+use crate::works::{facts, read_demonstration};
+
+/// Samples a run; `peers/augmentation.py` makes as many.
+const SAMPLES: usize = 64;
+
+pub fn samples(demonstration: &Path, threads: usize) -> Result<Work> {
+    let demonstration = read_demonstration(demonstration)?;
+    let size =
+        facts([("width", f64::from(demonstration.image.width())), ("height", f64::from(demonstration.image.height()))]);
+    let augmenter = Augmenter::new(&[demonstration], AugmentationConfig::paper(), 1)?;
+    let mut first = 0;
+    let run = move || {
+        let per_thread = SAMPLES / threads;
+        std::thread::scope(|scope| {
+            for thread in 0..threads {
+                let (augmenter, from) = (&augmenter, first + (thread * per_thread) as u64);
+                scope.spawn(move || {
+                    for index in from..from + per_thread as u64 {
+                        std::hint::black_box(augmenter.sample(index));
+                    }
+                });
+            }
+        });
+        first += SAMPLES as u64;
+        Ok(())
+    };
+    Ok(Work { pieces: SAMPLES, ..Work::new(size, run) })
+}

@@ -1,0 +1,88 @@
+//! The `edge` preset: detection to a grasp, a training step.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use burn::grad_clipping::GradientClippingConfig;
+use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer};
+use burn::tensor::Device;
+use nalgebra::Point2;
+use sdg_detection::{Detections, TransformedImage};
+use sdg_geometry::{Keypoint, PlanarGrasp};
+
+use crate::network::Network;
+use crate::protocol::{Facts, Work};
+use crate::scene;
+use crate::works::r50::sampled;
+use crate::works::{facts, mean};
+
+/// Parts a picture: as many as go through the keypoint head, so that it has the same to do on both sides.
+const GRID: (u32, u32) = (3, 2);
+const BATCH: u32 = 4;
+/// So low that the weights stay as they are: the hundredth step has the same to do as the first.
+const LEARNING_RATE: f64 = 1e-5;
+/// As `sdg-training` sets them.
+const WEIGHT_DECAY: f32 = 1e-4;
+const MAX_GRADIENT_NORM: f32 = 10.0;
+
+/// Centre and angle of the line through each detection's keypoints.
+fn grasps(found: &Detections) -> Vec<Option<PlanarGrasp>> {
+    let visible = |keypoint: &sdg_detection::ScoredKeypoint| Keypoint::visible(Point2::new(keypoint.x, keypoint.y));
+    found
+        .keypoints
+        .iter()
+        .map(|list| PlanarGrasp::from_keypoints(&list.iter().map(visible).collect::<Vec<_>>(), 1.0))
+        .collect()
+}
+
+pub fn detection(weights: &Path) -> Result<Work> {
+    let detector = Network::Edge.load(&Device::flex(), weights)?;
+    let (transform, picture) = (detector.image_transform(), scene::picture(0));
+    let found = detector.detect(&[transform.apply(&picture)?]).pop().context("one image gives one answer")?;
+    let keypoint_scores = found.keypoints.iter().flatten().map(|keypoint| keypoint.score);
+    let detection_facts = facts([
+        ("boxes", found.boxes.len() as f64),
+        ("mean_score", mean(found.scores.iter().copied())),
+        ("mean_keypoint_score", mean(keypoint_scores)),
+    ]);
+    Ok(Work::new(detection_facts, move || {
+        let found = detector.detect(&[transform.apply(&picture)?]);
+        std::hint::black_box(found.iter().map(grasps).collect::<Vec<_>>());
+        Ok(())
+    }))
+}
+
+pub fn training_step(weights: &Path) -> Result<Work> {
+    let mut detector = Network::Edge.load(&Device::flex().autodiff(), weights)?;
+    let transform = detector.image_transform();
+    let target = scene::target(GRID.0, GRID.1, sdg_grasp::NUM_KEYPOINTS);
+    // Ready made, as the trainer has them from another thread.
+    let images: Vec<TransformedImage> =
+        (0..BATCH).map(|number| transform.apply(&scene::picture(number))).collect::<sdg_detection::Result<_>>()?;
+    let counts = keypoint_rois(sampled(&detector, &images, &target));
+    let mut optimizer: ModuleOptimizer = AdamWConfig::new()
+        .with_weight_decay(WEIGHT_DECAY)
+        .with_epsilon(1e-8)
+        .with_grad_clipping(Some(GradientClippingConfig::Norm(MAX_GRADIENT_NORM)))
+        .init();
+    let targets = vec![target; BATCH as usize];
+    let mut seed = 0;
+    Ok(Work::new(counts, move || {
+        seed += 1;
+        let losses = detector.losses(&images, &targets, seed)?;
+        let gradients = GradientsParams::from_grads(losses.total().backward(), &detector);
+        detector = optimizer.step(LEARNING_RATE, detector.clone(), gradients);
+        Ok(())
+    }))
+}
+
+/// The preset bounds how many positive proposals go through the keypoint head.
+fn keypoint_rois(mut counts: Facts) -> Facts {
+    let head = Network::Edge.config().roi_heads.keypoint_head;
+    if let (Some(most), Some(count)) =
+        (head.and_then(|head| head.max_train_rois_per_image), counts.get_mut("head_rois"))
+    {
+        *count = count.min((most * BATCH as usize) as f64);
+    }
+    counts
+}

@@ -1,0 +1,82 @@
+//! Our side of every work, by the crates' public interfaces.
+
+mod augmentation;
+mod edge;
+mod gemm;
+mod r50;
+mod teaching;
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+
+use crate::WorkArgs;
+use crate::network::Network;
+use crate::protocol::{Facts, Work};
+
+/// Builds the work of that name.
+pub fn build(args: &WorkArgs) -> Result<Work> {
+    let weights = || args.weights.as_deref().context("expected --weights FILE, found none");
+    let demonstration = || args.demonstration.as_deref().context("expected --demonstration DIR, found none");
+    let model = || args.model.as_deref().context("expected --model FILE, found none");
+    match args.name.as_str() {
+        "gemm" => Ok(gemm::product()),
+        "backbone" => r50::backbone(weights()?),
+        "faster-inference" => r50::inference(Network::Faster, weights()?),
+        "mask-inference" => r50::inference(Network::Mask, weights()?),
+        "keypoint-inference" => r50::inference(Network::Keypoint, weights()?),
+        "faster-training-step" => r50::training_step(Network::Faster, weights()?),
+        "mask-training-step" => r50::training_step(Network::Mask, weights()?),
+        "keypoint-training-step" => r50::training_step(Network::Keypoint, weights()?),
+        "edge-detection" => edge::detection(weights()?),
+        "edge-training-step" => edge::training_step(weights()?),
+        "augmentation" => augmentation::samples(demonstration()?, args.threads),
+        "teaching" => teaching::teaching(demonstration()?, model()?),
+        "edge-grasp" => teaching::grasp(demonstration()?, model()?),
+        other => bail!("expected a work that `sdg-bench compare --help` lists, found {other}"),
+    }
+}
+
+/// Facts from names and numbers.
+fn facts<const N: usize>(entries: [(&str, f64); N]) -> Facts {
+    entries.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+/// The photo and its marks in a folder of `datasets/demonstrations`.
+fn read_demonstration(folder: &Path) -> Result<sdg_demonstration::Demonstration> {
+    let read = |name: &str| {
+        let path = folder.join(name);
+        std::fs::read(&path).with_context(|| path.display().to_string())
+    };
+    let demonstration =
+        sdg_demonstration::Demonstration::decode(&read("image.png")?, &read("annotation.json")?, Some("image.png"));
+    demonstration.with_context(|| folder.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry::{GEMM, WORKS};
+
+    #[test]
+    fn every_registered_work_is_known_here() {
+        for work in WORKS.iter().chain([&GEMM]) {
+            let args =
+                WorkArgs { name: work.name.to_owned(), weights: None, demonstration: None, model: None, threads: 2 };
+            // Without its files a work is refused for them, not for its name.
+            let refused = build(&args).err().map(|error| error.to_string());
+            assert!(refused.is_none_or(|error| !error.contains("expected a work")), "{}", work.name);
+        }
+    }
+
+    #[test]
+    fn mean_of_nothing_is_zero() {
+        assert_eq!(mean([]), 0.0);
+        assert_eq!(mean([1.0, 4.0]), 2.5);
+    }
+}

@@ -1,0 +1,42 @@
+//! From a demonstration to a validated model, and that model at work.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use sdg_grasp::{Device, GraspModel, TeachOptions, Verification, teach};
+
+use crate::protocol::{Facts, Work};
+use crate::works::{facts, read_demonstration};
+
+/// Teaches once and writes the model, for [`grasp`].
+pub fn teaching(demonstration: &Path, model: &Path) -> Result<Work> {
+    let demonstrations = [read_demonstration(demonstration)?];
+    let model = model.to_owned();
+    let run = move || {
+        let taught = teach(&demonstrations, &TeachOptions::new(1), &mut |_| ControlFlow::Continue(()))?;
+        let known = taught.model.facts();
+        eprintln!(
+            "taught in {} steps: {:.0} % found, {:.2} px and {:.2}° off",
+            known.steps,
+            100.0 * known.validation_hit_rate,
+            known.validation_error_px,
+            known.validation_error_degrees
+        );
+        std::fs::write(&model, taught.model.to_bytes()?).with_context(|| model.display().to_string())
+    };
+    Ok(Work { warm_up: false, ..Work::new(Facts::new(), run) })
+}
+
+/// Finds the part in the photo that it was taught on, verified by the demonstration.
+pub fn grasp(demonstration: &Path, model: &Path) -> Result<Work> {
+    let photo = read_demonstration(demonstration)?.image;
+    let bytes = std::fs::read(model).with_context(|| model.display().to_string())?;
+    let model = GraspModel::from_bytes(&bytes, &Device::flex())?;
+    let found = model.detect(&photo, Verification::ByShape)?;
+    let accepted = found.iter().filter(|detection| detection.is_accepted()).count();
+    Ok(Work::new(facts([("accepted", accepted as f64)]), move || {
+        std::hint::black_box(model.detect(&photo, Verification::ByShape)?);
+        Ok(())
+    }))
+}
