@@ -159,12 +159,12 @@ mod tests {
     }
 
     #[test]
-    fn a_false_alarm_costs_more_than_imprecision() {
+    fn imprecision_costs_more_than_a_false_alarm() {
         let good = [found(1.0, 1.0), Outcome::Absent { score: 0.1 }];
         let coarse = [found(8.0, 8.0), Outcome::Absent { score: 0.1 }];
         let alarmed = [found(1.0, 1.0), Outcome::Absent { score: 0.9 }];
         let merit = |outcomes: &[Outcome]| Validation::from_outcomes(outcomes).merit();
-        assert!(merit(&good) > merit(&coarse) && merit(&coarse) > merit(&alarmed));
+        assert!(merit(&good) > merit(&alarmed) && merit(&alarmed) > merit(&coarse));
     }
 
     #[test]
