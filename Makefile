@@ -13,8 +13,10 @@ help: ## Lists the targets
 setup: ## Installs what is missing from Debian (sudo only when not root)
 	@scripts/setup.sh
 
+# The whole workspace, with one example so that the tests' libraries have their say: cargo then chooses the features of
+# the libraries as it does for `make test`, which so finds burn compiled. With `-p sdg-cli` it is compiled twice.
 build: setup ## Builds target/release/sdg
-	$(CARGO) build $(PROFILE) --locked -p sdg-cli
+	$(CARGO) build $(PROFILE) --locked --workspace --bins --example try_views
 
 demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
 	target/release/sdg demo
@@ -31,9 +33,7 @@ lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
 
-# Together with sdg-cli: alone, sdg-benches would ask for fewer features, and burn would be compiled once more.
-bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
-	$(CARGO) build $(PROFILE) --locked -p sdg-cli -p sdg-benches
+bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
 	benches/peers/install.sh target/bench/venv
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 

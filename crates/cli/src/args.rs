@@ -56,7 +56,7 @@ pub struct DemoArgs {
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model: C (keypoints)
+    /// The grasp model: B (place from the box, turn from keypoints) or C (keypoints)
     #[arg(long, default_value = "C", value_name = "LETTER")]
     pub model: String,
     /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
