@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::architecture::{Architecture, Background};
 use crate::checkpoint::Checkpoint;
 use crate::error::{Result, WeightsError, printable};
-use crate::naming::{Naming, Renamed};
+use crate::naming::{Naming, Renamed, strip_wrapper};
 use crate::report::{Applied, Mismatch, Report};
 use crate::source::Source;
 use crate::tensor::StoredTensor;
@@ -13,6 +13,8 @@ use crate::tensor::StoredTensor;
 /// Shapes and values of parameters by name.
 pub type ParameterValues = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
+/// Where the names of a backbone's parameters start.
+const BACKBONE: &str = "backbone.bottom_up.";
 /// Box deltas of a class.
 const DELTAS: usize = 4;
 
@@ -48,12 +50,18 @@ impl Conversion {
     /// incomplete: see [`Self::complete`].
     ///
     /// # Errors
-    /// Names of no known scheme; a backbone alone where the target is a detector is none: only its part is filled.
+    /// Names of no known scheme; a part to re-initialise that the network has not. A backbone alone where the target is
+    /// a detector is no error: only its part is filled.
     pub fn plan(checkpoint: &Checkpoint, target: &Architecture, reinitialized: &[String]) -> Result<Self> {
         let naming = naming_of(checkpoint)?;
         let mut expected = target.parameters();
-        if naming.is_backbone_alone() {
-            expected.retain(|name, _| name.starts_with("backbone.bottom_up."));
+        for part in reinitialized {
+            if !expected.keys().any(|name| is_part_of(name, part)) {
+                return Err(WeightsError::UnknownPart { known: parts_of(&expected), found: printable(part) });
+            }
+        }
+        if is_backbone_alone(checkpoint, naming) {
+            expected.retain(|name, _| name.starts_with(BACKBONE));
         }
         let mut report = Report::new(checkpoint.format, naming);
         let is_reinitialized = |name: &str| reinitialized.iter().any(|part| is_part_of(name, part));
@@ -172,9 +180,17 @@ pub fn naming_of(checkpoint: &Checkpoint) -> Result<Naming> {
     })
 }
 
-/// torch's parallel training puts `module.` in front of every name.
-fn strip_wrapper(name: &str) -> &str {
-    name.strip_prefix("module.").unwrap_or(name)
+/// Whether a checkpoint holds a backbone and no detector: by its naming scheme or, converted before, by its names.
+pub fn is_backbone_alone(checkpoint: &Checkpoint, naming: Naming) -> bool {
+    let all_in_backbone = || checkpoint.tensors.keys().all(|name| strip_wrapper(name).starts_with(BACKBONE));
+    naming.is_backbone_alone() || (naming == Naming::Ours && all_in_backbone())
+}
+
+/// The parts that a user may name: the first two words of each parameter.
+fn parts_of(expected: &BTreeMap<String, Vec<usize>>) -> Vec<String> {
+    let parts: BTreeSet<String> =
+        expected.keys().map(|name| name.split('.').take(2).collect::<Vec<_>>().join(".")).collect();
+    parts.into_iter().collect()
 }
 
 /// Whether a parameter belongs to a part: `roi_heads.box` is no part of `roi_heads.box_head.fc1.weight`.

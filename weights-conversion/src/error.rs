@@ -84,6 +84,14 @@ pub enum WeightsError {
         /// One of them.
         first: String,
     },
+    /// A part to re-initialise that the network has not.
+    #[error("expected a part of the network to re-initialise, such as {}, found \"{found}\"", .known.join(", "))]
+    UnknownPart {
+        /// Parts that it has.
+        known: Vec<String>,
+        /// What was asked for.
+        found: String,
+    },
     /// A value that weights cannot have.
     #[error("{name}: expected finite values{limit}, found {found}")]
     Value {

@@ -25,6 +25,12 @@ pub enum Naming {
     Caffe2Resnet,
 }
 
+/// What stands in front of a name without belonging to it: torch's parallel training puts `module.` there, and this
+/// project's grasp models `network.`.
+pub(crate) fn strip_wrapper(name: &str) -> &str {
+    name.strip_prefix("module.").or_else(|| name.strip_prefix("network.")).unwrap_or(name)
+}
+
 /// What becomes of a name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Renamed {
@@ -84,7 +90,7 @@ impl Naming {
 
     /// Our name for a parameter of this scheme, if we have it.
     pub fn our_name(self, name: &str) -> Option<String> {
-        match self.rename(name.strip_prefix("module.").unwrap_or(name)) {
+        match self.rename(strip_wrapper(name)) {
             Renamed::To(ours) => Some(ours),
             Renamed::NotNeeded | Renamed::Unknown => None,
         }

@@ -77,6 +77,11 @@ impl Report {
         }
     }
 
+    /// The lines of all names but those that were applied as they are.
+    pub fn exceptions(&self) -> impl fmt::Display {
+        Exceptions(self)
+    }
+
     /// Counts, in one line.
     pub fn summary(&self) -> String {
         let counts = [
@@ -96,22 +101,32 @@ impl fmt::Display for Report {
             let moved = if *rows_moved { ", background moved" } else { "" };
             writeln!(f, "applied     {name} {shape:?} from {from}{moved}")?;
         }
-        for (name, value) in &self.filled {
+        Exceptions(self).fmt(f)
+    }
+}
+
+/// The report without what simply fits.
+struct Exceptions<'a>(&'a Report);
+
+impl fmt::Display for Exceptions<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(report) = self;
+        for (name, value) in &report.filled {
             writeln!(f, "applied     {name}: {value}, which the file implies")?;
         }
-        for name in &self.reinitialized {
+        for name in &report.reinitialized {
             writeln!(f, "reinit      {name}")?;
         }
-        for name in &self.missing {
+        for name in &report.missing {
             writeln!(f, "missing     {name}")?;
         }
-        for mismatch in &self.mismatched {
+        for mismatch in &report.mismatched {
             writeln!(f, "mismatched  {mismatch}")?;
         }
-        for name in &self.unused {
+        for name in &report.unused {
             writeln!(f, "unused      {name}")?;
         }
-        for name in &self.not_needed {
+        for name in &report.not_needed {
             writeln!(f, "not needed  {name}")?;
         }
         Ok(())

@@ -65,7 +65,7 @@ pub struct TeachArgs {
     /// The file to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Network, training and augmentation
+    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
     /// Decides every random choice
@@ -77,6 +77,12 @@ pub struct TeachArgs {
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
+    /// Weights to start from: any file that `sdg weights convert` reads or writes, or a grasp model
+    #[arg(long, value_name = "FILE")]
+    pub base_weights: Option<PathBuf>,
+    /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
+    #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
+    pub reinitialized: Vec<String>,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,

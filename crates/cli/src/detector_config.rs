@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
-use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind};
+use sdg_detection::config::{BackgroundClass, BlockKind, BoxDeltas, NormKind, RoiHeadsConfig};
 use sdg_detection::presets::{self, RcnnKind};
 use sdg_weights_conversion::architecture::{Backbone, Background, Block, Heads, KeypointHead, MaskHead, Norm};
 use sdg_weights_conversion::{Architecture, Checkpoint, Naming, SecondStage, naming_of};
@@ -45,6 +45,24 @@ pub fn preset(name: &str, checkpoint: &Checkpoint) -> Result<RcnnConfig> {
         (Some(_), false) => bail!("expected keypoints of one class, found {num_classes} classes"),
         (Some(_), true) => bail!("expected a keypoint head or a mask head, found both: describe it with --config"),
     };
+    preset_of_kind(name, kind)
+}
+
+/// The second stage that a configuration describes.
+pub fn kind_of(config: &RcnnConfig) -> RcnnKind {
+    let RoiHeadsConfig { num_classes, ref keypoint_head, ref mask_head, .. } = config.roi_heads;
+    match (keypoint_head, mask_head) {
+        (Some(head), _) => RcnnKind::Keypoint { num_keypoints: head.num_keypoints },
+        (None, Some(_)) => RcnnKind::Mask { num_classes },
+        (None, None) => RcnnKind::Faster { num_classes },
+    }
+}
+
+/// The detector of that name with another second stage.
+///
+/// # Errors
+/// An unknown name.
+pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig> {
     match name {
         "r50-detectron2" => Ok(presets::r50_detectron2(kind)),
         "r50-torchvision" => Ok(presets::r50_torchvision(kind)),

@@ -17,6 +17,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod args;
+pub mod base_weights;
 mod commands;
 mod demonstrations;
 pub mod detector_config;

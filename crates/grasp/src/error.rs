@@ -87,6 +87,24 @@ pub enum GraspError {
     /// The network refused its input.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
+    /// A preset with frozen stages and no weights to put there.
+    #[cfg(feature = "teach")]
+    #[error(
+        "the preset {preset} fine-tunes imported weights and freezes a part of them: expected base weights, found none"
+    )]
+    NeedsBaseWeights {
+        /// The preset's name.
+        preset: &'static str,
+    },
+    /// Base weights for another network.
+    #[cfg(feature = "teach")]
+    #[error("base weights: {fitting} parameters fit the network; found {found}")]
+    BaseWeights {
+        /// Parameters that fit.
+        fitting: usize,
+        /// The first thing that does not.
+        found: String,
+    },
     /// Teaching ended without a model.
     #[cfg(feature = "teach")]
     #[error(transparent)]

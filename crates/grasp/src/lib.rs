@@ -30,6 +30,8 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+#[cfg(feature = "teach")]
+mod base_weights;
 mod calibration;
 mod error;
 mod facts;
@@ -43,6 +45,8 @@ mod taught;
 mod teach;
 mod verification;
 
+#[cfg(feature = "teach")]
+pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
 pub use error::{GraspError, Result};

@@ -1,14 +1,17 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
+use std::io::Write;
 use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::Result;
 use sdg_grasp::{Ending, GraspError, TeachOptions, teach};
 use sdg_report::write_atomically;
+use sdg_weights_conversion::Report;
 use serde_json::json;
 
 use crate::args::TeachArgs;
+use crate::base_weights;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
@@ -17,7 +20,7 @@ use crate::teaching_progress::TeachingProgress;
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
-    let options = TeachOptions {
+    let mut options = TeachOptions {
         kind: parse("--model", &args.model)?,
         preset: parse("--preset", &args.preset)?,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
@@ -26,11 +29,15 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     files::check_writable(&args.out)?;
+    let report = read_base_weights(args, &mut options)?;
 
     let mut progress = TeachingProgress::new(Interrupt::watch());
     let taught = teach(&demonstrations, &options, &mut |event| progress.show(event));
     progress.finish();
-    let taught = taught?;
+    let taught = taught.map_err(|error| match error {
+        GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
+        error => anyhow::Error::from(error),
+    })?;
     let bytes = taught.model.to_bytes()?;
     write_atomically(&args.out, &bytes)?;
 
@@ -44,6 +51,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "bytes": bytes.len(),
             "teach_seconds": facts.seconds,
             "teaching": facts,
+            "base_weights": report,
         });
         println!("{line}");
     } else {
@@ -65,6 +73,24 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
     }
     Ok(Outcome::Done)
+}
+
+/// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
+/// minutes; the whole report is part of the JSON at the end.
+fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Report>> {
+    let Some(path) = &args.base_weights else { return Ok(None) };
+    let mut told = None;
+    let base_weights = base_weights::read(path, &options.network(), &args.reinitialized, &mut |report| {
+        if !args.json {
+            let mut stdout = std::io::stdout().lock();
+            write!(stdout, "{}", report.exceptions())?;
+            writeln!(stdout, "base weights {} (names of {}): {}", path.display(), report.naming, report.summary())?;
+        }
+        told = Some(report.clone());
+        Ok(())
+    })?;
+    options.base_weights = Some(base_weights);
+    Ok(told)
 }
 
 /// An argument that names one of a few things; another name is wrong usage.

@@ -11,10 +11,12 @@ use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::verification;
 use sdg_grasp::Device;
 use sdg_weights_conversion::architecture::Backbone;
-use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision, Source, naming_of, sha256_of};
+use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
+use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
 use serde_json::json;
 
 use crate::args::{ConvertArgs, InspectArgs, VerifyArgs, WeightsArgs, WeightsCommand};
+use crate::base_weights::open;
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
 use crate::exit::Outcome;
 use crate::files;
@@ -26,13 +28,6 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
         WeightsCommand::Inspect(inspect) => self::inspect(inspect),
         WeightsCommand::Verify(verify) => self::verify(verify),
     }
-}
-
-fn open(path: &Path) -> Result<(Source, Checkpoint)> {
-    let named = || path.display().to_string();
-    let mut source = Source::open(path).with_context(named)?;
-    let checkpoint = Checkpoint::read(&mut source).with_context(named)?;
-    Ok((source, checkpoint))
 }
 
 /// The detector to fill: as configured, as the file itself says, or as its names say.
@@ -52,7 +47,7 @@ fn config_of(checkpoint: &Checkpoint, config: Option<&Path>, preset_name: Option
 /// The network to fill, and the metadata that says which one it is.
 fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, BTreeMap<String, String>)> {
     let naming = naming_of(checkpoint)?;
-    if naming.is_backbone_alone() && args.preset.is_none() && args.config.is_none() {
+    if is_backbone_alone(checkpoint, naming) && args.preset.is_none() && args.config.is_none() {
         let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
         return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
     }

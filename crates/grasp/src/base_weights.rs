@@ -1,0 +1,127 @@
+//! Weights that teaching starts from, instead of from nothing.
+
+use std::collections::BTreeSet;
+
+use sdg_detection::GeneralizedRcnn;
+use sdg_detection::state_dict::{self, ImportReport, StateDict};
+
+use crate::error::{GraspError, Result};
+
+/// Imported weights for the network of a preset.
+///
+/// Every parameter of the network has a value here or is named as one that starts from nothing: what is left out by
+/// mistake would be taught from random values, and nobody would notice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BaseWeights {
+    /// SHA-256 of the file that the weights come from, in hexadecimal digits; the taught model remembers it.
+    pub sha256: String,
+    /// Values by the parameters' names.
+    pub parameters: StateDict,
+    /// Parameters that stay as the seed draws them, such as predictors for other classes.
+    pub reinitialized: BTreeSet<String>,
+}
+
+impl BaseWeights {
+    /// Sets the network's parameters. What the preset freezes stays frozen.
+    ///
+    /// # Errors
+    /// [`GraspError::BaseWeights`] where a parameter has neither a value nor leave to start from nothing, where a value
+    /// has another shape, or where it belongs to no parameter.
+    pub(crate) fn apply(&self, network: GeneralizedRcnn) -> Result<GeneralizedRcnn> {
+        let (network, mut report) = state_dict::import(network, &self.parameters);
+        report.missing.retain(|name| !self.reinitialized.contains(name));
+        match first_misfit(&report) {
+            None => Ok(network),
+            Some(found) => Err(GraspError::BaseWeights { fitting: report.applied.len(), found }),
+        }
+    }
+}
+
+fn first_misfit(report: &ImportReport) -> Option<String> {
+    if let Some((name, expected, found)) = report.mismatched.first() {
+        return Some(format!("{name} with shape {found:?} instead of {expected:?}"));
+    }
+    if let Some(name) = report.missing.first() {
+        return Some(format!("no {name} ({} missing)", report.missing.len()));
+    }
+    report.unused.first().map(|name| format!("{name}, which the network has not"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::grad_clipping::GradientClippingConfig;
+    use burn::module::Module;
+    use burn::optim::{AdamWConfig, GradientsParams};
+    use burn::tensor::Device;
+    use image::{Rgb, RgbImage};
+    use sdg_detection::RcnnConfig;
+    use sdg_detection::Target;
+
+    /// torchvision's numerics and freezing on a network that takes no time.
+    fn narrow() -> RcnnConfig {
+        let changes = r#"{"kind": "keypoint", "numerics": "torchvision", "keypoints": 12, "min_size_test": 64,
+            "max_size_test": 64, "stem_out_channels": 8, "res2_out_channels": 8, "width_per_group": 4,
+            "num_blocks": [1, 1, 1, 1], "fpn_channels": 8, "box_head_fc": 8, "keypoint_convs": 8}"#;
+        RcnnConfig::from_json(changes).unwrap()
+    }
+
+    fn base(config: &RcnnConfig) -> BaseWeights {
+        let network = config.init(&Device::flex(), 7).unwrap();
+        let parameters = state_dict::export(&network);
+        BaseWeights { sha256: "0".repeat(64), parameters, reinitialized: BTreeSet::new() }
+    }
+
+    #[test]
+    fn a_step_moves_what_the_preset_trains_and_nothing_else() {
+        let config = narrow();
+        let base = base(&config);
+        let mut network = base.apply(config.init(&Device::flex().autodiff(), 1).unwrap()).unwrap();
+        assert_eq!(state_dict::export(&network), base.parameters);
+
+        let image = RgbImage::from_fn(64, 64, |x, y| Rgb([(x * 4) as u8, (y * 4) as u8, 90]));
+        let bbox = sdg_geometry::BoundingBox { x1: 10.0, y1: 12.0, x2: 50.0, y2: 44.0 };
+        let point = |i: usize| nalgebra::Point2::new(12.0 + 3.0 * i as f64, 15.0 + 2.0 * i as f64);
+        let keypoints = (0..crate::NUM_KEYPOINTS).map(|i| sdg_geometry::Keypoint::visible(point(i))).collect();
+        let target = Target { boxes: vec![bbox], labels: vec![0], keypoints: vec![keypoints], masks: Vec::new() };
+        let images = [network.image_transform().apply(&image).unwrap()];
+        let clipping = Some(GradientClippingConfig::Norm(10.0));
+        let mut optimizer = AdamWConfig::new().with_grad_clipping(clipping).init();
+        for step in 0..2 {
+            let total = network.losses(&images, std::slice::from_ref(&target), step).unwrap().total();
+            let gradients = GradientsParams::from_grads(total.backward(), &network);
+            network = optimizer.step(1e-3, network.clone(), gradients);
+        }
+        let trained = state_dict::export(&network.valid());
+        for (name, before) in &base.parameters {
+            let is_frozen = name.contains("stem.") || name.contains("res2.") || name.contains(".norm.");
+            assert_eq!(trained[name] == *before, is_frozen, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let config = narrow();
+        let whole = base(&config);
+        let refused = |base: &BaseWeights| {
+            let network = config.init(&Device::flex(), 1).unwrap();
+            base.apply(network).unwrap_err().to_string()
+        };
+        let bias = "roi_heads.keypoint_head.score_lowres.bias";
+
+        let mut missing = whole.clone();
+        missing.parameters.remove(bias);
+        assert!(refused(&missing).contains(&format!("no {bias} (1 missing)")), "{}", refused(&missing));
+        missing.reinitialized.insert(bias.to_owned());
+        assert!(missing.apply(config.init(&Device::flex(), 1).unwrap()).is_ok());
+
+        let mut mismatched = whole.clone();
+        mismatched.parameters.get_mut(bias).unwrap().shape = vec![12, 1];
+        assert!(refused(&mismatched).contains("shape [12, 1] instead of [12]"), "{}", refused(&mismatched));
+
+        let mut unused = whole;
+        let value = unused.parameters[bias].clone();
+        unused.parameters.insert("roi_heads.mask_head.deconv.bias".to_owned(), value);
+        assert!(refused(&unused).contains("which the network has not"), "{}", refused(&unused));
+    }
+}
