@@ -18,7 +18,10 @@ use sdg_detection::presets::{self, RcnnKind};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 use sdg_geometry::{PlanarGrasp, PlanarSimilarity};
 use sdg_shape::GradientField;
-use sdg_training::{Event, History, Outcome, SampleSource, TrainingConfig, TrainingError, median, train};
+use sdg_training::{
+    Event, History, OneCycle, Outcome, SampleSource, TrainingConfig, TrainingError, ValidationConfig, WindowPhase,
+    median, train,
+};
 
 use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
@@ -82,7 +85,7 @@ impl Preset {
     fn training(self, seed: u64) -> TrainingConfig {
         match self {
             Self::Edge => TrainingConfig::edge(seed),
-            Self::R50Detectron2 | Self::R50Torchvision => TrainingConfig::fine_tuning(seed),
+            Self::R50Detectron2 | Self::R50Torchvision => fine_tuning(seed),
         }
     }
 }
@@ -121,6 +124,18 @@ impl FromStr for Preset {
             known: Self::ALL.map(Self::name).to_vec(),
             found: text.to_owned(),
         })
+    }
+}
+
+/// A lower learning rate, so that imported weights are not forgotten, and fewer, costlier steps.
+fn fine_tuning(seed: u64) -> TrainingConfig {
+    TrainingConfig {
+        steps: 200,
+        batch_size: 2,
+        windows: Some(WindowPhase { share: 0.7, batch_size: 6 }),
+        schedule: OneCycle { peak: 2e-4, warm_up: 0.2 },
+        validation: ValidationConfig { every: 40, first: 80, samples: 24 },
+        ..TrainingConfig::edge(seed)
     }
 }
 

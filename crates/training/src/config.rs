@@ -107,19 +107,6 @@ impl TrainingConfig {
         }
     }
 
-    /// Fine-tuning a large network from imported weights: a lower learning rate, so that they are not forgotten, and
-    /// fewer, costlier steps.
-    pub fn fine_tuning(seed: u64) -> Self {
-        Self {
-            steps: 200,
-            batch_size: 2,
-            windows: Some(WindowPhase { share: 0.7, batch_size: 6 }),
-            schedule: OneCycle { peak: 2e-4, warm_up: 0.2 },
-            validation: ValidationConfig { every: 40, first: 80, samples: 24 },
-            ..Self::edge(seed)
-        }
-    }
-
     /// Refuses settings that no run can have.
     pub(crate) fn check(&self) -> Result<(), TrainingError> {
         let refuse = |setting, expected, found: String| Err(TrainingError::BadSetting { setting, expected, found });
