@@ -31,6 +31,7 @@ mod scene;
 mod sensor;
 #[cfg(test)]
 mod tests;
+mod warp;
 
 pub use augmenter::{Augmenter, Sample, SampleObject};
 pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle};

@@ -6,9 +6,9 @@ use rand::Rng;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
 use super::config::PaperStyle;
-use super::homography::Homography;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, uniform};
+use super::warp::{Gains, RowMap};
 
 /// The numbers of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,32 +51,22 @@ impl PaperDraw {
 
     /// Paints the sample. What an earlier stage has cut off stays black, even if a later one moves its place inside.
     pub fn paint(&self, part: &Prepared, width: u32, height: u32) -> RgbImage {
-        let [rotated, shifted, scaled] = self.stages(part.photo_size);
-        let fit = fitted(part, width, height);
-        let map = |similarity: &PlanarSimilarity| Homography::from_similarity(similarity);
-        let photo_from_image = map(&fit.compose(&scaled)).inverse();
-        let prepared_from_image = Homography::scaling(part.prepared_from_photo).compose(&photo_from_image);
-        // Where the pixel stood after each earlier stage; outside the frame it was cut off.
-        let frames = [scaled, shifted, rotated].map(|stage| map(&stage).compose(&photo_from_image));
-        let [right, bottom] = part.photo_size.map(|side| side as f32);
-        let mut image = RgbImage::new(width, height);
-        for y in 0..height {
-            let source = prepared_from_image.row(y as usize);
-            let frames = frames.map(|frame| frame.row(y as usize));
-            let photo = photo_from_image.row(y as usize);
-            for x in 0..width {
-                let kept = |(u, v): (f32, f32)| u >= 0.0 && v >= 0.0 && u <= right && v <= bottom;
-                if !kept(photo.at(x as usize)) || !frames.iter().all(|frame| kept(frame.at(x as usize))) {
-                    continue;
-                }
-                let (u, v) = source.at(x as usize);
-                let pixel = part.photo.bilinear(u, v);
-                for (k, out) in image.get_pixel_mut(x, y).0.iter_mut().enumerate() {
-                    *out = (pixel[k] * self.channel_gain[k] * 255.0 + 0.5) as u8;
-                }
-            }
+        let stages = self.stages(part.photo_size);
+        let photo_from_image = fitted(part, width, height).compose(&stages[2]).inverse();
+        let prepared_from_photo = PlanarSimilarity { scale: part.prepared_from_photo, ..PlanarSimilarity::IDENTITY };
+        let prepared_from_image = RowMap::new(&prepared_from_photo.compose(&photo_from_image));
+        // Where the pixel stood in the photo and after each stage; outside the frame it was cut off.
+        let frames = stages.map(|stage| RowMap::new(&stage.compose(&photo_from_image)));
+        let frames = [[RowMap::new(&photo_from_image)].as_slice(), &frames].concat();
+        let gains = Gains::new(self.channel_gain);
+        let width = width as usize;
+        let mut bytes = vec![0; 3 * width * height as usize];
+        for (y, out) in bytes.chunks_exact_mut(3 * width).enumerate() {
+            let kept = frames.iter().fold(0..width, |kept, frame| frame.row(y).inside(part.photo_size, kept));
+            let out = &mut out[3 * kept.start..3 * kept.end];
+            part.lanes.read(&prepared_from_image.row(y), kept, &gains, out);
         }
-        image
+        RgbImage::from_raw(width as u32, height, bytes).expect("three bytes were made for each pixel")
     }
 }
 
@@ -92,8 +82,67 @@ fn fitted(part: &Prepared, width: u32, height: u32) -> PlanarSimilarity {
 
 #[cfg(test)]
 mod tests {
+    use image::Rgb;
+    use sdg_geometry::{BoundingBox, Polygon};
+
     use super::super::random::{Stream, sample_rng};
     use super::*;
+    use crate::{Annotation, Demonstration};
+
+    /// A part on a photo of smooth colours, which tell where a pixel comes from.
+    fn prepared(output: [u32; 2]) -> Prepared {
+        let image = RgbImage::from_fn(200, 150, |x, y| Rgb([(x + 40) as u8, (y + 90) as u8, (x / 2 + y) as u8]));
+        let bbox = BoundingBox { x1: 60.0, y1: 50.0, x2: 140.0, y2: 100.0 };
+        let annotation =
+            Annotation { label: "part".into(), bbox, grasp: None, outline: Some(Polygon::from_box(&bbox)) };
+        Prepared::new(&Demonstration { image, annotation }, output, &mut sample_rng(1, Stream::Preparation, 0))
+    }
+
+    /// Pixel by pixel in double precision, from the definition.
+    fn reference(draw: &PaperDraw, part: &Prepared, width: u32, height: u32) -> Vec<Option<[f64; 3]>> {
+        let stages = draw.stages(part.photo_size);
+        let photo_from_image = draw.image_from_photo(part, width, height).inverse();
+        let inside =
+            |p: &Point2<f64>| p.x >= 0.0 && p.y >= 0.0 && p.x <= part.photo_size[0] && p.y <= part.photo_size[1];
+        let places = (0..width * height).map(|i| Point2::new(f64::from(i % width) + 0.5, f64::from(i / width) + 0.5));
+        places
+            .map(|place| {
+                let photo = photo_from_image.apply(&place);
+                let kept = inside(&photo) && stages.iter().all(|stage| inside(&stage.apply(&photo)));
+                kept.then(|| {
+                    let p = photo * part.prepared_from_photo;
+                    let pixel = part.photo.bilinear(p.x as f32, p.y as f32);
+                    std::array::from_fn(|k| f64::from((pixel[k] * draw.channel_gain[k] * 255.0).min(255.0)))
+                })
+            })
+            .collect()
+    }
+
+    #[test]
+    fn samples_agree_with_the_definition_pixel_by_pixel() {
+        // The photo's smooth colours need no more than the rounding of a byte and of a weight.
+        const TOLERANCE: f64 = 1.0;
+        for size in [[200, 150], [100, 75], [90, 160]] {
+            let part = prepared(size);
+            for index in 0..12 {
+                let draw = PaperDraw::draw(&PaperStyle::default(), &mut sample_rng(3, Stream::Training, index));
+                let image = draw.paint(&part, size[0], size[1]);
+                let expected = reference(&draw, &part, size[0], size[1]);
+                let mut seen = 0;
+                for (pixel, expected) in image.pixels().zip(&expected) {
+                    match expected {
+                        None => assert_eq!(pixel.0, [0; 3], "{draw:?} cut this off"),
+                        Some(colour) => {
+                            seen += 1;
+                            let off = (0..3).map(|k| (f64::from(pixel[k]) - colour[k]).abs()).fold(0.0, f64::max);
+                            assert!(off <= TOLERANCE, "{draw:?}: {pixel:?}, not {colour:?}");
+                        }
+                    }
+                }
+                assert!(seen > expected.len() / 5, "{draw:?} shows {seen} pixels only");
+            }
+        }
+    }
 
     #[test]
     fn draws_span_the_published_ranges() {

@@ -10,6 +10,7 @@ use super::homography::Homography;
 use super::mutant::Mutant;
 use super::random::{SampleRng, index_below};
 use super::raster::Raster;
+use super::warp::LanePicture;
 use crate::{Demonstration, NUM_KEYPOINTS};
 
 /// The photo is kept at this many times the resolution it is usually shown at: sharp when shown larger, and not much
@@ -26,6 +27,8 @@ pub(crate) struct Prepared {
     pub photo_size: [f64; 2],
     /// The photo; the fourth float is the signed distance to the part's outline, in prepared pixels, positive inside.
     pub photo: Raster,
+    /// The photo once more, for warps of all of it in 8 bits.
+    pub lanes: LanePicture,
     /// The photo without the part.
     pub background: Raster,
     /// The outline, or the box.
@@ -53,13 +56,13 @@ impl Prepared {
         let photo_size = [f64::from(image.width()), f64::from(image.height())];
         let nominal_scale = (f64::from(output[0]) / photo_size[0]).min(f64::from(output[1]) / photo_size[1]);
         let wanted = (nominal_scale * OVERSAMPLING).min(1.0);
-        let mut photo = if wanted < 1.0 {
+        let reduced = (wanted < 1.0).then(|| {
             let side = |length: f64| ((length * wanted).round() as u32).max(1);
             // Triangle widens with the reduction, so that fine structure is averaged and not skipped.
-            Raster::from_image(&imageops::resize(image, side(photo_size[0]), side(photo_size[1]), FilterType::Triangle))
-        } else {
-            Raster::from_image(image)
-        };
+            imageops::resize(image, side(photo_size[0]), side(photo_size[1]), FilterType::Triangle)
+        });
+        let kept = reduced.as_ref().unwrap_or(image);
+        let (lanes, mut photo) = (LanePicture::from_image(kept), Raster::from_image(kept));
         // One factor for both axes; the rounding of the shorter side is below half a pixel over the whole photo.
         let prepared_from_photo = photo.width as f64 / photo_size[0];
 
@@ -95,6 +98,7 @@ impl Prepared {
             nominal_scale,
             photo_size,
             photo,
+            lanes,
             background,
             region,
             has_outline: annotation.outline.is_some(),
