@@ -108,7 +108,7 @@ fn split(word: u64) -> [u16; 4] {
 
 #[inline(always)]
 fn lanes(r: u8, g: u8, b: u8) -> u64 {
-    u64::from(r) | u64::from(g) << 16 | u64::from(b) << 32
+    u64::from(r) | (u64::from(g) << 16) | (u64::from(b) << 32)
 }
 
 /// A place in the bordered picture, or a step there, with [`FRACTION_BITS`].
@@ -240,8 +240,8 @@ impl Gains {
 /// The upper half of the product, rounded to a byte.
 #[inline(always)]
 fn scaled(lane: u16, factor: u16, left_bits: u32) -> u8 {
-    let product = (u32::from(lane) * u32::from(factor) >> 16) as u16;
-    (product + (1 << (left_bits - 1)) >> left_bits).min(255) as u8
+    let product = ((u32::from(lane) * u32::from(factor)) >> 16) as u16;
+    ((product + (1 << (left_bits - 1))) >> left_bits).min(255) as u8
 }
 
 /// Drops every fourth byte.
@@ -252,9 +252,9 @@ fn pack(pixels: &[[u8; 4]], out: &mut [u8]) {
     // Four pixels are three whole words.
     for (four, out) in fours.iter().zip(packed.chunks_exact_mut(12)) {
         let [a, b, c, d] = four.map(u32::from_le_bytes);
-        out[..4].copy_from_slice(&(a & 0xff_ffff | b << 24).to_le_bytes());
-        out[4..8].copy_from_slice(&(b >> 8 & 0xffff | c << 16).to_le_bytes());
-        out[8..].copy_from_slice(&(c >> 16 & 0xff | d << 8).to_le_bytes());
+        out[..4].copy_from_slice(&((a & 0xff_ffff) | (b << 24)).to_le_bytes());
+        out[4..8].copy_from_slice(&(((b >> 8) & 0xffff) | (c << 16)).to_le_bytes());
+        out[8..].copy_from_slice(&(((c >> 16) & 0xff) | (d << 8)).to_le_bytes());
     }
     for ([r, g, b, _], out) in rest.iter().zip(left.chunks_exact_mut(3)) {
         out.copy_from_slice(&[*r, *g, *b]);
@@ -278,7 +278,7 @@ mod tests {
     /// The hardest picture for an interpolation: neighbours that share nothing.
     fn speckle(width: u32, height: u32) -> RgbImage {
         RgbImage::from_fn(width, height, |x, y| {
-            let at = |k: u64| super::super::random::scramble(u64::from(x) << 40 | u64::from(y) << 8 | k) as u8;
+            let at = |k: u64| super::super::random::scramble((u64::from(x) << 40) | (u64::from(y) << 8) | k) as u8;
             image::Rgb([at(1), at(2) / 128 * 255, at(3)])
         })
     }
