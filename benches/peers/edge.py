@@ -238,7 +238,7 @@ class Detector(nn.Module):
         chosen, cells = [], []
         for of_image, label, matched, target in zip(boxes, labels, matches, targets):
             idxs = torch.where(label == 0)[0]
-            idxs = idxs[torch.randperm(len(idxs))[:6]]
+            idxs = idxs[torch.randperm(len(idxs))[:2]]
             chosen.append(of_image[idxs])
             cells.append(heatmap_cells(target["keypoints"][matched[idxs]], of_image[idxs]))
         self.keypoint_rois = sum(len(of_image) for of_image in chosen)

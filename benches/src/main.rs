@@ -71,6 +71,7 @@ struct WorkArgs {
 }
 
 fn main() -> ExitCode {
+    sdg_grasp::keep_freed_memory();
     let result = match Args::parse().command {
         Command::Compare(args) => compare::run(&args),
         Command::Work(args) => protocol::serve(|| works::build(&args)),

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use burn::grad_clipping::GradientClippingConfig;
-use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer};
+use burn::optim::GradientsParams;
 use burn::tensor::Device;
 use nalgebra::Point2;
 use sdg_detection::{Detections, TransformedImage};
 use sdg_geometry::{Keypoint, PlanarGrasp};
+use sdg_training::AdamW;
 
 use crate::network::Network;
 use crate::protocol::{Facts, Work};
@@ -16,14 +16,14 @@ use crate::scene;
 use crate::works::r50::sampled;
 use crate::works::{facts, mean};
 
-/// Parts a picture: as many as go through the keypoint head, so that it has the same to do on both sides.
+/// Parts a picture: more than go through the keypoint head, so that it has the same to do on both sides.
 const GRID: (u32, u32) = (3, 2);
 const BATCH: u32 = 4;
 /// So low that the weights stay as they are: the hundredth step has the same to do as the first.
 const LEARNING_RATE: f64 = 1e-5;
 /// As `sdg-training` sets them.
-const WEIGHT_DECAY: f32 = 1e-4;
-const MAX_GRADIENT_NORM: f32 = 10.0;
+const WEIGHT_DECAY: f64 = 1e-4;
+const MAX_GRADIENT_NORM: f64 = 10.0;
 
 /// Centre and angle of the line through each detection's keypoints.
 fn grasps(found: &Detections) -> Vec<Option<PlanarGrasp>> {
@@ -60,11 +60,7 @@ pub fn training_step(weights: &Path) -> Result<Work> {
     let images: Vec<TransformedImage> =
         (0..BATCH).map(|number| transform.apply(&scene::picture(number))).collect::<sdg_detection::Result<_>>()?;
     let counts = keypoint_rois(sampled(&detector, &images, &target));
-    let mut optimizer: ModuleOptimizer = AdamWConfig::new()
-        .with_weight_decay(WEIGHT_DECAY)
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(GradientClippingConfig::Norm(MAX_GRADIENT_NORM)))
-        .init();
+    let mut optimizer = AdamW::new(WEIGHT_DECAY, MAX_GRADIENT_NORM);
     let targets = vec![target; BATCH as usize];
     let mut seed = 0;
     Ok(Work::new(counts, move || {

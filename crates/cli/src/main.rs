@@ -7,5 +7,6 @@ use clap::Parser;
 use sdg_cli::args::Args;
 
 fn main() -> ExitCode {
+    sdg_grasp::keep_freed_memory();
     sdg_cli::run(&Args::parse())
 }

@@ -64,4 +64,5 @@ pub use error::{DetectionError, Result};
 pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint};
 pub use image_transform::{ImageTransform, TransformedImage};
 pub use losses::Losses;
+pub use sdg_kernels::keep_freed_memory;
 pub use target::{ObjectMask, Target};

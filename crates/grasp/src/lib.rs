@@ -55,6 +55,7 @@ pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
 pub use sdg_demonstration::NUM_KEYPOINTS;
+pub use sdg_detection::keep_freed_memory;
 #[cfg(feature = "teach")]
 pub use sdg_training::{Ending, Event, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::{TaughtDemonstration, TaughtMarks};

@@ -1,5 +1,7 @@
 //! The extension on `Autodiff<Flex>`: what is kept for the backward pass, and which gradients are computed.
 
+use std::cell::RefCell;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
@@ -196,6 +198,50 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     }
 }
 
+thread_local! {
+    /// Nodes that operations of this crate gave a gradient, and that none of them has taken it from.
+    static GIVEN: RefCell<HashSet<u64>> = RefCell::default();
+}
+
+/// The gradient of a node's output, to be gone on with.
+macro_rules! consumed {
+    ($grads:ident, $node:expr) => {{
+        GIVEN.with_borrow_mut(|given| given.remove(&$node.id.value));
+        channels_last($grads.consume::<Flex>(&$node))
+    }};
+}
+
+/// What a map was given before, if it was given by this crate: taken away, to be given back with more.
+///
+/// burn adds a second gradient to the first by itself, but reads both in the order of their shape, which for maps that
+/// stand channels last is the slowest: a tenth of a training step of the `edge` preset. A macro, since a node's type has
+/// no name outside burn. Of a leaf, whose gradient is asked for after the pass, nothing can be taken away; its
+/// requirement is not that of an operation's node.
+macro_rules! given_before {
+    ($grads:ident, $ops_node:expr, $parent:expr) => {{
+        let first = GIVEN.with_borrow_mut(|given| given.insert($parent.id.value));
+        (!first && $parent.requirement == $ops_node.requirement)
+            .then(|| channels_last($grads.consume::<Flex>(&$parent)))
+    }};
+}
+
+/// Gives a map its gradient, `[N, C, H, W]` that stands channels last.
+macro_rules! give {
+    ($grads:ident, $ops_node:expr, $parent:expr, $gradient:expr) => {{
+        let gradient = $gradient;
+        let gradient = match given_before!($grads, $ops_node, $parent) {
+            None => gradient,
+            Some(before) => sum(&gradient, &before),
+        };
+        $grads.register::<Flex>($parent.id, gradient);
+    }};
+}
+
+/// The sum of two maps that stand channels last.
+fn sum(a: &FlexTensor, b: &FlexTensor) -> FlexTensor {
+    tensor_channels_last(elementwise::sum(Isa::detect(), last_values(a), last_values(b)), shape4(a))
+}
+
 const KEPT: &str = "an operand is kept where the other is tracked";
 
 /// What a convolution's gradients need.
@@ -218,7 +264,7 @@ impl Backward<Flex, 4> for Conv2dBackward {
 
     fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
         let isa = Isa::detect();
-        let mut output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let mut output_grad = consumed!(grads, ops.node);
         let Conv2dKept { x: kept_x, weight: kept_weight, scale, output, shape, keep } = ops.state;
         let [x, weight, bias, residual] = ops.parents;
         let mut bias_grad = None;
@@ -233,7 +279,7 @@ impl Backward<Flex, 4> for Conv2dBackward {
             grads.register::<Flex>(bias.id, tensor(bias_grad.unwrap_or_else(sums), [shape.out_channels]));
         }
         if let Some(residual) = residual {
-            grads.register::<Flex>(residual.id, output_grad.clone());
+            give!(grads, ops.node, residual, output_grad.clone());
         }
         if let Some(scale) = scale
             && (x.is_some() || weight.is_some())
@@ -244,7 +290,9 @@ impl Backward<Flex, 4> for Conv2dBackward {
         }
         if let Some(x) = x {
             let weight = kept_weight.expect(KEPT);
-            let grad = convolved(Direction::Backward, &output_grad, weight, Epilogue::default(), &shape, keep);
+            let before = given_before!(grads, ops.node, x);
+            let epilogue = Epilogue { residual: before.as_ref().map(last_values), ..Epilogue::default() };
+            let grad = convolved(Direction::Backward, &output_grad, weight, epilogue, &shape, keep);
             grads.register::<Flex>(x.id, grad);
         }
         if let Some(weight) = weight {
@@ -265,12 +313,14 @@ impl Backward<Flex, 3> for ConvTranspose2dBackward {
 
     fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
         let isa = Isa::detect();
-        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let output_grad = consumed!(grads, ops.node);
         let Conv2dKept { x: kept_x, weight: kept_weight, shape, keep, .. } = ops.state;
         let [x, weight, bias] = ops.parents;
         if let Some(x) = x {
             let weight = kept_weight.expect(KEPT);
-            let grad = convolved(Direction::Forward, &output_grad, weight, Epilogue::default(), &shape, keep);
+            let before = given_before!(grads, ops.node, x);
+            let epilogue = Epilogue { residual: before.as_ref().map(last_values), ..Epilogue::default() };
+            let grad = convolved(Direction::Forward, &output_grad, weight, epilogue, &shape, keep);
             grads.register::<Flex>(x.id, grad);
         }
         if let Some(weight) = weight {
@@ -303,11 +353,11 @@ impl Backward<Flex, 1> for RoiAlignBackward {
     type State = (FlexTensor, [usize; 4], RoiAlignParams);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let crop_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let crop_grad = consumed!(grads, ops.node);
         let (rois, shape, params) = ops.state;
         if let [Some(features)] = ops.parents {
             let grad = roi_align::kernel::backward(last_values(&crop_grad), shape, values(&rois), &params);
-            grads.register::<Flex>(features.id, tensor_channels_last(grad, shape));
+            give!(grads, ops.node, features, tensor_channels_last(grad, shape));
         }
     }
 }
@@ -329,7 +379,7 @@ impl Backward<Flex, 4> for GroupNormBackward {
     type State = GroupNormKept;
 
     fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let output_grad = consumed!(grads, ops.node);
         let kept = ops.state;
         let shape = shape4(&kept.x);
         let found = norm::backward(
@@ -343,7 +393,7 @@ impl Backward<Flex, 4> for GroupNormBackward {
         );
         let [x, gamma, beta, residual] = ops.parents;
         if let Some(x) = x {
-            grads.register::<Flex>(x.id, tensor_channels_last(found.x, shape));
+            give!(grads, ops.node, x, tensor_channels_last(found.x, shape));
         }
         if let Some(gamma) = gamma {
             grads.register::<Flex>(gamma.id, tensor(found.gamma, [shape[1]]));
@@ -353,7 +403,7 @@ impl Backward<Flex, 4> for GroupNormBackward {
         }
         if let Some(residual) = residual {
             let grad = found.masked.map_or(output_grad, |masked| tensor_channels_last(masked, shape));
-            grads.register::<Flex>(residual.id, grad);
+            give!(grads, ops.node, residual, grad);
         }
     }
 }
@@ -366,12 +416,12 @@ impl Backward<Flex, 1> for MaxPoolBackward {
     type State = (FlexTensor, FlexTensor, PoolShape);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let output_grad = consumed!(grads, ops.node);
         let (kept_x, output, shape) = ops.state;
         if let [Some(x)] = ops.parents {
             let [output_grad, kept_x, output] = [&output_grad, &kept_x, &output].map(last_values);
             let grad = resize::kernel::max_pool_gradient(Isa::detect(), output_grad, kept_x, output, &shape);
-            grads.register::<Flex>(x.id, tensor_channels_last(grad, shape.input()));
+            give!(grads, ops.node, x, tensor_channels_last(grad, shape.input()));
         }
     }
 }
@@ -384,10 +434,10 @@ impl Backward<Flex, 1> for UpsampleBackward {
     type State = [usize; 4];
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let output_grad = channels_last(grads.consume::<Flex>(&ops.node));
+        let output_grad = consumed!(grads, ops.node);
         if let [Some(x)] = ops.parents {
             let grad = resize::kernel::upsample_gradient(Isa::detect(), last_values(&output_grad), ops.state);
-            grads.register::<Flex>(x.id, tensor_channels_last(grad, ops.state));
+            give!(grads, ops.node, x, tensor_channels_last(grad, ops.state));
         }
     }
 }

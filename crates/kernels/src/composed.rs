@@ -8,6 +8,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata, read_sync};
 use burn::tensor::{Shape, Slice, TensorData};
 
+use crate::adamw::AdamWParams;
 use crate::conv::{Conv2dParams, FusedConv2dParams};
 use crate::group_norm::{Activation, FusedGroupNormParams};
 use crate::roi_align::{RoiAlignParams, RoiBins};
@@ -52,6 +53,42 @@ pub fn conv_transpose2d<B: Backend>(
 ) -> FloatTensor<B> {
     let options = ConvTransposeOptions::new(params.stride, params.padding, [0, 0], [1, 1], 1);
     B::conv_transpose2d(x, weight, Some(bias), options)
+}
+
+fn scaled<B: Backend>(tensor: FloatTensor<B>, factor: f32) -> FloatTensor<B> {
+    B::float_mul_scalar(tensor, factor.into())
+}
+
+fn row<B: Backend>(tensor: FloatTensor<B>, idx: isize) -> FloatTensor<B> {
+    B::float_slice(tensor, &[Slice::new(idx, Some(idx + 1), 1), Slice::full()])
+}
+
+/// The moments of [`adamw`](crate::adamw()), term by term.
+pub fn adamw_moments<B: Backend>(grad: FloatTensor<B>, moments: FloatTensor<B>, params: AdamWParams) -> FloatTensor<B> {
+    let grad = match params.max_norm {
+        None => grad,
+        Some(most) => {
+            let squares = B::float_mul(grad.clone(), grad.clone());
+            let norm = B::float_reshape(B::float_sqrt(B::float_sum(squares)), Shape::from(vec![1, 1]));
+            let factor = scaled::<B>(B::float_recip(B::float_add_scalar(norm, f32::MIN_POSITIVE.into())), most);
+            B::float_mul(grad, B::float_clamp_max(factor, 1.0_f32.into()))
+        }
+    };
+    let square = B::float_mul(grad.clone(), grad.clone());
+    let mean = |idx, beta: f32, news| {
+        B::float_add(scaled::<B>(row::<B>(moments.clone(), idx), beta), scaled::<B>(news, 1.0 - beta))
+    };
+    B::float_cat(vec![mean(0, params.beta_1, grad), mean(1, params.beta_2, square)], 0)
+}
+
+/// The value of [`adamw`](crate::adamw()), term by term.
+pub fn adamw_value<B: Backend>(param: FloatTensor<B>, moments: FloatTensor<B>, params: AdamWParams) -> FloatTensor<B> {
+    let [first_correction, second_correction] = params.corrections();
+    let first = scaled::<B>(row::<B>(moments.clone(), 0), 1.0 / first_correction);
+    let root = B::float_sqrt(scaled::<B>(row::<B>(moments, 1), 1.0 / second_correction));
+    let delta = B::float_div(first, B::float_add_scalar(root, params.epsilon.into()));
+    let kept = scaled::<B>(param, 1.0 - params.learning_rate * params.weight_decay);
+    B::float_sub(kept, scaled::<B>(delta, params.learning_rate))
 }
 
 /// [`roi_align`](crate::roi_align()) by two matrix products an image, one per axis.

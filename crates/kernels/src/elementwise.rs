@@ -51,6 +51,21 @@ pub(crate) fn scale_channels(isa: Isa, values: &mut [f32], factors: &[f32]) {
     });
 }
 
+/// The sum of two lists of values.
+pub(crate) fn sum(isa: Isa, a: &[f32], b: &[f32]) -> Vec<f32> {
+    /// Values of a unit.
+    const BLOCK: usize = 32 * 1024;
+    let output = Output::new(a.len());
+    for_each_unit(a.len().div_ceil(BLOCK), |unit| {
+        let range = unit * BLOCK..a.len().min((unit + 1) * BLOCK);
+        // SAFETY: every unit has its own values.
+        let target = unsafe { output.range(range.start, range.len()) };
+        add_to(isa, target, &a[range.clone()], &b[range]);
+    });
+    // SAFETY: the units together are all values.
+    unsafe { output.into_vec() }
+}
+
 /// Sums of chunks of positions, added in their order.
 fn sum_chunks(
     positions: usize,
@@ -100,6 +115,14 @@ widest! {
     fn add(sums: &mut [f32], values: &[f32]) -> () {
         for (sum, value) in sums.iter_mut().zip(values) {
             *sum += value;
+        }
+    }
+}
+
+widest! {
+    fn add_to(target: &mut [MaybeUninit<f32>], a: &[f32], b: &[f32]) -> () {
+        for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
+            target.write(a + b);
         }
     }
 }

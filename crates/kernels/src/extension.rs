@@ -3,6 +3,7 @@
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
+use crate::adamw::AdamWParams;
 use crate::composed;
 use crate::conv::{Conv2dParams, FusedConv2dParams};
 use crate::group_norm::FusedGroupNormParams;
@@ -68,5 +69,24 @@ pub trait KernelBackend: Backend {
     /// See [`upsample_nearest_2x`](crate::upsample_nearest_2x).
     fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {
         composed::upsample_nearest_2x::<Self>(x)
+    }
+
+    /// The moments of [`adamw`](crate::adamw()): `grad` is `[1, count]`, `moments` and the result are `[2, count]`.
+    fn kernel_adamw_moments(
+        grad: FloatTensor<Self>,
+        moments: FloatTensor<Self>,
+        params: AdamWParams,
+    ) -> FloatTensor<Self> {
+        composed::adamw_moments::<Self>(grad, moments, params)
+    }
+
+    /// The value of [`adamw`](crate::adamw()): `param` and the result are `[1, count]`, `moments`, after the step,
+    /// `[2, count]`.
+    fn kernel_adamw_value(
+        param: FloatTensor<Self>,
+        moments: FloatTensor<Self>,
+        params: AdamWParams,
+    ) -> FloatTensor<Self> {
+        composed::adamw_value::<Self>(param, moments, params)
     }
 }

@@ -6,6 +6,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
 use burn::tensor::{Bytes, DType, Shape};
 
+use crate::adamw::{self, AdamWParams};
 use crate::conv::filters::Direction;
 use crate::conv::kernel::{self as conv, ConvShape};
 use crate::conv::{Conv2dParams, FusedConv2dParams};
@@ -103,6 +104,32 @@ impl KernelBackend for Flex {
         let shape = PoolShape::new(shape4(&x), params);
         let x = channels_last(x);
         tensor_channels_last(resize::kernel::max_pool(Isa::detect(), last_values(&x), &shape), shape.output())
+    }
+
+    fn kernel_adamw_moments(
+        grad: FloatTensor<Self>,
+        moments: FloatTensor<Self>,
+        params: AdamWParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&grad, &moments]) {
+            return composed::adamw_moments::<Self>(grad, moments, params);
+        }
+        let [grad, moments] = [grad, moments].map(|tensor| tensor.to_contiguous());
+        let after = adamw::moments_after(Isa::detect(), values(&grad), values(&moments), params);
+        tensor(after, [2, grad.shape()[1]])
+    }
+
+    fn kernel_adamw_value(
+        param: FloatTensor<Self>,
+        moments: FloatTensor<Self>,
+        params: AdamWParams,
+    ) -> FloatTensor<Self> {
+        if !all_f32([&param, &moments]) {
+            return composed::adamw_value::<Self>(param, moments, params);
+        }
+        let [param, moments] = [param, moments].map(|tensor| tensor.to_contiguous());
+        let after = adamw::value_after(Isa::detect(), values(&param), values(&moments), params);
+        tensor(after, [1, param.shape()[1]])
     }
 
     fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {

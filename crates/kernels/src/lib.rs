@@ -41,6 +41,7 @@
 // Backward passes are compiled without `autodiff` too, and then nothing calls them.
 #![cfg_attr(not(feature = "autodiff"), allow(dead_code, unused_imports))]
 
+mod adamw;
 #[cfg(feature = "autodiff")]
 mod autodiff;
 pub mod composed;
@@ -49,6 +50,7 @@ mod elementwise;
 mod extension;
 mod flex;
 mod group_norm;
+mod memory;
 mod nms;
 mod packed;
 mod parallel;
@@ -60,9 +62,11 @@ mod roi_align;
 mod scratch;
 mod simd;
 
+pub use adamw::{AdamWParams, adamw};
 pub use conv::{Conv2dEpilogue, Conv2dParams, FusedConv2dParams, conv_transpose2d, conv2d, conv2d_fused};
 pub use extension::KernelBackend;
 pub use group_norm::{Activation, FusedGroupNormParams, GroupNormParams, group_norm, group_norm_residual};
+pub use memory::keep_freed_memory;
 pub use nms::{batched_nms, nms};
 pub use resize::{MaxPool2dParams, max_pool2d, upsample_nearest_2x};
 pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};

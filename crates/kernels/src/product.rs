@@ -14,6 +14,8 @@ use crate::simd::lanes_kernel;
 
 /// Columns of a panel.
 pub(crate) const PANEL: usize = 32;
+/// Floats of a cache line.
+const LINE: usize = 16;
 
 /// Where the values of one side stand.
 #[derive(Clone, Copy)]
@@ -63,6 +65,30 @@ pub(crate) struct PanelProduct<'a> {
     pub(crate) epilogue: Epilogue<'a>,
     /// Whether to add to what stands in the output.
     pub(crate) accumulate: bool,
+    /// What is read next, to be fetched into the cache meanwhile.
+    pub(crate) ahead: Ahead<'a>,
+}
+
+/// Runs of memory that are fetched while a product computes, a cache line at each step of its depth.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Ahead<'a> {
+    pub(crate) runs: [&'a [f32]; 2],
+}
+
+impl Ahead<'_> {
+    /// The next lines, `steps` of them, or as many as there are: where they start, and from one to the next.
+    #[inline(always)]
+    fn next(&mut self, steps: usize) -> (*const f32, usize) {
+        for run in &mut self.runs {
+            if !run.is_empty() {
+                let (now, later) = run.split_at(run.len().min(steps * LINE));
+                *run = later;
+                // The last lines of a run that is too short are not there; a hint may say anything.
+                return (now.as_ptr(), LINE);
+            }
+        }
+        (std::ptr::null(), 0)
+    }
 }
 
 impl PanelProduct<'_> {
@@ -100,6 +126,7 @@ lanes_kernel! {
 unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let tiles = product.rows.div_ceil(L::ROWS);
     let mut row = 0;
+    let mut ahead = product.ahead;
     for tile in 0..tiles {
         // As even as they come: short tiles wait for their sums.
         let rows = (product.rows - row).div_ceil(tiles - tile);
@@ -110,9 +137,9 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
             // SAFETY: within the product.
             unsafe {
                 if columns > LANES {
-                    tile_of_rows::<L, 2>(product, output, row, rows, column, columns);
+                    tile_of_rows::<L, 2>(product, output, row, rows, column, columns, &mut ahead);
                 } else {
-                    tile_of_rows::<L, 1>(product, output, row, rows, column, columns);
+                    tile_of_rows::<L, 1>(product, output, row, rows, column, columns, &mut ahead);
                 }
             }
             column += step;
@@ -129,12 +156,13 @@ unsafe fn tile_of_rows<L: Lanes, const V: usize>(
     rows: usize,
     column: usize,
     columns: usize,
+    ahead: &mut Ahead<'_>,
 ) {
     macro_rules! choose {
         ($($count:literal)*) => {
             match rows {
                 // SAFETY: within the product, and `rows` is the count.
-                $($count if $count <= L::ROWS => unsafe { tile::<L, $count, V>(product, output, row, column, columns) },)*
+                $($count if $count <= L::ROWS => unsafe { tile::<L, $count, V>(product, output, row, column, columns, ahead) },)*
                 _ => unreachable!("a tile has 1 to {} rows", L::ROWS),
             }
         };
@@ -150,8 +178,10 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
     row: usize,
     column: usize,
     columns: usize,
+    ahead: &mut Ahead<'_>,
 ) {
     let [outer, inner] = product.depth;
+    let (mut line, line_step) = ahead.next(outer * inner);
     let (left, right) = (&product.left, &product.right);
     // SAFETY: reads are the operands' within the depth, as asserted; writes are the tile's. `wrapping_add`
     // only steps past the last.
@@ -182,6 +212,8 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
                     *at = at.wrapping_add(left.inner);
                 }
                 of_right = of_right.wrapping_add(right.inner);
+                L::prefetch(line);
+                line = line.wrapping_add(line_step);
             }
             left_run = left_run.wrapping_add(left.outer);
             right_run = right_run.wrapping_add(right.outer);

@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod adamw;
 mod batch;
 mod config;
 mod error;
@@ -32,6 +33,7 @@ mod schedule;
 mod trainer;
 mod validation;
 
+pub use adamw::AdamW;
 pub use batch::SampleSource;
 pub use config::{EarlyStop, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;

@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use burn::grad_clipping::GradientClippingConfig;
 use burn::module::Module;
-use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer};
+use burn::optim::GradientsParams;
 use sdg_detection::{GeneralizedRcnn, Losses};
 
+use crate::adamw::AdamW;
 use crate::batch::{Batch, BatchRequest, Batches, SampleSource, View, with_batches};
 use crate::config::TrainingConfig;
 use crate::error::TrainingError;
@@ -40,12 +40,7 @@ pub fn train(
 ) -> Result<Trained, TrainingError> {
     config.check()?;
     let transform = detector.config().input.clone();
-    let clipping = GradientClippingConfig::Norm(config.max_gradient_norm);
-    let optimizer = AdamWConfig::new()
-        .with_weight_decay(config.weight_decay as f32)
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(clipping))
-        .init();
+    let optimizer = AdamW::new(config.weight_decay, config.max_gradient_norm.into());
     let run = Run {
         detector,
         optimizer,
@@ -61,7 +56,7 @@ pub fn train(
 
 struct Run<'a> {
     detector: GeneralizedRcnn,
-    optimizer: ModuleOptimizer,
+    optimizer: AdamW,
     config: &'a TrainingConfig,
     pace: Pace,
     start: Instant,

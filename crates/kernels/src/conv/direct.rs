@@ -6,7 +6,7 @@
 
 use super::filters::Panels;
 use crate::parallel::{Raw, for_each_unit};
-use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;
 use crate::simd::Isa;
 
@@ -86,10 +86,11 @@ impl DirectConv<'_> {
         for_each_unit(chunks * groups, |unit| {
             let (first, group) = (unit / groups * chunk, unit % groups);
             let end = rows.min(first + chunk);
-            prefetch(&values[first * channels..end * channels]);
+            let next = &values[end * channels..rows.min(end + chunk) * channels];
             for panel in self.panels_of(group, groups) {
                 let left = Operand { values: &values[first * channels..], step: channels, inner: 1, outer: 0 };
-                let product = self.product(panel, chunk.min(rows - first), left, [1, channels], first);
+                let mut product = self.product(panel, chunk.min(rows - first), left, [1, channels], first);
+                product.ahead = self.ahead(panel, self.panels_of(group, groups).end, next);
                 // SAFETY: a unit has its own rows and panels.
                 unsafe { product.run(isa, output) };
             }
@@ -170,7 +171,14 @@ impl DirectConv<'_> {
             first_column,
             epilogue: self.epilogue,
             accumulate: false,
+            ahead: Ahead::default(),
         }
+    }
+
+    /// What is read after a panel: the next panel, or after the last (`end`) the next unit's positions, `next`.
+    fn ahead<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Ahead<'a> {
+        let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
+        Ahead { runs: [run, &[]] }
     }
 
     /// What the window sees from the grid rows `rows` of an image, zeros outside the map.
@@ -191,21 +199,6 @@ impl DirectConv<'_> {
         }
         band
     }
-}
-
-/// Fetches values that are about to be read in twelve streams at once, more than processors foresee.
-#[inline]
-fn prefetch(values: &[f32]) {
-    #[cfg(target_arch = "x86_64")]
-    for line in values.chunks(16) {
-        // SAFETY: a hint, which reads nothing; every x86-64 has it.
-        unsafe {
-            use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-            _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast());
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = values;
 }
 
 /// `target[i] = source[first + i]`, zeros outside the source.

@@ -307,3 +307,36 @@ fn a_stride_of_zero_is_refused() {
     let device = Device::flex();
     conv2d(Tensor::ones([1, 3, 4, 4], &device), Tensor::ones([2, 3, 3, 3], &device), None, Conv2dParams::square(0, 0));
 }
+
+/// Maps and a leaf that several operations read, once through ours and once through burn's.
+#[test]
+fn gradients_of_what_is_read_more_than_once_are_added() {
+    let device = Device::flex().autodiff();
+    let random = |shape: [usize; 4]| tensor(shape, (shape[0] * shape[2]) as u64, &device).require_grad();
+    let image = random([2, 3, 9, 10]);
+    let weights = [random([4, 3, 3, 3]), random([4, 4, 3, 3]), random([4, 4, 1, 1])];
+    let gradients = |ours: bool| {
+        let conv = |x: Tensor<4>, weight: &Tensor<4>| {
+            let padding = weight.dims()[2] / 2;
+            if ours {
+                return conv2d(x, weight.clone(), None, Conv2dParams::square(1, padding));
+            }
+            module::conv2d(x, weight.clone(), None, ConvOptions::new([1, 1], [padding; 2], [1, 1], 1))
+        };
+        let map = conv(image.clone(), &weights[0]);
+        let loss = conv(map.clone(), &weights[1]).square().sum()
+            + conv(map.clone(), &weights[2]).exp().sum()
+            // By burn itself, in between and beside ours.
+            + (map * 3.0).sum()
+            + conv(image.clone() * 0.5, &weights[0]).square().sum()
+            + conv(image.clone(), &weights[0]).exp().sum();
+        let grads = loss.backward();
+        let of = |tensor: &Tensor<4>| tensor.grad(&grads).unwrap();
+        [of(&image), of(&weights[0]), of(&weights[1]), of(&weights[2])]
+    };
+    for (ours, theirs) in gradients(true).into_iter().zip(gradients(false)) {
+        let largest: f32 = theirs.clone().abs().max().into_scalar();
+        let error: f32 = (ours - theirs).abs().max().into_scalar();
+        assert!(error < 2e-5 * largest, "{error} of {largest}");
+    }
+}

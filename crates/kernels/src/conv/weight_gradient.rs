@@ -11,7 +11,7 @@
 use super::direct::{Maps, copy_row};
 use super::kernel::ConvShape;
 use crate::parallel::{SharedSlice, for_each_unit};
-use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
@@ -89,6 +89,7 @@ pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_
                         first_column: 0,
                         epilogue: Epilogue::default(),
                         accumulate: block > first_block,
+                        ahead: Ahead::default(),
                     };
                     // SAFETY: every unit has its own chunk and filters.
                     unsafe { product.run(isa, raw) };

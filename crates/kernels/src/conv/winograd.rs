@@ -20,7 +20,7 @@ use super::direct::Maps;
 use super::filters::{Direction, Panels, gather};
 use super::kernel::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
-use crate::product::{Epilogue, Operand, PANEL, PanelProduct, packed_len, panel_width};
+use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct, packed_len, panel_width};
 use crate::scratch::Scratch;
 use crate::simd::Isa;
 use crate::simd::lanes::LANES;
@@ -198,6 +198,14 @@ impl Winograd<'_> {
             for panel in 0..panels {
                 let (right, width) = self.filters.panel(frequency, panel);
                 let first_column = panel * PANEL;
+                let (next_panel, next_seen) = if panel + 1 < panels {
+                    (self.filters.panel(frequency, panel + 1).0, &[][..])
+                } else if frequency + 1 < FREQUENCIES {
+                    let next = &seen.values[(frequency + 1) * seen_step..][..count * channels];
+                    (self.filters.panel(frequency + 1, 0).0, next)
+                } else {
+                    (&[][..], &[][..])
+                };
                 let product = PanelProduct {
                     rows: count,
                     columns: PANEL.min(columns - first_column),
@@ -209,6 +217,7 @@ impl Winograd<'_> {
                     first_column,
                     epilogue: Epilogue::default(),
                     accumulate: false,
+                    ahead: Ahead { runs: [next_panel, next_seen] },
                 };
                 // SAFETY: a unit has its own frequency.
                 unsafe { product.run(self.isa, raw) };

@@ -34,6 +34,17 @@ pub(crate) trait Lanes: Copy {
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self;
     /// `max(self, 0)`; a NaN stays one.
     unsafe fn relu(self) -> Self;
+    /// Fetches a cache line that is read soon; a hint that reads nothing, whatever the pointer.
+    #[inline(always)]
+    fn prefetch(at: *const f32) {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: every x86-64 has it, and it never faults.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T1>(at.cast());
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        let _ = at;
+    }
 }
 
 /// One AVX-512 register.

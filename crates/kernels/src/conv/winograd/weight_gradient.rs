@@ -6,7 +6,7 @@ use super::{FREQUENCIES, Frequencies, Tiling};
 use crate::conv::direct::Maps;
 use crate::conv::kernel::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
-use crate::product::{Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
@@ -148,6 +148,7 @@ impl Sums<'_> {
                         first_column: 0,
                         epilogue: Epilogue::default(),
                         accumulate: start > tiles.start,
+                        ahead: Ahead::default(),
                     };
                     // SAFETY: a unit has its own frequency and rows.
                     unsafe { product.run(self.isa, sums) };
