@@ -56,7 +56,8 @@ pub struct DemoArgs {
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model: B (place from the box, turn from keypoints) or C (keypoints)
+    /// The grasp model: A (box, turn from its crop), B (box, turn from keypoints), C (keypoints), D (mask, turn from
+    /// texture or outline) or S (no network: the demonstration looked for in the whole image, ready at once)
     #[arg(long, default_value = "C", value_name = "LETTER")]
     pub model: String,
     /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
@@ -65,7 +66,8 @@ pub struct TeachArgs {
     /// The file to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights
+    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights; paper, which
+    /// takes hours
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
     /// Decides every random choice

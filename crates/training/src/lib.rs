@@ -33,7 +33,7 @@ mod trainer;
 mod validation;
 
 pub use batch::SampleSource;
-pub use config::{EarlyStop, TrainingConfig, ValidationConfig, WindowPhase};
+pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
 pub use pace::Pace;
 pub use progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};

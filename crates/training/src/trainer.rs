@@ -5,11 +5,13 @@ use std::time::Instant;
 
 use burn::grad_clipping::GradientClippingConfig;
 use burn::module::Module;
-use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer};
+use burn::optim::decay::WeightDecayConfig;
+use burn::optim::momentum::MomentumConfig;
+use burn::optim::{AdamWConfig, GradientsParams, ModuleOptimizer, SgdConfig};
 use sdg_detection::{GeneralizedRcnn, Losses};
 
 use crate::batch::{Batch, BatchRequest, Batches, SampleSource, View, with_batches};
-use crate::config::TrainingConfig;
+use crate::config::{Optimizer, TrainingConfig};
 use crate::error::TrainingError;
 use crate::pace::Pace;
 use crate::progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
@@ -40,15 +42,9 @@ pub fn train(
 ) -> Result<Trained, TrainingError> {
     config.check()?;
     let transform = detector.config().input.clone();
-    let clipping = GradientClippingConfig::Norm(config.max_gradient_norm);
-    let optimizer = AdamWConfig::new()
-        .with_weight_decay(config.weight_decay as f32)
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(clipping))
-        .init();
     let run = Run {
         detector,
-        optimizer,
+        optimizer: optimizer(config),
         config,
         pace: Pace::new(config.steps, config.time_budget.map(|budget| budget.as_secs_f64())),
         start: Instant::now(),
@@ -57,6 +53,22 @@ pub fn train(
         best: None,
     };
     with_batches(&transform, source, |batches| run.run(batches, examine, observe))
+}
+
+fn optimizer(config: &TrainingConfig) -> ModuleOptimizer {
+    let clipping = Some(GradientClippingConfig::Norm(config.max_gradient_norm));
+    let weight_decay = config.weight_decay as f32;
+    match config.optimizer {
+        Optimizer::AdamW => {
+            AdamWConfig::new().with_weight_decay(weight_decay).with_epsilon(1e-8).with_grad_clipping(clipping).init()
+        }
+        Optimizer::Sgd { momentum } => SgdConfig::new()
+            // Without dampening, as torch and Detectron2 have it.
+            .with_momentum(Some(MomentumConfig::new().with_momentum(momentum).with_dampening(0.0)))
+            .with_weight_decay(Some(WeightDecayConfig::new(weight_decay)))
+            .with_gradient_clipping(clipping)
+            .init(),
+    }
 }
 
 struct Run<'a> {
