@@ -12,6 +12,7 @@ use sdg_report::{
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
+use crate::machine::machine;
 use crate::rehearsal::Rehearsed;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
@@ -258,7 +259,6 @@ fn last_looks(page: &RunPage) -> Section {
 
 fn this_run(page: &RunPage) -> Section {
     let facts = page.model.facts();
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     Section::new("This run")
         .lead("Everything needed to see the same numbers again.")
         .facts([
@@ -274,7 +274,7 @@ fn this_run(page: &RunPage) -> Section {
                     )
                 }),
             ),
-            ("machine", format!("{cores} cores, {} {}", std::env::consts::ARCH, std::env::consts::OS)),
+            ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ])
         .command(page.command)

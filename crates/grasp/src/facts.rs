@@ -41,6 +41,19 @@ impl ModelKind {
     pub fn has_keypoints(self) -> bool {
         matches!(self, Self::B | Self::C)
     }
+
+    /// Whether it looks with a network; model S is nothing but the demonstration.
+    pub fn has_network(self) -> bool {
+        self != Self::S
+    }
+
+    /// The model whose network this one reads: B and C are taught alike and read differently, so that C's file serves both.
+    pub fn taught_as(self) -> Self {
+        match self {
+            Self::B => Self::C,
+            other => other,
+        }
+    }
 }
 
 impl fmt::Display for ModelKind {

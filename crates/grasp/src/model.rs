@@ -74,6 +74,16 @@ impl GraspModel {
         self.network.as_ref().map_or(ModelKind::S, Network::kind)
     }
 
+    /// The same network read as another model; `None` where the two are not taught alike (see [`ModelKind::taught_as`]).
+    /// Its calibration stays, though the network's errors were judged by the first reading.
+    pub fn read_as(self, kind: ModelKind) -> Option<Self> {
+        if self.kind() == kind {
+            return Some(self);
+        }
+        let network = self.network?.read_as(kind)?;
+        Some(Self { network: Some(network), ..self })
+    }
+
     /// The preset's name.
     pub fn preset(&self) -> &str {
         &self.preset

@@ -98,6 +98,16 @@ impl Network {
         }
     }
 
+    /// The same detector read as another model does that is taught alike.
+    pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
+        let reading = match (self.reading, kind) {
+            (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::B) => Reading::BoxAndKeypoints,
+            (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::C) => Reading::Keypoints,
+            _ => return None,
+        };
+        Some(Self { reading, ..self })
+    }
+
     /// The network as a file keeps it: every weight rounded to half precision.
     #[cfg(feature = "teach")]
     pub(crate) fn rounded(self) -> Self {

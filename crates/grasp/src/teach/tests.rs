@@ -129,6 +129,20 @@ fn the_paper_freezes_what_was_imported_and_nothing_else() {
 }
 
 #[test]
+fn one_network_serves_the_models_that_are_taught_alike() {
+    let taught = taught(Preset::Edge, ModelKind::C);
+    let read = taught.clone().read_as(ModelKind::B).unwrap();
+    assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
+    // The same detections; where they lie is read otherwise, and a way there is a way back.
+    let photo = demonstration().image;
+    let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
+    let boxes = |model: &GraspModel| said(model).iter().map(|found| found.bbox).collect::<Vec<_>>();
+    assert_eq!(boxes(&read), boxes(&taught));
+    assert_eq!(said(&read.clone().read_as(ModelKind::C).unwrap()), said(&taught));
+    assert!(read.clone().read_as(ModelKind::A).is_none() && read.read_as(ModelKind::S).is_none());
+}
+
+#[test]
 fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
     let unobserved = &mut |_: &Event| panic!("nothing is trained");
