@@ -12,9 +12,9 @@ use super::units::Cell;
 pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
     let parts = summary.cells.len() / summary.models.len().max(1);
     let mut report = Report::new("Every model on every part").kicker("Evaluation in simulation").lead(format!(
-        "{} models, each taught on {parts} parts from one photo of each, looked for and grasped from poses that they \
-             had not seen.",
-        summary.models.len()
+        "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then looked for it and grasped it \
+         in poses that it had not seen.",
+        summary.models.iter().map(|model| model.model.letter()).collect::<Vec<_>>().join(", ")
     ));
     for model in &summary.models {
         let Some(percent) = model.verified.held.percent() else { continue };
