@@ -14,6 +14,8 @@
 //! What is in the store is not done again, so an evaluation that was interrupted goes on where it stopped. A teaching
 //! that led to nothing is a result, too: all attempts of its cell count as failed.
 
+mod cell;
+mod looking;
 mod page;
 mod paper;
 mod progress;
@@ -26,6 +28,7 @@ mod summary;
 mod tables;
 mod units;
 
+pub use cell::Cell;
 pub use page::page;
 pub use progress::EvaluationProgress;
 pub use records::{AttemptRecord, AttemptsRecord, LookRecord, Pictured, Said, SpeedRecord, TeachingRecord};
@@ -34,4 +37,4 @@ pub use statistics::{Share, percentile, wilson_interval};
 pub use store::Store;
 pub use summary::{CellSummary, ModelSummary, Summary};
 pub use tables::{Titled, markdown, tables};
-pub use units::{Cell, Evaluation};
+pub use units::Evaluation;

@@ -3,10 +3,10 @@
 use anyhow::Result;
 use sdg_report::{Figure, GallerySize, KeyFigure, Report, Section, Tone};
 
+use super::cell::Cell;
 use super::store::Store;
 use super::summary::Summary;
 use super::tables::{Titled, notice, tables};
-use super::units::Cell;
 
 /// The tables, success at a glance, and a picture of every cell.
 pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {

@@ -6,11 +6,12 @@ use anyhow::Result;
 use sdg_grasp::{ModelKind, Verification};
 use serde::Serialize;
 
+use super::cell::Cell;
 use super::records::{AttemptRecord, Said, TeachingRecord};
 use super::settings::Settings;
 use super::statistics::{Share, percentile, wilson_interval};
 use super::store::Store;
-use super::units::{Cell, Evaluation};
+use super::units::Evaluation;
 
 /// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
 #[derive(Debug, Clone, PartialEq, Serialize)]

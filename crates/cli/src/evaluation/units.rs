@@ -5,104 +5,27 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
-use sdg_grasp::{Event, GraspModel, ModelKind, Preset, TeachOptions, Verification, teach};
+use sdg_grasp::{Event, ModelKind, Preset, TeachOptions, Verification, teach};
 use sdg_simulation::SimulationError;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{SceneVariation, TestView, VariationConfig, test_view, test_views};
+use sdg_simulation::scene::{TestView, test_views};
 
+use super::cell::{Cell, attempts_of};
+use super::looking::{picture_seed, scene_without, show};
 use super::progress::EvaluationProgress;
-use super::records::{AttemptRecord, AttemptsRecord, LookRecord, Pictured, Said, SpeedRecord, TeachingRecord};
+use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
 use super::schedule::{Task, run_all};
 use super::store::Store;
 use crate::exit::one_line;
-use crate::files;
 use crate::rehearsal::Rehearsal;
 use crate::shipped;
-use crate::trial::{Trial, try_view};
+use crate::trial::try_view;
 
 /// Pictures on which speed is measured, for each part.
 const SPEED_VIEWS: usize = 3;
 
 /// What there is to say of a unit whose teaching failed while it waited.
 const NO_MODEL: &str = "there is no model";
-
-/// One model on one part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cell<'a> {
-    /// The model.
-    pub model: ModelKind,
-    /// The part's name.
-    pub object: &'a str,
-}
-
-impl Cell<'_> {
-    /// The cell whose network this one's model reads.
-    pub fn network(self) -> Self {
-        Self { model: self.model.taught_as(), ..self }
-    }
-
-    /// A file of this cell.
-    fn file(self, what: &str) -> String {
-        format!("cells/{self}.{what}.json")
-    }
-
-    /// Where its network lies.
-    fn model_file(self) -> String {
-        format!("models/{}.sdg", self.network())
-    }
-
-    /// Where a picture of its detections lies.
-    pub fn picture_file(self) -> String {
-        format!("pictures/{self}.png")
-    }
-
-    /// How the teaching of its network ended, if it has.
-    pub fn teaching(self, store: &Store) -> Result<Option<TeachingRecord>> {
-        store.read(&self.network().file("teaching"))
-    }
-
-    /// What it said of pictures, if it was shown them.
-    pub fn look(self, store: &Store) -> Result<Option<LookRecord>> {
-        store.read(&self.file("look"))
-    }
-
-    /// Its attempts so far.
-    pub fn attempts(self, verification: Verification, store: &Store) -> Result<Vec<AttemptRecord>> {
-        let record: Option<AttemptsRecord> = store.read(&self.file(&attempts_of(verification)))?;
-        Ok(record.unwrap_or_default().attempts)
-    }
-
-    /// How fast it is, if that was measured.
-    pub fn speed(self, store: &Store) -> Result<Option<SpeedRecord>> {
-        store.read(&self.file("speed"))
-    }
-
-    /// Its model; `None` where teaching led to none.
-    fn read_model(self, store: &Store) -> Result<Option<GraspModel>> {
-        match self.teaching(store)? {
-            Some(TeachingRecord::Taught { .. }) => {}
-            Some(TeachingRecord::Failed { .. }) => return Ok(None),
-            None => return Err(anyhow!("{self}: expected a taught model, found none")),
-        }
-        let path = store.path(&self.model_file());
-        let model = files::read_model(&path)?.read_as(self.model);
-        Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
-    }
-}
-
-impl std::fmt::Display for Cell<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}-{}", self.model, self.object)
-    }
-}
-
-fn attempts_of(verification: Verification) -> String {
-    let way = match verification {
-        Verification::ByShape => "verified",
-        Verification::Off => "alone",
-    };
-    format!("attempts-{way}")
-}
 
 /// What is kept or lost as a whole.
 #[derive(Debug, Clone, Copy)]
@@ -410,44 +333,6 @@ impl std::fmt::Display for Unit<'_> {
     }
 }
 
-/// What a model says of a picture, both ways; the trial is the verified one.
-fn show(
-    model: &GraspModel,
-    object: &ObjectSpec,
-    seen: &TestView,
-    seed: u64,
-    other_part: Option<&str>,
-) -> Result<(Pictured, Trial)> {
-    let verified = try_view(model, object, seen, Verification::ByShape)?;
-    let alone = match model.kind().has_network() {
-        true => Some(Said::new(&try_view(model, object, seen, Verification::Off)?)),
-        false => None,
-    };
-    let other_part = other_part.map(str::to_owned);
-    Ok((Pictured { seed, other_part, verified: Said::new(&verified), alone }, verified))
-}
-
-/// A picture without the part: one to six unseen things, some made to resemble parts. Every second one also has another
-/// shipped part, each in its turn: real parts in real finishes are the look-alikes that a workshop has.
-fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Result<(TestView, Option<&'static str>)> {
-    if number.is_multiple_of(2) {
-        return Ok((test_views(object, false, 1, seed).next().context("a picture")??, None));
-    }
-    let others: Vec<&'static str> = ObjectSpec::names().filter(|name| *name != object.name).collect();
-    let other = others[(number / 2) as usize % others.len()];
-    let mut config = VariationConfig::default();
-    config.distractors = 1..=*config.distractors.end();
-    let scene = SceneVariation::sample(Some(&ObjectSpec::by_name(other)?), &config, seed);
-    // The truth about the other part is none about this one.
-    Ok((TestView { truth: None, ..test_view(scene)? }, Some(other)))
-}
-
-/// Pictures' seeds, apart from those of attempts, of the demo and of tests.
-fn picture_seed(seed: u64, number: u64) -> u64 {
-    const PICTURES: u64 = 0x5049_4354_5552_4553;
-    seed.wrapping_mul(0xd134_2543_de82_ef95).wrapping_add(PICTURES).wrapping_add(number)
-}
-
 /// Whether the physics gave up, as against files, OpenGL or settings: that is one attempt's misfortune.
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(
@@ -532,17 +417,6 @@ mod tests {
             ]
         );
         assert_eq!(evaluation.remaining().unwrap(), 5 + 1);
-    }
-
-    #[test]
-    fn scenes_without_the_part_show_each_other_part_in_turn() {
-        let object = ObjectSpec::by_name("pendulum").unwrap();
-        let (seen, other) = scene_without(&object, 0, 5).unwrap();
-        assert!(other.is_none() && seen.scene.object.is_none() && !seen.scene.distractors.is_empty());
-        let (seen, other) = scene_without(&object, 3, 5).unwrap();
-        assert_eq!(other, Some("rod_end"));
-        assert_eq!(seen.scene.object.unwrap().spec.name, "rod_end");
-        assert!(seen.truth.is_none());
     }
 
     #[test]

@@ -124,6 +124,7 @@ fn number(value: Option<f64>, decimals: usize) -> Cell {
 mod tests {
     use super::*;
     use crate::evaluation::{CellSummary, Settings, wilson_interval};
+    use sdg_grasp::ModelKind;
     use std::collections::BTreeMap;
 
     fn figures(count: usize, of: usize) -> Figures {
