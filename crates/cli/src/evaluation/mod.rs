@@ -9,7 +9,8 @@
 //!
 //! A **network** is what is taught; models B and C are two readings of one. A **unit** is the least piece of work that is
 //! kept or lost as a whole: one teaching, one attempt, the pictures of one part. A **cell** is one model on one part.
-//! Random choices depend on the seed, the part and the attempt's number alone, so every model meets the same scenes.
+//! Random choices depend on the seed, the part and the attempt's number alone, so every model meets the same scenes and
+//! `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's place in the list) meets them again.
 //!
 //! What is in the store is not done again, so an evaluation that was interrupted goes on where it stopped. A teaching
 //! that led to nothing is a result, too: all attempts of its cell count as failed.

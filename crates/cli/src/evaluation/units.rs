@@ -11,7 +11,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
 use super::cell::{Cell, attempts_of};
-use super::looking::{picture_seed, scene_without, show};
+use super::looking::{part_seed, picture_seed, scene_without, show};
 use super::progress::EvaluationProgress;
 use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
 use super::schedule::{Task, run_all};
@@ -231,7 +231,7 @@ impl Evaluation<'_> {
             }
         }
         for number in 0..u64::from(settings.views) {
-            let seed = picture_seed(settings.seed, number);
+            let seed = picture_seed(settings.seed, object, number);
             let seen = test_views(object, true, 1, seed).next().context("a picture")??;
             if is_interrupted() {
                 return Ok(None);
@@ -243,7 +243,7 @@ impl Evaluation<'_> {
             }
         }
         for number in 0..u64::from(settings.scenes) {
-            let seed = picture_seed(settings.seed, number);
+            let seed = picture_seed(settings.seed, object, number);
             let (seen, other_part) = scene_without(object, number, seed)?;
             if is_interrupted() {
                 return Ok(None);
@@ -277,8 +277,8 @@ impl Evaluation<'_> {
     ) -> Result<Option<String>> {
         let settings = self.store.settings();
         let Some(model) = cell.read_model(self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
-        let rehearsal =
-            Rehearsal { model: &model, object, attempts: settings.attempts, seed: settings.seed, verification };
+        let seed = part_seed(settings.seed, object);
+        let rehearsal = Rehearsal { model: &model, object, attempts: settings.attempts, seed, verification };
         let mut record = AttemptsRecord { attempts: cell.attempts(verification, self.store)? };
         for number in record.attempts.len() + 1..=settings.attempts as usize {
             if is_interrupted() {
@@ -299,7 +299,7 @@ impl Evaluation<'_> {
 
     /// Times detections with nothing of ours beside them, on all cores.
     fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
-        let seed = picture_seed(self.store.settings().seed, 0);
+        let seed = picture_seed(self.store.settings().seed, object, 0);
         let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
         for cell in self.cells(object) {
             if cell.speed(self.store)?.is_some() {
