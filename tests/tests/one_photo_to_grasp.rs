@@ -19,7 +19,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
     let demonstration = shipped::demonstration("pendulum").unwrap();
     let taught = teach(&[demonstration], &TeachOptions::new(1), &mut |_| ControlFlow::Continue(())).unwrap();
     let seconds = taught.model.facts().seconds;
-    println!("taught in {seconds:.0} s: {:?}", taught.history.best.validation);
+    println!("taught in {seconds:.0} s: {:?}", taught.model.facts().validation);
 
     // What is used from here on is what a file gives back.
     let bytes = taught.model.to_bytes().unwrap();

@@ -16,13 +16,15 @@ pub fn teaching(demonstration: &Path, model: &Path) -> Result<Work> {
     let run = move || {
         let taught = teach(&demonstrations, &TeachOptions::new(1), &mut |_| ControlFlow::Continue(()))?;
         let known = taught.model.facts();
-        eprintln!(
-            "taught in {} steps: {:.0} % found, {:.2} px and {:.2}° off",
-            known.steps,
-            100.0 * known.validation_hit_rate,
-            known.validation_error_px,
-            known.validation_error_degrees
-        );
+        if let Some(held_back) = known.validation {
+            eprintln!(
+                "taught in {} steps: {:.0} % found, {:.2} px and {:.2}° off",
+                known.steps,
+                100.0 * held_back.hit_rate,
+                held_back.error_px,
+                held_back.error_degrees
+            );
+        }
         std::fs::write(&model, taught.model.to_bytes()?).with_context(|| model.display().to_string())
     };
     Ok(Work { warm_up: false, ..Work::new(Facts::new(), run) })

@@ -5,14 +5,13 @@
 
 use std::time::Instant;
 
-use sdg_cli::rehearsal::grasp_plane;
+use sdg_cli::against_truth::{grasp_error, grasp_pose};
 use sdg_cli::shipped;
 use sdg_cli::trial::{RIGHT_DEGREES, RIGHT_MM};
-use sdg_geometry::Angle;
-use sdg_grasp::{GraspPose, TaughtDemonstration};
+use sdg_grasp::TaughtDemonstration;
 use sdg_report::median;
 use sdg_shape::{InstantSearch, Match, SearchConfig};
-use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
+use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -95,9 +94,7 @@ fn error(
 ) -> Option<(f64, f64)> {
     let truth = seen.truth.as_ref()?;
     let grasp = demonstration.grasp(&found.image_from_demonstration);
-    let pose = GraspPose::from_planar(&seen.view.camera, &grasp, &grasp_plane(object), LARGEST_JAW_WIDTH_M).ok()?;
-    let at = pose.base_from_tcp.translation.vector;
-    let along = pose.base_from_tcp * nalgebra::Vector3::x();
-    let turn = Angle::from_direction(along.x, along.y).distance(Angle::from_radians(truth.direction_rad));
-    Some(((at.x - truth.tcp.x).hypot(at.y - truth.tcp.y) * 1e3, turn.to_degrees()))
+    let pose = grasp_pose(object, &seen.view.camera, &grasp).ok()?;
+    let error = grasp_error(object, &truth.base_from_object, &pose.base_from_tcp);
+    Some((error.distance_mm, error.angle_deg))
 }

@@ -24,6 +24,8 @@ pub enum Command {
     Detect(DetectArgs),
     /// Grasp attempts in MuJoCo
     Rehearse(RehearseArgs),
+    /// The paper's protocol: every model on every part, and the paper's tables
+    Evaluate(EvaluateArgs),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
     /// Detectron2 and torchvision checkpoints: convert, inspect, verify
@@ -56,7 +58,8 @@ pub struct DemoArgs {
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model: B (place from the box, turn from keypoints) or C (keypoints)
+    /// The grasp model: A (box, turn from its crop), B (box, turn from keypoints), C (keypoints), D (mask, turn from
+    /// texture or outline) or S (no network: the demonstration looked for in the whole image, ready at once)
     #[arg(long, default_value = "C", value_name = "LETTER")]
     pub model: String,
     /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
@@ -65,7 +68,8 @@ pub struct TeachArgs {
     /// The file to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights
+    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights; paper, which
+    /// takes hours
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
     /// Decides every random choice
@@ -132,6 +136,50 @@ pub struct RehearseArgs {
     /// Folder for the report
     #[arg(long, default_value = "report", value_name = "DIR")]
     pub out: PathBuf,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg evaluate`
+#[derive(Debug, ClapArgs)]
+pub struct EvaluateArgs {
+    /// The grasp models, by their letters; without it, all
+    #[arg(long, value_name = "LETTERS", value_delimiter = ',')]
+    pub models: Vec<String>,
+    /// The parts, out of those shipped under datasets/; without it, all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub objects: Vec<String>,
+    /// Grasp attempts of each model on each part
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub attempts: u32,
+    /// Unseen pictures of each part, for detection against the truth
+    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub views: u32,
+    /// Pictures for each part in which it is not, for false alarms
+    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub scenes: u32,
+    /// Also try every grasp without the check against the demonstration: twice the attempts
+    #[arg(long)]
+    pub unverified: bool,
+    /// Network, training and augmentation
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Optimiser steps instead of the preset's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub steps: Option<u32>,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Teachings and rehearsals side by side; without it, one for each core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub jobs: Option<u32>,
+    /// Folder for models and results; what is in it already is not done again
+    #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Folder for the page; without it, the folder of the results
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -263,6 +311,8 @@ mod tests {
             "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --seed 3 --time-budget 60",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
+            "sdg evaluate",
+            "sdg evaluate --models B,C --objects pendulum,rod_end --attempts 2 --seed 3 --out d --report r --json",
             "sdg augment --demo a.png:a.json --count 5 --out samples",
             "sdg weights convert model.pkl model.safetensors --preset r50-detectron2 --f16 --reinit roi_heads --json",
             "sdg weights inspect model.pth --json",

@@ -4,7 +4,7 @@
 //! args ─ commands/<verb>.rs ─ grasp, simulation, report
 //! ```
 //!
-//! The binary is a thin shell around [`run`]; [`rehearsal`] and [`trial`] are open to the end-to-end tests.
+//! The binary is a thin shell around [`run`]; [`rehearsal`], [`trial`] and [`evaluation`] are open to the end-to-end tests.
 //!
 //! ```
 //! use clap::Parser;
@@ -16,14 +16,17 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod against_truth;
 pub mod args;
 pub mod base_weights;
 mod commands;
 mod demonstrations;
 pub mod detector_config;
+pub mod evaluation;
 mod exit;
 mod files;
 mod interrupt;
+mod machine;
 mod pictures;
 pub mod rehearsal;
 mod run_page;
@@ -43,6 +46,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Teach(teach) => commands::teach::run(teach),
         Command::Detect(detect) => commands::detect::run(detect),
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
+        Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Weights(weights) => commands::weights::run(weights),
     };

@@ -1,19 +1,22 @@
 //! Grasp attempts with a model in the simulated workcell, and what became of them.
 
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Isometry3;
-use sdg_grasp::{GraspDetection, GraspModel, GraspPlane, GraspPose, Verification};
-use sdg_report::{Attempt, DetectionError, Step};
-use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
+use sdg_grasp::{GraspDetection, GraspModel, Verification};
+use sdg_report::{Attempt, Step};
+use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptConfig, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig, Workcell,
-    WorkcellConfig,
+    AttemptConfig, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig, SimulationError,
+    Workcell, WorkcellConfig,
 };
 use serde::Serialize;
+
+use crate::against_truth::{grasp_error, grasp_pose};
 
 /// Height of the camera over the table when the shipped demonstrations were photographed, in metres: at the same height
 /// the part has the same size in the picture.
@@ -73,32 +76,62 @@ impl Rehearsed {
     }
 }
 
+/// One attempt, and what there is to see of it.
+pub struct Attempted {
+    /// How it went.
+    pub attempt: Attempt,
+    /// Pictures from outside, if they were asked for.
+    pub frames: Vec<RgbImage>,
+    /// What the wrist camera saw last, with the detection drawn.
+    pub view: Option<RgbImage>,
+}
+
 impl Rehearsal<'_> {
     /// Runs the attempts one after the other; `observe` hears of each and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&Attempt) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
-            let seed = attempt_seed(self.seed, number);
-            let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
-            let mut workcell = Workcell::new(&WorkcellConfig::new(scene))?;
-            let mut perception = ModelPerception { rehearsal: self, last: None };
-            let record = (!filmed_success).then(RecordConfig::default);
-            let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
-            let mut report =
-                workcell.run_attempt(&mut perception, &config, seed).with_context(|| format!("attempt {number}"))?;
-            if !report.frames.is_empty() {
-                rehearsed.film = std::mem::take(&mut report.frames);
-                filmed_success = report.outcome.is_success();
+            let Attempted { attempt, frames, view } =
+                self.attempt(number, (!filmed_success).then(RecordConfig::default))?;
+            if !frames.is_empty() {
+                rehearsed.film = frames;
+                filmed_success = attempt.success;
             }
-            rehearsed.views.extend(perception.last);
-            let attempt = self.record(number, &report);
+            rehearsed.views.extend(view);
+            let observed = observe(&attempt);
             rehearsed.attempts.push(attempt);
-            if rehearsed.attempts.last().is_some_and(|attempt| observe(attempt).is_break()) {
+            if observed.is_break() {
                 break;
             }
         }
         Ok(rehearsed)
+    }
+
+    /// Runs one attempt: the same number of the same rehearsal is always the same scene and start.
+    ///
+    /// A grasp that leads nowhere (wider than the hand, off the table) is a failed attempt.
+    ///
+    /// # Errors
+    /// Errors of the simulation itself.
+    pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<Attempted> {
+        let seed = attempt_seed(self.seed, number);
+        let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
+        let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
+        let mut workcell = Workcell::new(&WorkcellConfig::new(scene))?;
+        let mut perception = ModelPerception { rehearsal: self, last: None };
+        let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
+        let started = Instant::now();
+        let (attempt, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
+            Ok(mut report) => (self.record(number, &report), std::mem::take(&mut report.frames)),
+            Err(SimulationError::Perception(why)) => {
+                let duration_secs = started.elapsed().as_secs_f64();
+                let failed = Attempt { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
+                (failed, Vec::new())
+            }
+            Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
+        };
+        Ok(Attempted { attempt, frames, view: perception.last })
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> Attempt {
@@ -108,29 +141,38 @@ impl Rehearsal<'_> {
                 (Step::from_name(&step.to_string()).unwrap_or(Step::Detect), why.clone())
             }
         };
-        let (mut object_mm, mut object_angle_deg, mut detection_error) = ([f64::NAN; 2], f64::NAN, None);
-        if let Some(base_from_object) = &report.base_from_object {
-            let (tcp, direction_rad) = self.object.grasp_in_base(base_from_object);
-            object_mm = [tcp.x * 1e3, tcp.y * 1e3];
-            object_angle_deg = direction_rad.to_degrees();
-            // The last look decides where the hand goes.
-            detection_error = report
-                .targets
-                .iter()
-                .rev()
-                .flatten()
-                .next()
-                .map(|target| grasp_error(self.object, base_from_object, &target.base_from_tcp));
-        }
+        // The last look decides where the hand goes.
+        let last_target = report.targets.iter().rev().flatten().next();
+        let detection_error = report
+            .base_from_object
+            .zip(last_target)
+            .map(|(base_from_object, target)| grasp_error(self.object, &base_from_object, &target.base_from_tcp));
         Attempt {
-            number,
-            object_mm,
-            object_angle_deg,
             detection_error,
             step,
             success: report.outcome.is_success(),
             why,
             duration_secs: report.wall_secs,
+            ..self.begun(number, report.base_from_object)
+        }
+    }
+
+    /// What is known of an attempt before it begins: where the part lies.
+    fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> Attempt {
+        let grasp = base_from_object.map(|base_from_object| self.object.grasp_in_base(&base_from_object));
+        let (object_mm, object_angle_deg) = match grasp {
+            Some((tcp, direction_rad)) => ([tcp.x * 1e3, tcp.y * 1e3], direction_rad.to_degrees()),
+            None => ([f64::NAN; 2], f64::NAN),
+        };
+        Attempt {
+            number,
+            object_mm,
+            object_angle_deg,
+            detection_error: None,
+            step: Step::Detect,
+            success: false,
+            why: String::new(),
+            duration_secs: 0.0,
         }
     }
 }
@@ -138,21 +180,6 @@ impl Rehearsal<'_> {
 /// A seed of its own for every attempt of every rehearsal.
 fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
-}
-
-/// How far a found grasp lies beside the true one, as reports give it.
-pub fn grasp_error(
-    object: &ObjectSpec,
-    base_from_object: &Isometry3<f64>,
-    base_from_tcp: &Isometry3<f64>,
-) -> DetectionError {
-    let error = object.grasp_error(base_from_object, base_from_tcp);
-    DetectionError { distance_mm: error.distance_m * 1e3, angle_deg: error.angle_rad.to_degrees() }
-}
-
-/// The heights of a part's grasp, which no photo shows.
-pub fn grasp_plane(object: &ObjectSpec) -> GraspPlane {
-    GraspPlane { mark_height_m: object.mark_height_m, grasp_height_m: object.grasp_height_m }
 }
 
 /// The model as the workcell's eyes.
@@ -170,7 +197,7 @@ impl Perception for ModelPerception<'_> {
         let detections = model.detect(&view.image, *verification)?;
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
         let Some(best) = detections.into_iter().next().filter(GraspDetection::is_accepted) else { return Ok(None) };
-        let pose = GraspPose::from_planar(&view.camera, &best.grasp, &grasp_plane(object), LARGEST_JAW_WIDTH_M)?;
+        let pose = grasp_pose(object, &view.camera, &best.grasp)?;
         Ok(Some(GraspTarget { base_from_tcp: pose.base_from_tcp, jaw_width_m: pose.jaw_width_m, score: best.score }))
     }
 }

@@ -12,6 +12,7 @@ use sdg_report::{
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
+use crate::machine::machine;
 use crate::rehearsal::Rehearsed;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
@@ -31,8 +32,8 @@ pub struct RunPage<'a> {
 pub struct TaughtHere<'a> {
     /// The photo and its marks.
     pub demonstration: &'a Demonstration,
-    /// Losses and validations.
-    pub history: &'a History,
+    /// Losses and validations of the detector; `None` for a model without.
+    pub history: Option<&'a History>,
     /// Pictures with and without the part.
     pub trials: &'a [Trial],
     /// Decides the augmentation.
@@ -77,14 +78,11 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
                 .tone(tone),
         );
     }
-    let report = with_film(report, page)?;
-    Ok(report
-        .section(demonstration(page, taught)?)
-        .section(teaching(taught))
-        .section(detections(&with_part, &without))
-        .section(attempts(page))
-        .section(this_run(page))
-        .footer(FOOTER))
+    let mut report = with_film(report, page)?.section(demonstration(page, taught)?);
+    if let Some(history) = taught.history {
+        report = report.section(teaching(history));
+    }
+    Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
 }
 
 const FOOTER: &str = "Made by sdg. This page is one file: it fetches nothing and runs no script.";
@@ -172,8 +170,7 @@ fn sheet(demonstration: &Demonstration, seed: u64) -> Result<Vec<RgbImage>> {
         .collect())
 }
 
-fn teaching(taught: &TaughtHere) -> Section {
-    let history = taught.history;
+fn teaching(history: &History) -> Section {
     let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
         history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
     };
@@ -262,7 +259,6 @@ fn last_looks(page: &RunPage) -> Section {
 
 fn this_run(page: &RunPage) -> Section {
     let facts = page.model.facts();
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     Section::new("This run")
         .lead("Everything needed to see the same numbers again.")
         .facts([
@@ -271,12 +267,14 @@ fn this_run(page: &RunPage) -> Section {
             ("taught with", format!("seed {}, {} samples, {} steps", facts.seed, facts.samples, facts.steps)),
             (
                 "held-back samples",
-                format!(
-                    "median {:.1} px and {:.1}° after verification",
-                    facts.validation_error_px, facts.validation_error_degrees
-                ),
+                facts.validation.map_or("none".to_owned(), |held_back| {
+                    format!(
+                        "median {:.1} px and {:.1}° after verification",
+                        held_back.error_px, held_back.error_degrees
+                    )
+                }),
             ),
-            ("machine", format!("{cores} cores, {} {}", std::env::consts::ARCH, std::env::consts::OS)),
+            ("machine", machine()),
             ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
         ])
         .command(page.command)

@@ -61,6 +61,20 @@ impl TeachingProgress {
                 }
             }
             Event::Validated(record) => self.show_validation(record),
+            Event::OrientationStep { step, planned_steps, loss, elapsed_secs } => {
+                let done = step + 1;
+                match &self.bar {
+                    Some(bar) => {
+                        bar.set_length(*planned_steps as u64);
+                        bar.set_position(done as u64);
+                        bar.set_message(format!("angles, loss {loss:.2}"));
+                    }
+                    None if done % LINE_EVERY == 0 || done == *planned_steps => eprintln!(
+                        "teaching angles: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone"
+                    ),
+                    None => {}
+                }
+            }
         }
         if self.interrupt.is_requested() {
             if !self.told_of_interrupt {

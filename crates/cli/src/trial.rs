@@ -2,13 +2,13 @@
 
 use anyhow::Result;
 use image::RgbImage;
-use sdg_grasp::{GraspDetection, GraspModel, GraspPose, Verification};
+use sdg_grasp::{GraspDetection, GraspModel, Verification};
 use sdg_report::DetectionError;
-use sdg_simulation::objects::{LARGEST_JAW_WIDTH_M, ObjectSpec};
-use sdg_simulation::scene::test_views;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{TestView, test_views};
 
+use crate::against_truth::{grasp_error, grasp_pose};
 use crate::pictures;
-use crate::rehearsal::{grasp_error, grasp_plane};
 
 /// Largest distance at which a detection counts as right, in millimetres.
 pub const RIGHT_MM: f64 = 10.0;
@@ -56,31 +56,29 @@ pub fn try_views(
     seed: u64,
     verification: Verification,
 ) -> Result<Vec<Trial>> {
-    test_views(object, present, count, seed)
-        .map(|view| {
-            let seen = view?;
-            let start = std::time::Instant::now();
-            let detections = model.detect(&seen.view.image, verification)?;
-            let seconds = start.elapsed().as_secs_f64();
-            let best = detections.first();
-            let error = |detection: &GraspDetection| -> Option<DetectionError> {
-                let truth = seen.truth.as_ref()?;
-                let plane = grasp_plane(object);
-                let pose =
-                    GraspPose::from_planar(&seen.view.camera, &detection.grasp, &plane, LARGEST_JAW_WIDTH_M).ok()?;
-                Some(grasp_error(object, &truth.base_from_object, &pose.base_from_tcp))
-            };
-            let best_error = best.and_then(error);
-            Ok(Trial {
-                drawn: pictures::with_detections(&seen.view.image, &detections),
-                present,
-                best_score: best.map_or(0.0, |d| d.score),
-                best_agreement: best.and_then(|d| d.agreement),
-                network_score: best.map_or(0.0, |d| d.network_score),
-                error: best_error.filter(|_| best.is_some_and(GraspDetection::is_accepted)),
-                best_error,
-                seconds,
-            })
-        })
-        .collect()
+    test_views(object, present, count, seed).map(|seen| try_view(model, object, &seen?, verification)).collect()
+}
+
+/// Shows a model one picture; the part is in it if the picture knows the truth about it.
+pub fn try_view(model: &GraspModel, object: &ObjectSpec, seen: &TestView, verification: Verification) -> Result<Trial> {
+    let start = std::time::Instant::now();
+    let detections = model.detect(&seen.view.image, verification)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let best = detections.first();
+    let error = |detection: &GraspDetection| -> Option<DetectionError> {
+        let truth = seen.truth.as_ref()?;
+        let pose = grasp_pose(object, &seen.view.camera, &detection.grasp).ok()?;
+        Some(grasp_error(object, &truth.base_from_object, &pose.base_from_tcp))
+    };
+    let best_error = best.and_then(error);
+    Ok(Trial {
+        drawn: pictures::with_detections(&seen.view.image, &detections),
+        present: seen.truth.is_some(),
+        best_score: best.map_or(0.0, |d| d.score),
+        best_agreement: best.and_then(|d| d.agreement),
+        network_score: best.map_or(0.0, |d| d.network_score),
+        error: best_error.filter(|_| best.is_some_and(GraspDetection::is_accepted)),
+        best_error,
+        seconds,
+    })
 }

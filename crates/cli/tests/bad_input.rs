@@ -5,6 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use sdg_cli::evaluation::{Settings, Store};
+
 fn sdg(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
 }
@@ -123,6 +125,27 @@ fn a_folder_that_cannot_be_written_is_told_before_the_work() {
 }
 
 #[test]
+fn results_of_other_settings_are_not_mixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = Settings {
+        protocol: Settings::PROTOCOL,
+        preset: "edge".to_owned(),
+        steps: None,
+        seed: 7,
+        attempts: 10,
+        views: 25,
+        scenes: 25,
+    };
+    drop(Store::open(folder.path(), &settings).unwrap());
+    let out = folder.path().to_str().unwrap();
+    let before = files_in(folder.path());
+    let parts = ["settings.json", "seed: expected 8, found 7", "--out"];
+    assert_refused(&["evaluate", "--models", "S", "--seed", "8", "--out", out], 1, &parts);
+    assert_eq!(files_in(folder.path()), before);
+    assert_refused(&["evaluate", "--out", "/proc/evaluation"], 1, &["/proc/evaluation"]);
+}
+
+#[test]
 fn wrong_usage_is_exit_code_2() {
     let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
     for arguments in [
@@ -134,6 +157,11 @@ fn wrong_usage_is_exit_code_2() {
         vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--preset", "huge"],
         vec!["augment", "--demo", &demonstration, "--count", "1", "--out", "x", "--preset", "huge"],
         vec!["demo", "--attempts", "0"],
+        vec!["evaluate", "--models", "C,Z"],
+        vec!["evaluate", "--models", "C,c"],
+        vec!["evaluate", "--objects", "teapot"],
+        vec!["evaluate", "--preset", "huge"],
+        vec!["evaluate", "--scenes", "0"],
         vec!["demo", "--time-budget", "-3"],
     ] {
         assert_eq!(sdg(&arguments).status.code(), Some(2), "{arguments:?}");

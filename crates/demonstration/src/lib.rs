@@ -46,7 +46,7 @@ mod labelme;
 
 pub use annotation::{Annotation, ImageFacts};
 pub use augmentation::{
-    AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle,
+    AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle, Windows,
 };
 pub use coco::CocoFile;
 pub use decode::{ImageLimits, decode_image};

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 println!("{:4} {elapsed_secs:6.1} s  {:?}", record.step, record.losses);
             }
             Event::Validated(record) => println!("{record:?}"),
-            Event::Step { .. } => {}
+            Event::Step { .. } | Event::OrientationStep { .. } => {}
         }
         ControlFlow::Continue(())
     })?;

@@ -11,6 +11,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::decimal::decimal;
+
 /// Maps a raw score to (0, 1) so that `threshold` becomes 0.5.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
@@ -52,7 +54,8 @@ impl Calibration {
             (least_errors(&right, &wrong), 0.0)
         };
         let slope = (SCORE_AT_GAP_END / (1.0 - SCORE_AT_GAP_END)).ln() / half_gap.max(f64::MIN_POSITIVE);
-        Some(Self { threshold, slope: slope.clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1) })
+        let slope = slope.clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
+        Some(Self { threshold: decimal(threshold), slope: decimal(slope) })
     }
 
     /// The same with its threshold moved into bounds.

@@ -105,10 +105,20 @@ pub enum GraspError {
         /// The first thing that does not.
         found: String,
     },
+    /// The orientation CNN refused its input or did not learn.
+    #[error(transparent)]
+    Orientation(#[from] sdg_orientation::OrientationError),
+    /// A demonstration that shows neither texture nor an outline, or a mask of another size than its image.
+    #[error(transparent)]
+    Sift(#[from] sdg_sift::SiftError),
     /// Teaching ended without a model.
     #[cfg(feature = "teach")]
     #[error(transparent)]
     Training(#[from] sdg_training::TrainingError),
+    /// The observer asked to stop before there was a network to keep.
+    #[cfg(feature = "teach")]
+    #[error("stopped while the orientation CNN was taught: there is no model to keep")]
+    StoppedTooEarly,
     /// Teaching ended with a network that does not find the part.
     #[cfg(feature = "teach")]
     #[error(

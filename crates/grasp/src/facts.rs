@@ -7,24 +7,51 @@ use serde::{Deserialize, Serialize};
 
 use crate::GraspError;
 
-/// The grasp models of the paper, by their letters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The grasp models, by their letters: four of the paper, and one without a network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum ModelKind {
+    /// Faster R-CNN; position from the box, angle from a CNN on the box's crop (paper, section IV-A).
+    A,
     /// Keypoint R-CNN; position from the box, angle from the keypoints (paper, section IV-B).
     B,
     /// Keypoint R-CNN; position and angle from the keypoints (paper, section IV-C).
     C,
+    /// Mask R-CNN; position and angle from the mask's texture or outline (paper, section IV-D).
+    D,
+    /// Instant: no network, the demonstration itself is looked for in the whole image.
+    S,
 }
 
 impl ModelKind {
     /// Every model that this version teaches.
-    pub const ALL: [Self; 2] = [Self::B, Self::C];
+    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::S];
 
     /// The letter, as on the command line and in the file.
     pub fn letter(self) -> &'static str {
         match self {
+            Self::A => "A",
             Self::B => "B",
             Self::C => "C",
+            Self::D => "D",
+            Self::S => "S",
+        }
+    }
+
+    /// Whether its detections come with keypoints.
+    pub fn has_keypoints(self) -> bool {
+        matches!(self, Self::B | Self::C)
+    }
+
+    /// Whether it looks with a network; model S is nothing but the demonstration.
+    pub fn has_network(self) -> bool {
+        self != Self::S
+    }
+
+    /// The model whose network this one reads: B and C are taught alike and read differently, so that C's file serves both.
+    pub fn taught_as(self) -> Self {
+        match self {
+            Self::B => Self::C,
+            other => other,
         }
     }
 }
@@ -56,14 +83,41 @@ pub struct TeachingFacts {
     pub steps: usize,
     /// Wall-clock time from demonstration to model.
     pub seconds: f64,
-    /// Held-back samples with the part found within 10 mm and 10°, in `[0, 1]`, network alone.
-    pub validation_hit_rate: f64,
-    /// Median error on them in pixels of the demonstration, after verification.
-    pub validation_error_px: f64,
-    /// Median error on them in degrees, after verification.
-    pub validation_error_degrees: f64,
+    /// How good it was found to be; `None` for model S, which is taught without samples.
+    #[serde(flatten)]
+    pub validation: Option<ValidationFacts>,
+    /// How the orientation CNN came to be; `None` for models without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub orientation: Option<OrientationFacts>,
     /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.
     pub base_weights_sha256: Option<String>,
+}
+
+/// How good a model was found to be on held-back samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ValidationFacts {
+    /// Share of the parts found within 10 mm and 10°, in `[0, 1]`, network alone.
+    #[serde(rename = "validation_hit_rate")]
+    pub hit_rate: f64,
+    /// Median error in pixels of the demonstration, after verification.
+    #[serde(rename = "validation_error_px")]
+    pub error_px: f64,
+    /// Median error in degrees, after verification.
+    #[serde(rename = "validation_error_degrees")]
+    pub error_degrees: f64,
+}
+
+/// How model A's orientation CNN came to be, and how good it was found to be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OrientationFacts {
+    /// Crops that it saw.
+    pub crops: usize,
+    /// Optimiser steps.
+    pub steps: usize,
+    /// Share of held-back crops with the angle read within 10°, in `[0, 1]`.
+    pub hit_rate: f64,
+    /// Median error on them, in degrees.
+    pub error_degrees: f64,
 }
 
 #[cfg(test)]
@@ -74,6 +128,19 @@ mod tests {
     fn letters_round_trip_and_others_are_refused() {
         assert_eq!("c".parse::<ModelKind>().unwrap(), ModelKind::C);
         let refused = "Z".parse::<ModelKind>().unwrap_err().to_string();
-        assert_eq!(refused, "expected a grasp model out of B, C, found \"Z\"");
+        assert_eq!(refused, "expected a grasp model out of A, B, C, D, S, found \"Z\"");
+    }
+
+    #[test]
+    fn facts_keep_the_names_that_files_have() {
+        let file = r#"{"seed": 1, "samples": 2, "steps": 3, "seconds": 4.0, "validation_hit_rate": 0.9,
+            "validation_error_px": 0.8, "validation_error_degrees": 0.7, "base_weights_sha256": null}"#;
+        let facts: TeachingFacts = serde_json::from_str(file).unwrap();
+        assert_eq!(facts.validation, Some(ValidationFacts { hit_rate: 0.9, error_px: 0.8, error_degrees: 0.7 }));
+        let written = serde_json::to_value(&facts).unwrap();
+        assert_eq!(written, serde_json::from_str::<serde_json::Value>(file).unwrap());
+        let instant = TeachingFacts { validation: None, ..facts };
+        let written = serde_json::to_string(&instant).unwrap();
+        assert_eq!(serde_json::from_str::<TeachingFacts>(&written).unwrap(), instant);
     }
 }

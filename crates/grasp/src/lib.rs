@@ -6,9 +6,9 @@
 //!                    to_bytes / from_bytes: one self-describing file
 //! ```
 //!
-//! Model C of the paper: Keypoint R-CNN finds twelve keypoints along the marked line; their mean is the grasp's centre
-//! and the least-squares line through them its angle. The network proposes, the demonstration disposes: every
-//! detection is refined and scored by laying the demonstration over the image ([`Verification`]).
+//! Five models, by their letters ([`ModelKind`]): four of the paper, which differ in what their network sees (a box and
+//! its crop, keypoints, a mask), and one without a network, ready at once. The network proposes, the demonstration
+//! disposes: every detection is refined and scored by laying the demonstration over the image ([`Verification`]).
 //!
 //! What is deliberately absent: files, clocks in detection, threads (bytes in, bytes out, so that the same code runs in
 //! a browser), the robot and the simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
@@ -33,12 +33,13 @@
 #[cfg(feature = "teach")]
 mod base_weights;
 mod calibration;
+mod decimal;
 mod error;
 mod facts;
 mod model;
 mod model_file;
+mod models;
 mod pose;
-mod reading;
 mod safetensors_file;
 mod taught;
 #[cfg(feature = "teach")]
@@ -50,14 +51,14 @@ pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
 pub use error::{GraspError, Result};
-pub use facts::{ModelKind, TeachingFacts};
+pub use facts::{ModelKind, OrientationFacts, TeachingFacts, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
 pub use sdg_demonstration::NUM_KEYPOINTS;
 pub use sdg_detection::keep_freed_memory;
 #[cfg(feature = "teach")]
-pub use sdg_training::{Ending, Event, History, LossValues, StepRecord, Validation, ValidationRecord};
+pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
-pub use teach::{Preset, Taught, TeachOptions, teach};
+pub use teach::{Event, Preset, Taught, TeachOptions, teach};

@@ -1,22 +1,22 @@
 //! The grasp model: what was taught, and how it looks at an image.
 //!
 //! ```text
-//! RgbImage ─ ImageTransform ─ GeneralizedRcnn ─ keypoints ─ pose of the demonstration ─ refined, scored by shape ─ PlanarGrasp
+//! RgbImage ─ Network: detections, each read as a pose of the demonstration ─ laid over the image, refined, scored
+//!     └───── no network, or nothing accepted: the demonstration looked for in the whole image ─────┘       │
+//!                                                                                            PlanarGrasp ──┘
 //! ```
 
 use burn::tensor::Device;
 use image::RgbImage;
 use nalgebra::Point2;
-use sdg_detection::{Detections, GeneralizedRcnn};
-use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, Match};
+use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model_file::Calibrations;
-use crate::reading::{self, Candidate};
+use crate::models::{Candidate, Network, instant};
 use crate::taught::TaughtDemonstration;
-use crate::verification::verify;
+use crate::verification::{Overlay, Scene, verify};
 
 /// No part can be told in an image with a shorter side.
 const LEAST_SIDE_PX: u32 = 32;
@@ -24,9 +24,9 @@ const LEAST_SIDE_PX: u32 = 32;
 /// A grasp model: taught from demonstrations, finds planar grasps.
 #[derive(Debug, Clone)]
 pub struct GraspModel {
-    pub(crate) kind: ModelKind,
     pub(crate) preset: String,
-    pub(crate) network: GeneralizedRcnn,
+    /// `None` for model S.
+    pub(crate) network: Option<Network>,
     pub(crate) demonstrations: Vec<TaughtDemonstration>,
     pub(crate) calibrations: Calibrations,
     pub(crate) facts: TeachingFacts,
@@ -38,7 +38,7 @@ pub enum Verification {
     /// Every detection is refined and scored by the demonstration.
     #[default]
     ByShape,
-    /// The network alone decides and places.
+    /// The network alone decides and places. Model S has no network: it looks as ever.
     Off,
 }
 
@@ -47,13 +47,13 @@ pub enum Verification {
 pub struct GraspDetection {
     /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
     pub score: f64,
-    /// The network's own score, in `[0, 1]`.
+    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, second opinions).
     pub network_score: f64,
     /// How well the demonstration agrees with the image there, in `[0, 1]`; `None` without verification.
     pub agreement: Option<f64>,
     /// The box around the part.
     pub bbox: BoundingBox,
-    /// Keypoints along the grasp line, each with the network's score.
+    /// Keypoints along the grasp line, each with the network's score; empty for models without.
     pub keypoints: Vec<(Point2<f64>, f64)>,
     /// The demonstration's outline as it lies in the image; `None` without verification.
     pub outline: Option<Polygon>,
@@ -71,7 +71,17 @@ impl GraspDetection {
 impl GraspModel {
     /// The letter.
     pub fn kind(&self) -> ModelKind {
-        self.kind
+        self.network.as_ref().map_or(ModelKind::S, Network::kind)
+    }
+
+    /// The same network read as another model; `None` where the two are not taught alike (see [`ModelKind::taught_as`]).
+    /// Its calibration stays, though the network's errors were judged by the first reading.
+    pub fn read_as(self, kind: ModelKind) -> Option<Self> {
+        if self.kind() == kind {
+            return Some(self);
+        }
+        let network = self.network?.read_as(kind)?;
+        Some(Self { network: Some(network), ..self })
     }
 
     /// The preset's name.
@@ -96,8 +106,7 @@ impl GraspModel {
 
     /// Moves the network to another device.
     pub fn to_device(mut self, device: &Device) -> Self {
-        use burn::module::Module;
-        self.network = self.network.to_device(device);
+        self.network = self.network.map(|network| network.moved_to(device));
         self
     }
 
@@ -111,28 +120,27 @@ impl GraspModel {
         if width.min(height) < LEAST_SIDE_PX {
             return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
         }
-        let detections = self.look(image)?;
-        let candidates = reading::candidates(self.kind, &detections, &self.demonstrations);
-        let mut found: Vec<GraspDetection> = match verification {
-            Verification::Off => candidates.iter().map(|c| self.unverified(c)).collect(),
-            Verification::ByShape => {
-                let field = GradientField::new(image);
-                let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, image, &field)).collect();
+        let mut found: Vec<GraspDetection> = match (&self.network, verification) {
+            (Some(network), Verification::Off) => {
+                network.candidates(image, &self.demonstrations)?.iter().map(|c| self.unverified(c)).collect()
+            }
+            (Some(network), Verification::ByShape) => {
+                let scene = Scene::new(image);
+                let candidates = network.candidates(image, &self.demonstrations)?;
+                let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, &scene)).collect();
                 if !found.iter().any(GraspDetection::is_accepted) {
-                    found.extend(self.second_opinion(image, &field));
+                    // A second opinion: the network finds nothing that the demonstration agrees with.
+                    found.extend(self.searched(&scene));
                 }
                 found
             }
+            (None, _) => self.searched(&Scene::new(image)),
         };
+        let (width, height) = (f64::from(width), f64::from(height));
+        found.iter_mut().for_each(|detection| detection.bbox = detection.bbox.clip(width, height));
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         drop_repeated(&mut found);
         Ok(found)
-    }
-
-    /// The network's own detections.
-    pub(crate) fn look(&self, image: &RgbImage) -> Result<Detections> {
-        let transformed = self.network.image_transform().apply(image)?;
-        Ok(self.network.detect(&[transformed]).pop().unwrap_or_default())
     }
 
     fn unverified(&self, candidate: &Candidate) -> GraspDetection {
@@ -148,48 +156,37 @@ impl GraspModel {
     }
 
     /// Lays the demonstration over the image where the network proposes.
-    fn verified(&self, candidate: &Candidate, image: &RgbImage, field: &GradientField) -> GraspDetection {
-        let demonstration = &self.demonstrations[candidate.demonstration_idx];
-        let (pose, agreement) = verify(demonstration, candidate, image, field);
-        let scores = candidate.keypoints.iter().map(|(_, score)| *score).collect();
-        self.laid_over(demonstration, &pose, agreement, candidate.network_score, scores, field)
+    fn verified(&self, candidate: &Candidate, scene: &Scene) -> GraspDetection {
+        let overlay = verify(&self.demonstrations[candidate.demonstration_idx], candidate, scene);
+        let keypoint_scores = candidate.keypoints.iter().map(|(_, score)| *score);
+        self.laid_over(&overlay, candidate.network_score, keypoint_scores)
     }
 
-    /// Where the demonstration itself is found when the network finds nothing that it agrees with: looked for in the
-    /// whole image. The network's score of such a detection is zero.
-    fn second_opinion(&self, image: &RgbImage, field: &GradientField) -> Vec<GraspDetection> {
-        let mut found = Vec::new();
-        for demonstration in &self.demonstrations {
-            for Match { image_from_demonstration: pose, agreement, .. } in demonstration.search(image, field) {
-                let scores = match self.kind {
-                    ModelKind::B | ModelKind::C => vec![0.0; crate::NUM_KEYPOINTS],
-                };
-                found.push(self.laid_over(demonstration, &pose, agreement, 0.0, scores, field));
-            }
-        }
-        found
+    /// Looks for the demonstrations in the whole image, with no network's help.
+    fn searched(&self, scene: &Scene) -> Vec<GraspDetection> {
+        let num_keypoints = if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 };
+        let overlays = instant::search(&self.demonstrations, scene);
+        overlays.iter().map(|overlay| self.laid_over(overlay, 0.0, (0..num_keypoints).map(|_| 0.0))).collect()
     }
 
     /// A detection as the demonstration says, where it lies; a keypoint for each score.
     fn laid_over(
         &self,
-        demonstration: &TaughtDemonstration,
-        pose: &PlanarSimilarity,
-        agreement: f64,
+        overlay: &Overlay,
         network_score: f64,
-        keypoint_scores: Vec<f64>,
-        field: &GradientField,
+        keypoint_scores: impl Iterator<Item = f64>,
     ) -> GraspDetection {
-        let outline = demonstration.outline(pose);
+        let &Overlay { demonstration, image_from_cutout: pose, agreement } = overlay;
+        let outline = demonstration.outline(&pose);
         let taught = demonstration.keypoints();
         GraspDetection {
             score: self.calibrations.agreement.apply(agreement),
             network_score,
             agreement: Some(agreement),
-            bbox: outline.bounds().clip(field.width() as f64, field.height() as f64),
+            bbox: outline.bounds(),
             keypoints: taught.iter().zip(keypoint_scores).map(|(k, score)| (pose.apply(&k.point()), score)).collect(),
             outline: Some(outline),
-            grasp: demonstration.grasp(pose),
+            grasp: demonstration.grasp(&pose),
         }
     }
 }

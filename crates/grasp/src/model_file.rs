@@ -3,10 +3,12 @@
 //! ```text
 //! metadata   format_version, model, preset, object, keypoint_count, input_size, angle_reference_deg, grasp_offset_px
 //!            teaching       seed, samples, steps, seconds, validation figures, base weights' hash   (JSON)
-//!            network        the detector's configuration                                            (JSON)
+//!            network        the detector's configuration; none in model S                           (JSON)
+//!            orientation    the orientation CNN's configuration; in model A alone                   (JSON)
 //!            calibration    of the network's score and of the agreement                             (JSON)
 //!            demonstrations marks of each, in pixels of its cut-out                                 (JSON)
 //! tensors    network.NAME              f16
+//!            orientation.NAME          f16
 //!            demonstrations.I.cutout   u8, a PNG file
 //! ```
 
@@ -19,6 +21,7 @@ use safetensors::{Dtype, SafeTensors};
 use sdg_demonstration::{ImageLimits, decode_image};
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_orientation::OrientationConfig;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +29,8 @@ use crate::calibration::Calibration;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model::GraspModel;
+use crate::models::mask::MaskMatcher;
+use crate::models::{self, Network, Reading};
 use crate::safetensors_file::{self, TensorBytes};
 use crate::taught::{TaughtDemonstration, TaughtMarks};
 
@@ -62,8 +67,16 @@ impl GraspModel {
     /// A cut-out that cannot be coded as PNG.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let mut tensors = BTreeMap::new();
-        for (name, weight) in state_dict::export(&self.network) {
-            tensors.insert(format!("network.{name}"), (weight.shape, TensorBytes::halves(&weight.values)));
+        let mut put_weights = |module: &str, weights: StateDict| {
+            for (name, weight) in weights {
+                tensors.insert(format!("{module}.{name}"), (weight.shape, TensorBytes::halves(&weight.values)));
+            }
+        };
+        if let Some(Network { detector, reading }) = &self.network {
+            put_weights("network", state_dict::export(detector));
+            if let Reading::BoxAndCrop(orientation) = reading {
+                put_weights("orientation", orientation.state_dict());
+            }
         }
         for (i, demonstration) in self.demonstrations.iter().enumerate() {
             let mut png = Cursor::new(Vec::new());
@@ -81,15 +94,20 @@ impl GraspModel {
         let mut metadata = BTreeMap::new();
         let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
         put("format_version", FORMAT_VERSION.to_string());
-        put("model", self.kind.to_string());
+        put("model", self.kind().to_string());
         put("preset", self.preset.clone());
         put("object", self.object().to_owned());
-        put("keypoint_count", crate::NUM_KEYPOINTS.to_string());
-        put("input_size", to_json(&self.network.config().input.resize));
+        put("keypoint_count", if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }.to_string());
         put("angle_reference_deg", first.grasp.angle().degrees().to_string());
         put("grasp_offset_px", to_json(&[offset.x, offset.y]));
         put("teaching", to_json(&self.facts));
-        put("network", to_json(self.network.config()));
+        if let Some(Network { detector, reading }) = &self.network {
+            put("input_size", to_json(&detector.config().input.resize));
+            put("network", to_json(detector.config()));
+            if let Reading::BoxAndCrop(orientation) = reading {
+                put("orientation", to_json(orientation.config()));
+            }
+        }
         put("calibration", to_json(&self.calibrations));
         put("demonstrations", to_json(&marks));
         Ok(safetensors_file::write(&metadata, &tensors))
@@ -106,7 +124,7 @@ impl GraspModel {
             found: error.to_string(),
         })?;
 
-        let config: RcnnConfig = metadata.json("network")?;
+        let kind: ModelKind = metadata.text("model")?.parse()?;
         let marks: Vec<TaughtMarks> = metadata.json("demonstrations")?;
         if marks.is_empty() || marks.len() > MOST_DEMONSTRATIONS {
             return Err(GraspError::Damaged {
@@ -124,30 +142,65 @@ impl GraspModel {
             })
             .collect::<Result<Vec<_>>>()?;
 
-        let mut dict = StateDict::new();
-        for name in file.names() {
-            if let Some(parameter) = name.strip_prefix("network.") {
-                let weight = tensor(&file, name, Dtype::F16)?;
-                let values = safetensors_file::values_from_halves(weight.data());
-                dict.insert(parameter.to_owned(), WeightTensor { shape: weight.shape().to_vec(), values });
-            }
-        }
-        let (network, report) = state_dict::import(config.init(device, 0)?, &dict);
-        if !report.is_complete() {
-            return Err(GraspError::Damaged {
-                expected: format!("the {} parameters of the network that the file describes", report.applied.len()),
-                found: incomplete(&report),
-            });
-        }
         Ok(Self {
-            kind: metadata.text("model")?.parse()?,
             preset: metadata.text("preset")?.to_owned(),
             calibrations: metadata.json("calibration")?,
             facts: metadata.json("teaching")?,
-            network,
+            network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
         })
     }
+}
+
+/// The networks of a model of this kind; none for model S.
+fn read_network(
+    kind: ModelKind,
+    metadata: &Metadata,
+    file: &SafeTensors<'_>,
+    demonstrations: &[TaughtDemonstration],
+    device: &Device,
+) -> Result<Option<Network>> {
+    let reading = match kind {
+        ModelKind::S => return Ok(None),
+        ModelKind::A => {
+            let config: OrientationConfig = metadata.json("orientation")?;
+            let (orientation, report) = state_dict::import(config.init(device, 0)?, &weights(file, "orientation")?);
+            check_complete(&report, "orientation CNN")?;
+            Reading::BoxAndCrop(Box::new(orientation))
+        }
+        ModelKind::B => Reading::BoxAndKeypoints,
+        ModelKind::C => Reading::Keypoints,
+        ModelKind::D => Reading::Mask(MaskMatcher::new(demonstrations)?),
+    };
+    let config: RcnnConfig = metadata.json("network")?;
+    models::check_heads(kind, &config)?;
+    let (detector, report) = state_dict::import(config.init(device, 0)?, &weights(file, "network")?);
+    check_complete(&report, "network")?;
+    Ok(Some(Network { detector, reading }))
+}
+
+/// The weights whose names start with a module's.
+fn weights(file: &SafeTensors<'_>, module: &str) -> Result<StateDict> {
+    let mut dict = StateDict::new();
+    for name in file.names() {
+        if let Some(parameter) = name.strip_prefix(module).and_then(|rest| rest.strip_prefix('.')) {
+            let weight = tensor(file, name, Dtype::F16)?;
+            let values = safetensors_file::values_from_halves(weight.data());
+            dict.insert(parameter.to_owned(), WeightTensor { shape: weight.shape().to_vec(), values });
+        }
+    }
+    Ok(dict)
+}
+
+fn check_complete(report: &state_dict::ImportReport, module: &str) -> Result<()> {
+    if report.is_complete() {
+        return Ok(());
+    }
+    let count = report.applied.len() + report.missing.len() + report.mismatched.len();
+    Err(GraspError::Damaged {
+        expected: format!("the {count} parameters of the {module} that the file describes"),
+        found: incomplete(report),
+    })
 }
 
 fn incomplete(report: &state_dict::ImportReport) -> String {
@@ -252,11 +305,11 @@ mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
-    use sdg_detection::presets;
+    use sdg_detection::presets::edge_of;
     use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
     /// A model of an untaught network: everything that a file holds, in no time.
-    fn untaught() -> GraspModel {
+    fn untaught(kind: ModelKind) -> GraspModel {
         let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 20.0, x2: 100.0, y2: 50.0 });
         let cutout = RgbImage::from_fn(120, 70, |x, y| {
             let inside = outline.contains(&Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
@@ -269,20 +322,30 @@ mod tests {
             outline: Some(outline),
             width_px: 30.0,
         };
+        let demonstrations = vec![TaughtDemonstration::from_parts(cutout, marks).unwrap()];
+        let network = models::rcnn_kind(kind).map(|rcnn| Network {
+            detector: edge_of(rcnn).init(&Device::flex(), 3).unwrap(),
+            reading: match kind {
+                ModelKind::A => {
+                    Reading::BoxAndCrop(Box::new(OrientationConfig::edge().init(&Device::flex(), 3).unwrap()))
+                }
+                ModelKind::B => Reading::BoxAndKeypoints,
+                ModelKind::D => Reading::Mask(MaskMatcher::new(&demonstrations).unwrap()),
+                _ => Reading::Keypoints,
+            },
+        });
         GraspModel {
-            kind: ModelKind::C,
             preset: "edge".to_owned(),
-            network: presets::edge(crate::NUM_KEYPOINTS).init(&Device::flex(), 3).unwrap(),
-            demonstrations: vec![TaughtDemonstration::from_parts(cutout, marks).unwrap()],
+            network,
+            demonstrations,
             calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: Calibration::NEUTRAL },
             facts: TeachingFacts {
                 seed: 3,
                 samples: 0,
                 steps: 0,
                 seconds: 0.5,
-                validation_hit_rate: 0.0,
-                validation_error_px: 1.0,
-                validation_error_degrees: 1.0,
+                validation: None,
+                orientation: None,
                 base_weights_sha256: None,
             },
         }
@@ -298,17 +361,33 @@ mod tests {
 
     #[test]
     fn a_file_gives_the_model_back() {
-        let bytes = untaught().to_bytes().unwrap();
-        assert!(bytes.len() < 12_000_000);
-        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
-        // Half precision was rounded once: a second round changes nothing.
-        assert_eq!(read.to_bytes().unwrap(), bytes);
-        assert_eq!(summarize(&bytes).unwrap().object, "bar");
+        for kind in ModelKind::ALL {
+            let bytes = untaught(kind).to_bytes().unwrap();
+            assert!(bytes.len() < 12_000_000, "{kind}: {} bytes", bytes.len());
+            let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+            assert_eq!(read.kind(), kind);
+            // Half precision was rounded once: a second round changes nothing.
+            assert_eq!(read.to_bytes().unwrap(), bytes, "{kind}");
+            let summary = summarize(&bytes).unwrap();
+            assert_eq!((summary.model, summary.object.as_str()), (kind, "bar"));
+        }
+    }
+
+    #[test]
+    fn another_letter_on_a_file_is_an_error_that_says_what_is_lacking() {
+        let bytes = untaught(ModelKind::C).to_bytes().unwrap();
+        let read = |letter: &str| {
+            let altered = with_metadata(&bytes, r#""model":"C""#, &format!(r#""model":"{letter}""#));
+            GraspModel::from_bytes(&altered, &Device::flex()).unwrap_err().to_string()
+        };
+        assert!(read("A").contains("metadata \"orientation\""), "{}", read("A"));
+        assert!(read("D").contains("0 keypoints and masks, found"), "{}", read("D"));
+        assert!(read("X").contains("expected a grasp model out of A, B, C, D, S, found \"X\""), "{}", read("X"));
     }
 
     #[test]
     fn other_versions_are_told_apart_from_damage() {
-        let bytes = untaught().to_bytes().unwrap();
+        let bytes = untaught(ModelKind::C).to_bytes().unwrap();
         let newer = with_metadata(&bytes, r#""format_version":"1""#, r#""format_version":"7""#);
         let refused = GraspModel::from_bytes(&newer, &Device::flex()).unwrap_err();
         assert!(matches!(&refused, GraspError::OtherVersion { expected: 1, found } if found == "7"), "{refused}");
@@ -316,7 +395,7 @@ mod tests {
 
     #[test]
     fn a_file_cut_anywhere_is_an_error() {
-        let bytes = untaught().to_bytes().unwrap();
+        let bytes = untaught(ModelKind::C).to_bytes().unwrap();
         for length in [0, 1, 7, 8, 100, 5_000, bytes.len() / 2, bytes.len() - 1] {
             assert!(GraspModel::from_bytes(&bytes[..length], &Device::flex()).is_err(), "{length} bytes");
         }
@@ -327,7 +406,7 @@ mod tests {
 
     #[test]
     fn a_parameter_of_another_name_is_an_error_that_names_it() {
-        let bytes = untaught().to_bytes().unwrap();
+        let bytes = untaught(ModelKind::C).to_bytes().unwrap();
         let renamed =
             with_metadata(&bytes, "network.roi_heads.box_head.fc1.weight", "network.roi_heads.box_head.fc9.weight");
         let refused = GraspModel::from_bytes(&renamed, &Device::flex()).unwrap_err().to_string();

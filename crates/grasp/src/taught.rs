@@ -7,6 +7,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilari
 use sdg_shape::{GradientField, InstantSearch, Match, Refinement, SearchConfig, ShapeConfig, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
 
+use crate::decimal::decimal;
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides.
@@ -71,13 +72,13 @@ impl TaughtDemonstration {
         .to_image();
 
         let to_cutout = Vector2::new(-left, -top);
-        let moved = |p: &Point2<f64>| p + to_cutout;
+        let moved = |p: &Point2<f64>| (p + to_cutout).map(decimal);
         let corners = bbox.corners();
         let (upper_left, lower_right) = (moved(&corners[0]), moved(&corners[2]));
         let bbox = BoundingBox { x1: upper_left.x, y1: upper_left.y, x2: lower_right.x, y2: lower_right.y };
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
-        let width_px = width_across(&grasp, outline.as_ref(), &bbox);
+        let width_px = decimal(width_across(&grasp, outline.as_ref(), &bbox));
         Self::from_parts(cutout, TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px })
     }
 

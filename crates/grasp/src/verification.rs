@@ -4,37 +4,56 @@ use image::RgbImage;
 use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_shape::{GradientField, SURFACE_SHARE};
 
-use crate::reading::Candidate;
+use crate::models::Candidate;
 use crate::taught::TaughtDemonstration;
 
-/// Lays the demonstration over the image where the candidate is, both ways round, and returns the better pose with
-/// its agreement.
+/// An image with its gradients, which every overlay reads.
+pub(crate) struct Scene<'a> {
+    pub(crate) image: &'a RgbImage,
+    pub(crate) field: GradientField,
+}
+
+impl<'a> Scene<'a> {
+    pub(crate) fn new(image: &'a RgbImage) -> Self {
+        Self { image, field: GradientField::new(image) }
+    }
+}
+
+/// A demonstration laid over an image.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Overlay<'a> {
+    pub(crate) demonstration: &'a TaughtDemonstration,
+    pub(crate) image_from_cutout: PlanarSimilarity,
+    /// How well it agrees with the image there, in `[0, 1]`.
+    pub(crate) agreement: f64,
+}
+
+/// Lays the demonstration over the image where the candidate is, both ways round, and returns the better one.
 ///
 /// Keypoints give place and turn well, but a short grasp line gives the scale badly, so the box decides that: the
 /// start takes the scale at which the outline is as large as the detected box. A network that mistakes one end of a
 /// part for the other is half a turn off; the demonstration sees which end it is.
-pub(crate) fn verify(
-    demonstration: &TaughtDemonstration,
+pub(crate) fn verify<'a>(
+    demonstration: &'a TaughtDemonstration,
     candidate: &Candidate,
-    image: &RgbImage,
-    field: &GradientField,
-) -> (PlanarSimilarity, f64) {
+    scene: &Scene<'_>,
+) -> Overlay<'a> {
     let pose = candidate.image_from_cutout;
     let outline = demonstration.outline(&pose).bounds();
     let box_over_outline = (candidate.bbox.area() / outline.area()).sqrt();
     let rescaled = about_middle(demonstration, &pose, Angle::ZERO, box_over_outline.clamp(0.5, 2.0));
     let turned = about_middle(demonstration, &rescaled, Angle::from_radians(std::f64::consts::PI), 1.0);
-    let mut best = (pose, f64::NEG_INFINITY);
-    for start in [rescaled, turned] {
-        let refined = demonstration.refine(field, &start);
-        let refined_pose = refined.image_from_demonstration;
-        let surface = demonstration.surface_agreement(image, &refined_pose);
-        let agreement = (1.0 - SURFACE_SHARE) * refined.agreement + SURFACE_SHARE * surface;
-        if agreement > best.1 {
-            best = (refined_pose, agreement);
-        }
-    }
-    best
+    let [straight, turned] = [rescaled, turned].map(|start| refined(demonstration, &start, scene));
+    if turned.agreement > straight.agreement { turned } else { straight }
+}
+
+/// The demonstration where it agrees best near `start`.
+fn refined<'a>(demonstration: &'a TaughtDemonstration, start: &PlanarSimilarity, scene: &Scene<'_>) -> Overlay<'a> {
+    let refined = demonstration.refine(&scene.field, start);
+    let image_from_cutout = refined.image_from_demonstration;
+    let surface = demonstration.surface_agreement(scene.image, &image_from_cutout);
+    let agreement = (1.0 - SURFACE_SHARE) * refined.agreement + SURFACE_SHARE * surface;
+    Overlay { demonstration, image_from_cutout, agreement }
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.

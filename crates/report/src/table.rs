@@ -96,6 +96,21 @@ impl Cell {
             }
         }
     }
+
+    fn to_markdown(&self) -> String {
+        match self {
+            Self::Text(text) => escape_markdown(text),
+            Self::Number { value, decimals } => format_number(*value, *decimals),
+            Self::Verdict { text, note: None, .. } => escape_markdown(text),
+            Self::Verdict { text, note: Some(note), .. } => escape_markdown(&format!("{text} ({note})")),
+            Self::Progress { done, total, label } => escape_markdown(&format!("{done} of {total}, {label}")),
+        }
+    }
+}
+
+/// Text inside a table's cell: on one line, without bars that would end the cell.
+fn escape_markdown(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
 }
 
 /// A column: its heading, its unit, and the heading it shares with its neighbours.
@@ -132,6 +147,12 @@ impl Column {
     pub fn group(mut self, group: impl Into<String>) -> Self {
         self.group = Some(group.into());
         self
+    }
+
+    fn to_markdown(&self) -> String {
+        let group = self.group.as_ref().map(|group| format!("{group}: ")).unwrap_or_default();
+        let unit = self.unit.as_ref().map(|unit| format!(", {unit}")).unwrap_or_default();
+        escape_markdown(&format!("{group}{}{unit}", self.heading))
     }
 
     fn class(&self) -> &'static str {
@@ -230,6 +251,22 @@ impl Table {
         html + "</figure>"
     }
 
+    /// The table as Markdown, its caption below. A column under a common heading carries both.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let headings: Vec<String> = self.columns.iter().map(Column::to_markdown).collect();
+        let rules: Vec<&str> = self.columns.iter().map(|column| if column.numeric { "--:" } else { "---" }).collect();
+        let mut markdown = format!("| {} |\n| {} |\n", headings.join(" | "), rules.join(" | "));
+        for row in self.rows.iter().chain(&self.summary) {
+            let cells: Vec<String> = row.iter().map(Cell::to_markdown).collect();
+            markdown += &format!("| {} |\n", cells.join(" | "));
+        }
+        if let Some(caption) = &self.caption {
+            markdown += &format!("\n{}\n", escape_markdown(caption));
+        }
+        markdown
+    }
+
     fn row_to_html(&self, cells: &[Cell]) -> String {
         let cells: String = cells
             .iter()
@@ -280,6 +317,26 @@ mod tests {
         assert!(html.contains("&lt;i&gt;") && html.contains("\u{2212}1.50") && html.contains(">–<"));
         assert!(html.contains("badge bad\">&lt;lost&gt;") && html.contains("a &amp; b"));
         assert_eq!(html.matches("<i class=\"on\"></i>").count(), 2);
+    }
+
+    #[test]
+    fn markdown_has_the_same_rows() {
+        let verdict = Cell::Verdict { tone: Tone::Bad, text: "lost".into(), note: Some("a | b\nc".into()) };
+        let markdown = table()
+            .row(vec![Cell::text("rod end"), Cell::number(-1.5, 1), Cell::missing(), verdict])
+            .summary(vec![
+                Cell::text("all"),
+                Cell::number(1.0, 0),
+                Cell::number(2.0, 0),
+                Cell::Progress { done: 2, total: 3, label: "hover".into() },
+            ])
+            .caption("As measured.")
+            .to_markdown();
+        assert_eq!(
+            markdown,
+            "| part | pose: x, mm | pose: y, mm | outcome |\n| --- | --: | --: | --- |\n\
+             | rod end | \u{2212}1.5 | – | lost (a \\| b c) |\n| all | 1 | 2 | 2 of 3, hover |\n\nAs measured.\n"
+        );
     }
 
     #[test]

@@ -17,9 +17,11 @@ pub struct TrainingConfig {
     pub batch_size: usize,
     /// The first part of the run, on windows of frames; `None` for whole frames from the start.
     pub windows: Option<WindowPhase>,
+    /// What the gradients are made into.
+    pub optimizer: Optimizer,
     /// Learning rate over the run.
     pub schedule: OneCycle,
-    /// AdamW's decoupled weight decay.
+    /// Weight decay; decoupled from the gradients in AdamW.
     pub weight_decay: f64,
     /// The gradient's norm is cut to this.
     pub max_gradient_norm: f32,
@@ -32,6 +34,18 @@ pub struct TrainingConfig {
     pub time_budget: Option<Duration>,
     /// Decides the samples, their order and every random choice of the losses.
     pub seed: u64,
+}
+
+/// What a step makes of the gradients.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Optimizer {
+    /// Steps as long as the gradients are steady: learns from nothing in a few hundred of them.
+    AdamW,
+    /// Stochastic gradient descent with momentum, as Detectron2 fine-tunes.
+    Sgd {
+        /// Share of the last step that the next one keeps.
+        momentum: f64,
+    },
 }
 
 /// The part of a run that learns from windows: small pictures just around the part, at the scale of whole frames.
@@ -91,6 +105,7 @@ impl TrainingConfig {
             steps: 300,
             batch_size: 4,
             windows: Some(WindowPhase { share: 0.7, batch_size: 16 }),
+            optimizer: Optimizer::AdamW,
             schedule: OneCycle { peak: 1e-3, warm_up: 0.2 },
             weight_decay: 1e-4,
             max_gradient_norm: 10.0,

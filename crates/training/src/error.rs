@@ -30,6 +30,9 @@ pub enum TrainingError {
         /// The step, from zero.
         step: usize,
     },
+    /// The held-back samples could not be looked at.
+    #[error("the held-back samples cannot be examined: {0}")]
+    Examination(Box<dyn std::error::Error + Send + Sync>),
     /// The network refused a batch.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),

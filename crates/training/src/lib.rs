@@ -27,6 +27,7 @@ mod adamw;
 mod batch;
 mod config;
 mod error;
+mod optimizer;
 mod pace;
 mod progress;
 mod schedule;
@@ -35,7 +36,7 @@ mod validation;
 
 pub use adamw::AdamW;
 pub use batch::SampleSource;
-pub use config::{EarlyStop, TrainingConfig, ValidationConfig, WindowPhase};
+pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
 pub use pace::Pace;
 pub use progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};

@@ -7,10 +7,10 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use sdg_detection::{GeneralizedRcnn, Losses};
 
-use crate::adamw::AdamW;
 use crate::batch::{Batch, BatchRequest, Batches, SampleSource, View, with_batches};
 use crate::config::TrainingConfig;
 use crate::error::TrainingError;
+use crate::optimizer::Stepper;
 use crate::pace::Pace;
 use crate::progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
 use crate::validation::{Outcome, Validation};
@@ -40,10 +40,9 @@ pub fn train(
 ) -> Result<Trained, TrainingError> {
     config.check()?;
     let transform = detector.config().input.clone();
-    let optimizer = AdamW::new(config.weight_decay, config.max_gradient_norm.into());
     let run = Run {
         detector,
-        optimizer,
+        optimizer: Stepper::new(config),
         config,
         pace: Pace::new(config.steps, config.time_budget.map(|budget| budget.as_secs_f64())),
         start: Instant::now(),
@@ -56,7 +55,7 @@ pub fn train(
 
 struct Run<'a> {
     detector: GeneralizedRcnn,
-    optimizer: AdamW,
+    optimizer: Stepper,
     config: &'a TrainingConfig,
     pace: Pace,
     start: Instant,

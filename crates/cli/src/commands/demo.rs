@@ -61,8 +61,12 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);
     let page = RunPage { model: &taught.model, object: &object, rehearsed: &rehearsed, command: &command };
-    let taught_here =
-        TaughtHere { demonstration: &demonstration, history: &taught.history, trials: &trials, seed: args.seed };
+    let taught_here = TaughtHere {
+        demonstration: &demonstration,
+        history: taught.history.as_ref(),
+        trials: &trials,
+        seed: args.seed,
+    };
     let report = run_page::demo(&page, &taught_here)?.write(&args.out)?;
     finish(&page, Some(taught.model.facts().seconds), &report, args.json)
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_grasp::{Ending, GraspError, TeachOptions, teach};
+use sdg_grasp::{Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::json;
@@ -55,21 +55,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{line}");
     } else {
-        let ending = match taught.history.ending {
-            Ending::Completed => "",
-            Ending::EarlyStop => ", stopped early: good enough",
-            Ending::TimeBudget => ", stopped by the time budget",
-            Ending::Interrupted => ", interrupted",
-        };
-        println!(
-            "taught \"{}\" in {:.0} s ({} steps{ending}): finds {:.0} % of held-back samples, median {:.1} px and {:.1}°",
-            taught.model.object(),
-            facts.seconds,
-            facts.steps,
-            100.0 * facts.validation_hit_rate,
-            facts.validation_error_px,
-            facts.validation_error_degrees,
-        );
+        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
     }
     Ok(Outcome::Done)
@@ -79,8 +65,15 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
 /// minutes; the whole report is part of the JSON at the end.
 fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Report>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
+    let Some(network) = options.network() else {
+        return Err(Usage(format!(
+            "--base-weights: model {} has no network that could start from weights",
+            options.kind
+        ))
+        .into());
+    };
     let mut told = None;
-    let base_weights = base_weights::read(path, &options.network(), &args.reinitialized, &mut |report| {
+    let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
         if !args.json {
             let mut stdout = std::io::stdout().lock();
             write!(stdout, "{}", report.exceptions())?;
@@ -91,6 +84,28 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
     })?;
     options.base_weights = Some(base_weights);
     Ok(told)
+}
+
+/// What the network has learnt, for people; nothing for a model without.
+fn learnt(taught: &Taught) -> String {
+    let facts = taught.model.facts();
+    let (Some(history), Some(held_back)) = (&taught.history, facts.validation) else { return String::new() };
+    let ending = match history.ending {
+        Ending::Completed => "",
+        Ending::EarlyStop => ", stopped early: good enough",
+        Ending::TimeBudget => ", stopped by the time budget",
+        Ending::Interrupted => ", interrupted",
+    };
+    let orientation = facts.orientation.map_or(String::new(), |cnn| {
+        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
+    });
+    format!(
+        " ({} steps{ending}): finds {:.0} % of held-back samples, median {:.1} px and {:.1}°{orientation}",
+        facts.steps,
+        100.0 * held_back.hit_rate,
+        held_back.error_px,
+        held_back.error_degrees,
+    )
 }
 
 /// An argument that names one of a few things; another name is wrong usage.

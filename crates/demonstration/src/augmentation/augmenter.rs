@@ -101,10 +101,8 @@ const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
 pub struct Augmenter {
     parts: Vec<Prepared>,
     config: AugmentationConfig,
-    /// Of the whole frame.
+    /// Width and height of the samples.
     frame: [u32; 2],
-    /// Of the samples: the frame, or a window of it.
-    size: [u32; 2],
     seed: u64,
     noises: NoiseBank,
     normal: NormalTable,
@@ -130,13 +128,14 @@ impl Augmenter {
         let mut rng = sample_rng(seed, Stream::Preparation, 0);
         let parts = demonstrations.iter().map(|one| Prepared::new(one, frame, &mut rng)).collect();
         let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));
-        Ok(Self { parts, config, frame, size: frame, seed, noises, normal })
+        Ok(Self { parts, config, frame, seed, noises, normal })
     }
 
-    /// Shows only windows of the frame, just large enough for the part at any turn and size: the same scale, tables,
-    /// things and light in a smaller picture, so that most of what a network computes is about the part. Sides are
-    /// multiples of `multiple` pixels and never exceed the frame; the paper's samples stay whole.
-    pub fn with_windows(mut self, multiple: u32) -> Self {
+    /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables, things
+    /// and light in a smaller picture, so that most of what a network computes is about the part. Sides are multiples
+    /// of `multiple` pixels and never exceed the frame; the paper's samples stay whole.
+    pub fn windows(&self, multiple: u32) -> Windows<'_> {
+        let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {
             let most_scale = f64::from(style.scale[1]);
             let diameter = self.parts.iter().map(|p| 2.0 * p.radius * p.nominal_scale * most_scale).fold(0.0, f64::max);
@@ -146,24 +145,24 @@ impl Augmenter {
             };
             // A little wider than high, as frames are; a pixel of room on each side where the part fits tightly.
             let [width, height] = self.frame;
-            self.size = [side(WINDOW_OVER_PART[0], width), side(WINDOW_OVER_PART[1], height)];
+            size = [side(WINDOW_OVER_PART[0], width), side(WINDOW_OVER_PART[1], height)];
         }
-        self
+        Windows { augmenter: self, size }
     }
 
     /// Sample `index` of the training stream.
     pub fn sample(&self, index: u64) -> Sample {
-        self.draw(Stream::Training, index)
+        self.draw(Stream::Training, index, self.frame)
     }
 
     /// Sample `index` of a stream that [`sample`](Self::sample) never touches, for validation.
     pub fn held_out(&self, index: u64) -> Sample {
-        self.draw(Stream::HeldOut, index)
+        self.draw(Stream::HeldOut, index, self.frame)
     }
 
     /// Width and height of the samples, in pixels.
     pub fn output_size(&self) -> [u32; 2] {
-        self.size
+        self.frame
     }
 
     /// The settings.
@@ -171,18 +170,18 @@ impl Augmenter {
         &self.config
     }
 
-    fn draw(&self, stream: Stream, index: u64) -> Sample {
+    fn draw(&self, stream: Stream, index: u64, size: [u32; 2]) -> Sample {
         let mut rng = sample_rng(self.seed, stream, index);
         match &self.config.style {
             AugmentationStyle::Paper(style) => {
                 let demonstration_idx = index_below(&mut rng, self.parts.len());
                 let part = &self.parts[demonstration_idx];
                 let draw = PaperDraw::draw(style, &mut rng);
-                let [width, height] = self.size;
+                let [width, height] = size;
                 let pose = draw.image_from_photo(part, width, height);
                 let object = SampleObject {
                     image_from_demonstration: pose,
-                    ..SampleObject::new(part, &Homography::from_similarity(&pose), self.size, demonstration_idx)
+                    ..SampleObject::new(part, &Homography::from_similarity(&pose), size, demonstration_idx)
                 };
                 // The original's boxes are hulls of the turned box, whatever the outline.
                 let hull = BoundingBox::around(part.drawn_box.corners().iter().map(|corner| pose.apply(corner)));
@@ -195,11 +194,29 @@ impl Augmenter {
                     style,
                     noises: &self.noises,
                     normal: &self.normal,
-                    size: self.size,
+                    size,
                     frame: self.frame,
                 };
                 studio.compose(&mut rng)
             }
         }
+    }
+}
+
+/// An [`Augmenter`]'s samples, seen through windows.
+pub struct Windows<'a> {
+    augmenter: &'a Augmenter,
+    size: [u32; 2],
+}
+
+impl Windows<'_> {
+    /// Sample `index` of the training stream.
+    pub fn sample(&self, index: u64) -> Sample {
+        self.augmenter.draw(Stream::Training, index, self.size)
+    }
+
+    /// Width and height of the windows, in pixels.
+    pub fn output_size(&self) -> [u32; 2] {
+        self.size
     }
 }

@@ -33,7 +33,7 @@ mod sensor;
 mod tests;
 mod warp;
 
-pub use augmenter::{Augmenter, Sample, SampleObject};
+pub use augmenter::{Augmenter, Sample, SampleObject, Windows};
 pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle};
 
 pub(crate) use erase::erase_parts;

@@ -90,10 +90,9 @@ fn dot_center(image: &RgbImage, near: Point2<f64>) -> Option<Point2<f64>> {
     Some(Point2::new(sum[1] / sum[0], sum[2] / sum[0]))
 }
 
-fn check_dots(augmenter: &Augmenter, count: u64) -> usize {
+fn check_dots(samples: impl Iterator<Item = Sample>) -> usize {
     let mut checked = 0;
-    for index in 0..count {
-        let sample = augmenter.sample(index);
+    for (index, sample) in samples.enumerate() {
         for object in &sample.objects {
             assert_eq!(object.keypoints.len(), NUM_KEYPOINTS);
             for keypoint in [object.keypoints[0], object.keypoints[NUM_KEYPOINTS - 1]] {
@@ -109,11 +108,11 @@ fn check_dots(augmenter: &Augmenter, count: u64) -> usize {
 
 #[test]
 fn a_drawn_dot_lands_at_its_keypoint() {
-    let style = SceneStyle { max_distractors: 1, ..plain() };
-    assert!(check_dots(&augmenter(style), 60) > 90);
+    let dotted = augmenter(SceneStyle { max_distractors: 1, ..plain() });
+    assert!(check_dots((0..60).map(|i| dotted.sample(i))) > 90);
     let paper = AugmentationConfig::paper().with_output_size(320, 240);
     let paper = Augmenter::new(&[demonstration(true)], paper, 5).unwrap();
-    assert!(check_dots(&paper, 40) > 40);
+    assert!(check_dots((0..40).map(|i| paper.sample(i))) > 40);
 }
 
 /// The box of the pixels that are clearly redder than they are green.
@@ -258,17 +257,18 @@ fn settings_and_demonstrations_are_checked() {
 
 #[test]
 fn windows_keep_the_scale_and_hold_the_part() {
-    let (frames, windows) = (augmenter(plain()), augmenter(plain()).with_windows(32));
+    let frames = augmenter(plain());
+    let windows = frames.windows(32);
     let [width, height] = windows.output_size();
     // The L's vertices are up to 129 photo pixels from its centre: 65 in the frame, 155 across at the largest scale.
     assert_eq!([width, height], [224, 192]);
     assert_eq!((windows.sample(0).image.width(), windows.sample(0).image.height()), (width, height));
-    let mean_scale = |augmenter: &Augmenter| {
-        let scales = (0..40).map(|i| augmenter.sample(i).objects[0].image_from_demonstration.scale);
-        scales.sum::<f64>() / 40.0
+    let mean_scale = |sample: &dyn Fn(u64) -> Sample| {
+        (0..40).map(|i| sample(i).objects[0].image_from_demonstration.scale).sum::<f64>() / 40.0
     };
-    assert!((mean_scale(&windows) / mean_scale(&frames) - 1.0).abs() < 0.05);
-    assert!(check_dots(&windows, 30) > 40);
+    let (in_windows, in_frames) = (mean_scale(&|i| windows.sample(i)), mean_scale(&|i| frames.sample(i)));
+    assert!((in_windows / in_frames - 1.0).abs() < 0.05);
+    assert!(check_dots((0..30).map(|i| windows.sample(i))) > 40);
     let whole = (0..40).filter(|&i| {
         let object = &windows.sample(i).objects[0];
         object.keypoints.iter().all(|keypoint| keypoint.is_labelled())

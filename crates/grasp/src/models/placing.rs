@@ -4,12 +4,18 @@ use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
 use crate::taught::TaughtDemonstration;
 
-/// The demonstration turned by `turn`, so large and so placed that its outline fills `bbox`.
+/// The demonstration turned until its grasp line points to `grasp_angle`, so large and so placed that its outline fills
+/// `bbox`.
 ///
 /// The middle of a turned part's upright box is not the turned middle of its box: the outline is turned first, and
 /// what is then its box is laid over the detected one. With that the grasp's offset from the box's middle is the
 /// taught one at any angle.
-pub(super) fn fill_box(demonstration: &TaughtDemonstration, bbox: &BoundingBox, turn: Angle) -> PlanarSimilarity {
+pub(super) fn fill_box(
+    demonstration: &TaughtDemonstration,
+    bbox: &BoundingBox,
+    grasp_angle: Angle,
+) -> PlanarSimilarity {
+    let turn = grasp_angle - demonstration.marks.grasp.angle();
     let pivot = demonstration.marks.bbox.center();
     let turned = PlanarSimilarity::about(pivot, pivot, turn, 1.0);
     let bounds = demonstration.outline(&turned).bounds();

@@ -1,0 +1,77 @@
+//! An evaluation as it is seen: a line for every unit that ends, and on a terminal a bar below; on standard error.
+
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Shows what was done; shared by all workers.
+pub struct EvaluationProgress {
+    bar: Option<ProgressBar>,
+    started: Instant,
+    counted: Mutex<Counted>,
+}
+
+#[derive(Default)]
+struct Counted {
+    done: usize,
+    of: usize,
+}
+
+impl Default for EvaluationProgress {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl EvaluationProgress {
+    /// A bar if standard error is a terminal.
+    pub fn new() -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(0);
+            if let Ok(style) = ProgressStyle::with_template("{bar:32.cyan/blue} {pos} of {len} units  {elapsed} gone") {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(std::time::Duration::from_secs(1));
+            bar
+        });
+        Self { bar, started: Instant::now(), counted: Mutex::default() }
+    }
+
+    /// How many units there are to do.
+    pub fn expect(&self, units: usize) {
+        self.counted.lock().unwrap_or_else(PoisonError::into_inner).of += units;
+        if let Some(bar) = &self.bar {
+            bar.inc_length(units as u64);
+        }
+    }
+
+    /// A unit ended.
+    pub fn unit_done(&self, what: &str) {
+        let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
+        counted.done += 1;
+        let (done, of) = (counted.done, counted.of);
+        // Under the lock, so that lines stand in the order of their numbers.
+        self.say(&format!("[{done}/{of}, {:.0} s] {what}", self.started.elapsed().as_secs_f64()));
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+        }
+    }
+
+    /// A line of its own.
+    pub fn say(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! What a unit of work leaves behind.
+
+use sdg_grasp::TeachingFacts;
+use sdg_report::{Attempt, DetectionError};
+use serde::{Deserialize, Serialize};
+
+use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
+
+/// How a teaching ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TeachingRecord {
+    /// There is a model.
+    Taught {
+        /// What it says of itself.
+        facts: TeachingFacts,
+        /// Size of its file.
+        bytes: usize,
+        /// How many units ran side by side meanwhile.
+        jobs: usize,
+    },
+    /// There is none.
+    Failed {
+        /// Why, in one line.
+        why: String,
+    },
+}
+
+/// One grasp attempt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AttemptRecord {
+    /// Its number, from 1.
+    pub attempt: usize,
+    /// Whether the part was held at the end.
+    pub success: bool,
+    /// The step at which it ended.
+    pub step: String,
+    /// Why it failed; empty on success.
+    pub why: String,
+    /// Place of the last detection beside the truth, in millimetres.
+    pub error_mm: Option<f64>,
+    /// Turn of the last detection beside the truth, in degrees.
+    pub error_deg: Option<f64>,
+    /// Wall-clock time.
+    pub seconds: f64,
+}
+
+impl AttemptRecord {
+    /// Where an attempt ends that the simulation itself gave up.
+    pub const SIMULATION: &str = "simulation";
+    /// Where an attempt ends for which there is no model.
+    pub const TEACH: &str = "teach";
+
+    /// As the rehearsal tells it.
+    pub fn new(attempt: &Attempt) -> Self {
+        Self {
+            attempt: attempt.number,
+            success: attempt.success,
+            step: attempt.step.name().to_owned(),
+            why: attempt.why.clone(),
+            error_mm: attempt.detection_error.map(|e| e.distance_mm),
+            error_deg: attempt.detection_error.map(|e| e.angle_deg),
+            seconds: attempt.duration_secs,
+        }
+    }
+
+    /// An attempt that failed without the robot's doing.
+    pub fn failed(attempt: usize, step: &str, why: String) -> Self {
+        Self { attempt, success: false, step: step.to_owned(), why, error_mm: None, error_deg: None, seconds: 0.0 }
+    }
+}
+
+/// The attempts of a cell so far, in their order.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct AttemptsRecord {
+    /// One each.
+    pub attempts: Vec<AttemptRecord>,
+}
+
+/// What a model said of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Said {
+    /// Score of the best detection, accepted or not; zero for none.
+    pub score: f64,
+    /// The network's own score of it.
+    pub network_score: f64,
+    /// How well the demonstration agrees there, where it was asked.
+    pub agreement: Option<f64>,
+    /// Place of the best detection beside the truth, in millimetres; `None` without a part or a detection.
+    pub error_mm: Option<f64>,
+    /// Turn of the best detection beside the truth, in degrees.
+    pub error_deg: Option<f64>,
+}
+
+impl Said {
+    /// As the trial tells it.
+    pub fn new(trial: &Trial) -> Self {
+        Self {
+            score: trial.best_score,
+            network_score: trial.network_score,
+            agreement: trial.best_agreement,
+            error_mm: trial.best_error.map(|e| e.distance_mm),
+            error_deg: trial.best_error.map(|e| e.angle_deg),
+        }
+    }
+
+    /// Whether it says that the part is there.
+    pub fn is_accepted(&self) -> bool {
+        self.score >= 0.5
+    }
+
+    /// How far beside the truth it is, where it says that the part is there.
+    pub fn error(&self) -> Option<DetectionError> {
+        let (distance_mm, angle_deg) = self.error_mm.zip(self.error_deg)?;
+        self.is_accepted().then_some(DetectionError { distance_mm, angle_deg })
+    }
+
+    /// Whether it says so near enough to the truth.
+    pub fn is_right(&self) -> bool {
+        self.error().is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
+    }
+}
+
+/// A picture and what was said of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pictured {
+    /// Seed of its scene.
+    pub seed: u64,
+    /// Another shipped part that lies there, where the taught one does not.
+    pub other_part: Option<String>,
+    /// With the check against the demonstration.
+    pub verified: Said,
+    /// Without it; `None` for a model that is nothing but the demonstration.
+    pub alone: Option<Said>,
+}
+
+/// What a model said of a part's pictures.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct LookRecord {
+    /// The part is there.
+    pub present: Vec<Pictured>,
+    /// It is not, but other things are.
+    pub absent: Vec<Pictured>,
+}
+
+/// How long a detection takes with the machine to itself.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct SpeedRecord {
+    /// Cores that it had.
+    pub cores: usize,
+    /// Seconds an image, with the check against the demonstration.
+    pub verified_secs: Vec<f64>,
+    /// Seconds an image without it.
+    pub alone_secs: Vec<f64>,
+}

@@ -1,0 +1,193 @@
+//! The folder of an evaluation: a file for every unit of work that has ended.
+//!
+//! ```text
+//! DIR/settings.json
+//! DIR/models/C-pendulum.sdg                   the taught network
+//! DIR/cells/C-pendulum.teaching.json          how its teaching ended
+//! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
+//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten as each ends
+//! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
+//! ```
+//!
+//! Each JSON file carries the settings that it was made with and is there whole or not at all.
+
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sdg_report::write_atomically;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use super::settings::Settings;
+use crate::files;
+
+/// Larger than any record.
+const MOST_RECORD_BYTES: u64 = 64 << 20;
+
+/// An evaluation's folder, held by this process.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    settings: Settings,
+    /// Locked while the store lives.
+    _lock: File,
+}
+
+/// A file of the store.
+#[derive(Serialize, Deserialize)]
+struct Stored<S, T> {
+    settings: S,
+    record: T,
+}
+
+impl Store {
+    /// Opens the folder of an evaluation or begins one.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, that another process works in, or whose results were made with other settings.
+    pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
+        files::prepare_folder(folder)?;
+        for inner in ["models", "cells", "pictures"] {
+            files::prepare_folder(&folder.join(inner))?;
+        }
+        let lock_file = folder.join(".lock");
+        let lock = File::create(&lock_file).with_context(|| format!("{}: cannot write", lock_file.display()))?;
+        match lock.try_lock() {
+            // A file system without locks does not keep anyone from working alone.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+            Err(TryLockError::WouldBlock) => {
+                bail!("{}: another evaluation is at work in this folder", folder.display())
+            }
+        }
+        let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
+        match store.read::<()>("settings.json")? {
+            Some(()) => {}
+            None => store.write("settings.json", &())?,
+        }
+        Ok(store)
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What its results are made with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// A record, if there is one yet. `name` is that of its file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, or was made with other settings.
+    pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
+        let path = self.folder.join(name);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let bytes = files::read(&path, MOST_RECORD_BYTES)?;
+        let named = || format!("{}: expected a record of an evaluation", path.display());
+        let stored: Stored<serde_json::Value, serde_json::Value> =
+            serde_json::from_slice(&bytes).with_context(named)?;
+        let made_with: Settings = serde_json::from_value(stored.settings).with_context(named)?;
+        if let Some(difference) = self.settings.difference(&made_with) {
+            bail!(
+                "{}: made with other settings ({difference}); give these settings, or another folder with --out",
+                path.display()
+            );
+        }
+        Ok(Some(serde_json::from_value(stored.record).with_context(named)?))
+    }
+
+    /// Writes a record, whole or not at all.
+    pub fn write<T: Serialize>(&self, name: &str, record: &T) -> Result<()> {
+        let stored = Stored { settings: &self.settings, record };
+        let mut bytes = serde_json::to_vec_pretty(&stored)?;
+        bytes.push(b'\n');
+        self.write_bytes(name, &bytes)
+    }
+
+    /// Writes any file of the folder, whole or not at all.
+    pub fn write_bytes(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        Ok(write_atomically(&self.folder.join(name), bytes)?)
+    }
+
+    /// Where a file of the folder lies.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Removes a file that stands for nothing any more; none is no error.
+    pub fn remove(&self, name: &str) -> Result<()> {
+        let path = self.folder.join(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("{}: cannot remove", path.display()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exit::one_line;
+
+    fn settings(seed: u64) -> Settings {
+        Settings {
+            protocol: Settings::PROTOCOL,
+            preset: "edge".into(),
+            steps: None,
+            seed,
+            attempts: 2,
+            views: 1,
+            scenes: 1,
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_there_when_opened_again() {
+        let folder = tempfile::tempdir().unwrap();
+        {
+            let store = Store::open(folder.path(), &settings(1)).unwrap();
+            assert_eq!(store.read::<u32>("cells/a.json").unwrap(), None);
+            store.write("cells/a.json", &7u32).unwrap();
+        }
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        assert_eq!(store.read::<u32>("cells/a.json").unwrap(), Some(7));
+    }
+
+    #[test]
+    fn other_settings_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Store::open(folder.path(), &settings(1)).unwrap());
+        let refused = one_line(&Store::open(folder.path(), &settings(2)).unwrap_err());
+        assert!(refused.contains("settings.json: made with other settings (seed: expected 2, found 1)"), "{refused}");
+        // A file that was carried in from another evaluation, too.
+        let elsewhere = tempfile::tempdir().unwrap();
+        Store::open(elsewhere.path(), &settings(3)).unwrap().write("cells/a.json", &7u32).unwrap();
+        fs::copy(elsewhere.path().join("cells/a.json"), folder.path().join("cells/a.json")).unwrap();
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        assert!(one_line(&store.read::<u32>("cells/a.json").unwrap_err()).contains("seed: expected 1, found 3"));
+    }
+
+    #[test]
+    fn damaged_records_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        fs::write(folder.path().join("cells/a.json"), "{\"settings\": {").unwrap();
+        let refused = one_line(&store.read::<u32>("cells/a.json").unwrap_err());
+        assert!(refused.contains("a.json: expected a record of an evaluation"), "{refused}");
+    }
+
+    #[test]
+    fn two_at_once_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let _first = Store::open(folder.path(), &settings(1)).unwrap();
+        let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
+        assert!(refused.contains("another evaluation is at work"), "{refused}");
+    }
+}

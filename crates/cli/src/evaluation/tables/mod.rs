@@ -1,0 +1,198 @@
+//! The paper's two tables for this project, and those that say more; as Markdown here, on the page by the same rows.
+
+mod grasping;
+mod looking;
+mod models;
+
+use sdg_report::{Cell, Column, Table, Tone};
+
+use super::records::TeachingRecord;
+use super::statistics::Share;
+use super::summary::{Figures, ModelSummary, Summary};
+
+/// A table under its heading.
+pub struct Titled {
+    /// The heading.
+    pub title: String,
+    /// What is to be seen, in a sentence or two.
+    pub lead: String,
+    /// The rows.
+    pub table: Table,
+}
+
+/// All tables, the most important first.
+pub fn tables(summary: &Summary) -> Vec<Titled> {
+    let mut tables = vec![
+        grasping::success(summary),
+        grasping::by_part(summary),
+        grasping::failures(summary),
+        looking::accuracy(summary),
+        looking::false_alarms(summary),
+        models::costs(summary),
+        models::models(summary),
+        cells(summary),
+    ];
+    if summary.cells.iter().any(|cell| matches!(cell.teaching, Some(TeachingRecord::Failed { .. }))) {
+        tables.push(models::not_taught(summary));
+    }
+    tables
+}
+
+/// The tables as a document of their own; `facts` are what is needed to see the same numbers again.
+pub fn markdown(summary: &Summary, facts: &[(&str, String)], command: &str) -> String {
+    let mut text = String::from("# Evaluation\n\n");
+    if let Some(notice) = notice(summary) {
+        text += &format!("**{notice}**\n\n");
+    }
+    for Titled { title, lead, table } in tables(summary) {
+        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
+    }
+    text += "## This run\n\n";
+    for (name, value) in facts {
+        text += &format!("- {name}: {value}\n");
+    }
+    text + &format!("\n```\n{command}\n```\n")
+}
+
+/// What the reader must know before the first number.
+pub fn notice(summary: &Summary) -> Option<String> {
+    (summary.remaining > 0).then(|| {
+        format!("Not complete: {} units of work are still to do. The same command goes on.", summary.remaining)
+    })
+}
+
+/// Everything about every cell, in brief.
+fn cells(summary: &Summary) -> Titled {
+    let mut table = Table::new(vec![
+        Column::text("part"),
+        Column::text("model"),
+        Column::number("teaching").unit("s"),
+        Column::text("held").group("verified"),
+        Column::text("right").group("verified"),
+        Column::text("false alarms").group("verified"),
+        Column::number("median").unit("mm").group("verified"),
+        Column::text("held").group("alone"),
+        Column::text("right").group("alone"),
+        Column::text("false alarms").group("alone"),
+        Column::number("median").unit("mm").group("alone"),
+    ]);
+    let mut cells: Vec<_> = summary.cells.iter().collect();
+    // Stable: models keep their order within a part.
+    cells.sort_by(|a, b| a.object.cmp(&b.object));
+    for cell in cells {
+        let teaching = match &cell.teaching {
+            Some(TeachingRecord::Taught { facts, .. }) => Cell::number(facts.seconds, 0),
+            Some(TeachingRecord::Failed { .. }) => Cell::text("failed"),
+            None => Cell::missing(),
+        };
+        let mut row = vec![Cell::text(cell.object.replace('_', " ")), Cell::text(cell.model.letter()), teaching];
+        for figures in [Some(&cell.verified), cell.alone.as_ref()] {
+            let counted =
+                |pick: fn(&Figures) -> Share| figures.map_or(Cell::missing(), |f| share(pick(f), Tone::Plain));
+            row.extend([
+                counted(|f| f.held),
+                counted(|f| f.right),
+                counted(|f| f.false_alarms),
+                number(figures.and_then(|f| f.median_mm), 2),
+            ]);
+        }
+        table = table.row(row);
+    }
+    Titled { title: "Every part and model".to_owned(), lead: "What the sums above are made of.".to_owned(), table }
+}
+
+/// With the check and, where there is a network, without it.
+fn ways(model: &ModelSummary) -> impl Iterator<Item = (String, &Figures)> {
+    debug_assert_eq!(model.alone.is_some(), model.model.has_network());
+    let alone = model.alone.as_ref().map(|figures| (format!("{}, alone", model.model), figures));
+    std::iter::once((model.model.to_string(), &model.verified)).chain(alone)
+}
+
+fn share(share: Share, tone: Tone) -> Cell {
+    match (share.of, tone) {
+        (0, _) => Cell::text("–"),
+        (_, Tone::Plain) => Cell::text(share.to_string()),
+        (_, tone) => Cell::Verdict { tone, text: share.to_string(), note: None },
+    }
+}
+
+fn number(value: Option<f64>, decimals: usize) -> Cell {
+    value.map_or(Cell::missing(), |value| Cell::number(value, decimals))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::{CellSummary, Settings, wilson_interval};
+    use sdg_grasp::ModelKind;
+    use std::collections::BTreeMap;
+
+    fn figures(count: usize, of: usize) -> Figures {
+        let held = Share { count, of };
+        Figures {
+            held,
+            held_interval: wilson_interval(held),
+            failures_by_step: BTreeMap::from([("lift".to_owned(), of - count)]),
+            right: Share { count: 24, of: 25 },
+            median_mm: Some(0.654),
+            false_alarms: Share { count: 1, of: 25 },
+            frames_per_second: Some(12.34),
+            ..Figures::default()
+        }
+    }
+
+    fn summary() -> Summary {
+        let why = "the network | finds nothing".to_owned();
+        let cell = CellSummary {
+            model: ModelKind::B,
+            object: "rod_end".into(),
+            teaching: Some(TeachingRecord::Failed { why }),
+            verified: figures(9, 10),
+            alone: Some(Figures::default()),
+            failures: Vec::new(),
+            failures_alone: Vec::new(),
+        };
+        let model = ModelSummary {
+            model: ModelKind::B,
+            network: ModelKind::C,
+            taught: Share { count: 0, of: 1 },
+            samples: Some(3456.0),
+            crops: None,
+            teaching_secs: Some(151.6),
+            longest_teaching_secs: Some(151.6),
+            largest_bytes: Some(8_912_345),
+            verified: figures(9, 10),
+            alone: Some(Figures::default()),
+        };
+        let settings = Settings {
+            protocol: Settings::PROTOCOL,
+            preset: "edge".into(),
+            steps: None,
+            seed: 1,
+            attempts: 10,
+            views: 25,
+            scenes: 25,
+        };
+        Summary { settings, remaining: 0, unverified: false, models: vec![model], cells: vec![cell] }
+    }
+
+    #[test]
+    fn rows_stand_beside_the_paper_s() {
+        let text = markdown(&summary(), &[("seed", "1".to_owned())], "sdg evaluate --seed 1");
+        assert!(text.contains("| B | 9 of 10 | 90.0 | 59.6 to 98.2 | – | – | 82.5 |"), "{text}");
+        assert!(text.contains("| B | 3456 | 2:32 | 8.91 | 12.3 | 1500 | 7:30 | 450 | 20 |"), "{text}");
+        assert!(text.contains("B reads the network taught for C, which is taught once."));
+        assert!(text.contains("| rod end | 9 of 10 |\n| all | 9 of 10 |"), "{text}");
+        // Failures: one, at the lift, which stands sixth behind teach, detect, hover, approach and close.
+        assert!(text.contains("| B | 1 of 10 | 0 | 0 | 0 | 0 | 0 | 1 | 0 | 0 |"), "{text}");
+        assert!(text.contains("| B | 24 of 25 | 96.0 | 0.65 | – | – | – | 12.3 |"), "{text}");
+        assert!(text.contains("the network \\| finds nothing"), "{text}");
+        assert!(text.contains("- seed: 1\n\n```\nsdg evaluate --seed 1\n```\n") && !text.contains("Not complete"));
+    }
+
+    #[test]
+    fn what_is_missing_is_told_first() {
+        let text = markdown(&Summary { remaining: 3, ..summary() }, &[], "sdg evaluate");
+        assert!(text.starts_with("# Evaluation\n\n**Not complete: 3 units"), "{text}");
+    }
+}

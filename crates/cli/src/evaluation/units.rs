@@ -1,0 +1,428 @@
+//! What there is to do, and the doing of it.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use anyhow::{Context, Result, anyhow};
+use sdg_grasp::{Event, ModelKind, Preset, TeachOptions, Verification, teach};
+use sdg_simulation::SimulationError;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{TestView, test_views};
+
+use super::cell::{Cell, attempts_of};
+use super::looking::{part_seed, picture_seed, scene_without, show};
+use super::progress::EvaluationProgress;
+use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
+use super::schedule::{Task, run_all};
+use super::store::Store;
+use crate::exit::one_line;
+use crate::rehearsal::Rehearsal;
+use crate::shipped;
+use crate::trial::try_view;
+
+/// Pictures on which speed is measured, for each part.
+const SPEED_VIEWS: usize = 3;
+
+/// What there is to say of a unit whose teaching failed while it waited.
+const NO_MODEL: &str = "there is no model";
+
+/// What is kept or lost as a whole.
+#[derive(Debug, Clone, Copy)]
+enum Unit<'a> {
+    /// A network is taught on a part.
+    Teach(Cell<'a>),
+    /// All models look at a part's pictures: each picture is drawn once.
+    Look(&'a ObjectSpec),
+    /// A model grasps a part; kept attempt by attempt.
+    Attempts(Cell<'a>, &'a ObjectSpec, Verification),
+}
+
+/// Models, parts, and the folder for what becomes of them.
+pub struct Evaluation<'a> {
+    /// The models.
+    pub models: &'a [ModelKind],
+    /// The parts.
+    pub objects: &'a [ObjectSpec],
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    /// Results and settings.
+    pub store: &'a Store,
+    /// Whether every grasp is also tried without the check against the demonstration.
+    pub unverified: bool,
+    /// Units side by side.
+    pub jobs: usize,
+}
+
+impl Evaluation<'_> {
+    /// Does what is not in the store yet; breaks when `is_interrupted` says so, with everything kept that has ended.
+    ///
+    /// # Errors
+    /// Files that cannot be read or written, and errors of the simulator itself. A teaching that fails is a result.
+    pub fn run(
+        &self,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+        progress: &EvaluationProgress,
+    ) -> Result<ControlFlow<()>> {
+        let tasks = self.tasks()?;
+        let without_speed = self.without_speed()?;
+        progress.expect(tasks.len() + without_speed.len());
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let work = |unit: &Unit| {
+            if is_interrupted() {
+                return Ok(ControlFlow::Break(()));
+            }
+            caught(|| self.work(*unit, is_interrupted, progress)).with_context(|| unit.to_string())
+        };
+        run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)?;
+        for object in without_speed {
+            if is_interrupted() {
+                break;
+            }
+            self.measure_speed(object, cores)?;
+            progress.unit_done(&format!("time {}: done", object.name));
+        }
+        Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    }
+
+    /// How many units are not in the store yet.
+    pub fn remaining(&self) -> Result<usize> {
+        Ok(self.tasks()?.len() + self.without_speed()?.len())
+    }
+
+    /// With the check against the demonstration; and without it where that is asked for.
+    fn ways(&self, model: ModelKind) -> impl Iterator<Item = Verification> {
+        let alone = self.unverified && model.has_network();
+        std::iter::once(Verification::ByShape).chain(alone.then_some(Verification::Off))
+    }
+
+    fn cells<'s>(&'s self, object: &'s ObjectSpec) -> impl Iterator<Item = Cell<'s>> {
+        self.models.iter().map(|&model| Cell { model, object: &object.name })
+    }
+
+    /// What is not in the store yet, part by part, so that an interrupted evaluation has whole parts to show. Attempts
+    /// without the check come last of all.
+    fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
+        let (store, mut tasks, mut last) = (self.store, Vec::<Task<Unit>>::new(), Vec::new());
+        for object in self.objects {
+            let mut teachings: Vec<(ModelKind, usize)> = Vec::new();
+            for cell in self.cells(object).map(Cell::network) {
+                let known = teachings.iter().any(|(network, _)| *network == cell.model);
+                if !known && cell.teaching(store)?.is_none() {
+                    teachings.push((cell.model, tasks.len()));
+                    tasks.push(Task { unit: Unit::Teach(cell), after: Vec::new() });
+                }
+            }
+            let teaching = |cell: Cell| {
+                let of_its_network = |(network, _): &&(ModelKind, usize)| *network == cell.network().model;
+                teachings.iter().find(of_its_network).map(|(_, task)| *task)
+            };
+            let mut not_shown = Vec::new();
+            for cell in self.cells(object) {
+                if self.is_usable(cell)? && cell.look(store)?.is_none() {
+                    not_shown.push(cell);
+                }
+            }
+            if !not_shown.is_empty() {
+                let after = not_shown.iter().filter_map(|cell| teaching(*cell)).collect();
+                tasks.push(Task { unit: Unit::Look(object), after });
+            }
+            for cell in self.cells(object) {
+                for way in self.ways(cell.model) {
+                    let done = cell.attempts(way, store)?.len();
+                    if self.is_usable(cell)? && done < store.settings().attempts as usize {
+                        let after = teaching(cell).into_iter().collect();
+                        let task = Task { unit: Unit::Attempts(cell, object, way), after };
+                        if way == Verification::ByShape { tasks.push(task) } else { last.push(task) }
+                    }
+                }
+            }
+        }
+        tasks.extend(last);
+        Ok(tasks)
+    }
+
+    /// Not so once its teaching has failed: then there is nothing left to do for it.
+    fn is_usable(&self, cell: Cell) -> Result<bool> {
+        Ok(!matches!(cell.teaching(self.store)?, Some(TeachingRecord::Failed { .. })))
+    }
+
+    fn without_speed(&self) -> Result<Vec<&ObjectSpec>> {
+        let mut without = Vec::new();
+        for object in self.objects {
+            for cell in self.cells(object) {
+                if self.is_usable(cell)? && cell.speed(self.store)?.is_none() {
+                    without.push(object);
+                    break;
+                }
+            }
+        }
+        Ok(without)
+    }
+
+    fn work(
+        &self,
+        unit: Unit,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+        progress: &EvaluationProgress,
+    ) -> Result<ControlFlow<()>> {
+        let started = Instant::now();
+        let said = match unit {
+            Unit::Teach(cell) => self.teach(cell, is_interrupted)?,
+            Unit::Look(object) => self.look(object, is_interrupted)?,
+            Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted)?,
+        };
+        let Some(said) = said else { return Ok(ControlFlow::Break(())) };
+        progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// Teaches a network and keeps it; in words what came of it, `None` when it was interrupted.
+    fn teach(&self, cell: Cell, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        let demonstration = shipped::demonstration(cell.object)?;
+        let settings = self.store.settings();
+        let options = TeachOptions {
+            kind: cell.model,
+            preset: self.preset,
+            steps: settings.steps.map(|steps| steps as usize),
+            ..TeachOptions::new(settings.seed)
+        };
+        // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
+        let mut interrupted = false;
+        let mut observe = |_: &Event| {
+            interrupted |= is_interrupted();
+            if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let taught = caught(|| Ok(teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
+        if interrupted {
+            return Ok(None);
+        }
+        let (record, said) = match taught {
+            Ok(taught) => {
+                let bytes = taught.model.to_bytes()?;
+                // The record last: it says that the model is whole.
+                self.store.write_bytes(&cell.model_file(), &bytes)?;
+                let facts = taught.model.facts().clone();
+                let said = facts.validation.map_or("nothing to train".to_owned(), |validation| {
+                    format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
+                });
+                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs }, said)
+            }
+            Err(error) => {
+                self.store.remove(&cell.model_file())?;
+                let why = one_line(&error);
+                let said = format!("failed, all its attempts count as failures: {why}");
+                (TeachingRecord::Failed { why }, said)
+            }
+        };
+        self.store.write(&cell.file("teaching"), &record)?;
+        Ok(Some(said))
+    }
+
+    /// Shows every model of a part that has not seen them the same pictures.
+    fn look(&self, object: &ObjectSpec, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        let settings = self.store.settings();
+        let mut looks = Vec::new();
+        for cell in self.cells(object) {
+            if cell.look(self.store)?.is_none()
+                && let Some(model) = cell.read_model(self.store)?
+            {
+                looks.push((cell, model, LookRecord::default(), None));
+            }
+        }
+        for number in 0..u64::from(settings.views) {
+            let seed = picture_seed(settings.seed, object, number);
+            let seen = test_views(object, true, 1, seed).next().context("a picture")??;
+            if is_interrupted() {
+                return Ok(None);
+            }
+            for (_, model, record, drawn) in &mut looks {
+                let (pictured, trial) = show(model, object, &seen, seed, None)?;
+                record.present.push(pictured);
+                drawn.get_or_insert(trial.drawn);
+            }
+        }
+        for number in 0..u64::from(settings.scenes) {
+            let seed = picture_seed(settings.seed, object, number);
+            let (seen, other_part) = scene_without(object, number, seed)?;
+            if is_interrupted() {
+                return Ok(None);
+            }
+            for (_, model, record, _) in &mut looks {
+                record.absent.push(show(model, object, &seen, seed, other_part)?.0);
+            }
+        }
+        let mut said = Vec::new();
+        for (cell, _, record, drawn) in looks {
+            if let Some(drawn) = drawn {
+                let mut png = std::io::Cursor::new(Vec::new());
+                drawn.write_to(&mut png, image::ImageFormat::Png)?;
+                self.store.write_bytes(&cell.picture_file(), &png.into_inner())?;
+            }
+            self.store.write(&cell.file("look"), &record)?;
+            let right = record.present.iter().filter(|p| p.verified.is_right()).count();
+            let false_alarms = record.absent.iter().filter(|p| p.verified.is_accepted()).count();
+            said.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
+        }
+        Ok(Some(if said.is_empty() { NO_MODEL.to_owned() } else { said.join("; ") }))
+    }
+
+    /// Goes on with a cell's attempts.
+    fn attempt(
+        &self,
+        cell: Cell,
+        object: &ObjectSpec,
+        verification: Verification,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let settings = self.store.settings();
+        let Some(model) = cell.read_model(self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
+        let seed = part_seed(settings.seed, object);
+        let rehearsal = Rehearsal { model: &model, object, attempts: settings.attempts, seed, verification };
+        let mut record = AttemptsRecord { attempts: cell.attempts(verification, self.store)? };
+        for number in record.attempts.len() + 1..=settings.attempts as usize {
+            if is_interrupted() {
+                return Ok(None);
+            }
+            record.attempts.push(match rehearsal.attempt(number, None) {
+                Ok(attempted) => AttemptRecord::new(&attempted.attempt),
+                Err(error) if is_of_physics(&error) => {
+                    AttemptRecord::failed(number, AttemptRecord::SIMULATION, one_line(&error))
+                }
+                Err(error) => return Err(error),
+            });
+            self.store.write(&cell.file(&attempts_of(verification)), &record)?;
+        }
+        let held = record.attempts.iter().filter(|attempt| attempt.success).count();
+        Ok(Some(format!("held in {held} of {}", record.attempts.len())))
+    }
+
+    /// Times detections with nothing of ours beside them, on all cores.
+    fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
+        let seed = picture_seed(self.store.settings().seed, object, 0);
+        let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
+        for cell in self.cells(object) {
+            if cell.speed(self.store)?.is_some() {
+                continue;
+            }
+            let Some(model) = cell.read_model(self.store)? else { continue };
+            let timed = |verification: Verification| -> Result<Vec<f64>> {
+                // The first one packs weights and fills caches.
+                model.detect(&pictures[0].view.image, verification)?;
+                pictures.iter().map(|seen| Ok(try_view(&model, object, seen, verification)?.seconds)).collect()
+            };
+            let record = SpeedRecord {
+                cores,
+                verified_secs: timed(Verification::ByShape)?,
+                alone_secs: if cell.model.has_network() { timed(Verification::Off)? } else { Vec::new() },
+            };
+            self.store.write(&cell.file("speed"), &record)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::fmt::Display for Unit<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Teach(cell) => write!(f, "teach {} {}", cell.model, cell.object),
+            Self::Look(object) => write!(f, "look {}", object.name),
+            Self::Attempts(cell, _, Verification::ByShape) => write!(f, "grasp {} {}", cell.model, cell.object),
+            Self::Attempts(cell, _, Verification::Off) => write!(f, "grasp {} {} unverified", cell.model, cell.object),
+        }
+    }
+}
+
+/// Whether the physics gave up, as against files, OpenGL or settings: that is one attempt's misfortune.
+fn is_of_physics(error: &anyhow::Error) -> bool {
+    matches!(
+        error.downcast_ref::<SimulationError>(),
+        Some(SimulationError::Unstable { .. } | SimulationError::MuJoCo { .. })
+    )
+}
+
+/// Turns a panic into an error, so that the units beside it are kept.
+fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
+    // Unwind safety: whatever the closure was changing is given up with its unit.
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
+        let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(anyhow!("a mistake in this program: {}", said.unwrap_or_else(|| "it panicked".to_owned())))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::Settings;
+
+    fn settings() -> Settings {
+        Settings {
+            protocol: Settings::PROTOCOL,
+            preset: "edge".into(),
+            steps: None,
+            seed: 1,
+            attempts: 2,
+            views: 1,
+            scenes: 1,
+        }
+    }
+
+    #[test]
+    fn models_that_share_a_network_wait_for_one_teaching() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &settings()).unwrap();
+        let objects = [ObjectSpec::by_name("pendulum").unwrap(), ObjectSpec::by_name("rod_end").unwrap()];
+        let evaluation = Evaluation {
+            models: &[ModelKind::B, ModelKind::C],
+            objects: &objects,
+            preset: Preset::Edge,
+            store: &store,
+            unverified: true,
+            jobs: 1,
+        };
+        let told = |tasks: &[Task<Unit>]| -> Vec<String> {
+            tasks.iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect()
+        };
+        let tasks = told(&evaluation.tasks().unwrap());
+        assert_eq!(
+            tasks[..4],
+            ["teach C pendulum []", "look pendulum [0, 0]", "grasp B pendulum [0]", "grasp C pendulum [0]"]
+        );
+        assert_eq!(
+            tasks[8..],
+            [
+                "grasp B pendulum unverified [0]",
+                "grasp C pendulum unverified [0]",
+                "grasp B rod_end unverified [4]",
+                "grasp C rod_end unverified [4]"
+            ]
+        );
+
+        // What is there is not done again; a part whose teaching failed needs nothing more.
+        let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
+        store.write("cells/C-pendulum.teaching.json", &failed).unwrap();
+        let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
+        let done = AttemptsRecord { attempts: vec![attempt(1), attempt(2)] };
+        store.write("cells/C-rod_end.attempts-verified.json", &done).unwrap();
+        store.write("cells/B-rod_end.look.json", &LookRecord::default()).unwrap();
+        assert_eq!(
+            told(&evaluation.tasks().unwrap()),
+            [
+                "teach C rod_end []",
+                "look rod_end [0]",
+                "grasp B rod_end [0]",
+                "grasp B rod_end unverified [0]",
+                "grasp C rod_end unverified [0]"
+            ]
+        );
+        assert_eq!(evaluation.remaining().unwrap(), 5 + 1);
+    }
+
+    #[test]
+    fn a_panic_becomes_an_error() {
+        let error = caught::<()>(|| panic!("index {}", 7)).unwrap_err();
+        assert_eq!(error.to_string(), "a mistake in this program: index 7");
+        assert!(caught(|| Ok(1)).is_ok());
+    }
+}

@@ -1,0 +1,86 @@
+//! An evaluation in small, in the simulator: model S, which is taught at once, on one part.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::Path;
+
+use sdg_cli::evaluation::{Evaluation, EvaluationProgress, Settings, Store, Summary, TeachingRecord, markdown, page};
+use sdg_grasp::{ModelKind, Preset};
+use sdg_simulation::objects::ObjectSpec;
+
+const ATTEMPTS: &str = "cells/S-rod_end.attempts-verified.json";
+const MODEL: &str = "models/S-rod_end.sdg";
+
+/// Opens the folder as a process of its own would, goes on until it is interrupted, and adds up what there is.
+fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
+    let settings = Settings {
+        protocol: Settings::PROTOCOL,
+        preset: Preset::Edge.name().to_owned(),
+        steps: None,
+        seed: 3,
+        attempts: 2,
+        views: 2,
+        scenes: 2,
+    };
+    let store = Store::open(folder, &settings).unwrap();
+    let evaluation = Evaluation {
+        models: &[ModelKind::S],
+        objects: &[ObjectSpec::by_name("rod_end").unwrap()],
+        preset: Preset::Edge,
+        store: &store,
+        unverified: true,
+        jobs: 2,
+    };
+    let ended = evaluation.run(is_interrupted, &EvaluationProgress::new()).unwrap();
+    let summary = Summary::collect(&evaluation).unwrap();
+    assert_eq!(ended.is_break(), summary.remaining > 0);
+    assert!(page(&summary, &store, &[], "sdg evaluate").unwrap().to_html().is_ok());
+    summary
+}
+
+/// Without what differs from run to run.
+fn timeless(mut summary: Summary) -> Summary {
+    for model in &mut summary.models {
+        (model.teaching_secs, model.longest_teaching_secs) = (None, None);
+        (model.verified.frames_per_second, model.largest_bytes) = (None, None);
+    }
+    for cell in &mut summary.cells {
+        cell.verified.frames_per_second = None;
+        if let Some(TeachingRecord::Taught { facts, bytes, .. }) = &mut cell.teaching {
+            (facts.seconds, *bytes) = (0.0, 0);
+        }
+        cell.failures.iter_mut().for_each(|failure| failure.seconds = 0.0);
+    }
+    summary
+}
+
+#[test]
+fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
+    let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let whole = go_on(whole.path(), &|| false);
+    assert_eq!(whole.remaining, 0);
+    let model = &whole.models[0];
+    assert_eq!((model.taught.count, model.verified.held.of, model.verified.right.of), (1, 2, 2));
+    assert_eq!(model.verified.false_alarms.of, 2);
+    assert!(model.alone.is_none() && model.verified.frames_per_second.unwrap() > 0.0);
+    // A search or a robot that breaks shows here.
+    assert!(model.verified.held.count > 0 && model.verified.right.count > 0, "{model:?}");
+    assert_eq!(model.verified.false_alarms.count, 0);
+
+    let attempts_file = broken.path().join(ATTEMPTS);
+    let interrupted = go_on(broken.path(), &|| attempts_file.exists());
+    assert!(interrupted.remaining > 0 && markdown(&interrupted, &[], "").contains("Not complete"));
+    let read = |name: &str| fs::read(broken.path().join(name)).unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&read(ATTEMPTS)).unwrap();
+    let first_attempt = &record["record"]["attempts"][0];
+    let model_file = read(MODEL);
+
+    let resumed = go_on(broken.path(), &|| false);
+    assert_eq!(timeless(resumed.clone()), timeless(whole));
+    // What was there was kept, its times too: nothing was done twice.
+    let record: serde_json::Value = serde_json::from_slice(&read(ATTEMPTS)).unwrap();
+    assert_eq!(&record["record"]["attempts"][0], first_attempt);
+    assert_eq!(read(MODEL), model_file);
+    // Once more there is nothing to do, and every number stands.
+    assert_eq!(go_on(broken.path(), &|| panic!("asked of work that there is none of")), resumed);
+}

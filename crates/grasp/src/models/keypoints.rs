@@ -1,0 +1,50 @@
+//! Models B and C: keypoints along the grasp line.
+
+use nalgebra::Point2;
+use sdg_detection::Detections;
+use sdg_geometry::{BoundingBox, Keypoint, PlanarGrasp, PlanarSimilarity};
+
+use super::placing::fill_box;
+use super::{Placement, nearest_demonstration};
+use crate::taught::TaughtDemonstration;
+
+/// The keypoints of one detection, each with the network's score; none without a keypoint head.
+pub(super) fn scored(detections: &Detections, i: usize) -> Vec<(Point2<f64>, f64)> {
+    detections.keypoints[i].iter().map(|k| (Point2::new(k.x, k.y), k.score)).collect()
+}
+
+/// Model C: the keypoints say where the demonstration lies.
+pub(super) fn on_line(
+    keypoints: &[(Point2<f64>, f64)],
+    bbox: &BoundingBox,
+    demonstrations: &[TaughtDemonstration],
+) -> Option<Placement> {
+    let seen: Vec<Point2<f64>> = keypoints.iter().map(|(point, _)| *point).collect();
+    nearest_demonstration(demonstrations, bbox, |_, demonstration| {
+        let taught: Vec<Point2<f64>> = demonstration.keypoints().iter().map(|k| k.point()).collect();
+        PlanarSimilarity::fit(&taught, &seen)
+    })
+}
+
+/// Model C: the keypoints' mean is the grasp's middle, the least-squares line through them its angle. `None` where
+/// they all fall on one place.
+///
+/// # Source
+/// Paper, section IV-C.
+pub(super) fn grasp(keypoints: &[(Point2<f64>, f64)], width_px: f64) -> Option<PlanarGrasp> {
+    let visible: Vec<Keypoint> = keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
+    PlanarGrasp::from_keypoints(&visible, width_px)
+}
+
+/// Model B: the box gives the place, the keypoints the turn alone.
+///
+/// # Source
+/// Paper, section IV-B. There the box's middle is the grasp; here the grasp keeps the taught offset from it.
+pub(super) fn box_and_turn(
+    keypoints: &[(Point2<f64>, f64)],
+    bbox: &BoundingBox,
+    demonstrations: &[TaughtDemonstration],
+) -> Option<Placement> {
+    let angle = grasp(keypoints, 0.0)?.angle;
+    nearest_demonstration(demonstrations, bbox, |_, demonstration| Some(fill_box(demonstration, bbox, angle)))
+}

@@ -1,0 +1,228 @@
+//! What each model looks with, and how it reads what it sees: where the demonstration lies in the image.
+//!
+//! | model | network | place | turn |
+//! |---|---|---|---|
+//! | A ([`orientation`]) | Faster R-CNN, orientation CNN | box ([`placing`]) | class of the box's crop |
+//! | B ([`keypoints`]) | Keypoint R-CNN | box ([`placing`]) | line through the keypoints |
+//! | C ([`keypoints`]) | Keypoint R-CNN | keypoints | keypoints |
+//! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
+//! | S ([`instant`]) | none | the demonstration looked for in the whole image | likewise |
+
+pub(crate) mod instant;
+mod keypoints;
+pub(crate) mod mask;
+mod orientation;
+mod placing;
+
+use burn::module::Module;
+use burn::tensor::Device;
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_detection::presets::RcnnKind;
+#[cfg(feature = "teach")]
+use sdg_detection::state_dict;
+use sdg_detection::{Detections, GeneralizedRcnn, RcnnConfig};
+use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
+use sdg_orientation::OrientationCnn;
+
+use self::mask::MaskMatcher;
+use crate::NUM_KEYPOINTS;
+use crate::error::{GraspError, Result};
+use crate::facts::ModelKind;
+use crate::taught::TaughtDemonstration;
+
+/// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
+const MOST_CANDIDATES: usize = 4;
+/// Below this the network itself does not believe it.
+const LEAST_NETWORK_SCORE: f64 = 0.05;
+
+/// A model's detector, and how it is read. Model S has none.
+#[derive(Debug, Clone)]
+pub(crate) struct Network {
+    pub(crate) detector: GeneralizedRcnn,
+    pub(crate) reading: Reading,
+}
+
+/// How a detection becomes a pose of the demonstration.
+#[derive(Debug, Clone)]
+pub(crate) enum Reading {
+    /// Model A.
+    BoxAndCrop(Box<OrientationCnn>),
+    /// Model B.
+    BoxAndKeypoints,
+    /// Model C.
+    Keypoints,
+    /// Model D.
+    Mask(MaskMatcher),
+}
+
+/// A detection with the model's reading of it, not yet verified.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) network_score: f64,
+    pub(crate) bbox: BoundingBox,
+    /// Each with the network's score; empty where the model has none.
+    pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
+    pub(crate) grasp: PlanarGrasp,
+    /// The demonstration that it is compared with first.
+    pub(crate) demonstration_idx: usize,
+    /// Where that demonstration lies.
+    pub(crate) image_from_cutout: PlanarSimilarity,
+}
+
+/// Where a demonstration lies.
+#[derive(Debug, Clone, Copy)]
+struct Placement {
+    demonstration_idx: usize,
+    image_from_cutout: PlanarSimilarity,
+}
+
+/// The detector that a model looks with; `None` for model S.
+pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
+    match kind {
+        ModelKind::A => Some(RcnnKind::Faster { num_classes: 1 }),
+        ModelKind::B | ModelKind::C => Some(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS }),
+        ModelKind::D => Some(RcnnKind::Mask { num_classes: 1 }),
+        ModelKind::S => None,
+    }
+}
+
+impl Network {
+    /// The letter of the model that looks like this.
+    pub(crate) fn kind(&self) -> ModelKind {
+        match self.reading {
+            Reading::BoxAndCrop(_) => ModelKind::A,
+            Reading::BoxAndKeypoints => ModelKind::B,
+            Reading::Keypoints => ModelKind::C,
+            Reading::Mask(_) => ModelKind::D,
+        }
+    }
+
+    /// The same detector read as another model does that is taught alike.
+    pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
+        let reading = match (self.reading, kind) {
+            (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::B) => Reading::BoxAndKeypoints,
+            (Reading::BoxAndKeypoints | Reading::Keypoints, ModelKind::C) => Reading::Keypoints,
+            _ => return None,
+        };
+        Some(Self { reading, ..self })
+    }
+
+    /// The network as a file keeps it: every weight rounded to half precision.
+    #[cfg(feature = "teach")]
+    pub(crate) fn rounded(self) -> Self {
+        fn round<M: Module>(module: M) -> M {
+            let mut weights = state_dict::export(&module);
+            for value in weights.values_mut().flat_map(|weight| &mut weight.values) {
+                *value = half::f16::from_f32(*value).to_f32();
+            }
+            state_dict::import(module, &weights).0
+        }
+        let reading = match self.reading {
+            Reading::BoxAndCrop(orientation) => Reading::BoxAndCrop(Box::new(round(*orientation))),
+            other => other,
+        };
+        Self { detector: round(self.detector), reading }
+    }
+
+    pub(crate) fn moved_to(self, device: &Device) -> Self {
+        let reading = match self.reading {
+            Reading::BoxAndCrop(orientation) => Reading::BoxAndCrop(Box::new(orientation.to_device(device))),
+            other => other,
+        };
+        Self { detector: self.detector.to_device(device), reading }
+    }
+
+    /// What the network proposes, best first. Detections that make no sense to the model (keypoints on one place, a
+    /// mask without a turn) are left out.
+    ///
+    /// # Errors
+    /// An image that the network refuses.
+    pub(crate) fn candidates(
+        &self,
+        image: &RgbImage,
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Vec<Candidate>> {
+        let transformed = self.detector.image_transform().apply(image)?;
+        let detections = self.detector.detect(&[transformed]).pop().unwrap_or_default();
+        let mut candidates = Vec::new();
+        for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= LEAST_NETWORK_SCORE) {
+            if i == MOST_CANDIDATES {
+                break;
+            }
+            candidates.extend(self.read(image, &detections, i, demonstrations)?);
+        }
+        Ok(candidates)
+    }
+
+    fn read(
+        &self,
+        image: &RgbImage,
+        detections: &Detections,
+        i: usize,
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Option<Candidate>> {
+        let bbox = &detections.boxes[i];
+        let keypoints = keypoints::scored(detections, i);
+        let placement = match &self.reading {
+            Reading::BoxAndCrop(network) => orientation::box_and_crop(network, image, bbox, demonstrations)?,
+            Reading::BoxAndKeypoints => keypoints::box_and_turn(&keypoints, bbox, demonstrations),
+            Reading::Keypoints => keypoints::on_line(&keypoints, bbox, demonstrations),
+            Reading::Mask(matcher) => matcher.place(image, &detections.masks[i], bbox, demonstrations)?,
+        };
+        Ok(placement.and_then(|Placement { demonstration_idx, image_from_cutout }| {
+            let demonstration = &demonstrations[demonstration_idx];
+            let grasp = match self.reading {
+                Reading::Keypoints => {
+                    keypoints::grasp(&keypoints, demonstration.marks.width_px * image_from_cutout.scale)?
+                }
+                _ => demonstration.grasp(&image_from_cutout),
+            };
+            let network_score = detections.scores[i];
+            Some(Candidate { network_score, bbox: *bbox, keypoints, grasp, demonstration_idx, image_from_cutout })
+        }))
+    }
+}
+
+/// Refuses a detector that is not the model's own kind, as a forged file may bring.
+///
+/// # Errors
+/// [`GraspError::Damaged`] says which head was expected.
+pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
+    let heads = &config.roi_heads;
+    let keypoints = heads.keypoint_head.as_ref().map(|head| head.num_keypoints);
+    let (expected_keypoints, expected_masks) = match kind {
+        ModelKind::A | ModelKind::S => (None, false),
+        ModelKind::B | ModelKind::C => (Some(NUM_KEYPOINTS), false),
+        ModelKind::D => (None, true),
+    };
+    if keypoints == expected_keypoints && heads.mask_head.is_some() == expected_masks && heads.num_classes == 1 {
+        return Ok(());
+    }
+    let describe = |keypoints: Option<usize>, masks: bool, classes: usize| {
+        let masks = if masks { "masks" } else { "no masks" };
+        format!("a network of {classes} class with {} keypoints and {masks}", keypoints.unwrap_or(0))
+    };
+    Err(GraspError::Damaged {
+        expected: describe(expected_keypoints, expected_masks, 1),
+        found: describe(keypoints, heads.mask_head.is_some(), heads.num_classes),
+    })
+}
+
+/// The demonstration that, where `pose` puts it, fills the detected box best.
+fn nearest_demonstration(
+    demonstrations: &[TaughtDemonstration],
+    bbox: &BoundingBox,
+    pose: impl Fn(usize, &TaughtDemonstration) -> Option<PlanarSimilarity>,
+) -> Option<Placement> {
+    demonstrations
+        .iter()
+        .enumerate()
+        .filter_map(|(demonstration_idx, demonstration)| {
+            let image_from_cutout = pose(demonstration_idx, demonstration)?;
+            let overlap = demonstration.outline(&image_from_cutout).bounds().iou(bbox);
+            Some((Placement { demonstration_idx, image_from_cutout }, overlap))
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(placement, _)| placement)
+}

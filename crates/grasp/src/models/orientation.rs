@@ -1,0 +1,28 @@
+//! Model A: the box says where the part is, a CNN on the box's crop how it is turned.
+
+use image::RgbImage;
+use sdg_geometry::BoundingBox;
+use sdg_orientation::{OrientationCnn, crop_for};
+
+use super::placing::fill_box;
+use super::{Placement, nearest_demonstration};
+use crate::error::Result;
+use crate::taught::TaughtDemonstration;
+
+/// Reads the turn off the crop of a detected box and lays the demonstration, so turned, into the box.
+///
+/// # Source
+/// Paper, section IV-A. There the box's middle is the grasp; here the grasp keeps the taught offset from it.
+///
+/// # Errors
+/// A box without area.
+pub(super) fn box_and_crop(
+    network: &OrientationCnn,
+    image: &RgbImage,
+    bbox: &BoundingBox,
+    demonstrations: &[TaughtDemonstration],
+) -> Result<Option<Placement>> {
+    let crop = crop_for(image, bbox, network.config().input_px)?;
+    let angle = network.predict(&crop)?.angle;
+    Ok(nearest_demonstration(demonstrations, bbox, |_, demonstration| Some(fill_box(demonstration, bbox, angle))))
+}

@@ -1,0 +1,41 @@
+//! What is told while a model is taught.
+
+use sdg_training::{StepRecord, ValidationRecord};
+
+/// What is told while a model is taught.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Event {
+    /// A step of model A's orientation CNN, which is taught before the detector.
+    OrientationStep {
+        /// From zero.
+        step: usize,
+        /// Steps that its run will have, as known now.
+        planned_steps: usize,
+        /// Cross-entropy before the update, in nats a crop.
+        loss: f64,
+        /// Since the start of its run.
+        elapsed_secs: f64,
+    },
+    /// A step of the detector.
+    Step {
+        /// The step.
+        record: StepRecord,
+        /// Steps that the run will have, as known now.
+        planned_steps: usize,
+        /// Since the start of the run.
+        elapsed_secs: f64,
+    },
+    /// A validation of the detector, read as the model reads it.
+    Validated(ValidationRecord),
+}
+
+impl From<sdg_training::Event> for Event {
+    fn from(event: sdg_training::Event) -> Self {
+        match event {
+            sdg_training::Event::Step { record, planned_steps, elapsed_secs } => {
+                Self::Step { record, planned_steps, elapsed_secs }
+            }
+            sdg_training::Event::Validated(record) => Self::Validated(record),
+        }
+    }
+}

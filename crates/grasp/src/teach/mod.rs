@@ -1,0 +1,227 @@
+//! From demonstrations to a grasp model.
+//!
+//! ```text
+//! demonstrations ─ (model A: crops ─ orientation CNN)
+//!        │
+//!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
+//!        │      └─ held-back samples ── validation ─────────┴─ calibrate ─ GraspModel
+//!        └─ (model S: nothing to train) ──────────────────────────────────────┘
+//! ```
+
+mod event;
+mod held_back;
+mod orientation;
+mod paper;
+mod plan;
+mod r50;
+#[cfg(test)]
+mod tests;
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use burn::tensor::Device;
+use sdg_demonstration::{Augmenter, Demonstration, Sample};
+use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+use sdg_training::{History, SampleSource, Trained, TrainingError, train};
+
+use crate::base_weights::BaseWeights;
+use crate::calibration::Calibration;
+use crate::decimal::decimal;
+use crate::error::{GraspError, Result};
+use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
+use crate::model::GraspModel;
+use crate::model_file::Calibrations;
+use crate::models::mask::MaskMatcher;
+use crate::models::{self, Network, Reading};
+use crate::taught::TaughtDemonstration;
+
+pub use event::Event;
+pub(crate) use plan::Plan;
+pub use plan::Preset;
+
+/// How to teach.
+#[derive(Debug, Clone)]
+pub struct TeachOptions {
+    /// Which model.
+    pub kind: ModelKind,
+    /// Which network and training; without effect on model S, which has neither.
+    pub preset: Preset,
+    /// Decides every random choice.
+    pub seed: u64,
+    /// Wall-clock time for the training.
+    pub time_budget: Option<Duration>,
+    /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
+    pub steps: Option<usize>,
+    /// Weights that the detector starts from; `None` to start from nothing.
+    pub base_weights: Option<BaseWeights>,
+    /// Where to compute; without gradients.
+    pub device: Device,
+}
+
+impl TeachOptions {
+    /// Model C with the default preset on the default device.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            kind: ModelKind::C,
+            preset: Preset::default(),
+            seed,
+            time_budget: None,
+            steps: None,
+            base_weights: None,
+            device: Device::flex(),
+        }
+    }
+
+    /// The detector that is taught, which [`Self::base_weights`] must fit; `None` for model S, which has none.
+    pub fn network(&self) -> Option<RcnnConfig> {
+        models::rcnn_kind(self.kind).map(|rcnn| self.preset.network(rcnn, true))
+    }
+
+    /// The detector as teaching starts.
+    fn initial_detector(&self, config: &RcnnConfig) -> Result<GeneralizedRcnn> {
+        let detector = config.init(&self.device.clone().autodiff(), self.seed)?;
+        match &self.base_weights {
+            Some(base_weights) => base_weights.apply(detector),
+            None if self.preset.needs_base_weights() => {
+                Err(GraspError::NeedsBaseWeights { preset: self.preset.name() })
+            }
+            None => Ok(detector),
+        }
+    }
+}
+
+/// A model and the run that made it.
+#[derive(Debug, Clone)]
+pub struct Taught {
+    /// The model, ready to detect.
+    pub model: GraspModel,
+    /// Losses and validations of the detector; `None` for model S, which has none.
+    pub history: Option<History>,
+}
+
+/// Teaches a grasp model. `observe` hears of every step and validation and may end the teaching, which then keeps the
+/// best network so far, if it is any good.
+///
+/// # Errors
+/// No demonstration, one that lacks what the model needs, or a training that led to nothing usable.
+pub fn teach(
+    demonstrations: &[Demonstration],
+    options: &TeachOptions,
+    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+) -> Result<Taught> {
+    let start = Instant::now();
+    check_marks(demonstrations, options.kind)?;
+    let Some(rcnn) = models::rcnn_kind(options.kind) else { return instant(demonstrations, options, start) };
+    let plan = options.preset.plan(options.kind, rcnn, options.base_weights.is_some(), options.seed);
+    teach_network(demonstrations, &plan, options, observe, start)
+}
+
+/// Every model needs the grasp line; model D is taught what lies inside the outline, too.
+fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
+    if demonstrations.is_empty() {
+        return Err(GraspError::NoDemonstration);
+    }
+    for Demonstration { annotation, .. } in demonstrations {
+        annotation.require_grasp()?;
+        if kind == ModelKind::D {
+            annotation.require_outline()?;
+        }
+    }
+    Ok(())
+}
+
+/// Model S: the demonstrations alone.
+fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
+    let demonstrations = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
+    let model = GraspModel {
+        preset: options.preset.name().to_owned(),
+        network: None,
+        demonstrations,
+        calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: held_back::AGREEMENT_UNSEEN },
+        facts: TeachingFacts {
+            seed: options.seed,
+            samples: 0,
+            steps: 0,
+            seconds: decimal(start.elapsed().as_secs_f64()),
+            validation: None,
+            orientation: None,
+            base_weights_sha256: None,
+        },
+    };
+    Ok(Taught { model, history: None })
+}
+
+/// The models with a network, by a plan.
+pub(crate) fn teach_network(
+    demonstrations: &[Demonstration],
+    plan: &Plan,
+    options: &TeachOptions,
+    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+    start: Instant,
+) -> Result<Taught> {
+    let plan = options.steps.map_or_else(|| plan.clone(), |steps| plan.clone().with_steps(steps));
+    let taught = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
+    // First, because what is wrong with base weights should not come out after minutes.
+    let detector = options.initial_detector(&plan.network)?;
+    let mut orientation_facts = None;
+    let reading = match (options.kind, &plan.orientation) {
+        (ModelKind::A, Some(orientation_plan)) => {
+            let (network, facts) = orientation::teach(demonstrations, orientation_plan, options, observe)?;
+            orientation_facts = Some(facts);
+            Reading::BoxAndCrop(Box::new(network))
+        }
+        (ModelKind::B, _) => Reading::BoxAndKeypoints,
+        (ModelKind::C, _) => Reading::Keypoints,
+        (ModelKind::D, _) => Reading::Mask(MaskMatcher::new(&taught)?),
+        (kind, _) => unreachable!("model {kind} comes here with all that it needs"),
+    };
+
+    let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
+    let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
+    let held_back: Vec<Sample> = (0..plan.training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
+    let mut training = plan.training.clone();
+    training.time_budget = options.time_budget.map(|budget| budget.saturating_sub(start.elapsed()));
+
+    let recurring = |i: u64| plan.distinct_samples.map_or(i, |distinct| i % distinct);
+    let windows = augmenter.windows(plan.network.input.size_divisibility as u32);
+    let Trained { detector, history } = train(
+        detector,
+        &training,
+        SampleSource { frames: &|i| augmenter.sample(recurring(i)), windows: &|i| windows.sample(recurring(i)) },
+        &mut |detector: &GeneralizedRcnn| {
+            let network = Network { detector: detector.clone(), reading: reading.clone() };
+            held_back::examine(&network, &taught, &held_back).map_err(|error| TrainingError::Examination(error.into()))
+        },
+        &mut |event| observe(&Event::from(*event)),
+    )?;
+    let best = history.best.validation;
+    if best.hit_rate() < plan.least_hit_rate {
+        let (hits, positives, steps) = (best.hits, best.positives, history.steps.len());
+        return Err(GraspError::NotLearnt { hits, positives, steps });
+    }
+    // Calibrated and handed out is what a file will give back.
+    let network = Network { detector, reading }.rounded();
+    let calibrated = held_back::calibrate(&network, &taught, &held_back)?;
+    let facts = TeachingFacts {
+        seed: options.seed,
+        samples: history.steps.iter().map(|step| step.samples).sum(),
+        steps: history.steps.len(),
+        seconds: decimal(start.elapsed().as_secs_f64()),
+        validation: Some(ValidationFacts {
+            hit_rate: decimal(best.hit_rate()),
+            error_px: decimal(calibrated.error_px),
+            error_degrees: decimal(calibrated.error_degrees),
+        }),
+        orientation: orientation_facts,
+        base_weights_sha256: options.base_weights.as_ref().map(|base_weights| base_weights.sha256.clone()),
+    };
+    let model = GraspModel {
+        preset: options.preset.name().to_owned(),
+        network: Some(network),
+        demonstrations: taught,
+        calibrations: calibrated.calibrations,
+        facts,
+    };
+    Ok(Taught { model, history: Some(history) })
+}

@@ -1,0 +1,46 @@
+//! Model A's first half: the orientation CNN.
+
+use std::ops::ControlFlow;
+
+use sdg_demonstration::Demonstration;
+use sdg_orientation::OrientationCnn;
+use sdg_orientation::training::{self, Event as CnnEvent};
+use sdg_training::Ending;
+
+use super::TeachOptions;
+use super::event::Event;
+use super::plan::OrientationPlan;
+use crate::decimal::decimal;
+use crate::error::{GraspError, Result};
+use crate::facts::OrientationFacts;
+
+/// Share of a time budget that goes to the orientation CNN; the detector has the rest.
+const TIME_SHARE: f64 = 0.3;
+
+/// Teaches the orientation CNN from the demonstrations.
+pub(super) fn teach(
+    demonstrations: &[Demonstration],
+    plan: &OrientationPlan,
+    options: &TeachOptions,
+    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+) -> Result<(OrientationCnn, OrientationFacts)> {
+    let mut training = plan.training.clone();
+    training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
+    let taught =
+        training::teach(demonstrations, &plan.network, &training, &options.device, &mut |event| match *event {
+            CnnEvent::Step { step, planned_steps, loss, elapsed_secs } => {
+                observe(&Event::OrientationStep { step, planned_steps, loss, elapsed_secs })
+            }
+            _ => ControlFlow::Continue(()),
+        })?;
+    if taught.ending == Ending::Interrupted {
+        return Err(GraspError::StoppedTooEarly);
+    }
+    let facts = OrientationFacts {
+        crops: taught.steps * training.batch_size,
+        steps: taught.steps,
+        hit_rate: decimal(taught.errors.hit_rate()),
+        error_degrees: decimal(taught.errors.median_degrees()),
+    };
+    Ok((taught.network, facts))
+}

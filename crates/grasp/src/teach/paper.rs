@@ -1,0 +1,62 @@
+//! The paper's protocol: its network, samples, steps, learning rates and batches.
+//!
+//! Kept as published: R50-FPN at a short side of 800 pixels, SGD, 1500 samples of the paper's own augmentation for 1000
+//! steps of two images (model A's detector: 500 steps of eight), 200 held-back ones, 5000 crops for the orientation CNN.
+//!
+//! Corrected, because it is an error of the original and no part of its protocol:
+//! - the learning rate runs one cycle, where the original's warm-up of 1000 steps ramps it up for the whole run;
+//! - colours reach the network in the order that it knows;
+//! - no mirror images;
+//! - the angle is a least-squares line with `atan2`.
+//!
+//! On two cores such a run takes hours.
+
+use sdg_demonstration::AugmentationConfig;
+use sdg_detection::RcnnConfig;
+use sdg_detection::config::{Freeze, NormKind};
+use sdg_detection::presets::{RcnnKind, r50_detectron2};
+use sdg_training::{OneCycle, Optimizer, TrainingConfig, ValidationConfig};
+
+use crate::facts::ModelKind;
+
+/// Samples that come round again and again.
+pub(super) const DISTINCT_SAMPLES: u64 = 1500;
+/// Held-back samples.
+const HELD_BACK: usize = 200;
+/// Width and height of the samples, in pixels.
+const SAMPLE_SIZE: [u32; 2] = [640, 480];
+
+/// Detectron2's R50-FPN. With imported weights, stem and first stage are frozen, and so are the norms. From nothing there
+/// is nothing to keep: all of it learns, and the frozen norms, which would be none at all, are group norms.
+pub(super) fn network(kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
+    let mut config = r50_detectron2(kind);
+    if !has_base_weights {
+        config.backbone.norm = NormKind::Group { num_groups: 32 };
+        config.backbone.freeze = Freeze::Nothing;
+    }
+    config
+}
+
+/// # Source
+/// Paper, section V; the published code's settings.
+pub(super) fn training(kind: ModelKind, seed: u64) -> TrainingConfig {
+    let (steps, batch_size, peak) = match kind {
+        ModelKind::A => (500, 8, 0.005),
+        _ => (1000, 2, 0.0008),
+    };
+    TrainingConfig {
+        steps,
+        batch_size,
+        windows: None,
+        optimizer: Optimizer::Sgd { momentum: 0.9 },
+        schedule: OneCycle { peak, warm_up: 0.1 },
+        weight_decay: 1e-4,
+        validation: ValidationConfig { every: steps, first: steps, samples: HELD_BACK },
+        early_stop: None,
+        ..TrainingConfig::edge(seed)
+    }
+}
+
+pub(super) fn samples() -> AugmentationConfig {
+    AugmentationConfig::paper().with_output_size(SAMPLE_SIZE[0], SAMPLE_SIZE[1])
+}

@@ -1,0 +1,170 @@
+//! What a preset teaches a model with: network, samples, steps.
+
+use std::str::FromStr;
+
+use sdg_demonstration::AugmentationConfig;
+use sdg_detection::presets::RcnnKind;
+use sdg_detection::{RcnnConfig, presets};
+use sdg_orientation::OrientationConfig;
+use sdg_orientation::training::OrientationTraining;
+use sdg_training::TrainingConfig;
+
+use super::{paper, r50};
+use crate::error::{GraspError, Result};
+use crate::facts::ModelKind;
+
+/// Steps of the `edge` detector. Boxes and masks need fewer than keypoints, and model A's other network has steps of
+/// its own: each is then taught in about the same time.
+fn edge_steps(kind: ModelKind) -> usize {
+    match kind {
+        ModelKind::A => 260,
+        ModelKind::D => 220,
+        ModelKind::B | ModelKind::C | ModelKind::S => 300,
+    }
+}
+
+/// A network that finds fewer parts is of no use.
+const LEAST_HIT_RATE: f64 = 0.5;
+
+/// A network, its training and its augmentation under one name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// Made for two cores: minutes from photo to grasp.
+    #[default]
+    Edge,
+    /// Detectron2's R50-FPN, fine-tuned from imported weights.
+    R50Detectron2,
+    /// torchvision's R50-FPN, fine-tuned from imported weights.
+    R50Torchvision,
+    /// The paper's protocol: hours on two cores.
+    Paper,
+}
+
+impl Preset {
+    /// Every preset of this version.
+    pub const ALL: [Self; 4] = [Self::Edge, Self::R50Detectron2, Self::R50Torchvision, Self::Paper];
+
+    /// The name on the command line and in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+            Self::R50Detectron2 => "r50-detectron2",
+            Self::R50Torchvision => "r50-torchvision",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// Whether its frozen stages are worth nothing without imported weights.
+    pub(super) fn needs_base_weights(self) -> bool {
+        match self {
+            Self::Edge | Self::Paper => false,
+            Self::R50Detectron2 | Self::R50Torchvision => true,
+        }
+    }
+
+    /// The detector that is taught, from imported weights or from nothing.
+    pub(super) fn network(self, kind: RcnnKind, has_base_weights: bool) -> RcnnConfig {
+        match self {
+            Self::Edge => presets::edge_of(kind),
+            Self::R50Detectron2 => r50::on_two_cores(presets::r50_detectron2(kind)),
+            Self::R50Torchvision => r50::on_two_cores(presets::r50_torchvision(kind)),
+            Self::Paper => paper::network(kind, has_base_weights),
+        }
+    }
+
+    fn training(self, kind: ModelKind, seed: u64) -> TrainingConfig {
+        match self {
+            Self::Edge => TrainingConfig { steps: edge_steps(kind), ..TrainingConfig::edge(seed) },
+            Self::R50Detectron2 | Self::R50Torchvision => r50::fine_tuning(seed),
+            Self::Paper => paper::training(kind, seed),
+        }
+    }
+
+    /// The training samples: of the network's input size, so that nothing is computed to be thrown away.
+    fn samples(self) -> AugmentationConfig {
+        match self {
+            Self::Edge => AugmentationConfig::default().with_output_size(320, 240),
+            Self::R50Detectron2 | Self::R50Torchvision => {
+                AugmentationConfig::default().with_output_size(640, r50::SHORT_SIDE_PX)
+            }
+            Self::Paper => paper::samples(),
+        }
+    }
+
+    fn orientation(self, seed: u64) -> OrientationPlan {
+        match self {
+            Self::Edge | Self::R50Detectron2 | Self::R50Torchvision => {
+                OrientationPlan { network: OrientationConfig::edge(), training: OrientationTraining::edge(seed) }
+            }
+            Self::Paper => {
+                OrientationPlan { network: OrientationConfig::paper(), training: OrientationTraining::paper(seed) }
+            }
+        }
+    }
+
+    /// How a model with a network is taught.
+    pub(super) fn plan(self, kind: ModelKind, rcnn: RcnnKind, has_base_weights: bool, seed: u64) -> Plan {
+        Plan {
+            network: self.network(rcnn, has_base_weights),
+            training: self.training(kind, seed),
+            samples: self.samples(),
+            distinct_samples: (self == Self::Paper).then_some(paper::DISTINCT_SAMPLES),
+            held_back: match self {
+                Self::Paper => AugmentationConfig::paper(),
+                // At the photo's own size, so that verification is calibrated on what it will see.
+                _ => AugmentationConfig::default(),
+            },
+            least_hit_rate: LEAST_HIT_RATE,
+            orientation: (kind == ModelKind::A).then(|| self.orientation(seed)),
+        }
+    }
+}
+
+impl FromStr for Preset {
+    type Err = GraspError;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == text).ok_or_else(|| GraspError::UnknownPreset {
+            known: Self::ALL.map(Self::name).to_vec(),
+            found: text.to_owned(),
+        })
+    }
+}
+
+/// Everything that decides how a network model is taught, but for the demonstrations.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    /// The detector.
+    pub(crate) network: RcnnConfig,
+    /// Its training.
+    pub(crate) training: TrainingConfig,
+    /// What it is trained on.
+    pub(crate) samples: AugmentationConfig,
+    /// Samples before the first comes round again; `None` for new ones for ever.
+    pub(crate) distinct_samples: Option<u64>,
+    /// What it is validated and calibrated on.
+    pub(crate) held_back: AugmentationConfig,
+    /// Least share of parts that a network must find to be kept.
+    pub(crate) least_hit_rate: f64,
+    /// Model A's other network.
+    pub(crate) orientation: Option<OrientationPlan>,
+}
+
+/// The orientation CNN and its training.
+#[derive(Debug, Clone)]
+pub(crate) struct OrientationPlan {
+    pub(crate) network: OrientationConfig,
+    pub(crate) training: OrientationTraining,
+}
+
+impl Plan {
+    /// The same with other detector steps; the orientation CNN's change in proportion.
+    pub(super) fn with_steps(mut self, steps: usize) -> Self {
+        if let Some(OrientationPlan { training, .. }) = &mut self.orientation {
+            training.steps = (training.steps * steps).div_ceil(self.training.steps);
+        }
+        self.training.steps = steps;
+        self.training.validation.first = self.training.validation.first.min(steps);
+        self
+    }
+}

@@ -1,0 +1,43 @@
+//! R50-FPN from imported weights, for an ordinary computer.
+
+use sdg_detection::RcnnConfig;
+use sdg_detection::config::ResizeRule;
+use sdg_training::{OneCycle, TrainingConfig, ValidationConfig, WindowPhase};
+
+/// Short side of the images that an R50 is taught on and looks at.
+pub(super) const SHORT_SIDE_PX: u32 = 480;
+
+/// An R50 with the numerics of its weights, but for what would cost an ordinary computer minutes. Images are not enlarged
+/// to 800 pixels, which adds no detail to a photo of 480. And where COCO's images show dozens of objects, a
+/// demonstration's show one: fewer regions go through the heads, of which the keypoint head takes 7 GFLOP for each.
+pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
+    const MOST_PROPOSALS: usize = 100;
+    const MOST_DETECTIONS: usize = 5;
+    const ROIS_PER_IMAGE: usize = 128;
+    const MOST_KEYPOINT_OR_MASK_ROIS: usize = 2;
+    if let ResizeRule::ShortSide { short_px, .. } = &mut config.input.resize {
+        *short_px = SHORT_SIDE_PX;
+    }
+    config.rpn.post_nms_top_n.test = MOST_PROPOSALS;
+    config.roi_heads.sampler.batch_size_per_image = ROIS_PER_IMAGE;
+    config.roi_heads.box_head.detections_per_image = MOST_DETECTIONS;
+    if let Some(head) = &mut config.roi_heads.keypoint_head {
+        head.max_train_rois_per_image = Some(MOST_KEYPOINT_OR_MASK_ROIS);
+    }
+    if let Some(head) = &mut config.roi_heads.mask_head {
+        head.max_train_rois_per_image = Some(MOST_KEYPOINT_OR_MASK_ROIS);
+    }
+    config
+}
+
+/// A lower learning rate, so that imported weights are not forgotten, and fewer, costlier steps.
+pub(super) fn fine_tuning(seed: u64) -> TrainingConfig {
+    TrainingConfig {
+        steps: 200,
+        batch_size: 2,
+        windows: Some(WindowPhase { share: 0.7, batch_size: 6 }),
+        schedule: OneCycle { peak: 2e-4, warm_up: 0.2 },
+        validation: ValidationConfig { every: 40, first: 80, samples: 24 },
+        ..TrainingConfig::edge(seed)
+    }
+}

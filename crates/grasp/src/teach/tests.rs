@@ -1,0 +1,199 @@
+//! Every kind of model, taught in a few steps with small networks on a small synthetic part.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use image::{Rgb, RgbImage};
+use nalgebra::Point2;
+use sdg_demonstration::Annotation;
+use sdg_detection::config::{NormKind, RcnnConfig, ResizeRule};
+use sdg_geometry::{GraspLine, Polygon};
+use sdg_training::ValidationConfig;
+
+use super::plan::OrientationPlan;
+use super::*;
+use crate::model::Verification;
+
+/// Width and height of the photo, in pixels.
+const PHOTO: [u32; 2] = [192, 144];
+
+/// An L with a bright foot, on a dim ramp.
+fn demonstration() -> Demonstration {
+    let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
+    let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };
+    let mask = outline.rasterize(PHOTO[0], PHOTO[1]);
+    let image = RgbImage::from_fn(PHOTO[0], PHOTO[1], |x, y| {
+        let table = (50 + x / 8) as u8;
+        let part = if x > 100 { [230, 200, 60] } else { [190, 40, 30] };
+        Rgb(if mask.get(x, y) { part } else { [table, table, 70] })
+    });
+    let grasp = Some(GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0)));
+    let annotation = Annotation { label: "L".into(), bbox: outline.bounds(), grasp, outline: Some(outline) };
+    Demonstration { image, annotation }
+}
+
+/// The network's structure with few channels and pixels.
+fn shrink(network: &mut RcnnConfig) {
+    network.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 72 };
+    network.backbone.stem_channels = 8;
+    network.backbone.res2_channels = 8;
+    network.backbone.num_blocks = [1, 1, 1, 1];
+    network.backbone.norm = NormKind::Group { num_groups: 4 };
+    network.fpn.channels = 16;
+    let heads = &mut network.roi_heads;
+    heads.sampler.batch_size_per_image = 32;
+    heads.box_head.fc_channels = 32;
+    if let Some(head) = &mut heads.keypoint_head {
+        head.conv_channels = vec![16; 2];
+    }
+    if let Some(head) = &mut heads.mask_head {
+        (head.conv_channels, head.deconv_channels) = (vec![16; 2], 16);
+    }
+}
+
+/// A preset's plan, small enough for a test; any network is kept.
+fn small_plan(preset: Preset, kind: ModelKind) -> Plan {
+    let mut plan = preset.plan(kind, models::rcnn_kind(kind).unwrap(), false, 1);
+    shrink(&mut plan.network);
+    plan.least_hit_rate = 0.0;
+    plan.samples = plan.samples.with_output_size(96, 72);
+    plan.training.steps = STEPS;
+    plan.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
+    if let Some(OrientationPlan { network, training }) = &mut plan.orientation {
+        network.input_px = 32;
+        (network.stage_channels, network.stage_convs, network.hidden) = (vec![8, 16], vec![1, 1], 16);
+        (training.steps, training.validation_crops) = (STEPS, 4);
+    }
+    plan
+}
+
+fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
+    let options = TeachOptions { kind, preset, ..TeachOptions::new(1) };
+    let plan = small_plan(preset, kind);
+    teach_network(&[demonstration()], &plan, &options, &mut |_| ControlFlow::Continue(()), Instant::now())
+        .unwrap()
+        .model
+}
+
+/// Steps of detector and orientation CNN.
+const STEPS: usize = 12;
+
+/// What a model says of its own photo is what a file of it says, to the bit.
+fn assert_same_after_a_file(model: &GraspModel) {
+    let bytes = model.to_bytes().unwrap();
+    let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+    assert_eq!((read.kind(), read.facts(), read.preset()), (model.kind(), model.facts(), model.preset()));
+    let photo = demonstration().image;
+    for verification in [Verification::ByShape, Verification::Off] {
+        let found = model.detect(&photo, verification).unwrap();
+        assert_eq!(found, read.detect(&photo, verification).unwrap(), "{} {verification:?}", model.kind());
+    }
+    // Verified, the part is found in its own photo even by a network that has learnt nothing.
+    let best = &read.detect(&photo, Verification::ByShape).unwrap()[0];
+    let truth = demonstration().annotation.grasp.unwrap().center();
+    assert!(best.is_accepted() && (best.grasp.center() - truth).norm() < 1.0, "{} {best:?}", model.kind());
+    assert_eq!(best.keypoints.len(), if model.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 });
+}
+
+#[test]
+fn every_network_model_detects_the_same_after_a_file() {
+    for kind in [ModelKind::A, ModelKind::B, ModelKind::C, ModelKind::D] {
+        let model = taught(Preset::Edge, kind);
+        assert_eq!(model.facts().steps, STEPS);
+        assert_eq!(model.facts().orientation.is_some(), kind == ModelKind::A);
+        assert_same_after_a_file(&model);
+    }
+}
+
+#[test]
+fn the_papers_protocol_teaches_every_network_model() {
+    for (kind, [steps, batch_size], rate) in
+        [(ModelKind::A, [500, 8], 0.005), (ModelKind::C, [1000, 2], 0.0008), (ModelKind::D, [1000, 2], 0.0008)]
+    {
+        let whole = Preset::Paper.plan(kind, models::rcnn_kind(kind).unwrap(), false, 1);
+        assert_eq!((whole.training.steps, whole.training.batch_size), (steps, batch_size));
+        assert_eq!((whole.training.schedule.peak, whole.distinct_samples), (rate, Some(1500)));
+        let model = taught(Preset::Paper, kind);
+        assert_eq!((model.preset(), model.facts().samples), ("paper", STEPS * batch_size));
+        assert_same_after_a_file(&model);
+    }
+}
+
+#[test]
+fn the_paper_freezes_what_was_imported_and_nothing_else() {
+    let frozen = |has_base_weights| {
+        let network = Preset::Paper.network(models::rcnn_kind(ModelKind::C).unwrap(), has_base_weights);
+        network.backbone.freeze != sdg_detection::config::Freeze::Nothing
+    };
+    assert!(frozen(true) && !frozen(false));
+}
+
+#[test]
+fn one_network_serves_the_models_that_are_taught_alike() {
+    let taught = taught(Preset::Edge, ModelKind::C);
+    let read = taught.clone().read_as(ModelKind::B).unwrap();
+    assert_eq!((read.kind(), ModelKind::B.taught_as()), (ModelKind::B, ModelKind::C));
+    // The same detections; where they lie is read otherwise, and a way there is a way back.
+    let photo = demonstration().image;
+    let said = |model: &GraspModel| model.detect(&photo, Verification::Off).unwrap();
+    let boxes = |model: &GraspModel| said(model).iter().map(|found| found.bbox).collect::<Vec<_>>();
+    assert_eq!(boxes(&read), boxes(&taught));
+    assert_eq!(said(&read.clone().read_as(ModelKind::C).unwrap()), said(&taught));
+    assert!(read.clone().read_as(ModelKind::A).is_none() && read.read_as(ModelKind::S).is_none());
+}
+
+#[test]
+fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    let unobserved = &mut |_: &Event| panic!("nothing is trained");
+    let Taught { model, history } = teach(&[demonstration()], &options, unobserved).unwrap();
+    assert!(history.is_none() && model.facts().seconds < 1.0, "{:?}", model.facts());
+    assert!(model.to_bytes().unwrap().len() < 100_000);
+    assert_same_after_a_file(&model);
+}
+
+#[test]
+fn two_demonstrations_are_two_views() {
+    let mut second = demonstration();
+    second.image = image::imageops::flip_horizontal(&second.image);
+    let mirrored = |p: &Point2<f64>| Point2::new(f64::from(PHOTO[0]) - p.x, p.y);
+    let Annotation { bbox, grasp, outline, .. } = &mut second.annotation;
+    *outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(mirrored).collect() });
+    *grasp = grasp.map(|line| GraspLine::new(mirrored(&line.start), mirrored(&line.end)));
+    *bbox = outline.as_ref().unwrap().bounds();
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    let views = [demonstration(), second];
+    let model = teach(&views, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+    for view in &views {
+        let best = &model.detect(&view.image, Verification::ByShape).unwrap()[0];
+        let truth = view.annotation.grasp.unwrap().center();
+        assert!(best.is_accepted() && (best.grasp.center() - truth).norm() < 1.0, "{best:?}");
+    }
+}
+
+#[test]
+fn a_mark_that_a_model_needs_is_asked_for_by_name() {
+    let teach_with = |kind: ModelKind, demonstration: Demonstration| {
+        let options = TeachOptions { kind, ..TeachOptions::new(1) };
+        teach(&[demonstration], &options, &mut |_| ControlFlow::Break(())).unwrap_err().to_string()
+    };
+    let mut without_outline = demonstration();
+    without_outline.annotation.outline = None;
+    assert!(teach_with(ModelKind::D, without_outline).contains("the outline"));
+    for kind in ModelKind::ALL {
+        let mut without_grasp = demonstration();
+        without_grasp.annotation.grasp = None;
+        assert!(teach_with(kind, without_grasp).contains("grasp_start"), "{kind}");
+    }
+}
+
+#[test]
+fn an_interrupt_before_there_is_a_network_leaves_nothing() {
+    for (kind, reason) in [(ModelKind::A, "orientation CNN"), (ModelKind::D, "no model to keep")] {
+        let options = TeachOptions { kind, ..TeachOptions::new(1) };
+        let plan = small_plan(Preset::Edge, kind);
+        let stop = &mut |_: &Event| ControlFlow::Break(());
+        let refused = teach_network(&[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
+}
