@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
+use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration, Sample};
 
 /// Width and height of the edge preset's input.
 const FRAME: [u32; 2] = [320, 240];
@@ -27,19 +27,20 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let [width, height] = FRAME;
     let scenes = || AugmentationConfig::default().with_output_size(width, height);
-    let kinds = [
-        ("paper, the photo's size", Augmenter::new(demonstration, AugmentationConfig::paper(), 1)?),
-        (
-            "paper, input size",
-            Augmenter::new(demonstration, AugmentationConfig::paper().with_output_size(width, height), 1)?,
-        ),
-        ("scene, frame", Augmenter::new(demonstration, scenes(), 1)?),
-        ("scene, window", Augmenter::new(demonstration, scenes(), 1)?.with_windows(WINDOW_MULTIPLE)),
+    let photo_sized = Augmenter::new(demonstration, AugmentationConfig::paper(), 1)?;
+    let input_sized = Augmenter::new(demonstration, AugmentationConfig::paper().with_output_size(width, height), 1)?;
+    let frames = Augmenter::new(demonstration, scenes(), 1)?;
+    let windows = frames.windows(WINDOW_MULTIPLE);
+    let kinds: [(&str, &dyn Fn(u64) -> Sample); 4] = [
+        ("paper, the photo's size", &|i| photo_sized.sample(i)),
+        ("paper, input size", &|i| input_sized.sample(i)),
+        ("scene, frame", &|i| frames.sample(i)),
+        ("scene, window", &|i| windows.sample(i)),
     ];
-    for (kind, augmenter) in &kinds {
-        let [width, height] = augmenter.output_size();
+    for (kind, sample) in kinds {
+        let (width, height) = sample(0).image.dimensions();
         let start = Instant::now();
-        let pixels: u64 = (0..samples).map(|i| u64::from(augmenter.sample(i).image.get_pixel(9, 9)[0])).sum();
+        let pixels: u64 = (0..samples).map(|i| u64::from(sample(i).image.get_pixel(9, 9)[0])).sum();
         let millis = start.elapsed().as_secs_f64() * 1e3 / samples as f64;
         println!("{kind:24} {width:4}×{height:<4} {millis:7.3} ms a sample (checksum {pixels})");
     }
