@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
+use sdg_geometry::RotationalSymmetry;
 
 /// Teach a robot a grasp from one photo, on an ordinary computer.
 #[derive(Debug, Parser)]
@@ -78,6 +79,9 @@ pub struct TeachArgs {
     /// Seconds that the network's training may take at most
     #[arg(long, value_name = "SECS", value_parser = seconds)]
     pub time_budget: Option<f64>,
+    /// How often the part looks the same in a whole turn: 1 for most, 4 for a square, full for a disc
+    #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
+    pub symmetry: RotationalSymmetry,
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
@@ -285,6 +289,16 @@ pub struct VerifyArgs {
     pub json: bool,
 }
 
+/// Equal turns in a whole one, or that no turn can be seen.
+fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
+    match (text, text.parse::<u32>()) {
+        ("full", _) => Ok(RotationalSymmetry::Full),
+        (_, Ok(1)) => Ok(RotationalSymmetry::None),
+        (_, Ok(count @ 2..=360)) => Ok(RotationalSymmetry::Fold(count)),
+        _ => Err("expected 1 to 360 equal turns, or full".to_owned()),
+    }
+}
+
 /// A positive, finite number of seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -308,7 +322,7 @@ mod tests {
         for line in [
             "sdg demo",
             "sdg demo --json",
-            "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --seed 3 --time-budget 60",
+            "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg evaluate",
@@ -321,5 +335,6 @@ mod tests {
             assert!(Args::try_parse_from(line.split(' ')).is_ok(), "{line}");
         }
         assert!(Args::try_parse_from(["sdg", "teach", "--demo", "a:b", "--out", "m", "--time-budget", "-1"]).is_err());
+        assert!(Args::try_parse_from(["sdg", "teach", "--demo", "a:b", "--out", "m", "--symmetry", "0"]).is_err());
     }
 }

@@ -33,6 +33,7 @@ mod mask;
 mod planar_grasp;
 mod planar_similarity;
 mod polygon;
+mod rotational_symmetry;
 
 pub use angle::Angle;
 pub use bounding_box::BoundingBox;
@@ -43,3 +44,4 @@ pub use mask::{Mask, RunLengthMask};
 pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;
+pub use rotational_symmetry::RotationalSymmetry;

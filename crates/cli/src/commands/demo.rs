@@ -31,8 +31,11 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
 
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());
-    let options =
-        TeachOptions { time_budget: args.time_budget.map(Duration::from_secs_f64), ..TeachOptions::new(args.seed) };
+    let options = TeachOptions {
+        time_budget: args.time_budget.map(Duration::from_secs_f64),
+        symmetry: object.symmetry,
+        ..TeachOptions::new(args.seed)
+    };
     let mut progress = TeachingProgress::new(interrupt.clone());
     let taught = teach(std::slice::from_ref(&demonstration), &options, &mut |event| progress.show(event));
     progress.finish();

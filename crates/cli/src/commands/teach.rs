@@ -23,6 +23,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = TeachOptions {
         kind: parse("--model", &args.model)?,
         preset: parse("--preset", &args.preset)?,
+        symmetry: args.symmetry,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         steps: args.steps.map(|steps| steps as usize),
         ..TeachOptions::new(args.seed)

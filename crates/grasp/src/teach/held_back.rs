@@ -4,6 +4,7 @@ use sdg_demonstration::{Sample, SampleObject};
 use sdg_geometry::{Keypoint, PlanarGrasp};
 use sdg_training::{Outcome, median};
 
+use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
 use crate::model_file::Calibrations;
@@ -22,26 +23,10 @@ const AGREEMENT_THRESHOLDS: (f64, f64) = (0.545, 0.6);
 /// steepest slope, which takes 0.08 from it to a score of 0.88.
 pub(super) const AGREEMENT_UNSEEN: Calibration = Calibration { threshold: AGREEMENT_THRESHOLDS.0, slope: 25.0 };
 
-/// What the network alone says of held-back samples.
-///
-/// # Errors
-/// An image that the network refuses.
-pub(super) fn examine(
-    network: &Network,
-    demonstrations: &[TaughtDemonstration],
-    held_back: &[Sample],
-) -> Result<Vec<Outcome>> {
-    held_back
-        .iter()
-        .map(|sample| {
-            let best = network.candidates(&sample.image, demonstrations)?.into_iter().next();
-            Ok(match (best, sample.objects.first()) {
-                (Some(candidate), Some(object)) => outcome(&candidate.grasp, object, candidate.network_score),
-                (None, Some(_)) => Outcome::Missed,
-                (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
-            })
-        })
-        .collect()
+/// Samples that no network is trained on.
+pub(super) struct HeldBack<'a> {
+    pub(super) samples: &'a [Sample],
+    pub(super) turns: &'a HiddenTurns,
 }
 
 /// Where both scores are cut, and the median errors after verification, in pixels of the demonstration and degrees:
@@ -52,53 +37,76 @@ pub(super) struct Calibrated {
     pub(super) error_degrees: f64,
 }
 
-/// Tries network and search on held-back samples, laid over by the demonstration as in use.
-///
-/// # Errors
-/// An image that the network refuses.
-pub(super) fn calibrate(
-    network: &Network,
-    demonstrations: &[TaughtDemonstration],
-    held_back: &[Sample],
-) -> Result<Calibrated> {
-    let mut scores = Scores::default();
-    let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
-    for sample in held_back {
-        let scene = Scene::new(&sample.image);
-        // The highest score of a candidate that ended beside the part, and of one on it.
-        let mut network_best = [0.0f64; 2];
-        let mut judge = |overlay: &Overlay| {
-            let grasp = overlay.demonstration.grasp(&overlay.image_from_cutout);
-            let outcome = sample.objects.first().map(|object| outcome(&grasp, object, 1.0));
-            let right = outcome.is_some_and(|outcome| outcome.is_hit());
-            if let (true, Some(Outcome::Found { error_px, error_degrees, .. })) = (right, outcome) {
-                errors_px.push(error_px);
-                errors_degrees.push(error_degrees);
-            }
-            scores.agreement[usize::from(right)].push(overlay.agreement);
-            right
-        };
-        for candidate in network.candidates(&sample.image, demonstrations)? {
-            let right = judge(&verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene));
-            let best = &mut network_best[usize::from(right)];
-            *best = best.max(candidate.network_score);
-        }
-        for overlay in instant::search(demonstrations, &scene) {
-            judge(&overlay);
-        }
-        let [beside, on_part] = network_best;
-        if on_part > 0.0 {
-            scores.network[1].push(on_part);
-        }
-        if sample.objects.is_empty() {
-            scores.network[0].push(beside);
-        }
+impl HeldBack<'_> {
+    /// What the network alone says of held-back samples.
+    ///
+    /// # Errors
+    /// An image that the network refuses.
+    pub(super) fn examine(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Vec<Outcome>> {
+        self.samples
+            .iter()
+            .map(|sample| {
+                let best = network.candidates(&sample.image, demonstrations)?.into_iter().next();
+                Ok(match (best, sample.objects.first()) {
+                    (Some(candidate), Some(object)) => self.outcome(&candidate.grasp, object, candidate.network_score),
+                    (None, Some(_)) => Outcome::Missed,
+                    (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
+                })
+            })
+            .collect()
     }
-    Ok(Calibrated {
-        calibrations: scores.calibrations(),
-        error_px: median(&mut errors_px).unwrap_or(f64::INFINITY),
-        error_degrees: median(&mut errors_degrees).unwrap_or(f64::INFINITY),
-    })
+
+    /// Tries network and search on held-back samples, laid over by the demonstration as in use.
+    ///
+    /// # Errors
+    /// An image that the network refuses.
+    pub(super) fn calibrate(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Calibrated> {
+        let mut scores = Scores::default();
+        let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
+        for sample in self.samples {
+            let scene = Scene::new(&sample.image);
+            // The highest score of a candidate that ended beside the part, and of one on it.
+            let mut network_best = [0.0f64; 2];
+            let mut judge = |overlay: &Overlay| {
+                let grasp = overlay.demonstration.grasp(&overlay.image_from_cutout);
+                let outcome = sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0));
+                let right = outcome.is_some_and(|outcome| outcome.is_hit());
+                if let (true, Some(Outcome::Found { error_px, error_degrees, .. })) = (right, outcome) {
+                    errors_px.push(error_px);
+                    errors_degrees.push(error_degrees);
+                }
+                scores.agreement[usize::from(right)].push(overlay.agreement);
+                right
+            };
+            for candidate in network.candidates(&sample.image, demonstrations)? {
+                let right = judge(&verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene));
+                let best = &mut network_best[usize::from(right)];
+                *best = best.max(candidate.network_score);
+            }
+            for overlay in instant::search(demonstrations, &scene) {
+                judge(&overlay);
+            }
+            let [beside, on_part] = network_best;
+            if on_part > 0.0 {
+                scores.network[1].push(on_part);
+            }
+            if sample.objects.is_empty() {
+                scores.network[0].push(beside);
+            }
+        }
+        Ok(Calibrated {
+            calibrations: scores.calibrations(),
+            error_px: median(&mut errors_px).unwrap_or(f64::INFINITY),
+            error_degrees: median(&mut errors_degrees).unwrap_or(f64::INFINITY),
+        })
+    }
+
+    /// A grasp compared with the true one of an object in a sample.
+    fn outcome(&self, grasp: &PlanarGrasp, object: &SampleObject, score: f64) -> Outcome {
+        let (truth, pose) = (truth(object), &object.image_from_demonstration);
+        let grasp = self.turns.nearest(grasp, truth.angle, object.demonstration_idx, pose);
+        Outcome::found(&grasp, &truth, score, 1.0 / pose.scale)
+    }
 }
 
 /// Raw scores of wrong and of right detections, in this order.
@@ -118,11 +126,6 @@ impl Scores {
             agreement: fit(&self.agreement).unwrap_or(Calibration::NEUTRAL).with_threshold_within(AGREEMENT_THRESHOLDS),
         }
     }
-}
-
-/// A grasp compared with the true one of an object in a sample.
-fn outcome(grasp: &PlanarGrasp, object: &SampleObject, score: f64) -> Outcome {
-    Outcome::found(grasp, &truth(object), score, 1.0 / object.image_from_demonstration.scale)
 }
 
 /// The true grasp of an object in a sample; its width plays no part.

@@ -14,6 +14,7 @@ mod orientation;
 mod paper;
 mod plan;
 mod r50;
+mod symmetry;
 #[cfg(test)]
 mod tests;
 
@@ -23,6 +24,7 @@ use std::time::{Duration, Instant};
 use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+use sdg_geometry::RotationalSymmetry;
 use sdg_training::{History, SampleSource, Trained, TrainingError, train};
 
 use crate::base_weights::BaseWeights;
@@ -37,8 +39,10 @@ use crate::models::{self, Network, Reading};
 use crate::taught::TaughtDemonstration;
 
 pub use event::Event;
+use held_back::HeldBack;
 pub(crate) use plan::Plan;
 pub use plan::Preset;
+use symmetry::HiddenTurns;
 
 /// How to teach.
 #[derive(Debug, Clone)]
@@ -53,6 +57,8 @@ pub struct TeachOptions {
     pub time_budget: Option<Duration>,
     /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
     pub steps: Option<usize>,
+    /// Turns of the part that look the same: they are neither taught nor held against the model.
+    pub symmetry: RotationalSymmetry,
     /// Weights that the detector starts from; `None` to start from nothing.
     pub base_weights: Option<BaseWeights>,
     /// Where to compute; without gradients.
@@ -68,6 +74,7 @@ impl TeachOptions {
             seed,
             time_budget: None,
             steps: None,
+            symmetry: RotationalSymmetry::None,
             base_weights: None,
             device: Device::flex(),
         }
@@ -113,7 +120,7 @@ pub fn teach(
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
     let Some(rcnn) = models::rcnn_kind(options.kind) else { return instant(demonstrations, options, start) };
-    let plan = options.preset.plan(options.kind, rcnn, options.base_weights.is_some(), options.seed);
+    let plan = options.preset.plan(rcnn, options);
     teach_network(demonstrations, &plan, options, observe, start)
 }
 
@@ -179,7 +186,10 @@ pub(crate) fn teach_network(
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
     let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
-    let held_back: Vec<Sample> = (0..plan.training.validation.samples as u64).map(|i| held_back.held_out(i)).collect();
+    let turns = HiddenTurns::new(demonstrations, options.symmetry);
+    let num_held_back = plan.training.validation.samples as u64;
+    let held_back: Vec<Sample> = (0..num_held_back).map(|i| turns.canonical(held_back.held_out(i))).collect();
+    let held_back = HeldBack { samples: &held_back, turns: &turns };
     let mut training = plan.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.saturating_sub(start.elapsed()));
 
@@ -188,10 +198,13 @@ pub(crate) fn teach_network(
     let Trained { detector, history } = train(
         detector,
         &training,
-        SampleSource { frames: &|i| augmenter.sample(recurring(i)), windows: &|i| windows.sample(recurring(i)) },
+        SampleSource {
+            frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
+            windows: &|i| turns.canonical(windows.sample(recurring(i))),
+        },
         &mut |detector: &GeneralizedRcnn| {
             let network = Network { detector: detector.clone(), reading: reading.clone() };
-            held_back::examine(&network, &taught, &held_back).map_err(|error| TrainingError::Examination(error.into()))
+            held_back.examine(&network, &taught).map_err(|error| TrainingError::Examination(error.into()))
         },
         &mut |event| observe(&Event::from(*event)),
     )?;
@@ -202,7 +215,7 @@ pub(crate) fn teach_network(
     }
     // Calibrated and handed out is what a file will give back.
     let network = Network { detector, reading }.rounded();
-    let calibrated = held_back::calibrate(&network, &taught, &held_back)?;
+    let calibrated = held_back.calibrate(&network, &taught)?;
     let facts = TeachingFacts {
         seed: options.seed,
         samples: history.steps.iter().map(|step| step.samples).sum(),

@@ -5,13 +5,17 @@ use std::str::FromStr;
 use sdg_demonstration::AugmentationConfig;
 use sdg_detection::presets::RcnnKind;
 use sdg_detection::{RcnnConfig, presets};
+use sdg_geometry::RotationalSymmetry;
 use sdg_orientation::OrientationConfig;
 use sdg_orientation::training::OrientationTraining;
 use sdg_training::TrainingConfig;
 
-use super::{paper, r50};
+use super::{TeachOptions, paper, r50};
 use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
+
+/// As often as an orientation CNN may fold the circle: what is left of it, 5°, is no turn to speak of.
+const MOST_FOLD: usize = 72;
 
 /// Steps of the `edge` detector. Boxes and masks need fewer than keypoints, and model A's other network has steps of
 /// its own: each is then taught in about the same time.
@@ -91,21 +95,30 @@ impl Preset {
         }
     }
 
-    fn orientation(self, seed: u64) -> OrientationPlan {
-        match self {
+    fn orientation(self, symmetry: RotationalSymmetry, seed: u64) -> OrientationPlan {
+        let (network, mut training) = match self {
             Self::Edge | Self::R50Detectron2 | Self::R50Torchvision => {
-                OrientationPlan { network: OrientationConfig::edge(), training: OrientationTraining::edge(seed) }
+                (OrientationConfig::edge(), OrientationTraining::edge(seed))
             }
-            Self::Paper => {
-                OrientationPlan { network: OrientationConfig::paper(), training: OrientationTraining::paper(seed) }
+            Self::Paper => (OrientationConfig::paper(), OrientationTraining::paper(seed)),
+        };
+        let fold = match symmetry {
+            RotationalSymmetry::Fold(count) => (count as usize).min(MOST_FOLD),
+            RotationalSymmetry::Full => {
+                // Every answer is right: there is nothing to learn.
+                training.steps = 1;
+                MOST_FOLD
             }
-        }
+            _ => 1,
+        };
+        OrientationPlan { network: network.with_symmetry(fold), training }
     }
 
     /// How a model with a network is taught.
-    pub(super) fn plan(self, kind: ModelKind, rcnn: RcnnKind, has_base_weights: bool, seed: u64) -> Plan {
+    pub(super) fn plan(self, rcnn: RcnnKind, options: &TeachOptions) -> Plan {
+        let &TeachOptions { kind, seed, symmetry, .. } = options;
         Plan {
-            network: self.network(rcnn, has_base_weights),
+            network: self.network(rcnn, options.base_weights.is_some()),
             training: self.training(kind, seed),
             samples: self.samples(),
             distinct_samples: (self == Self::Paper).then_some(paper::DISTINCT_SAMPLES),
@@ -115,7 +128,7 @@ impl Preset {
                 _ => AugmentationConfig::default(),
             },
             least_hit_rate: LEAST_HIT_RATE,
-            orientation: (kind == ModelKind::A).then(|| self.orientation(seed)),
+            orientation: (kind == ModelKind::A).then(|| self.orientation(symmetry, seed)),
         }
     }
 }

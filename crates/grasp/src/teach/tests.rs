@@ -51,9 +51,13 @@ fn shrink(network: &mut RcnnConfig) {
     }
 }
 
+fn whole_plan(options: &TeachOptions) -> Plan {
+    options.preset.plan(models::rcnn_kind(options.kind).unwrap(), options)
+}
+
 /// A preset's plan, small enough for a test; any network is kept.
-fn small_plan(preset: Preset, kind: ModelKind) -> Plan {
-    let mut plan = preset.plan(kind, models::rcnn_kind(kind).unwrap(), false, 1);
+fn small_plan(options: &TeachOptions) -> Plan {
+    let mut plan = whole_plan(options);
     shrink(&mut plan.network);
     plan.least_hit_rate = 0.0;
     plan.samples = plan.samples.with_output_size(96, 72);
@@ -69,10 +73,15 @@ fn small_plan(preset: Preset, kind: ModelKind) -> Plan {
 
 fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
     let options = TeachOptions { kind, preset, ..TeachOptions::new(1) };
-    let plan = small_plan(preset, kind);
-    teach_network(&[demonstration()], &plan, &options, &mut |_| ControlFlow::Continue(()), Instant::now())
-        .unwrap()
-        .model
+    teach_network(
+        &[demonstration()],
+        &small_plan(&options),
+        &options,
+        &mut |_| ControlFlow::Continue(()),
+        Instant::now(),
+    )
+    .unwrap()
+    .model
 }
 
 /// Steps of detector and orientation CNN.
@@ -110,7 +119,7 @@ fn the_papers_protocol_teaches_every_network_model() {
     for (kind, [steps, batch_size], rate) in
         [(ModelKind::A, [500, 8], 0.005), (ModelKind::C, [1000, 2], 0.0008), (ModelKind::D, [1000, 2], 0.0008)]
     {
-        let whole = Preset::Paper.plan(kind, models::rcnn_kind(kind).unwrap(), false, 1);
+        let whole = whole_plan(&TeachOptions { kind, preset: Preset::Paper, ..TeachOptions::new(1) });
         assert_eq!((whole.training.steps, whole.training.batch_size), (steps, batch_size));
         assert_eq!((whole.training.schedule.peak, whole.distinct_samples), (rate, Some(1500)));
         let model = taught(Preset::Paper, kind);
@@ -191,7 +200,7 @@ fn a_mark_that_a_model_needs_is_asked_for_by_name() {
 fn an_interrupt_before_there_is_a_network_leaves_nothing() {
     for (kind, reason) in [(ModelKind::A, "orientation CNN"), (ModelKind::D, "no model to keep")] {
         let options = TeachOptions { kind, ..TeachOptions::new(1) };
-        let plan = small_plan(Preset::Edge, kind);
+        let plan = small_plan(&options);
         let stop = &mut |_: &Event| ControlFlow::Break(());
         let refused = teach_network(&[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
         assert!(refused.to_string().contains(reason), "{refused}");

@@ -53,13 +53,28 @@ impl Metadata {
         if self.footprint.len() < 3 || self.footprint.iter().flatten().any(|value| !value.is_finite()) {
             return Err(format!("footprint: expected three or more finite points, found {:?}", self.footprint));
         }
-        self.symmetry.check()
+        match self.symmetry {
+            // A fold of zero or one says nothing.
+            RotationalSymmetry::Fold(count @ 0..=1) => Err(format!("symmetry: expected fold 2 or more, found {count}")),
+            _ => Ok(()),
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::objects::{ObjectSpec, source_folder};
+    use crate::objects::{ObjectSpec, RotationalSymmetry, source_folder};
+
+    #[test]
+    fn a_symmetry_is_a_word_or_a_number() {
+        for (text, expected) in [
+            ("\"none\"", RotationalSymmetry::None),
+            ("{\"fold\": 3}", RotationalSymmetry::Fold(3)),
+            ("\"full\"", RotationalSymmetry::Full),
+        ] {
+            assert_eq!(serde_json::from_str::<RotationalSymmetry>(text).unwrap(), expected);
+        }
+    }
 
     #[test]
     fn bad_metadata_names_the_field() {

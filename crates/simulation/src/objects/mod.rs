@@ -10,7 +10,6 @@
 
 mod embedded;
 mod metadata;
-mod symmetry;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -26,7 +25,7 @@ use crate::scene::pose_attributes;
 use embedded::EMBEDDED;
 use metadata::Metadata;
 
-pub use symmetry::RotationalSymmetry;
+pub use sdg_geometry::RotationalSymmetry;
 
 /// Version of `object.json` that this reader understands.
 pub const OBJECT_FORMAT: u32 = 1;

@@ -1,0 +1,67 @@
+//! Which turns of a part cannot be told from none.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::Angle;
+
+/// Turns about the vertical that change neither how a part looks nor how it is held.
+///
+/// In JSON: `"none"`, `{"fold": 4}` or `"full"`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum RotationalSymmetry {
+    /// Every direction looks different.
+    #[default]
+    None,
+    /// So many equal turns make a whole one, two at least: a turn by any of them cannot be seen.
+    Fold(u32),
+    /// No turn can be seen.
+    Full,
+}
+
+impl RotationalSymmetry {
+    /// The smallest of the turns that look like `turn`.
+    pub fn visible(self, turn: Angle) -> Angle {
+        match self {
+            Self::None => turn,
+            Self::Fold(count) => {
+                let period = TAU / f64::from(count);
+                Angle::from_radians(turn.radians() - period * (turn.radians() / period).round())
+            }
+            Self::Full => Angle::ZERO,
+        }
+    }
+
+    /// The shortest turn from one direction to the other or to any that looks like it, in radians, not negative.
+    pub fn distance(self, one: Angle, other: Angle) -> f64 {
+        self.visible(one - other).radians().abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn degrees_apart(symmetry: RotationalSymmetry, one: f64, other: f64) -> f64 {
+        symmetry.distance(Angle::from_degrees(one), Angle::from_degrees(other)).to_degrees()
+    }
+
+    #[test]
+    fn only_turns_that_can_be_seen_count() {
+        for (symmetry, one, other, expected) in [
+            (RotationalSymmetry::None, 170.0, -10.0, 180.0),
+            (RotationalSymmetry::Fold(2), 170.0, -10.0, 0.0),
+            (RotationalSymmetry::Fold(2), 10.0, -40.0, 50.0),
+            (RotationalSymmetry::Fold(2), -100.0, 75.0, 5.0),
+            (RotationalSymmetry::Fold(9), 1.0, 40.0, 1.0),
+            (RotationalSymmetry::Fold(9), -179.0, 179.0, 2.0),
+            (RotationalSymmetry::Full, 10.0, -140.0, 0.0),
+        ] {
+            assert!((degrees_apart(symmetry, one, other) - expected).abs() < 1e-9, "{symmetry:?} {one} {other}");
+            assert!((degrees_apart(symmetry, other, one) - expected).abs() < 1e-9, "{symmetry:?} {other} {one}");
+        }
+    }
+}
