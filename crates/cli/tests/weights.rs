@@ -76,20 +76,20 @@ fn what_does_not_fit_is_listed_and_nothing_is_written() {
     assert_eq!(sdg(&named).status.code(), Some(0));
 }
 
-/// Detectron2's own case of a detector of boxes.
+/// What Detectron2 and torchvision gave themselves.
 fn golden(name: &str) -> String {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden/detectron2");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden");
     folder.join(name).to_str().unwrap().to_owned()
 }
 
 #[test]
 fn verification_tells_the_right_image_from_another() {
-    let [weights, config] = ["faster/weights.safetensors", "faster/config.json"].map(golden);
-    let against = golden("faster/expected.safetensors");
+    let [weights, config, against] = ["weights.safetensors", "config.json", "expected.safetensors"]
+        .map(|n| golden(&format!("detectron2/faster/{n}")));
     let verify = |image: &str| {
         sdg(&["verify", &weights, "--config", &config, "--image", image, "--against", &against, "--json"])
     };
-    let right = verify(&golden("input.png"));
+    let right = verify(&golden("detectron2/input.png"));
     assert_eq!(right.status.code(), Some(0), "{right:?}");
     let line = one_json(&right);
     let stages: Vec<_> = line["stages"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
@@ -101,6 +101,36 @@ fn verification_tells_the_right_image_from_another() {
     assert_eq!(wrong.status.code(), Some(1));
     let stderr = String::from_utf8(wrong.stderr).unwrap();
     assert!(stderr.lines().count() == 1 && stderr.contains("first: preprocessed"), "{stderr}");
+}
+
+#[test]
+fn verification_knows_torchvision_s_numerics_from_detectron2_s() {
+    let case = |name: &str| golden(&format!("torchvision/keypoint/{name}"));
+    let (weights, against, image) =
+        (case("weights.safetensors"), case("expected.safetensors"), golden("detectron2/input.png"));
+    let verify = |config: &str| {
+        sdg(&["verify", &weights, "--config", config, "--image", &image, "--against", &against, "--json"])
+    };
+    let config = case("config.json");
+    let right = verify(&config);
+    assert_eq!(right.status.code(), Some(0), "{right:?}");
+    let line = one_json(&right);
+    let stages: Vec<_> = line["stages"].as_array().unwrap().iter().map(|s| s["name"].as_str().unwrap()).collect();
+    for stage in ["anchors.p6", "proposals.boxes", "detections.keypoints.places", "losses.loss_keypoint"] {
+        assert!(stages.contains(&stage), "{stage} in {stages:?}");
+    }
+    let gradient = "gradients.roi_heads.keypoint_head.score_lowres.weight";
+    assert!(stages.contains(&gradient), "gradients come under torchvision's names: {stages:?}");
+
+    let mut other: Value = serde_json::from_slice(&fs::read(&config).unwrap()).unwrap();
+    other["numerics"] = json!("detectron2");
+    let folder = tempfile::tempdir().unwrap();
+    let other_config = folder.path().join("config.json");
+    fs::write(&other_config, other.to_string()).unwrap();
+    let wrong = verify(other_config.to_str().unwrap());
+    assert_eq!(wrong.status.code(), Some(1));
+    let failed = one_json(&wrong)["stages"].as_array().unwrap().iter().filter(|s| s["passed"] == false).count();
+    assert!(failed > 10, "{failed} stages");
 }
 
 #[test]

