@@ -4,7 +4,7 @@ use super::homography::Homography;
 use super::noise::NoiseTile;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, log_uniform, uniform};
-use super::raster::{Raster, smoothstep};
+use super::raster::{Raster, floor, smoothstep};
 
 /// The noises that surfaces are made of, drawn once.
 pub(crate) struct NoiseBank {
@@ -90,7 +90,7 @@ fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &m
             let plank = if chance(rng, 0.5) { uniform(rng, 40.0, 120.0) } else { f32::MAX };
             fill_with(canvas, dark, light, |x, y| {
                 let (u, v) = frame.at(x * px, y * px);
-                let board = (v / plank).floor();
+                let board = floor(v / plank) as f32;
                 let ring = bank.cloudy.at(u * 0.08 + board * 37.0, v * 0.5 + board * 91.0);
                 let joint = if v - board * plank < 1.2 { -0.6 } else { 0.0 };
                 let band = (ring * rings).fract();
@@ -116,7 +116,7 @@ fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &m
             let cell = uniform(rng, 8.0, 60.0);
             fill_with(canvas, dark, light, |x, y| {
                 let (u, v) = frame.at(x * px, y * px);
-                let odd = ((u / cell).floor() + (v / cell).floor()).rem_euclid(2.0);
+                let odd = (floor(u / cell) + floor(v / cell)).rem_euclid(2) as f32;
                 odd + 0.3 * (bank.rough.at(u, v) - 0.5)
             });
         }
@@ -152,9 +152,9 @@ fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &m
 #[inline(always)]
 fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl Fn(f32, f32) -> f32) {
     for y in 0..canvas.height {
-        for x in 0..canvas.width {
-            let t = value(x as f32, y as f32).clamp(0.0, 1.0);
-            let pixel = &mut canvas.pixels[y * canvas.width + x];
+        let row = &mut canvas.pixels[y * canvas.width..(y + 1) * canvas.width];
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let t = value(x as i32 as f32, y as f32).clamp(0.0, 1.0);
             for k in 0..3 {
                 pixel[k] = dark[k] + (light[k] - dark[k]) * t;
             }

@@ -20,26 +20,27 @@ pub(crate) fn relight(canvas: &mut Raster, rng: &mut SampleRng) {
     });
     let curves = draw_curves(rng);
 
-    for y in 0..canvas.height {
+    for (y, row) in canvas.pixels.chunks_exact_mut(canvas.width).enumerate() {
         let dy = y as f32 - 0.5 * height;
-        for x in 0..canvas.width {
-            let dx = x as f32 - 0.5 * width;
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let x = x as i32 as f32;
+            let dx = x - 0.5 * width;
             let mut light = 1.0 + strength * (dx * slope[0] + dy * slope[1]);
             if let Some((edge, normal, soft, dark)) = shaded {
-                let along = (x as f32 - edge[0]) * normal[0] + (y as f32 - edge[1]) * normal[1];
+                let along = (x - edge[0]) * normal[0] + (y as f32 - edge[1]) * normal[1];
                 light *= 1.0 - dark * smoothstep(-soft, soft, along);
             }
-            let pixel = &mut canvas.pixels[y * canvas.width + x];
             let scale = light * (CURVE_STEPS as f32 / CURVE_TOP);
             for k in 0..3 {
-                let step = (pixel[k] * scale).max(0.0) as usize;
+                // Through i32, which a processor converts in one step.
+                let step = (pixel[k] * scale).max(0.0) as i32 as usize;
                 pixel[k] = curves[k][step.min(CURVE_STEPS - 1)];
             }
         }
     }
 }
 
-fn draw_curves(rng: &mut SampleRng) -> [Vec<f32>; 3] {
+fn draw_curves(rng: &mut SampleRng) -> [[f32; CURVE_STEPS]; 3] {
     let gain = uniform(rng, -0.55, 0.35).exp();
     let gamma = uniform(rng, -0.3, 0.3).exp();
     let contrast = uniform(rng, 0.75, 1.25);
@@ -47,13 +48,11 @@ fn draw_curves(rng: &mut SampleRng) -> [Vec<f32>; 3] {
     let lift = uniform(rng, -0.03, 0.08);
     std::array::from_fn(|_| {
         let cast = uniform(rng, -0.12, 0.12).exp();
-        (0..CURVE_STEPS)
-            .map(|step| {
-                let value = (step as f32 + 0.5) * CURVE_TOP / CURVE_STEPS as f32;
-                let toned = (value * gain * cast).powf(gamma);
-                shoulder((toned - 0.5) * contrast + 0.5 + lift)
-            })
-            .collect()
+        std::array::from_fn(|step| {
+            let value = (step as f32 + 0.5) * CURVE_TOP / CURVE_STEPS as f32;
+            let toned = (value * gain * cast).powf(gamma);
+            shoulder((toned - 0.5) * contrast + 0.5 + lift)
+        })
     })
 }
 

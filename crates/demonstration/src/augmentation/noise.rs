@@ -3,20 +3,22 @@
 use rand::Rng;
 
 use super::random::SampleRng;
+use super::raster::floor;
 
 /// Side of a tile; a power of two, so that wrapping is a mask.
 const SIDE: usize = 256;
 
 /// Noise in `[0, 1]` that repeats every 256 pixels without a seam.
 pub(crate) struct NoiseTile {
-    values: Vec<f32>,
+    /// An array, whose length the compiler knows: a masked place needs no check.
+    values: Box<[f32; SIDE * SIDE]>,
 }
 
 impl NoiseTile {
     /// Sums octaves of smooth noise: the first has `coarsest` cells a side, each next one twice as many and `fall`
     /// times the strength.
     pub fn fractal(rng: &mut SampleRng, coarsest: usize, octaves: u32, fall: f32) -> Self {
-        let mut values = vec![0.0; SIDE * SIDE];
+        let mut values = vec![0.0; SIDE * SIDE].into_boxed_slice();
         let mut strength = 1.0;
         for octave in 0..octaves {
             let cells = (coarsest << octave).min(SIDE);
@@ -37,16 +39,16 @@ impl NoiseTile {
         }
         let (low, high) = values.iter().fold((f32::MAX, f32::MIN), |(l, h), &v| (l.min(v), h.max(v)));
         values.iter_mut().for_each(|v| *v = (*v - low) / (high - low).max(1e-6));
-        Self { values }
+        Self { values: values.try_into().expect("one value was made for each pixel of the tile") }
     }
 
     /// Bilinear.
     #[inline(always)]
     pub fn at(&self, x: f32, y: f32) -> f32 {
-        let (column, row) = (x.floor(), y.floor());
-        let (fx, fy) = (x - column, y - row);
-        // Through i32, so that negative places wrap as well.
-        let (u, v) = (column as i32 as usize & (SIDE - 1), row as i32 as usize & (SIDE - 1));
+        let (column, row) = (floor(x), floor(y));
+        let (fx, fy) = (x - column as f32, y - row as f32);
+        // Negative places wrap as well.
+        let (u, v) = (column as usize & (SIDE - 1), row as usize & (SIDE - 1));
         let (right, below) = ((u + 1) & (SIDE - 1), (v + 1) & (SIDE - 1));
         let top = self.values[v * SIDE + u] + (self.values[v * SIDE + right] - self.values[v * SIDE + u]) * fx;
         let bottom =

@@ -34,13 +34,16 @@ impl Raster {
     pub fn bilinear(&self, x: f32, y: f32) -> [f32; 4] {
         let u = (x - 0.5).clamp(0.0, (self.width - 1) as f32);
         let v = (y - 0.5).clamp(0.0, (self.height - 1) as f32);
-        let (column, row) = (u as usize, v as usize);
+        // Through i32, which a processor converts in one step.
+        let (column, row) = (u as i32, v as i32);
         let (fx, fy) = (u - column as f32, v - row as f32);
-        let right = (column + 1).min(self.width - 1);
-        let below = (row + 1).min(self.height - 1);
-        let upper = &self.pixels[row * self.width..(row + 1) * self.width];
-        let lower = &self.pixels[below * self.width..(below + 1) * self.width];
-        let (a, b, c, d) = (&upper[column], &upper[right], &lower[column], &lower[right]);
+        let (column, row) = (column as usize, row as usize);
+        let right = usize::from(column + 1 < self.width);
+        let below = if row + 1 < self.height { self.width } else { 0 };
+        let at = row * self.width + column;
+        let upper = &self.pixels[at..at + right + 1];
+        let lower = &self.pixels[at + below..at + below + right + 1];
+        let (a, b, c, d) = (&upper[0], &upper[right], &lower[0], &lower[right]);
         let mut out = [0.0; 4];
         for k in 0..4 {
             let top = a[k] + (b[k] - a[k]) * fx;
@@ -53,8 +56,8 @@ impl Raster {
     /// The pixel that (x, y) falls into; beyond the border the border goes on.
     #[inline(always)]
     pub fn nearest(&self, x: f32, y: f32) -> [f32; 4] {
-        let column = (x.max(0.0) as usize).min(self.width - 1);
-        let row = (y.max(0.0) as usize).min(self.height - 1);
+        let column = (x.max(0.0) as i32 as usize).min(self.width - 1);
+        let row = (y.max(0.0) as i32 as usize).min(self.height - 1);
         self.pixels[row * self.width + column]
     }
 
@@ -73,6 +76,14 @@ fn reflect(x: f32, length: f32) -> f32 {
     }
     let folded = x.rem_euclid(2.0 * length);
     if folded > length { 2.0 * length - folded } else { folded }
+}
+
+/// The greatest whole number not above `x`, for places on a picture: without the library call that `f32::floor` is
+/// where a processor's newer instructions may not be taken for granted.
+#[inline(always)]
+pub(crate) fn floor(x: f32) -> i32 {
+    let towards_zero = x as i32;
+    towards_zero - i32::from(towards_zero as f32 > x)
 }
 
 /// Whole pixels `[x1, x2) × [y1, y2)`.
@@ -123,6 +134,13 @@ mod tests {
         assert_eq!(raster.bilinear(-9.0, 0.5)[0], 0.0);
         assert!((raster.reflected(-0.5, 0.5)[0] - raster.bilinear(0.5, 0.5)[0]).abs() < 1e-6);
         assert!((raster.reflected(4.5, 0.5)[0] - raster.bilinear(1.5, 0.5)[0]).abs() < 1e-6);
+    }
+
+    #[test]
+    fn floor_goes_down_on_both_sides_of_zero() {
+        for x in [-3.0f32, -2.5, -1e-9, -0.0, 0.0, 0.99, 7.0, 12_345.6] {
+            assert_eq!(floor(x) as f32, x.floor(), "{x}");
+        }
     }
 
     #[test]

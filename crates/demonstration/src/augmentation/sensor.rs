@@ -83,18 +83,31 @@ fn motion(canvas: &mut Raster, dx: f32, dy: f32) {
             ((dx * t).round() as isize, (dy * t).round() as isize)
         })
         .collect();
-    for y in 0..height {
-        for x in 0..width {
-            let mut sum = [0.0; 4];
-            for &(ox, oy) in &offsets {
-                let (u, v) = ((x + ox).clamp(0, width - 1), (y + oy).clamp(0, height - 1));
-                let pixel = &source[(v * width + u) as usize];
-                for k in 0..4 {
-                    sum[k] += pixel[k];
-                }
+    for (y, out) in canvas.pixels.chunks_exact_mut(canvas.width).enumerate() {
+        out.fill([0.0; 4]);
+        for &(ox, oy) in &offsets {
+            let v = (y as isize + oy).clamp(0, height - 1);
+            let row = &source[(v * width) as usize..((v + 1) * width) as usize];
+            // Columns that see the row's beginning, its inside, and its end.
+            let left = (-ox).clamp(0, width);
+            let right = (width - ox).clamp(left, width);
+            let (beginning, rest) = out.split_at_mut(left as usize);
+            let (inside, end) = rest.split_at_mut((right - left) as usize);
+            beginning.iter_mut().for_each(|sum| add(sum, &row[0]));
+            if !inside.is_empty() {
+                let seen = &row[(left + ox) as usize..(right + ox) as usize];
+                inside.iter_mut().zip(seen).for_each(|(sum, pixel)| add(sum, pixel));
             }
-            canvas.pixels[(y * width + x) as usize] = sum.map(|v| v * share);
+            end.iter_mut().for_each(|sum| add(sum, &row[row.len() - 1]));
         }
+        out.iter_mut().for_each(|sum| *sum = sum.map(|v| v * share));
+    }
+}
+
+#[inline(always)]
+fn add(sum: &mut [f32; 4], pixel: &[f32; 4]) {
+    for k in 0..4 {
+        sum[k] += pixel[k];
     }
 }
 
@@ -169,5 +182,15 @@ mod tests {
         motion(&mut raster, 6.0, 0.0);
         let [sum, xx, yy] = moments(&raster);
         assert!((sum - 1.0).abs() < 1e-5 && xx > 3.0 && yy == 0.0);
+    }
+
+    #[test]
+    fn motion_repeats_the_border_even_where_the_line_is_longer_than_the_picture() {
+        for (dx, dy) in [(4.0, 3.0), (-50.0, 0.0), (50.0, 20.0), (3.0, -50.0)] {
+            let mut raster = Raster::filled(9, 7, [0.25, 0.5, 0.75, 1.0]);
+            motion(&mut raster, dx, dy);
+            let off = |pixel: &[f32; 4]| (pixel[0] - 0.25).abs() + (pixel[2] - 0.75).abs();
+            assert!(raster.pixels.iter().all(|pixel| off(pixel) < 1e-5), "({dx}, {dy})");
+        }
     }
 }
