@@ -104,7 +104,7 @@ class Detector(nn.Module):
         self.rpn_coder, self.roi_coder = BoxCoder((1.0, 1.0, 1.0, 1.0)), BoxCoder((10.0, 10.0, 5.0, 5.0))
         self.rpn_matcher, self.roi_matcher = Matcher(0.7, 0.3, True), Matcher(0.5, 0.5, False)
         self.rpn_sampler = BalancedPositiveNegativeSampler(128, 0.5)
-        self.roi_sampler = BalancedPositiveNegativeSampler(64, 0.25)
+        self.roi_sampler = BalancedPositiveNegativeSampler(32, 0.25)
         self.anchors_of = {}
 
     def anchors(self, features):

@@ -1,7 +1,7 @@
 //! Crops of one size from the pyramid, each box from the level that suits its size.
 
-use burn::tensor::{Int, Tensor, TensorData};
-use sdg_kernels::{RoiAlignParams, roi_align};
+use burn::tensor::{Tensor, TensorData};
+use sdg_kernels::{RoiAlignParams, permute_maps, roi_align};
 
 use crate::anchors::LEVEL_STRIDES;
 use crate::boxes::{Corners, area};
@@ -74,12 +74,13 @@ pub fn pool(features: &[Tensor<4>; 5], rois: &[Roi], config: &RoiPoolerConfig) -
         return pooled.remove(0);
     }
     // `order[row]` is the ROI in a row of the concatenation; the inverse leads back.
-    let mut row_of_roi = vec![0i32; rois.len()];
+    let mut row_of_roi = vec![0; rois.len()];
     for (row, roi) in order.iter().enumerate() {
-        row_of_roi[*roi] = row as i32;
+        row_of_roi[*roi] = row;
     }
-    let row_of_roi = Tensor::<1, Int>::from_ints(row_of_roi.as_slice(), &device);
-    Tensor::cat(pooled, 0).select(0, row_of_roi)
+    // Seen as they stand in memory, channels last, so that whole crops are moved.
+    let pooled = pooled.into_iter().map(|crops| crops.permute([0, 2, 3, 1])).collect();
+    permute_maps(Tensor::cat(pooled, 0), &row_of_roi).permute([0, 3, 1, 2])
 }
 
 #[cfg(test)]

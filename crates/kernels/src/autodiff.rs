@@ -28,7 +28,7 @@ use crate::resize::kernel::PoolShape;
 use crate::resize::{self, MaxPool2dParams};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
-use crate::{composed, elementwise};
+use crate::{composed, elementwise, permute};
 
 impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     fn kernel_conv2d(
@@ -180,6 +180,18 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         let output = Flex::kernel_max_pool2d(x.clone(), params);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((x, output.clone(), shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_permute_maps(x: FloatTensor<Self>, order: Arc<[usize]>) -> FloatTensor<Self> {
+        if !all_f32([x.primitive()]) {
+            return composed::permute_maps::<Self>(x, &order);
+        }
+        let prepared = PermuteBackward.prepare::<C>([x.node()]).compute_bound().stateful();
+        let output = Flex::kernel_permute_maps(x.into_primitive(), Arc::clone(&order));
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish(permute::inverse(&order), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -438,6 +450,21 @@ impl Backward<Flex, 1> for UpsampleBackward {
         if let [Some(x)] = ops.parents {
             let grad = resize::kernel::upsample_gradient(Isa::detect(), last_values(&output_grad), ops.state);
             give!(grads, ops.node, x, tensor_channels_last(grad, ops.state));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct PermuteBackward;
+
+impl Backward<Flex, 1> for PermuteBackward {
+    /// The order that leads back.
+    type State = Arc<[usize]>;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node);
+        if let [Some(x)] = ops.parents {
+            grads.register::<Flex>(x.id, Flex::kernel_permute_maps(output_grad, ops.state));
         }
     }
 }

@@ -91,6 +91,14 @@ pub fn adamw_value<B: Backend>(param: FloatTensor<B>, moments: FloatTensor<B>, p
     B::float_sub(kept, scaled::<B>(delta, params.learning_rate))
 }
 
+/// [`permute_maps`](crate::permute_maps) by burn's `select`.
+pub fn permute_maps<B: Backend>(x: FloatTensor<B>, order: &[usize]) -> FloatTensor<B> {
+    let indices: Vec<i32> = order.iter().map(|&map| map as i32).collect();
+    let device = x.device();
+    let count = indices.len();
+    B::float_select(x, 0, B::int_from_data(TensorData::new(indices, [count]), &device))
+}
+
 /// [`roi_align`](crate::roi_align()) by two matrix products an image, one per axis.
 ///
 /// Holds `R·C·Ph·W` floats at a time, R the most ROIs of one image.

@@ -1,5 +1,7 @@
 //! The backend extension: one method per operation, with a default body of burn's own tensor operations.
 
+use std::sync::Arc;
+
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
@@ -88,5 +90,10 @@ pub trait KernelBackend: Backend {
         params: AdamWParams,
     ) -> FloatTensor<Self> {
         composed::adamw_value::<Self>(param, moments, params)
+    }
+
+    /// See [`permute_maps`](crate::permute_maps).
+    fn kernel_permute_maps(x: FloatTensor<Self>, order: Arc<[usize]>) -> FloatTensor<Self> {
+        composed::permute_maps::<Self>(x, &order)
     }
 }

@@ -1,5 +1,7 @@
 //! The extension on `Flex`: tensors to slices and back, and which kernel runs.
 
+use std::sync::Arc;
+
 use burn::backend::flex::{FlexTensor, Layout};
 use burn::backend::ops::ModuleOps;
 use burn::backend::tensor::FloatTensor;
@@ -18,7 +20,7 @@ use crate::resize::kernel::PoolShape;
 use crate::resize::{self, MaxPool2dParams};
 use crate::roi_align::{self, RoiAlignParams};
 use crate::simd::Isa;
-use crate::{composed, elementwise};
+use crate::{composed, elementwise, permute};
 
 impl KernelBackend for Flex {
     fn kernel_conv2d(
@@ -130,6 +132,14 @@ impl KernelBackend for Flex {
         let [param, moments] = [param, moments].map(|tensor| tensor.to_contiguous());
         let after = adamw::value_after(Isa::detect(), values(&param), values(&moments), params);
         tensor(after, [1, param.shape()[1]])
+    }
+
+    fn kernel_permute_maps(x: FloatTensor<Self>, order: Arc<[usize]>) -> FloatTensor<Self> {
+        if !all_f32([&x]) {
+            return composed::permute_maps::<Self>(x, &order);
+        }
+        let shape = shape4(&x);
+        tensor(permute::permuted(values(&x.to_contiguous()), &order), shape)
     }
 
     fn kernel_upsample_nearest_2x(x: FloatTensor<Self>) -> FloatTensor<Self> {

@@ -54,6 +54,7 @@ mod memory;
 mod nms;
 mod packed;
 mod parallel;
+mod permute;
 mod product;
 #[cfg(test)]
 mod reference;
@@ -68,5 +69,6 @@ pub use extension::KernelBackend;
 pub use group_norm::{Activation, FusedGroupNormParams, GroupNormParams, group_norm, group_norm_residual};
 pub use memory::keep_freed_memory;
 pub use nms::{batched_nms, nms};
+pub use permute::permute_maps;
 pub use resize::{MaxPool2dParams, max_pool2d, upsample_nearest_2x};
 pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};

@@ -184,6 +184,7 @@ impl Evaluation<'_> {
         let options = TeachOptions {
             kind: cell.model,
             preset: self.preset,
+            symmetry: ObjectSpec::by_name(cell.object)?.symmetry,
             steps: settings.steps.map(|steps| steps as usize),
             ..TeachOptions::new(settings.seed)
         };

@@ -67,7 +67,7 @@ pub fn edge_of(kind: RcnnKind) -> RcnnConfig {
                 positive_from: 0.5,
                 low_quality: LowQualityMatches::Forbidden,
             },
-            sampler: SamplerConfig { batch_size_per_image: 64, positive_fraction: 0.25 },
+            sampler: SamplerConfig { batch_size_per_image: 32, positive_fraction: 0.25 },
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 fc_channels: 256,

@@ -17,13 +17,12 @@ use crate::facts::ModelKind;
 /// As often as an orientation CNN may fold the circle: what is left of it, 5°, is no turn to speak of.
 const MOST_FOLD: usize = 72;
 
-/// Steps of the `edge` detector. Boxes and masks need fewer than keypoints, and model A's other network has steps of
-/// its own: each is then taught in about the same time.
+/// Steps of the `edge` detector. Boxes need fewer than keypoints, and model A's other network has steps of its own. Masks
+/// do not: after 220 steps the fuel line was found in 0 of 35 held-back samples.
 fn edge_steps(kind: ModelKind) -> usize {
     match kind {
         ModelKind::A => 260,
-        ModelKind::D => 220,
-        ModelKind::B | ModelKind::C | ModelKind::S => 300,
+        ModelKind::B | ModelKind::C | ModelKind::D | ModelKind::S => 300,
     }
 }
 
