@@ -21,7 +21,7 @@ pub type Facts = BTreeMap<String, f64>;
 /// What a worker says first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
-    /// Seconds of the run that does not count; `None` where there was none.
+    /// Seconds of the run that does not count, all its pieces; `None` where there was none.
     pub seconds: Option<f64>,
     /// What was computed.
     pub facts: Facts,
@@ -81,7 +81,7 @@ pub fn serve(build: impl FnOnce() -> Result<Work>) -> Result<()> {
         writeln!(out, "{}", serde_json::to_string(answer)?)?;
         Ok(out.flush()?)
     };
-    let seconds = if work.warm_up { Some(work.timed()?) } else { None };
+    let seconds = if work.warm_up { Some(work.timed()? * work.pieces as f64) } else { None };
     let version = concat!("sdg ", env!("CARGO_PKG_VERSION")).to_owned();
     tell(&Answer::Ready(Ready { seconds, facts: work.facts.clone(), gflop: None, version }))?;
     for line in std::io::stdin().lock().lines() {

@@ -321,6 +321,7 @@ mod tests {
             grasp: GraspLine::new(Point2::new(40.0, 35.0), Point2::new(80.0, 35.0)),
             outline: Some(outline),
             width_px: 30.0,
+            photo_size: None,
         };
         let demonstrations = vec![TaughtDemonstration::from_parts(cutout, marks).unwrap()];
         let network = models::rcnn_kind(kind).map(|rcnn| Network {

@@ -30,6 +30,9 @@ pub struct TaughtMarks {
     pub outline: Option<Polygon>,
     /// The part's width between the jaws, measured across the outline.
     pub width_px: f64,
+    /// Width and height of the photo that the cut-out is from; files of older versions do not tell.
+    #[serde(default)]
+    pub photo_size: Option<[u32; 2]>,
 }
 
 /// The cut-out, its marks, and the template that is laid over images.
@@ -79,7 +82,10 @@ impl TaughtDemonstration {
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
         let width_px = decimal(width_across(&grasp, outline.as_ref(), &bbox));
-        Self::from_parts(cutout, TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px })
+        Self::from_parts(
+            cutout,
+            TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px, photo_size: Some([width, height]) },
+        )
     }
 
     /// Puts a kept demonstration together again.
@@ -92,6 +98,13 @@ impl TaughtDemonstration {
         let surface = Surface::new(&cutout, &outline);
         let search = InstantSearch::new(&cutout, &outline, &SECOND_OPINION)?;
         Ok(Self { cutout, marks, template, surface, search })
+    }
+
+    /// The scale at which the part lies in an image of that size that is taken as the photo was, with as many pixels or
+    /// not: both are resized alike before a network sees them.
+    pub(crate) fn usual_scale(&self, width: u32, height: u32) -> f64 {
+        let shorter = |[width, height]: [u32; 2]| f64::from(width.min(height));
+        self.marks.photo_size.map_or(1.0, |photo| shorter([width, height]) / shorter(photo))
     }
 
     /// The twelve keypoints, in pixels of the cut-out.

@@ -141,6 +141,7 @@ mod tests {
             grasp: GraspLine::new(Point2::new(70.0, 32.0), Point2::new(110.0, 32.0)),
             outline: Some(outline.clone()),
             width_px: 25.0,
+            photo_size: None,
         };
         let demonstrations = [TaughtDemonstration::from_parts(painted(&outline, 140, 120), marks).unwrap()];
         let matcher = MaskMatcher::new(&demonstrations).unwrap();

@@ -45,6 +45,7 @@ mod tests {
             grasp: GraspLine::new(Point2::new(80.0, 30.0), Point2::new(110.0, 30.0)),
             outline: Some(outline),
             width_px: 20.0,
+            photo_size: None,
         };
         TaughtDemonstration::from_parts(cutout, marks).unwrap()
     }
