@@ -7,9 +7,11 @@ use std::time::Instant;
 use burn::tensor::{Device, Distribution, Tensor};
 use sdg_kernels::{Conv2dParams, conv2d};
 
+/// Name, how often, channels in and out, map in, kernel, stride.
+type Case = (&'static str, usize, [usize; 2], [usize; 2], usize, usize);
+
 fn main() {
-    // Name, how often, channels in and out, map in, kernel, stride.
-    let cases: [(&str, usize, [usize; 2], [usize; 2], usize, usize); 27] = [
+    let cases: [Case; 27] = [
         ("stem 7x7 s2", 1, [3, 64], [480, 640], 7, 2),
         ("res2 1x1 64->64", 1, [64, 64], [120, 160], 1, 1),
         ("res2 1x1 256->64", 2, [256, 64], [120, 160], 1, 1),
