@@ -25,16 +25,21 @@ pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &Matche
         return vec![Match::Negative; candidates.len()];
     }
     let mut matched_idxs = vec![0usize; candidates.len()];
-    let mut best_iou = vec![-1f32; candidates.len()];
-    let mut best_of_gt = vec![0f32; gt_boxes.len()];
-    for (gt_idx, gt) in gt_boxes.iter().enumerate() {
-        for (idx, candidate) in candidates.iter().enumerate() {
-            let overlap = iou(gt, candidate);
+    let mut best_iou = vec![0f32; candidates.len()];
+    // Few of the tens of thousands of anchors touch an object: the others' overlaps, all 0, are not computed.
+    let touching: Vec<Vec<(usize, f32)>> = gt_boxes
+        .iter()
+        .map(|gt| {
+            let touched = candidates.iter().enumerate().filter(|(_, candidate)| touch(gt, candidate));
+            touched.map(|(idx, candidate)| (idx, iou(gt, candidate))).collect()
+        })
+        .collect();
+    for (gt_idx, overlaps) in touching.iter().enumerate() {
+        for &(idx, overlap) in overlaps {
             if overlap > best_iou[idx] {
                 best_iou[idx] = overlap;
                 matched_idxs[idx] = gt_idx;
             }
-            best_of_gt[gt_idx] = best_of_gt[gt_idx].max(overlap);
         }
     }
     let mut matches: Vec<Match> = best_iou
@@ -51,19 +56,23 @@ pub fn match_boxes(candidates: &[Corners], gt_boxes: &[Corners], config: &Matche
         })
         .collect();
     if config.low_quality == LowQualityMatches::Allowed {
-        for (gt, best) in gt_boxes.iter().zip(&best_of_gt) {
+        for overlaps in &touching {
+            let best = overlaps.iter().fold(0f32, |best, &(_, overlap)| best.max(overlap));
             // An object outside every candidate has best overlap 0 with all of them.
-            if *best <= 0.0 {
+            if best <= 0.0 {
                 continue;
             }
-            for (idx, candidate) in candidates.iter().enumerate() {
-                if iou(gt, candidate) == *best {
-                    matches[idx] = Match::Positive(matched_idxs[idx]);
-                }
+            for &(idx, _) in overlaps.iter().filter(|(_, overlap)| *overlap == best) {
+                matches[idx] = Match::Positive(matched_idxs[idx]);
             }
         }
     }
     matches
+}
+
+/// Whether two boxes share any area.
+fn touch(a: &Corners, b: &Corners) -> bool {
+    a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
 #[cfg(test)]

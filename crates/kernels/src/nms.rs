@@ -44,6 +44,9 @@ fn suppress(boxes: &[[f32; 4]], scores: &[f32], classes: Option<&[usize]>, iou_t
     // Stable, and -0 equals 0.
     order.sort_by(|&a, &b| scores[b].partial_cmp(&scores[a]).unwrap_or(std::cmp::Ordering::Equal));
 
+    // In the order in which they are compared, so that the inner loop reads memory as it stands.
+    let sorted: Vec<[f32; 4]> = order.iter().map(|&idx| boxes[idx]).collect();
+    let areas: Vec<f32> = sorted.iter().copied().map(area).collect();
     let mut kept = Vec::new();
     let mut alive = vec![true; order.len()];
     for position in 0..order.len() {
@@ -52,20 +55,18 @@ fn suppress(boxes: &[[f32; 4]], scores: &[f32], classes: Option<&[usize]>, iou_t
         }
         let best = order[position];
         kept.push(best);
-        let best_box = boxes[best];
-        let best_area = area(best_box);
+        let (best_box, best_area) = (sorted[position], areas[position]);
         for later in position + 1..order.len() {
-            let candidate = order[later];
-            if !alive[later] || classes.is_some_and(|class| class[best] != class[candidate]) {
-                continue;
-            }
-            let other = boxes[candidate];
+            let other = sorted[later];
             let overlap_width = (best_box[2].min(other[2]) - best_box[0].max(other[0])).max(0.0);
             let overlap_height = (best_box[3].min(other[3]) - best_box[1].max(other[1])).max(0.0);
             let intersection = overlap_width * overlap_height;
-            let union = best_area + area(other) - intersection;
+            let union = best_area + areas[later] - intersection;
             // Without division: a union of zero gives no overlap.
-            if intersection > 0.0 && intersection > iou_threshold * union {
+            if intersection > 0.0
+                && intersection > iou_threshold * union
+                && classes.is_none_or(|class| class[best] == class[order[later]])
+            {
                 alive[later] = false;
             }
         }
