@@ -98,45 +98,13 @@ const SEED: u64 = 11;
 /// Factor on the last convolution of every bottleneck.
 const RESIDUAL_GAIN: f32 = 0.2;
 
-/// Detectron2's detector with every difference to torchvision's settled torchvision's way, at short side 480.
+/// torchvision's detector as the peers build it: at short side 480, norms with an epsilon, enough ROIs for the heads.
 fn with_torchvision_numerics(kind: RcnnKind) -> RcnnConfig {
-    let mut config = presets::r50_detectron2(kind);
-    config.input = ImageTransformConfig {
-        resize: ResizeRule::ShortSide { short_px: 480, max_long_px: 1333, rounding: SizeRounding::Floor },
-        filter: ResizeFilter::Bilinear,
-        channel_order: ChannelOrder::Rgb,
-        pixel_range: PixelRange::Unit,
-        mean: [0.485, 0.456, 0.406],
-        std: [0.229, 0.224, 0.225],
-        size_divisibility: 32,
-    };
-    config.backbone.block = BlockKind::Bottleneck { inner_channels: 64, stride_in: StrideIn::Conv3x3 };
-    config.anchors.rounding = AnchorRounding::Rounded;
-    config.anchors.stride = AnchorStride::ImageOverGrid;
-    config.rpn.post_nms_top_n = PerMode { train: 2000, test: 1000 };
-    config.rpn.min_box_size_px = 1e-3;
-    config.rpn.regression_loss = RegressionLoss::SmoothL1 { beta: 1.0 / 9.0 };
-    config.rpn.normaliser = RpnNormaliser::DrawnSamples;
-    let heads = &mut config.roi_heads;
-    heads.sampler.positive_fraction = POSITIVE_ROIS as f64 / heads.sampler.batch_size_per_image as f64;
-    heads.box_head.background = BackgroundClass::First;
-    heads.box_head.regression_loss = RegressionLoss::SmoothL1 { beta: 1.0 / 9.0 };
-    heads.box_head.min_box_size_px = 1e-2;
-    let legacy = |pooler: &mut RoiPoolerConfig| {
-        pooler.alignment = RoiAlignment::Legacy;
-        pooler.sampling_ratio = SamplingRatio::Fixed(2);
-        pooler.level_epsilon = LevelEpsilon::OutsideLog(1e-6);
-    };
-    legacy(&mut heads.box_head.pooler);
-    if let Some(head) = &mut heads.keypoint_head {
-        legacy(&mut head.pooler);
-        head.score = KeypointScore::Logit;
-    }
-    if let Some(head) = &mut heads.mask_head {
-        legacy(&mut head.pooler);
-        head.targets = MaskTargets::Pooled;
-        head.pasting = MaskPasting::WholePixels;
-    }
+    let mut config = presets::r50_torchvision(kind);
+    config.input.resize = ResizeRule::ShortSide { short_px: 480, max_long_px: 1333, rounding: SizeRounding::Floor };
+    config.backbone.norm = NormKind::FrozenBatch { eps: 1e-5 };
+    let sampler = &mut config.roi_heads.sampler;
+    sampler.positive_fraction = POSITIVE_ROIS as f64 / sampler.batch_size_per_image as f64;
     config
 }
 
