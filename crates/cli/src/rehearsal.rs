@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Isometry3;
-use sdg_grasp::{GraspDetection, GraspModel, Verification};
+use sdg_grasp::{GraspModel, GraspPose, Verification};
 use sdg_report::{Attempt, Step};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -196,9 +196,18 @@ impl Perception for ModelPerception<'_> {
         let Rehearsal { model, object, verification, .. } = self.rehearsal;
         let detections = model.detect(&view.image, *verification)?;
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
-        let Some(best) = detections.into_iter().next().filter(GraspDetection::is_accepted) else { return Ok(None) };
-        let pose = grasp_pose(object, &view.camera, &best.grasp)?;
-        Ok(Some(GraspTarget { base_from_tcp: pose.base_from_tcp, jaw_width_m: pose.jaw_width_m, score: best.score }))
+        let Some(best) = detections.into_iter().next() else { return Ok(None) };
+        let target = |pose: GraspPose| GraspTarget {
+            base_from_tcp: pose.base_from_tcp,
+            jaw_width_m: pose.jaw_width_m,
+            score: best.score,
+        };
+        match grasp_pose(object, &view.camera, &best.grasp) {
+            Ok(pose) => Ok(Some(target(pose))),
+            // What is nothing in all likelihood needs no pose.
+            Err(_) if !best.is_accepted() => Ok(None),
+            Err(error) => Err(error.into()),
+        }
     }
 }
 

@@ -58,11 +58,6 @@ impl Calibration {
         Some(Self { threshold: decimal(threshold), slope: decimal(slope) })
     }
 
-    /// The same with its threshold moved into bounds.
-    pub fn with_threshold_within(self, (least, most): (f64, f64)) -> Self {
-        Self { threshold: self.threshold.clamp(least, most), ..self }
-    }
-
     /// The calibrated score, in (0, 1).
     pub fn apply(&self, raw: f64) -> f64 {
         1.0 / (1.0 + (-self.slope * (raw - self.threshold)).exp())

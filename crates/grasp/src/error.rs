@@ -122,11 +122,11 @@ pub enum GraspError {
     /// Teaching ended with a network that does not find the part.
     #[cfg(feature = "teach")]
     #[error(
-        "the network finds the part in {hits} of {positives} held-back samples after {steps} steps: too few to keep; \
+        "after {steps} steps the network leads to the part in {hits} of {positives} held-back samples: too few to keep; \
          give it more time, or a demonstration with a clearer outline"
     )]
     NotLearnt {
-        /// Samples in which the part was found near enough.
+        /// Samples in which the demonstration, laid over where the network proposed, came to lie on the part.
         hits: usize,
         /// Samples with the part.
         positives: usize,

@@ -72,6 +72,36 @@ impl FromStr for ModelKind {
     }
 }
 
+/// What a part's turn was first read from, before the demonstration was laid over it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum TurnSource {
+    /// Model A: the class of the box's crop.
+    Crop,
+    /// Models B and C: the line through the keypoints.
+    Keypoints,
+    /// Model D: SIFT keypoints of the part's texture.
+    Texture,
+    /// Model D where there is too little texture: the mask's outline, which may be half a turn off.
+    Outline,
+    /// Model S and second opinions: every turn was tried.
+    Search,
+}
+
+impl TurnSource {
+    /// The name, as files and `--json` have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Crop => "crop",
+            Self::Keypoints => "keypoints",
+            Self::Texture => "texture",
+            Self::Outline => "outline",
+            Self::Search => "search",
+        }
+    }
+}
+
 /// How a model came to be and how good it was found to be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TeachingFacts {

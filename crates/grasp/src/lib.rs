@@ -51,7 +51,7 @@ pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
 pub use error::{GraspError, Result};
-pub use facts::{ModelKind, OrientationFacts, TeachingFacts, ValidationFacts};
+pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};

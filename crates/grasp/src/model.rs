@@ -12,7 +12,7 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 
 use crate::error::{GraspError, Result};
-use crate::facts::{ModelKind, TeachingFacts};
+use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::model_file::Calibrations;
 use crate::models::{Candidate, Network, instant};
 use crate::taught::TaughtDemonstration;
@@ -59,6 +59,8 @@ pub struct GraspDetection {
     pub outline: Option<Polygon>,
     /// Where to grasp.
     pub grasp: PlanarGrasp,
+    /// What the turn was first read from.
+    pub turn_source: TurnSource,
 }
 
 impl GraspDetection {
@@ -152,6 +154,7 @@ impl GraspModel {
             keypoints: candidate.keypoints.clone(),
             outline: None,
             grasp: candidate.grasp,
+            turn_source: candidate.turn_source,
         }
     }
 
@@ -159,14 +162,15 @@ impl GraspModel {
     fn verified(&self, candidate: &Candidate, scene: &Scene) -> GraspDetection {
         let overlay = verify(&self.demonstrations[candidate.demonstration_idx], candidate, scene);
         let keypoint_scores = candidate.keypoints.iter().map(|(_, score)| *score);
-        self.laid_over(&overlay, candidate.network_score, keypoint_scores)
+        self.laid_over(&overlay, candidate.network_score, keypoint_scores, candidate.turn_source)
     }
 
     /// Looks for the demonstrations in the whole image, with no network's help.
     fn searched(&self, scene: &Scene) -> Vec<GraspDetection> {
         let num_keypoints = if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 };
         let overlays = instant::search(&self.demonstrations, scene);
-        overlays.iter().map(|overlay| self.laid_over(overlay, 0.0, (0..num_keypoints).map(|_| 0.0))).collect()
+        let no_scores = || (0..num_keypoints).map(|_| 0.0);
+        overlays.iter().map(|overlay| self.laid_over(overlay, 0.0, no_scores(), TurnSource::Search)).collect()
     }
 
     /// A detection as the demonstration says, where it lies; a keypoint for each score.
@@ -175,6 +179,7 @@ impl GraspModel {
         overlay: &Overlay,
         network_score: f64,
         keypoint_scores: impl Iterator<Item = f64>,
+        turn_source: TurnSource,
     ) -> GraspDetection {
         let &Overlay { demonstration, image_from_cutout: pose, agreement } = overlay;
         let outline = demonstration.outline(&pose);
@@ -187,6 +192,7 @@ impl GraspModel {
             keypoints: taught.iter().zip(keypoint_scores).map(|(k, score)| (pose.apply(&k.point()), score)).collect(),
             outline: Some(outline),
             grasp: demonstration.grasp(&pose),
+            turn_source,
         }
     }
 }

@@ -51,8 +51,17 @@ pub(crate) fn verify<'a>(
     let usual = usual_scale(demonstration, scene);
     let scale = (pose.scale * box_over_outline).clamp(usual * SCALES.start(), usual * SCALES.end());
     let rescaled = about_middle(demonstration, &pose, Angle::ZERO, scale / pose.scale);
-    let turned = about_middle(demonstration, &rescaled, Angle::from_radians(std::f64::consts::PI), 1.0);
-    let [straight, turned] = [rescaled, turned].map(|start| refined(demonstration, &start, scene));
+    better_way_round(demonstration, &rescaled, scene)
+}
+
+/// Refined from `start` and from half a turn further; the one that agrees better.
+pub(crate) fn better_way_round<'a>(
+    demonstration: &'a TaughtDemonstration,
+    start: &PlanarSimilarity,
+    scene: &Scene<'_>,
+) -> Overlay<'a> {
+    let turned = about_middle(demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
+    let [straight, turned] = [*start, turned].map(|start| refined(demonstration, &start, scene));
     if turned.agreement > straight.agreement { turned } else { straight }
 }
 
@@ -128,6 +137,7 @@ mod tests {
                 grasp: sdg_geometry::PlanarGrasp::from_line(&grasp, 20.0),
                 demonstration_idx: 0,
                 image_from_cutout: PlanarSimilarity::fit(&[from.start, from.end], &to).unwrap(),
+                turn_source: crate::TurnSource::Keypoints,
             };
             let overlay = verify(&taught, &candidate, &Scene::new(&shown.image));
             assert_eq!(overlay.agreement > 0.6, is_it, "{scale} {pixels}: {overlay:?}");

@@ -2,30 +2,50 @@
 //!
 //! A lever of nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured, where the part
 //! itself in bad light gave 0.64), but where the part has a bushing it has a hole. The surface sees that: brightness and
-//! colour inside the outline, as a correlation, so that the light's strength and tint do not count.
+//! colour inside the outline, as correlations, so that the light's strength and tint do not count.
+//!
+//! ```text
+//! outline ─ grid of points ─┬─ one correlation of them all             1/3 ─┐
+//!                           └─ cells ─ a correlation about each          ├─ agreement
+//!                              cell's own mean, averaged               2/3 ─┘
+//! ```
+//! Across the whole part, bright against dark ends count; so does the edge of another thing's shadow that falls over it,
+//! and there the whole correlation is at a loss. Within a cell that shadow is in most cells no edge at all. On 475
+//! pictures of the eight shipped parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right
+//! poses below the best wrong one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the
+//! best wrong one of their own part.
+
+use std::collections::BTreeMap;
 
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 /// The weight of the surface where it is averaged with the edges' agreement; the edges have the rest.
-///
-/// Edges alone gave a lever of nearly the pendulum's outline 0.71 to 0.75; with this share it has 0.46 to 0.56.
-pub const SURFACE_SHARE: f64 = 0.4;
+pub const SURFACE_SHARE: f64 = 0.3;
 
-/// Points looked at; a few hundred are enough for a correlation, and cost microseconds.
-const POINTS: f64 = 700.0;
+/// Points looked at; a few hundred are enough for correlations, and cost microseconds.
+const POINTS: f64 = 900.0;
+/// Cells of equal size that the outline's area would fill.
+const CELLS: f64 = 6.0;
+/// A cell of fewer points tells nothing.
+const LEAST_IN_CELL: usize = 4;
+/// The weight of the cells where both correlations are averaged; the whole one has the rest.
+const CELLS_SHARE: f64 = 2.0 / 3.0;
 /// Points this near to the outline show the background when the pose is a pixel off.
 const EDGE_MARGIN_PX: f64 = 2.0;
 /// Contrast below this, in grey values, is noise: a surface without any agrees with nothing.
 const NOISE: f64 = 8.0;
+/// The same within a cell, where there is less contrast.
+const NOISE_IN_CELL: f64 = 6.0;
 /// Least share of the points that must lie inside the image.
 const LEAST_INSIDE: f64 = 0.5;
 
 /// The colours inside an outline, at a grid of points.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    points: Vec<(Point2<f64>, [f64; 3])>,
+    /// Cell by cell.
+    cells: Vec<Vec<(Point2<f64>, [f64; 3])>>,
 }
 
 impl Surface {
@@ -33,50 +53,121 @@ impl Surface {
     pub fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
         let bounds = outline.bounds();
         let step = (outline.area() / POINTS).sqrt().max(1.0);
+        let cell_side = (outline.area() / CELLS).sqrt().max(1.0);
         let (columns, rows) = ((bounds.width() / step) as usize, (bounds.height() / step) as usize);
-        let points = (0..rows * columns)
-            .map(|i| {
-                let (row, column) = (i / columns, i % columns);
-                Point2::new(bounds.x1 + (column as f64 + 0.5) * step, bounds.y1 + (row as f64 + 0.5) * step)
-            })
-            .filter(|point| outline.contains(point) && outline.distance_to_edge(point) >= EDGE_MARGIN_PX)
-            .filter_map(|point| Some((point, color_at(cutout, &point)?)))
-            .collect();
-        Self { points }
+        let mut cells: BTreeMap<[usize; 2], Vec<_>> = BTreeMap::new();
+        for i in 0..rows * columns {
+            let (row, column) = (i / columns, i % columns);
+            let [right, down] = [column, row].map(|k| (k as f64 + 0.5) * step);
+            let point = Point2::new(bounds.x1 + right, bounds.y1 + down);
+            if outline.contains(&point)
+                && outline.distance_to_edge(&point) >= EDGE_MARGIN_PX
+                && let Some(color) = color_at(cutout, &point)
+            {
+                cells.entry([right, down].map(|d| (d / cell_side) as usize)).or_default().push((point, color));
+            }
+        }
+        Self { cells: cells.into_values().collect() }
+    }
+
+    fn points(&self) -> impl Iterator<Item = &Point2<f64>> {
+        self.cells.iter().flatten().map(|(point, _)| point)
     }
 
     /// The share of the points that lie in `outline` after `outline_from_cutout`, in `[0, 1]`.
     pub(crate) fn share_inside(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
-        let inside =
-            self.points.iter().filter(|(point, _)| outline.contains(&outline_from_cutout.apply(point))).count();
-        inside as f64 / (self.points.len() as f64).max(1.0)
+        let inside = self.points().filter(|point| outline.contains(&outline_from_cutout.apply(point))).count();
+        inside as f64 / (self.points().count() as f64).max(1.0)
     }
 
-    /// The correlation of colours, each channel about its own mean, between the cut-out and the image at a pose;
-    /// 0 for none, 1 for the same surface under any light.
+    /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
+    /// none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
-        let pairs: Vec<([f64; 3], [f64; 3])> = self
-            .points
-            .iter()
-            .filter_map(|(point, taught)| Some((*taught, color_at(image, &image_from_cutout.apply(point))?)))
-            .collect();
-        if pairs.is_empty() || (pairs.len() as f64) < LEAST_INSIDE * self.points.len() as f64 {
+        let mut whole = Correlation::default();
+        let (mut cells, mut weights) = (0.0, 0.0);
+        for cell in &self.cells {
+            let mut local = Correlation::default();
+            for (point, taught) in cell {
+                if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
+                    local.add(taught, &seen);
+                }
+            }
+            if local.count >= LEAST_IN_CELL {
+                let weight = local.count as f64 * local.contrast_taught(NOISE_IN_CELL);
+                cells += weight * local.value(NOISE_IN_CELL);
+                weights += weight;
+            }
+            whole.merge(&local);
+        }
+        if whole.count == 0 || (whole.count as f64) < LEAST_INSIDE * self.points().count() as f64 {
             return 0.0;
         }
-        let n = pairs.len() as f64;
-        let (mut both, mut taught_variance, mut seen_variance) = (0.0, 0.0, 0.0);
+        let cells = if weights > 0.0 { cells / weights } else { 0.0 };
+        CELLS_SHARE * cells + (1.0 - CELLS_SHARE) * whole.value(NOISE)
+    }
+}
+
+/// Sums over pairs of a taught and a seen colour.
+#[derive(Default)]
+struct Correlation {
+    count: usize,
+    taught: [f64; 3],
+    seen: [f64; 3],
+    taught_squares: f64,
+    seen_squares: f64,
+    products: f64,
+}
+
+impl Correlation {
+    fn add(&mut self, taught: &[f64; 3], seen: &[f64; 3]) {
+        self.count += 1;
         for channel in 0..3 {
-            let mean_taught = pairs.iter().map(|(taught, _)| taught[channel]).sum::<f64>() / n;
-            let mean_seen = pairs.iter().map(|(_, seen)| seen[channel]).sum::<f64>() / n;
-            for (taught, seen) in &pairs {
-                let (a, b) = (taught[channel] - mean_taught, seen[channel] - mean_seen);
-                both += a * b;
-                taught_variance += a * a;
-                seen_variance += b * b;
-            }
+            let (a, b) = (taught[channel], seen[channel]);
+            self.taught[channel] += a;
+            self.seen[channel] += b;
+            self.taught_squares += a * a;
+            self.seen_squares += b * b;
+            self.products += a * b;
         }
-        let floor = NOISE * NOISE * 3.0 * n;
-        (both / ((taught_variance + floor) * (seen_variance + floor)).sqrt()).clamp(0.0, 1.0)
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        for channel in 0..3 {
+            self.taught[channel] += other.taught[channel];
+            self.seen[channel] += other.seen[channel];
+        }
+        self.taught_squares += other.taught_squares;
+        self.seen_squares += other.seen_squares;
+        self.products += other.products;
+    }
+
+    /// Sums of squares about the mean of each channel: taught, seen; and of products.
+    fn about_means(&self) -> [f64; 3] {
+        let n = self.count as f64;
+        let dot = |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / n;
+        [
+            (self.taught_squares - dot(&self.taught, &self.taught)).max(0.0),
+            (self.seen_squares - dot(&self.seen, &self.seen)).max(0.0),
+            self.products - dot(&self.taught, &self.seen),
+        ]
+    }
+
+    /// What so many points of noise alone would give.
+    fn floor(&self, noise: f64) -> f64 {
+        3.0 * self.count as f64 * noise * noise
+    }
+
+    /// In `[0, 1]`: opposite is no better than none.
+    fn value(&self, noise: f64) -> f64 {
+        let ([taught, seen, products], floor) = (self.about_means(), self.floor(noise));
+        (products / ((taught + floor) * (seen + floor)).sqrt()).clamp(0.0, 1.0)
+    }
+
+    /// How much there is to correlate with, in `[0, 1)`: nothing on a plain surface.
+    fn contrast_taught(&self, noise: f64) -> f64 {
+        let [taught, _, _] = self.about_means();
+        (taught / (taught + self.floor(noise))).sqrt()
     }
 }
 
@@ -132,6 +223,17 @@ mod tests {
         assert!(agreement(&plate(1.0, false)) > 0.85);
         assert!(agreement(&plate(0.6, false)) > 0.75);
         assert!(agreement(&plate(1.0, true)) < 0.2);
+    }
+
+    #[test]
+    fn a_shadow_across_the_part_costs_little() {
+        let shadowed = RgbImage::from_fn(120, 80, |x, y| {
+            let Rgb(color) = *plate(1.0, false).get_pixel(x, y);
+            Rgb(if x > 70 { color.map(|value| value / 2) } else { color })
+        });
+        let agreement = surface().agreement(&shadowed, &PlanarSimilarity::IDENTITY);
+        let unshadowed = surface().agreement(&plate(1.0, false), &PlanarSimilarity::IDENTITY);
+        assert!(agreement > 0.6 * unshadowed, "{agreement} of {unshadowed}");
     }
 
     #[test]

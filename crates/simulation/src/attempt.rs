@@ -4,6 +4,8 @@
 //! random start ─> look ─> perceive ─> hover, turned ─> perceive ─> above ─> straight down ─> close ─> lift ─> hold
 //!                             └ detect                    └ detect   └────── approach ──┘
 //! ```
+//! A look that does not find the part is repeated from beside, as a person would: another place shows a tall part from
+//! another side, and shadows of the arm elsewhere.
 
 use std::fmt;
 use std::time::Instant;
@@ -127,9 +129,9 @@ pub struct AttemptReport {
     pub seed: u64,
     /// Where the part lay at the start, in the base frame.
     pub base_from_object: Option<Isometry3<f64>>,
-    /// What the wrist camera saw, first and second look.
+    /// What the wrist camera saw, look by look: from afar until the part was found, then from above it.
     pub views: Vec<CameraView>,
-    /// What perception said to each view.
+    /// What perception said to each of the views, where it was sure enough.
     pub targets: Vec<Option<GraspTarget>>,
     /// Height of the part's lowest point above the table at the end, in metres.
     pub object_height_m: Option<f64>,
@@ -162,6 +164,16 @@ fn fails_at<T>(step: AttemptStep, planned: std::result::Result<T, KinematicsErro
     planned.map_err(|error| Stop::Failed(step, error.to_string()))
 }
 
+/// Where the camera looks from, one after the other, until the part is found: shifts over the table in metres.
+const LOOK_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [0.0, 0.10], [0.0, -0.10]];
+/// The same from above the part, where a small shift keeps it in the middle.
+const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
+/// Score on which perception decides.
+const SURE: f64 = 0.5;
+/// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
+/// radians of that.
+const CONFIRMED: f64 = 0.2;
+const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
 /// How long the arm stands still before a picture, in seconds.
 const SETTLE_SECS: f64 = 0.25;
 /// Least height of the arm over the table on its free motions, in metres.
@@ -246,7 +258,12 @@ impl Workcell {
     }
 
     fn look_configuration(&self, config: &AttemptConfig) -> Result<JointVector> {
-        let [x, y] = config.look_at_m;
+        self.look_configuration_beside(config, [0.0; 2])
+    }
+
+    /// As [`Self::look_configuration`] with the camera shifted, in metres.
+    fn look_configuration_beside(&self, config: &AttemptConfig, shift_m: [f64; 2]) -> Result<JointVector> {
+        let [x, y] = [0, 1].map(|k| config.look_at_m[k] + shift_m[k]);
         let base_from_tcp = self.base_from_tcp_for_camera(&camera_looking_down(x, y, config.look_height_m, 0.0));
         self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map(|solution| solution.q).map_err(
             |error| SimulationError::Configuration {
@@ -273,10 +290,8 @@ struct Attempt<'a, 'p> {
 
 impl Attempt<'_, '_> {
     fn sequence(&mut self) -> Sequence<()> {
-        self.look()?;
-        let first = self.detect("at the first look")?;
-        self.hover(&first)?;
-        let second = self.detect("from above the part")?;
+        let first = self.look_around()?;
+        let second = self.look_from_above(&first)?;
         let approach = self.go_above(&second)?;
         self.come_down(approach)?;
         self.close()?;
@@ -284,40 +299,73 @@ impl Attempt<'_, '_> {
         self.hold()
     }
 
-    fn look(&mut self) -> Sequence<()> {
-        let q = self.cell.look_configuration(self.config)?;
-        self.move_freely(&q, AttemptStep::Detect)?;
-        Ok(self.cell.wait(SETTLE_SECS)?)
+    fn look_around(&mut self) -> Sequence<GraspTarget> {
+        let mut looks = 0;
+        for shift_m in LOOK_SHIFTS_M {
+            let arrived = match self.cell.look_configuration_beside(self.config, shift_m) {
+                Ok(q) => self.move_freely(&q, AttemptStep::Detect),
+                Err(error) => Err(Stop::Error(error)),
+            };
+            match arrived {
+                Err(stop) if looks == 0 => return Err(stop),
+                // A place that cannot be reached is not looked from.
+                Err(_) => continue,
+                Ok(()) => self.cell.wait(SETTLE_SECS)?,
+            }
+            looks += 1;
+            if let Some(target) = self.perceive(|target| target.score >= SURE)? {
+                return Ok(target);
+            }
+        }
+        Err(Stop::Failed(AttemptStep::Detect, format!("the part was not found in {looks} looks")))
     }
 
-    fn detect(&mut self, when: &str) -> Sequence<GraspTarget> {
+    /// Looks again from above what the first look found: nearer to the middle of the picture, errors are smaller.
+    fn look_from_above(&mut self, first: &GraspTarget) -> Sequence<GraspTarget> {
+        let mut looks = 0;
+        for shift_m in HOVER_SHIFTS_M {
+            match self.hover(first, shift_m) {
+                Err(stop) if looks == 0 => return Err(stop),
+                Err(_) => continue,
+                Ok(()) => looks += 1,
+            }
+            if let Some(target) = self.perceive(|target| target.score >= SURE || confirms(first, target))? {
+                return Ok(target);
+            }
+        }
+        Err(Stop::Failed(AttemptStep::Detect, format!("the part was not found in {looks} looks from above it")))
+    }
+
+    /// Takes a picture and asks perception; a target that no hand can take is a failure.
+    fn perceive(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Sequence<Option<GraspTarget>> {
         let view = self.cell.wrist_view()?;
         let started = Instant::now();
-        let target =
-            (self.perceive)(self.cell, &view).map_err(|error| SimulationError::Perception(error.to_string()))?;
+        let best = (self.perceive)(self.cell, &view).map_err(|error| SimulationError::Perception(error.to_string()))?;
+        let target = best.filter(is_accepted);
         self.perception_secs += started.elapsed().as_secs_f64();
         self.views.push(view);
         self.targets.push(target);
+        let Some(found) = target else { return Ok(None) };
         let failed = |why: String| Stop::Failed(AttemptStep::Detect, why);
-        let target = target.ok_or_else(|| failed(format!("the part was not found {when}")))?;
-        let p = target.base_from_tcp.translation.vector;
-        if !(p.iter().all(|value| value.is_finite()) && target.jaw_width_m.is_finite()) {
-            return Err(failed(format!("the grasp found {when} is not finite")));
+        let p = found.base_from_tcp.translation.vector;
+        if !(p.iter().all(|value| value.is_finite()) && found.jaw_width_m.is_finite()) {
+            return Err(failed("the grasp that was found is not finite".into()));
         }
-        if target.jaw_width_m > HAND_OPENING_MAX_M {
+        if found.jaw_width_m > HAND_OPENING_MAX_M {
             return Err(failed(format!(
                 "the part is {:.0} mm wide, the hand opens {:.0} mm",
-                target.jaw_width_m * 1e3,
+                found.jaw_width_m * 1e3,
                 HAND_OPENING_MAX_M * 1e3
             )));
         }
-        Ok(target)
+        Ok(Some(found))
     }
 
-    /// Puts the camera over the grasp, the hand turned as for the grasp or by half a turn more.
-    fn hover(&mut self, target: &GraspTarget) -> Sequence<()> {
+    /// Puts the camera over the grasp or shifted from there, the hand turned as for the grasp or by half a turn more.
+    fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2]) -> Sequence<()> {
         let seed = self.cell.commanded();
-        let [x, y] = [target.base_from_tcp.translation.x, target.base_from_tcp.translation.y];
+        let grasp = target.base_from_tcp.translation;
+        let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
         let mut best: Option<IkSolution> = None;
         let mut first_error = None;
         for base_from_grasp in [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)] {
@@ -479,6 +527,14 @@ impl Attempt<'_, '_> {
             MotionEnd::Blocked(by) => Err(Stop::Failed(step, format!("the arm was held up: {by}"))),
         }
     }
+}
+
+/// Whether a second look sees what the first one saw.
+fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
+    let apart = first.base_from_tcp.inverse() * second.base_from_tcp;
+    second.score >= CONFIRMED
+        && apart.translation.vector.norm() <= CONFIRMED_WITHIN.0
+        && apart.rotation.angle() <= CONFIRMED_WITHIN.1
 }
 
 /// The limits of motions in free space: brisk, far from Franka's own.

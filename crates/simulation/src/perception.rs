@@ -18,7 +18,7 @@ pub struct GraspTarget {
 
 /// Finds the grasp of the taught part in a picture.
 pub trait Perception {
-    /// The best grasp in the picture, `None` where the part is not seen.
+    /// The best grasp in the picture, sure or not; `None` where nothing is seen.
     ///
     /// # Errors
     /// Where perception could not do its work at all; the attempt is given up with this error.

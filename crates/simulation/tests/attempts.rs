@@ -114,14 +114,50 @@ fn the_same_seed_gives_the_same_attempt_and_another_start_another() {
 fn nothing_seen_is_a_failure_to_detect() {
     let mut cell = bar_cell(0.48, 0.05, 0.6);
     let (step, why) = attempt(&mut cell, |_| Ok(None));
-    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found at the first look"));
+    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found in 3 looks"));
 
     let mut looks = 0;
     let (step, why) = attempt(&mut cell, |_| {
         looks += 1;
         Ok((looks == 1).then(true_target))
     });
-    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found from above the part"));
+    assert_eq!((step, why.as_str()), (AttemptStep::Detect, "the part was not found in 3 looks from above it"));
+}
+
+#[test]
+fn who_does_not_find_the_part_looks_from_elsewhere() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let mut looks = 0;
+    let mut blind_twice = |_: &CameraView| -> Perceived {
+        looks += 1;
+        // The first look and the first from above find nothing.
+        Ok((looks != 1 && looks != 3).then(true_target))
+    };
+    let report = cell.run_attempt(&mut blind_twice, &AttemptConfig::default(), 1).unwrap();
+    assert_eq!(report.outcome, AttemptOutcome::Success);
+    let places: Vec<_> =
+        report.views.iter().map(|view| view.camera.world_from_camera.translation.vector.xy()).collect();
+    assert_eq!(places.len(), 4);
+    assert!((places[0] - places[1]).norm() > 0.09 && (places[2] - places[3]).norm() > 0.03, "{places:?}");
+}
+
+#[test]
+fn the_second_look_may_be_less_sure_of_what_the_first_one_saw() {
+    let mut cell = bar_cell(0.48, 0.05, 0.6);
+    let mut looking = |second: GraspTarget| {
+        let mut looks = 0;
+        let mut perceive = |_: &CameraView| -> Perceived {
+            looks += 1;
+            Ok(Some(if looks == 1 { true_target() } else { second }))
+        };
+        cell.run_attempt(&mut perceive, &AttemptConfig::default(), 1).unwrap()
+    };
+    let unsure = GraspTarget { score: 0.3, ..true_target() };
+    assert_eq!(looking(unsure).outcome, AttemptOutcome::Success);
+    let elsewhere = Translation3::new(0.0, 0.05, 0.0) * unsure.base_from_tcp;
+    for other in [GraspTarget { base_from_tcp: elsewhere, ..unsure }, GraspTarget { score: 0.1, ..unsure }] {
+        assert_eq!(failure(looking(other)).0, AttemptStep::Detect);
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image::{ImageFormat, RgbImage};
-use sdg_grasp::{GraspDetection, Verification};
+use sdg_grasp::{GraspDetection, TurnSource, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
@@ -55,7 +55,7 @@ fn write_text(out: &mut impl Write, path: &Path, detections: &[GraspDetection]) 
         let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
         writeln!(
             out,
-            "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide; score {:.2} (network {:.2}{agreement})",
+            "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide; score {:.2} (network {:.2}{agreement}; turn by {})",
             path.display(),
             grasp.x,
             grasp.y,
@@ -63,6 +63,7 @@ fn write_text(out: &mut impl Write, path: &Path, detections: &[GraspDetection]) 
             grasp.width,
             detection.score,
             detection.network_score,
+            detection.turn_source.name(),
         )?;
     }
     Ok(())
@@ -99,6 +100,7 @@ struct DetectionJson {
     #[serde(skip_serializing_if = "Option::is_none")]
     polygon: Option<Vec<[f64; 2]>>,
     grasp: GraspJson,
+    turn_source: TurnSource,
 }
 
 #[derive(Serialize)]
@@ -133,6 +135,7 @@ impl DetectionJson {
             keypoints: detection.keypoints.iter().map(|(point, score)| [point.x, point.y, *score]).collect(),
             polygon: detection.outline.as_ref().map(|o| o.vertices.iter().map(|v| [v.x, v.y]).collect()),
             grasp: GraspJson { x: grasp.x, y: grasp.y, angle_deg: grasp.angle.degrees(), width_px: grasp.width },
+            turn_source: detection.turn_source,
         }
     }
 }

@@ -25,7 +25,7 @@ pub struct Settings {
 
 impl Settings {
     /// The protocol of this version.
-    pub const PROTOCOL: u32 = 1;
+    pub const PROTOCOL: u32 = 2;
 
     /// What differs from `found`, in words; `None` when nothing does.
     pub fn difference(&self, found: &Self) -> Option<String> {

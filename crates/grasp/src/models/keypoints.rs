@@ -6,6 +6,7 @@ use sdg_geometry::{BoundingBox, Keypoint, PlanarGrasp, PlanarSimilarity};
 
 use super::placing::fill_box;
 use super::{Placement, nearest_demonstration};
+use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
 /// The keypoints of one detection, each with the network's score; none without a keypoint head.
@@ -22,7 +23,7 @@ pub(super) fn on_line(
     let seen: Vec<Point2<f64>> = keypoints.iter().map(|(point, _)| *point).collect();
     nearest_demonstration(demonstrations, bbox, |_, demonstration| {
         let taught: Vec<Point2<f64>> = demonstration.keypoints().iter().map(|k| k.point()).collect();
-        PlanarSimilarity::fit(&taught, &seen)
+        Some((PlanarSimilarity::fit(&taught, &seen)?, TurnSource::Keypoints))
     })
 }
 
@@ -46,5 +47,7 @@ pub(super) fn box_and_turn(
     demonstrations: &[TaughtDemonstration],
 ) -> Option<Placement> {
     let angle = grasp(keypoints, 0.0)?.angle;
-    nearest_demonstration(demonstrations, bbox, |_, demonstration| Some(fill_box(demonstration, bbox, angle)))
+    nearest_demonstration(demonstrations, bbox, |_, demonstration| {
+        Some((fill_box(demonstration, bbox, angle), TurnSource::Keypoints))
+    })
 }

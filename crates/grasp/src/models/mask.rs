@@ -5,10 +5,11 @@ use std::sync::Arc;
 
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, Mask, PlanarSimilarity, Polygon};
-use sdg_sift::{Plane, RotationConfig, RotationEstimator, RotationTemplate, Sift, SiftConfig};
+use sdg_sift::{Plane, RotationConfig, RotationEstimator, RotationMethod, RotationTemplate, Sift, SiftConfig};
 
 use super::{Placement, nearest_demonstration};
 use crate::error::Result;
+use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
 /// Pixels kept around a mask, so that keypoints near its rim see what surrounds them.
@@ -71,7 +72,13 @@ impl MaskMatcher {
             .iter()
             .map(|template| {
                 let estimate = self.estimator.estimate(template, &plane, Some(&mask))?;
-                Ok(estimate.map(|estimate| window.in_image(&estimate.image_from_template)))
+                Ok(estimate.map(|estimate| {
+                    let source = match estimate.method {
+                        RotationMethod::Features { .. } => TurnSource::Texture,
+                        _ => TurnSource::Outline,
+                    };
+                    (window.in_image(&estimate.image_from_template), source)
+                }))
             })
             .collect::<Result<Vec<_>>>()?;
         Ok(nearest_demonstration(demonstrations, bbox, |i, _| poses[i]))

@@ -28,7 +28,7 @@ use sdg_orientation::OrientationCnn;
 use self::mask::MaskMatcher;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
-use crate::facts::ModelKind;
+use crate::facts::{ModelKind, TurnSource};
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
@@ -68,6 +68,7 @@ pub(crate) struct Candidate {
     pub(crate) demonstration_idx: usize,
     /// Where that demonstration lies.
     pub(crate) image_from_cutout: PlanarSimilarity,
+    pub(crate) turn_source: TurnSource,
 }
 
 /// Where a demonstration lies.
@@ -75,6 +76,7 @@ pub(crate) struct Candidate {
 struct Placement {
     demonstration_idx: usize,
     image_from_cutout: PlanarSimilarity,
+    turn_source: TurnSource,
 }
 
 /// The detector that a model looks with; `None` for model S.
@@ -170,7 +172,7 @@ impl Network {
             Reading::Keypoints => keypoints::on_line(&keypoints, bbox, demonstrations),
             Reading::Mask(matcher) => matcher.place(image, &detections.masks[i], bbox, demonstrations)?,
         };
-        Ok(placement.and_then(|Placement { demonstration_idx, image_from_cutout }| {
+        Ok(placement.and_then(|Placement { demonstration_idx, image_from_cutout, turn_source }| {
             let demonstration = &demonstrations[demonstration_idx];
             let grasp = match self.reading {
                 Reading::Keypoints => {
@@ -179,7 +181,8 @@ impl Network {
                 _ => demonstration.grasp(&image_from_cutout),
             };
             let network_score = detections.scores[i];
-            Some(Candidate { network_score, bbox: *bbox, keypoints, grasp, demonstration_idx, image_from_cutout })
+            let bbox = *bbox;
+            Some(Candidate { network_score, bbox, keypoints, grasp, demonstration_idx, image_from_cutout, turn_source })
         }))
     }
 }
@@ -213,15 +216,15 @@ pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
 fn nearest_demonstration(
     demonstrations: &[TaughtDemonstration],
     bbox: &BoundingBox,
-    pose: impl Fn(usize, &TaughtDemonstration) -> Option<PlanarSimilarity>,
+    pose: impl Fn(usize, &TaughtDemonstration) -> Option<(PlanarSimilarity, TurnSource)>,
 ) -> Option<Placement> {
     demonstrations
         .iter()
         .enumerate()
         .filter_map(|(demonstration_idx, demonstration)| {
-            let image_from_cutout = pose(demonstration_idx, demonstration)?;
+            let (image_from_cutout, turn_source) = pose(demonstration_idx, demonstration)?;
             let overlap = demonstration.outline(&image_from_cutout).bounds().iou(bbox);
-            Some((Placement { demonstration_idx, image_from_cutout }, overlap))
+            Some((Placement { demonstration_idx, image_from_cutout, turn_source }, overlap))
         })
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(placement, _)| placement)

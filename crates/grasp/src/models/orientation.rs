@@ -7,6 +7,7 @@ use sdg_orientation::{OrientationCnn, crop_for};
 use super::placing::fill_box;
 use super::{Placement, nearest_demonstration};
 use crate::error::Result;
+use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
 /// Reads the turn off the crop of a detected box and lays the demonstration, so turned, into the box.
@@ -24,5 +25,7 @@ pub(super) fn box_and_crop(
 ) -> Result<Option<Placement>> {
     let crop = crop_for(image, bbox, network.config().input_px)?;
     let angle = network.predict(&crop)?.angle;
-    Ok(nearest_demonstration(demonstrations, bbox, |_, demonstration| Some(fill_box(demonstration, bbox, angle))))
+    Ok(nearest_demonstration(demonstrations, bbox, |_, demonstration| {
+        Some((fill_box(demonstration, bbox, angle), TurnSource::Crop))
+    }))
 }
