@@ -7,9 +7,9 @@ use sdg_training::{Outcome, median};
 use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
-use crate::models::Network;
+use crate::models::{Network, instant};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Scene, verify};
+use crate::verification::{Overlay, Scene, verify};
 
 /// Samples that no network is trained on.
 pub(super) struct HeldBack<'a> {
@@ -61,17 +61,27 @@ impl HeldBack<'_> {
             let scene = Scene::new(&sample.image);
             // The highest score of a candidate that ended beside the part, and of one on it.
             let (mut beside, mut on_part) = (0.0f64, 0.0f64);
-            for candidate in network.candidates(&sample.image, demonstrations)? {
-                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
+            let mut is_on_part = |overlay: &Overlay| {
                 let grasp = overlay.demonstration.grasp(&overlay.image_from_cutout);
                 let outcome = sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0));
                 match outcome {
-                    Some(Outcome::Found { error_px, error_degrees, .. }) if outcome.is_some_and(|o| o.is_hit()) => {
+                    Some(found @ Outcome::Found { error_px, error_degrees, .. }) if found.is_hit() => {
                         errors_px.push(error_px);
                         errors_degrees.push(error_degrees);
-                        on_part = on_part.max(candidate.network_score);
+                        true
                     }
-                    _ => beside = beside.max(candidate.network_score),
+                    _ => false,
+                }
+            };
+            for candidate in network.candidates(&sample.image, demonstrations)? {
+                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
+                let best = if is_on_part(&overlay) { &mut on_part } else { &mut beside };
+                *best = best.max(candidate.network_score);
+            }
+            if on_part == 0.0 {
+                // The second opinion is no merit of the network, but its errors are the model's.
+                for overlay in instant::search(demonstrations, &scene) {
+                    is_on_part(&overlay);
                 }
             }
             if on_part > 0.0 {

@@ -157,7 +157,7 @@ fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> 
 /// Scenes of other things that the agreement is calibrated on: for a network, and for model S, which is to be there in
 /// less than a second.
 const STRANGERS: u64 = 24;
-const STRANGERS_INSTANT: u64 = 12;
+const STRANGERS_INSTANT: u64 = 8;
 
 /// Model S: the demonstrations alone.
 fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {

@@ -60,14 +60,14 @@ impl Strangers {
             let mut agreements = Vec::new();
             for overlay in instant::search(demonstrations, &scene) {
                 agreements.push(overlay.agreement);
-                // A network may propose the same place, and what it proposes is refined from both ways round.
-                let refined = better_way_round(overlay.demonstration, &overlay.image_from_cutout, &scene);
-                agreements.push(refined.agreement);
-            }
-            if let Some(network) = network {
-                for candidate in network.candidates(&sample.image, demonstrations)? {
-                    agreements.push(verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene).agreement);
+                if network.is_some() {
+                    // It may propose the same place, and what it proposes is refined from both ways round.
+                    let refined = better_way_round(overlay.demonstration, &overlay.image_from_cutout, &scene);
+                    agreements.push(refined.agreement);
                 }
+            }
+            for candidate in network.map_or(Ok(Vec::new()), |n| n.candidates(&sample.image, demonstrations))? {
+                agreements.push(verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene).agreement);
             }
             highest.extend(agreements.into_iter().reduce(f64::max));
         }
