@@ -43,6 +43,7 @@ mod demonstration;
 mod error;
 mod json;
 mod labelme;
+mod outline_proposal;
 
 pub use annotation::{Annotation, ImageFacts};
 pub use augmentation::{
@@ -52,3 +53,4 @@ pub use coco::CocoFile;
 pub use decode::{ImageLimits, decode_image};
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};
 pub use error::{Error, Result};
+pub use outline_proposal::propose_outline;

@@ -13,7 +13,6 @@ pub mod footprint;
 mod fragment;
 mod light;
 pub mod mesh;
-pub mod outline;
 pub mod solids;
 mod table;
 pub mod texture;

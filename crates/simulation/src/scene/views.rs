@@ -3,9 +3,8 @@
 //! Both are taken by the same code, from the same look pose, as a grasp attempt's own pictures.
 
 use nalgebra::{Isometry3, Point2, Point3};
-use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera};
+use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera, outer_outline};
 
-use super::outline::outer_outline;
 use super::{PlacedObject, SceneVariation, VariationConfig};
 use crate::attempt::AttemptConfig;
 use crate::camera::CameraView;

@@ -1,15 +1,18 @@
 //! The outline of a part in a picture, as a careful person would click it: traced from a mask, then thinned out.
 
 use nalgebra::Point2;
-use sdg_geometry::{Mask, Polygon};
+
+use crate::{Mask, Polygon};
 
 /// The most points that a person would click.
-pub const MOST_VERTICES: usize = 56;
+const MOST_VERTICES: usize = 56;
 
 /// How far the thinned outline may run from the traced one at first, in pixels.
 const LEAST_TOLERANCE_PX: f64 = 0.35;
 
 /// The outer outline of the largest piece of a mask, holes left out; `None` for a mask without a piece of any size.
+///
+/// It has 56 vertices at most: as many as a careful person would click.
 ///
 /// # Units and frames
 /// Pixels; the centre of the first pixel is (0.5, 0.5). The points run clockwise as seen (y points down).

@@ -1,0 +1,220 @@
+//! How likely a colour is on one side of an outline: a mixture of Gaussians.
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::lab::Lab;
+
+/// Gaussians of a mixture.
+const NUM_COMPONENTS: usize = 5;
+/// Added to every variance, in squared units of L*a*b*: no camera tells colours apart better.
+const LEAST_VARIANCE: f64 = 1.0;
+/// Fewer samples make no Gaussian.
+const LEAST_SAMPLES: usize = 4;
+/// Squared distances, in variances, within which 99 % of a Gaussian's samples lie in three dimensions.
+const EXPLAINED: f32 = 11.3;
+/// A Gaussian of fewer samples casts no shadow of its own.
+const LEAST_SHADED_WEIGHT: f32 = 0.05;
+/// How much of the lightness a shadow leaves at least.
+const DARKEST_SHADE: f32 = 0.5;
+/// Variance of hue in a shadow, beyond that in the light: other lamps reach into it.
+const SHADE_VARIANCE: f32 = 0.3;
+/// L* of a colour of no light, in units in which a shadow scales L*, a* and b* alike.
+const BLACK: f32 = 16.0;
+
+struct Component {
+    mean: Vector3<f32>,
+    covariance: Matrix3<f32>,
+    precision: Matrix3<f32>,
+    weight: f32,
+    /// Logarithm of the density at the mean.
+    log_peak: f32,
+}
+
+impl Component {
+    fn fit(samples: &[Vector3<f64>], of: usize) -> Option<Self> {
+        if samples.len() < LEAST_SAMPLES {
+            return None;
+        }
+        let (mean, scatter) = moments(samples);
+        let covariance = scatter + Matrix3::identity() * LEAST_VARIANCE;
+        let precision = covariance.try_inverse()?;
+        let weight = samples.len() as f64 / of as f64;
+        Some(Self {
+            mean: mean.cast(),
+            covariance: covariance.cast(),
+            precision: precision.cast(),
+            weight: weight as f32,
+            log_peak: (weight.ln() - 0.5 * covariance.determinant().ln()) as f32,
+        })
+    }
+
+    /// In variances.
+    fn distance_squared(&self, color: &Vector3<f32>) -> f32 {
+        let off = color - self.mean;
+        off.dot(&(self.precision * off))
+    }
+
+    fn log_density(&self, color: &Vector3<f32>) -> f32 {
+        self.log_peak - 0.5 * self.distance_squared(color)
+    }
+
+    /// Whether the colour is this one with less light on it: L*, a* and b* are then all smaller by one factor, since all
+    /// go with the cube root of the light.
+    fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
+        let shade = (color.x + BLACK) / (self.mean.x + BLACK);
+        let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);
+        if self.weight < LEAST_SHADED_WEIGHT || !(DARKEST_SHADE..brightest).contains(&shade) {
+            return false;
+        }
+        let off = |axis: usize| {
+            let off = color[axis] - shade * self.mean[axis];
+            off * off / (self.covariance[(axis, axis)] + SHADE_VARIANCE)
+        };
+        off(1) + off(2) < EXPLAINED
+    }
+}
+
+/// Mean and covariance.
+fn moments(samples: &[Vector3<f64>]) -> (Vector3<f64>, Matrix3<f64>) {
+    let count = samples.len().max(1) as f64;
+    let mean = samples.iter().sum::<Vector3<f64>>() / count;
+    let scatter = samples.iter().map(|sample| (sample - mean) * (sample - mean).transpose()).sum::<Matrix3<f64>>();
+    (mean, scatter / count)
+}
+
+/// A density over colours.
+pub(crate) struct ColorMixture {
+    components: Vec<Component>,
+}
+
+impl ColorMixture {
+    /// Learns from nothing: colours are split in two across their longest extent until there are as many groups as
+    /// Gaussians. `None` for fewer than a few colours.
+    ///
+    /// # Source
+    /// Orchard and Bouman, "Color quantization of images", 1991, which GrabCut starts from as well. It needs no random
+    /// start.
+    pub fn learn(colors: &[Lab]) -> Option<Self> {
+        let mut groups = vec![colors.iter().map(vector64).collect::<Vec<_>>()];
+        while groups.len() < NUM_COMPONENTS {
+            let spread = |group: &Vec<Vector3<f64>>| {
+                let (mean, scatter) = moments(group);
+                let eigen = SymmetricEigen::new(scatter);
+                let longest = eigen.eigenvalues.imax();
+                (eigen.eigenvalues[longest] * group.len() as f64, mean, eigen.eigenvectors.column(longest).into_owned())
+            };
+            let widest = groups.iter().map(spread).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+            let Some((at, (extent, mean, axis))) = widest.filter(|(_, (extent, ..))| *extent > 0.0) else { break };
+            debug_assert!(extent.is_finite());
+            let group = groups.swap_remove(at);
+            let (above, below) = group.into_iter().partition(|color| (color - mean).dot(&axis) > 0.0);
+            groups.extend([above, below]);
+        }
+        // Splits are planes; what lies beside them often belongs to the other side.
+        Self::fit(&groups, colors.len())?.relearn(colors)
+    }
+
+    /// Learns again from colours that are mostly those known: each goes to the Gaussian under which it is likeliest.
+    pub fn relearn(&self, colors: &[Lab]) -> Option<Self> {
+        let mut groups = vec![Vec::new(); self.components.len()];
+        for color in colors {
+            let here = vector(color);
+            let likeliest = self
+                .components
+                .iter()
+                .map(|component| component.log_density(&here))
+                .enumerate()
+                .max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((at, _)) = likeliest {
+                groups[at].push(vector64(color));
+            }
+        }
+        Self::fit(&groups, colors.len())
+    }
+
+    fn fit(groups: &[Vec<Vector3<f64>>], of: usize) -> Option<Self> {
+        let components: Vec<_> = groups.iter().filter_map(|group| Component::fit(group, of)).collect();
+        (!components.is_empty()).then_some(Self { components })
+    }
+
+    /// Logarithm of the density, but for a constant that is the same in all mixtures.
+    pub fn log_density(&self, color: &Lab) -> f32 {
+        let color = vector(color);
+        let densities = || self.components.iter().map(|component| component.log_density(&color));
+        // The largest is taken out, or all of them could vanish.
+        let largest = densities().fold(f32::NEG_INFINITY, f32::max);
+        largest + densities().map(|density| (density - largest).exp()).sum::<f32>().ln()
+    }
+
+    /// Whether the colour is among those learnt from.
+    pub fn explains(&self, color: &Lab) -> bool {
+        let color = vector(color);
+        self.components.iter().any(|component| component.distance_squared(&color) < EXPLAINED)
+    }
+
+    /// Whether the colour is one of those learnt from in a shadow.
+    pub fn explains_shaded(&self, color: &Lab) -> bool {
+        let color = vector(color);
+        self.components.iter().any(|component| component.explains_shaded(&color))
+    }
+}
+
+fn vector(color: &Lab) -> Vector3<f32> {
+    Vector3::from(color.0)
+}
+
+fn vector64(color: &Lab) -> Vector3<f64> {
+    vector(color).cast()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two tight groups of colours, a tenth of them dark.
+    fn colors() -> Vec<Lab> {
+        (0..1000)
+            .map(|i| {
+                let jitter = (i * 37 % 11) as f32 / 11.0 - 0.5;
+                if i % 10 == 0 { Lab([20.0 + jitter, 30.0, jitter]) } else { Lab([71.0 + jitter, -1.0, 3.0 - jitter]) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn colours_learnt_from_are_explained_and_others_not() {
+        let mixture = ColorMixture::learn(&colors()).unwrap();
+        assert!(mixture.explains(&Lab([71.0, -1.0, 3.0])) && mixture.explains(&Lab([20.0, 30.0, 0.0])));
+        assert!(!mixture.explains(&Lab([45.0, 15.0, 1.0])), "between the groups");
+        // Nine times as many of the one as of the other: ln 9 = 2.2 apart.
+        let apart = mixture.log_density(&Lab([71.0, -1.0, 3.0])) - mixture.log_density(&Lab([20.0, 30.0, 0.0]));
+        assert!((apart - 2.2).abs() < 0.5, "{apart}");
+    }
+
+    #[test]
+    fn a_shadow_is_the_same_colour_with_less_light() {
+        let mixture = ColorMixture::learn(&colors()).unwrap();
+        // sRGB (178, 174, 169) and the same surface under 0.4 of the light: every linear channel times 0.4.
+        let lit = Lab::from_srgb([178, 174, 169]);
+        let shaded = Lab::from_srgb([117, 114, 111]);
+        let table = ColorMixture::learn(&[lit; 100]).unwrap();
+        assert!(!table.explains(&shaded) && table.explains_shaded(&shaded));
+        assert!(!table.explains_shaded(&Lab::from_srgb([110, 112, 122])), "bluer");
+        assert!(!table.explains_shaded(&Lab::from_srgb([20, 20, 19])), "darker than shadows are");
+        assert!(!mixture.explains_shaded(&Lab([90.0, -1.0, 3.0])), "lighter");
+    }
+
+    #[test]
+    fn learning_again_follows_the_colours() {
+        let mixture = ColorMixture::learn(&colors()).unwrap();
+        let light: Vec<Lab> = colors().into_iter().filter(|color| color.0[0] > 50.0).collect();
+        let again = mixture.relearn(&light).unwrap();
+        assert!(again.log_density(&Lab([20.0, 30.0, 0.0])) < mixture.log_density(&Lab([20.0, 30.0, 0.0])) - 10.0);
+    }
+
+    #[test]
+    fn too_few_colours_make_no_mixture() {
+        assert!(ColorMixture::learn(&[]).is_none() && ColorMixture::learn(&[Lab([1.0; 3]); 3]).is_none());
+        assert!(ColorMixture::learn(&[Lab([1.0; 3]); 4]).is_some(), "all alike");
+    }
+}
