@@ -2,10 +2,8 @@
 
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
-use serde_json::Value;
 
-use crate::json::{self, Node};
-use crate::{Error, Result, coco, labelme};
+use crate::{AnnotationFormat, Error, Result};
 
 /// A click may miss the image by this much and is moved to its edge; annotation tools let it.
 const EDGE_TOLERANCE_PX: f64 = 1.0;
@@ -46,23 +44,23 @@ impl ImageFacts<'_> {
 }
 
 impl Annotation {
-    /// Reads every object that a COCO or LabelMe file marks on the image; the content says which of the two it is.
+    /// Reads every object that a file marks on the image; the content says which [`AnnotationFormat`] it is.
     ///
     /// # Errors
-    /// A file that is neither, one made on an image of another size, and whatever a [`Annotation`] may not be:
+    /// A file that is none, one made on an image of another size, and whatever a [`Annotation`] may not be:
     /// outside the image by more than a pixel, without extent, not finite, half a grasp line, an outline of fewer
     /// than three points or one that crosses itself. Several objects need group ids (LabelMe). The message says where.
     pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
-        let value = json::parse(bytes)?;
-        let root = Node::root(&value);
-        let is_list = |name: &str| value.get(name).is_some_and(Value::is_array);
-        if is_list("shapes") {
-            labelme::read(&root, image)
-        } else if is_list("images") && is_list("annotations") {
-            coco::read(&root, image)
-        } else {
-            Err(Error::WrongFile { found: json::describe(&value) })
-        }
+        Self::read_with(bytes, None, image)
+    }
+
+    /// As [`read`](Self::read), with the file that some formats keep `beside`: a YOLO dataset's `data.yaml`, or the other
+    /// one of OpenDR's two files.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read), and a file beside it that does not fit.
+    pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
+        AnnotationFormat::of(bytes)?.read(bytes, beside, image)
     }
 
     /// The outline, or the box where none was drawn.

@@ -47,7 +47,7 @@ pub enum Error {
         /// [`crate::ImageLimits::max_pixels`].
         max_pixels: u64,
     },
-    /// The annotation is not JSON at all.
+    /// The annotation is not JSON at all, nor of a format that is something else.
     #[error("annotation is not JSON ({place}): {reason}")]
     NotJson {
         /// Line and column.
@@ -55,9 +55,10 @@ pub enum Error {
         /// The parser's complaint.
         reason: String,
     },
-    /// JSON, but neither COCO nor LabelMe.
+    /// JSON, but neither COCO nor LabelMe; or nothing that annotations are written in.
     #[error(
-        "wrong annotation file: expected COCO JSON (`images`, `annotations`) or LabelMe JSON (`shapes`), found {found}"
+        "wrong annotation file: expected COCO JSON (`images`, `annotations`), LabelMe JSON (`shapes`), YOLO-pose labels \
+         or OpenDR's .npy, found {found}"
     )]
     WrongFile {
         /// The keys or the kind of value at the top.
@@ -150,6 +151,20 @@ pub enum Error {
         expected: String,
         /// The names that the file has.
         found: String,
+    },
+    /// A format of two files, of which one is not there.
+    #[error("annotation in two files: expected {expected}, found {found}")]
+    MissingBeside {
+        /// The two.
+        expected: &'static str,
+        /// What is there.
+        found: &'static str,
+    },
+    /// A format that is read but not written.
+    #[error("annotations are not written in the format `{format}`: expected coco, labelme or yolo-pose")]
+    ReadOnlyFormat {
+        /// Its name.
+        format: &'static str,
     },
     /// What a model needs and the annotation lacks.
     #[error("annotation of `{label}` lacks {missing}: {why}")]

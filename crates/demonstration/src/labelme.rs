@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Point2;
+use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, Draft, ImageFacts};
 use crate::json::{Node, shorten};
@@ -125,10 +126,53 @@ fn object(shapes: Vec<Shape>, image: &ImageFacts) -> Result<Annotation> {
     draft.finish(image)
 }
 
+/// The version of LabelMe whose files ours are like; LabelMe compares it with its own and warns of newer ones.
+const VERSION: &str = "5.4.1";
+
+/// Writes objects as LabelMe shows them: a group of a rectangle, two points and a polygon for each.
+pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation]) -> String {
+    let mut shapes = Vec::new();
+    for (object, group) in objects.iter().zip(1..) {
+        let mut push = |label: &str, shape_type: &str, points: &[Point2<f64>]| {
+            let points: Vec<Value> = points.iter().map(|point| json!([point.x, point.y])).collect();
+            shapes.push(json!({
+                "label": label,
+                "points": points,
+                "group_id": group,
+                "description": "",
+                "shape_type": shape_type,
+                "flags": {},
+                "mask": null,
+            }));
+        };
+        let [upper_left, _, lower_right, _] = object.bbox.corners();
+        push(&object.label, "rectangle", &[upper_left, lower_right]);
+        if let Some(line) = &object.grasp {
+            push("grasp_start", "point", &[line.start]);
+            push("grasp_end", "point", &[line.end]);
+        }
+        if let Some(outline) = &object.outline {
+            push(&object.label, "polygon", &outline.vertices);
+        }
+    }
+    let file = json!({
+        "version": VERSION,
+        "flags": {},
+        "shapes": shapes,
+        "imagePath": file_name,
+        "imageData": null,
+        "imageHeight": image.height,
+        "imageWidth": image.width,
+    });
+    format!("{file:#}\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::{Value, json};
+    use crate::AnnotationFormat;
+    use proptest::prelude::*;
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
     const IMAGE: ImageFacts = ImageFacts { width: 640, height: 480, file_name: None };
 
@@ -230,5 +274,37 @@ mod tests {
         assert!(message("[1, 2]").contains("found a list of 2"));
         assert!(message("{\"model\": 3}").contains("an object with `model`"));
         assert!(message("\u{89}PNG").contains("not JSON"));
+    }
+
+    /// Every place that is marked. Reading decimal text costs a last bit.
+    fn points(marked: &Annotation) -> impl Iterator<Item = Point2<f64>> {
+        let line = marked.grasp.iter().flat_map(|line| [line.start, line.end]);
+        let outline = marked.outline.iter().flat_map(|outline| outline.vertices.iter().copied());
+        marked.bbox.corners().into_iter().chain(line).chain(outline)
+    }
+
+    proptest! {
+        #[test]
+        fn round_trip(x in 0.0..300.0f64, y in 0.0..200.0f64, w in 2.0..300.0f64, h in 2.0..200.0f64, whole in any::<bool>()) {
+            let bbox = BoundingBox { x1: x, y1: y, x2: x + w, y2: y + h };
+            let first = Annotation {
+                label: "rod \"end\"".into(),
+                bbox,
+                grasp: whole.then(|| GraspLine::new(Point2::new(x, y + h), Point2::new(x + w, y))),
+                outline: whole.then(|| Polygon::from_box(&bbox)),
+            };
+            let second = Annotation { label: "other".into(), grasp: None, ..first.clone() };
+            for marked in [vec![first.clone()], vec![first, second]] {
+                let written = AnnotationFormat::LabelMe.write(&IMAGE, &marked).unwrap();
+                prop_assert!(written.left_out.is_empty());
+                let read = Annotation::read(written.text.as_bytes(), &IMAGE).unwrap();
+                prop_assert_eq!(read.len(), marked.len());
+                for (found, expected) in read.iter().zip(&marked) {
+                    prop_assert_eq!(&found.label, &expected.label);
+                    prop_assert!(points(found).zip(points(expected)).all(|(a, b)| (a - b).norm() < 1e-9));
+                    prop_assert_eq!(points(found).count(), points(expected).count());
+                }
+            }
+        }
     }
 }

@@ -3,8 +3,8 @@
 //! ```text
 //! photo bytes ── decode_image ─────┐
 //!                                  ├─ Demonstration ── Augmenter ── sample(i) ── Sample {image, objects}
-//! COCO or LabelMe ── Annotation ───┘                                                 │
-//!                                                              CocoFile ── bytes ────┘
+//! COCO, LabelMe,                   │                                                 │
+//! YOLO-pose, OpenDR ─ Annotation ──┘                           CocoFile ── bytes ────┘
 //! ```
 //!
 //! Everything from outside is checked here, once: [`decode_image`] reads the size before it takes memory,
@@ -38,12 +38,18 @@
 mod annotation;
 mod augmentation;
 mod coco;
+mod data_yaml;
 mod decode;
 mod demonstration;
 mod error;
+mod format;
 mod json;
+mod keypoint_row;
 mod labelme;
+mod npy;
+mod opendr;
 mod outline_proposal;
+mod yolo_pose;
 
 pub use annotation::{Annotation, ImageFacts};
 pub use augmentation::{
@@ -53,4 +59,5 @@ pub use coco::CocoFile;
 pub use decode::{ImageLimits, decode_image};
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};
 pub use error::{Error, Result};
+pub use format::{AnnotationFormat, DeclaredImage, WrittenAnnotation};
 pub use outline_proposal::propose_outline;

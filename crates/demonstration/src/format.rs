@@ -1,0 +1,161 @@
+//! The files that hold annotations: which of them one is, and what a file holds besides.
+
+use crate::json::{self, Node, describe};
+use crate::npy;
+use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, labelme, opendr, yolo_pose};
+
+/// A kind of annotation file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnnotationFormat {
+    /// COCO JSON, the canonical one: holds everything.
+    Coco,
+    /// LabelMe JSON: holds everything.
+    LabelMe,
+    /// Text of one object a line, as Ultralytics' pose models learn from: no outlines; labels in a `data.yaml` beside it.
+    YoloPose,
+    /// `boxes_*.npy` and `kps_*.npy` of OpenDR's augmentation: no outlines, no labels; read only.
+    OpenDr,
+}
+
+/// The size that an annotation file says of an image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeclaredImage {
+    /// The image's file name, as it stands there.
+    pub file_name: Option<String>,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+/// An annotation file in the making, and what it had no room for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WrittenAnnotation {
+    /// The file's text.
+    pub text: String,
+    /// What must stand beside it in a `data.yaml`: the labels of a YOLO-pose file.
+    pub data_yaml: Option<String>,
+    /// What the format cannot hold, in words; empty when nothing was lost.
+    pub left_out: Vec<String>,
+}
+
+impl AnnotationFormat {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Coco, Self::LabelMe, Self::YoloPose, Self::OpenDr];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Coco => "coco",
+            Self::LabelMe => "labelme",
+            Self::YoloPose => "yolo-pose",
+            Self::OpenDr => "opendr",
+        }
+    }
+
+    /// Tells the format by the content.
+    ///
+    /// # Errors
+    /// Content that is none of them.
+    pub fn of(bytes: &[u8]) -> Result<Self> {
+        if npy::is_npy(bytes) {
+            return Ok(Self::OpenDr);
+        }
+        if yolo_pose::looks_like(bytes) {
+            return Ok(Self::YoloPose);
+        }
+        let value = json::parse(bytes)?;
+        let is_list = |name: &str| value.get(name).is_some_and(serde_json::Value::is_array);
+        if is_list("shapes") {
+            Ok(Self::LabelMe)
+        } else if is_list("images") && is_list("annotations") {
+            Ok(Self::Coco)
+        } else {
+            Err(Error::WrongFile { found: describe(&value) })
+        }
+    }
+
+    /// The images and sizes that a file declares; none for formats that declare none.
+    ///
+    /// # Errors
+    /// Content that is no annotation file, or sizes that are none.
+    pub fn declared_images(bytes: &[u8]) -> Result<Vec<DeclaredImage>> {
+        let format = Self::of(bytes)?;
+        if !matches!(format, Self::Coco | Self::LabelMe) {
+            return Ok(Vec::new());
+        }
+        let value = json::parse(bytes)?;
+        let root = Node::root(&value);
+        let declared = |node: &Node, [name, width, height]: [&str; 3]| -> Result<Option<DeclaredImage>> {
+            let file_name = node.optional(name)?.map(|name| name.text().map(str::to_owned)).transpose()?;
+            let (Some(width), Some(height)) = (node.optional(width)?, node.optional(height)?) else { return Ok(None) };
+            Ok(Some(DeclaredImage { file_name, width: width.pixels()?, height: height.pixels()? }))
+        };
+        if format == Self::LabelMe {
+            return Ok(declared(&root, ["imagePath", "imageWidth", "imageHeight"])?.into_iter().collect());
+        }
+        let images = root.field("images", "the list of images")?.items()?;
+        let declared = images.iter().map(|image| declared(image, ["file_name", "width", "height"]));
+        Ok(declared.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+    }
+
+    /// Writes what is marked on one image. What is read back is the same but for what `left_out` says.
+    ///
+    /// # Errors
+    /// [`Error::ReadOnlyFormat`] for OpenDR's.
+    pub fn write(self, image: &ImageFacts, objects: &[Annotation]) -> Result<WrittenAnnotation> {
+        let file_name = image.file_name.unwrap_or("");
+        let whole = |text| WrittenAnnotation { text, data_yaml: None, left_out: Vec::new() };
+        match self {
+            Self::Coco => {
+                let mut file = CocoFile::new();
+                file.push_image(file_name, image.width, image.height, objects);
+                Ok(whole(file.to_json()))
+            }
+            Self::LabelMe => Ok(whole(labelme::write(file_name, image, objects))),
+            Self::YoloPose => Ok(yolo_pose::write(image, objects)),
+            Self::OpenDr => Err(Error::ReadOnlyFormat { format: self.name() }),
+        }
+    }
+
+    pub(crate) fn read(self, bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Annotation>> {
+        match self {
+            Self::OpenDr => opendr::read(bytes, beside, image),
+            Self::YoloPose => yolo_pose::read(bytes, beside, image),
+            Self::LabelMe => labelme::read(&Node::root(&json::parse(bytes)?), image),
+            Self::Coco => coco::read(&Node::root(&json::parse(bytes)?), image),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_tells_the_format() {
+        for (bytes, format) in [
+            (&b"{\"shapes\": []}"[..], AnnotationFormat::LabelMe),
+            (b" {\"images\": [], \"annotations\": []}", AnnotationFormat::Coco),
+            (b"\xef\xbb\xbf0 0.5 0.5 0.25 0.25 0.4 0.4 2 0.6 0.6 2\r\n", AnnotationFormat::YoloPose),
+            (b"\x93NUMPY\x01\x00", AnnotationFormat::OpenDr),
+        ] {
+            assert_eq!(AnnotationFormat::of(bytes), Ok(format));
+        }
+        for other in [&b"[1, 2]"[..], b"\x89PNG", b"", b"12", b"a b c d e", b"{\"images\": []}"] {
+            assert!(AnnotationFormat::of(other).is_err(), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn declared_sizes() {
+        let labelme = br#"{"shapes": [], "imagePath": "a.png", "imageWidth": 640, "imageHeight": 480}"#;
+        let expected = DeclaredImage { file_name: Some("a.png".into()), width: 640, height: 480 };
+        assert_eq!(AnnotationFormat::declared_images(labelme), Ok(vec![expected.clone()]));
+        let coco = br#"{"images": [{"id": 1, "file_name": "a.png", "width": 640, "height": 480}], "annotations": []}"#;
+        assert_eq!(AnnotationFormat::declared_images(coco), Ok(vec![expected]));
+        assert_eq!(AnnotationFormat::declared_images(b"0 0.5 0.5 0.5 0.5"), Ok(vec![]));
+        let spoilt = br#"{"shapes": [], "imageWidth": -3, "imageHeight": 480}"#;
+        assert!(AnnotationFormat::declared_images(spoilt).unwrap_err().to_string().contains("imageWidth"));
+    }
+}

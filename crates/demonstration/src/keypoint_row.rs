@@ -1,0 +1,46 @@
+//! Grasp lines in files that know keypoints only by their number.
+
+use nalgebra::Point2;
+
+use crate::annotation::Draft;
+use crate::{Error, Result};
+
+/// How far a keypoint between the ends may stray from its place on the line, as a share of the line's length …
+const MOST_STRAY_SHARE: f64 = 0.02;
+/// … and in pixels, whichever is more.
+const MOST_STRAY_PX: f64 = 1.5;
+
+/// Puts the first and the last keypoint into the draft as the grasp's ends; those between them must lie evenly on the
+/// line, as OpenDR's ten do: other keypoints mark something else. `None` is a keypoint that is not labelled.
+pub(crate) fn read_grasp(keypoints: &[Option<Point2<f64>>], place: &str, draft: &mut Draft) -> Result<()> {
+    let (first, last) = match keypoints {
+        [] => return Ok(()),
+        [only] => (only, &None),
+        [first, .., last] => (first, last),
+    };
+    if let (Some(start), Some(end)) = (first, last) {
+        let line = end - start;
+        let most_stray = (MOST_STRAY_SHARE * line.norm()).max(MOST_STRAY_PX);
+        for (k, keypoint) in keypoints.iter().enumerate() {
+            let Some(keypoint) = keypoint else { continue };
+            if let Some(found) = keypoint.iter().find(|value| !value.is_finite()) {
+                return Err(Error::NotFinite {
+                    place: format!("{place}, keypoint {}", k + 1),
+                    found: found.to_string(),
+                });
+            }
+            let on_line = start + line * (k as f64 / (keypoints.len() - 1) as f64);
+            let stray = (keypoint - on_line).norm();
+            if stray > most_stray {
+                return Err(Error::Malformed {
+                    place: place.into(),
+                    expected: "two keypoints, or more that lie evenly on the grasp line".into(),
+                    found: format!("keypoint {} of {}, {stray:.1} pixels beside it", k + 1, keypoints.len()),
+                });
+            }
+        }
+    }
+    draft.grasp_start = first.map(|point| (point, format!("{place}, keypoint 1")));
+    draft.grasp_end = last.map(|point| (point, format!("{place}, keypoint {}", keypoints.len())));
+    Ok(())
+}
