@@ -9,8 +9,8 @@ use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{GraspLine, PlanarGrasp, PlanarSimilarity, Polygon};
 use sdg_report::{
     Animation, AnimationOptions, Attempt, Axis, Chart, Color, DetectionError, DetectionMark, Figure, GallerySize,
-    KeyFigure, Report, Section, Series, Step, Tone, Verdict, attempts_table, draw_demonstration, draw_detection,
-    median, shade_polygon,
+    KeyFigure, Report, Section, Series, ShareChart, Step, Tone, Verdict, attempts_table, draw_demonstration,
+    draw_detection, median, outcome_matrix, shade_polygon,
 };
 
 const SIZE: (u32, u32) = (640, 480);
@@ -44,6 +44,14 @@ fn report() -> Result<Report, sdg_report::ReportError> {
         .section(
             Section::new("Attempts")
                 .lead("Random poses and start configurations. Held means: at least 10 cm above the table between both fingers, one second after lifting.")
+                .matrix(outcome_matrix(&attempts, 10.0, 10.0))
+                .shares(
+                    ShareChart::new("Attempts that held the part")
+                        .reference_name("the paper")
+                        .row("A", 92.5, [84.6, 96.5], Some(91.3))
+                        .row("B", 97.5, [91.3, 99.3], Some(82.5))
+                        .row("S", 78.8, [68.6, 86.3], None),
+                )
                 .table(attempts_table(&attempts).caption(
                     "Where the part lay is in the robot's base frame. Errors are those of the second detection, from above the part.",
                 )),

@@ -1,5 +1,6 @@
 //! Grasp attempts as a table and in numbers.
 
+use crate::chart::Matrix;
 use crate::table::{Cell, Column, Table, Tone};
 
 /// The steps of an attempt, in their order.
@@ -136,6 +137,31 @@ pub fn attempts_table(attempts: &[Attempt]) -> Table {
     ])
 }
 
+/// What was seen against what came of it: rows say how far the last detection was from the truth, columns at which step
+/// the attempt ended.
+///
+/// `right_mm` and `right_deg` are the largest errors of a detection that counts as right.
+#[must_use]
+pub fn outcome_matrix(attempts: &[Attempt], right_mm: f64, right_deg: f64) -> Matrix {
+    let seen = |attempt: &Attempt| match attempt.detection_error {
+        Some(error) if error.distance_mm <= right_mm && error.angle_deg <= right_deg => 0,
+        Some(_) => 1,
+        None => 2,
+    };
+    let mut counts = vec![[0usize; Step::ALL.len() + 1]; 3];
+    for attempt in attempts {
+        let ended = if attempt.success { Step::ALL.len() } else { attempt.step as usize };
+        counts[seen(attempt)][ended] += 1;
+    }
+    let columns = Step::ALL.map(Step::name).into_iter().chain(["held"]);
+    let labels = ["seen right".to_owned(), "seen beside it".to_owned(), "not seen".to_owned()];
+    let matrix = Matrix::new("What was seen, and where the attempt ended", columns).good_column(Step::ALL.len());
+    labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
+        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is the \
+         robot's, in the others the eye's."
+    ))
+}
+
 /// The median of the finite values; the mean of the middle two when they are even in number.
 #[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
@@ -169,6 +195,27 @@ mod tests {
         assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median([4.0, 1.0, f64::NAN, 2.0, 3.0]), Some(2.5));
         assert_eq!(median([]), None);
+    }
+
+    #[test]
+    fn outcomes_are_counted_by_what_was_seen() {
+        let beside = Attempt {
+            detection_error: Some(DetectionError { distance_mm: 30.0, angle_deg: 0.5 }),
+            ..attempt(4, Step::Close, false, "closed on nothing")
+        };
+        let html = outcome_matrix(
+            &[
+                attempt(1, Step::Hold, true, ""),
+                attempt(2, Step::Lift, false, "slipped"),
+                attempt(3, Step::Detect, false, "nothing found"),
+                beside,
+            ],
+            10.0,
+            10.0,
+        )
+        .to_html();
+        assert_well_formed(&html);
+        assert!(html.contains("seen right: lift 1, held 1. seen beside it: close 1. not seen: detect 1."), "{html}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐
 //! frames   ─ AnimationRecorder ─ Animation ───── Figure ──┤
-//! numbers  ─ Chart, Table, attempts_table, KeyFigure ─────┼─ Section ─ Report ─ write_atomically ─ DIR/index.html
+//! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ write_atomically ─ DIR/index.html
 //! ```
 //!
 //! The page is one file that fetches nothing and runs no script: pictures stand in it as base64, charts as inline
@@ -50,8 +50,8 @@ mod table;
 
 pub use animation::{Animation, AnimationOptions, AnimationRecorder};
 pub use atomic_file::write_atomically;
-pub use attempts::{Attempt, DetectionError, Step, attempts_table, median};
-pub use chart::{Axis, Chart, Scale, Series};
+pub use attempts::{Attempt, DetectionError, Step, attempts_table, median, outcome_matrix};
+pub use chart::{Axis, Chart, Matrix, Scale, Series, ShareChart};
 pub use draw::{
     Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detection, draw_grasp_jaws,
     draw_keypoints, draw_label, draw_line, draw_polygon, shade_polygon,

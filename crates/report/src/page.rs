@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::atomic_file::write_atomically;
-use crate::chart::Chart;
+use crate::chart::{Chart, Matrix, ShareChart};
 use crate::error::ReportError;
 use crate::figure::{Figure, PhotoQuality};
 use crate::html::{escape, slug};
@@ -72,6 +72,8 @@ enum Block {
     Figure(Figure),
     Gallery(GallerySize, Vec<Figure>, Option<String>),
     Charts(Vec<Chart>),
+    Matrix(Matrix),
+    Shares(ShareChart),
     Table(Table),
     Facts(Vec<(String, String)>),
     Command(String),
@@ -133,6 +135,18 @@ impl Section {
     #[must_use]
     pub fn charts(self, charts: Vec<Chart>) -> Self {
         self.with(Block::Charts(charts))
+    }
+
+    /// Adds a matrix of counts.
+    #[must_use]
+    pub fn matrix(self, matrix: Matrix) -> Self {
+        self.with(Block::Matrix(matrix))
+    }
+
+    /// Adds shares with their intervals.
+    #[must_use]
+    pub fn shares(self, shares: ShareChart) -> Self {
+        self.with(Block::Shares(shares))
     }
 
     /// Adds a table.
@@ -199,6 +213,8 @@ impl Block {
                 let charts: String = charts.iter().map(Chart::to_html).collect();
                 format!("<div class=\"{class}\">{charts}</div>")
             }
+            Self::Matrix(matrix) => format!("<div class=\"charts one\">{}</div>", matrix.to_html()),
+            Self::Shares(shares) => format!("<div class=\"charts one\">{}</div>", shares.to_html()),
             Self::Table(table) => table.to_html(),
             Self::Facts(facts) => {
                 let facts: String = facts
@@ -405,6 +421,8 @@ mod tests {
             .gallery(GallerySize::Medium, vec![photo()])
             .captioned_gallery(GallerySize::Small, vec![photo(), photo()], text)
             .charts(vec![chart])
+            .matrix(Matrix::new(text, [text]).row(text, [1]).caption(text))
+            .shares(ShareChart::new(text).reference_name(text).row(text, 50.0, [40.0, 60.0], Some(45.0)).caption(text))
             .table(Table::new(vec![Column::text(text)]).row(vec![Cell::text(text)]).caption(text))
             .facts([(text, text)])
             .command(text);

@@ -1,9 +1,13 @@
-//! Line charts: what a curve is, apart from how it is drawn.
+//! Plots: line charts here (what a curve is, apart from how it is drawn), matrices of counts and shares beside them.
 
+mod matrix;
 mod scale;
+mod shares;
 mod svg;
 
+pub use matrix::Matrix;
 pub use scale::Scale;
+pub use shares::ShareChart;
 
 /// An axis: what it measures, in which unit, on which scale.
 #[derive(Debug, Clone, PartialEq)]
