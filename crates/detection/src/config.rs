@@ -8,7 +8,7 @@ mod mask_head;
 
 use serde::{Deserialize, Serialize};
 
-pub use mask_head::{MaskHeadConfig, MaskPasting, MaskTargets};
+pub use mask_head::{MaskBalance, MaskHeadConfig, MaskPasting, MaskTargets};
 
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -52,10 +52,23 @@ impl Losses {
 /// # Shapes
 /// - `logits`, `targets`: `[S]`, targets from 0 to 1
 pub fn binary_cross_entropy(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
+    binary_cross_entropies(logits, targets).sum()
+}
+
+/// The same with a weight for each.
+///
+/// # Shapes
+/// - `logits`, `targets`, `weights`: `[S]`, targets from 0 to 1
+pub fn weighted_binary_cross_entropy(logits: Tensor<1>, targets: &[f32], weights: &[f32]) -> Tensor<1> {
+    let weights = Tensor::from_floats(weights, &logits.device());
+    (binary_cross_entropies(logits, targets) * weights).sum()
+}
+
+fn binary_cross_entropies(logits: Tensor<1>, targets: &[f32]) -> Tensor<1> {
     let targets = Tensor::from_floats(targets, &logits.device());
     // max(x, 0) - x·t + ln(1 + e^-|x|) never overflows.
     let log_term = (logits.clone().abs().neg()).exp().log1p();
-    (activation::relu(logits.clone()) - logits * targets + log_term).sum()
+    activation::relu(logits.clone()) - logits * targets + log_term
 }
 
 /// Cross-entropy of the softmax over the last axis, summed over rows that have a target.
@@ -114,6 +127,13 @@ mod tests {
         // ln 2 + ln(1 + e^-3) + 200.
         let expected = 2f32.ln() + (1.0 + (-3f32).exp()).ln() + 200.0;
         assert!((value(binary_cross_entropy(logits, &[1.0, 1.0, 1.0])) - expected).abs() < 1e-4);
+    }
+
+    #[test]
+    fn weights_multiply_each_cross_entropy() {
+        let logits = || Tensor::from_floats([0.0, 3.0], &Device::flex());
+        let expected = 4.0 * 2f32.ln() + (1.0 + (-3f32).exp()).ln();
+        assert!((value(weighted_binary_cross_entropy(logits(), &[1.0, 1.0], &[4.0, 1.0])) - expected).abs() < 1e-5);
     }
 
     #[test]

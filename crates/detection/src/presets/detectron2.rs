@@ -94,6 +94,7 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
                     deconv_channels: 256,
                     max_train_rois_per_image: None,
                     loss_weight: 1.0,
+                    balance: MaskBalance::Cells,
                     targets: MaskTargets::Rasterized,
                     pasting: MaskPasting::PixelCenters,
                     threshold: 0.5,

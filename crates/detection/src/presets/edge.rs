@@ -99,6 +99,7 @@ pub fn edge_of(kind: RcnnKind) -> RcnnConfig {
                     deconv_channels: 64,
                     max_train_rois_per_image: Some(8),
                     loss_weight: 1.0,
+                    balance: MaskBalance::ThinParts,
                     targets: MaskTargets::Rasterized,
                     pasting: MaskPasting::PixelCenters,
                     threshold: 0.5,

@@ -9,7 +9,7 @@
 use burn::module::Module;
 use burn::tensor::{Int, Tensor};
 
-use crate::config::{BackgroundClass, MaskHeadConfig, NormKind};
+use crate::config::{BackgroundClass, MaskBalance, MaskHeadConfig, NormKind};
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, relu};
 use crate::losses;
@@ -112,19 +112,27 @@ impl MaskHead {
     ) -> Tensor<1> {
         let size = self.config.mask_size();
         let mut wanted = Vec::with_capacity(rois.len() * size * size);
+        let mut weights = Vec::with_capacity(rois.len() * size * size);
         let (mut boxes, mut classes) = (Vec::new(), Vec::new());
         for SampledRoi { roi, class } in rois {
             let RoiClass::Object { class_idx, gt_idx } = *class else {
                 continue;
             };
             let mask = &targets[roi.image_idx].masks[gt_idx];
-            wanted.extend(encode(mask, &roi.corners, image_sizes[roi.image_idx], size, self.config.targets));
+            let cells = encode(mask, &roi.corners, image_sizes[roi.image_idx], size, self.config.targets);
+            let inside = self.config.balance.weight(cells.iter().sum(), cells.len());
+            weights.extend(cells.iter().map(|cell| 1.0 + cell * (inside - 1.0)));
+            wanted.extend(cells);
             boxes.push(*roi);
             classes.push(class_idx);
         }
         let count = wanted.len();
         let logits = self.logits_of_classes(features, &boxes, &classes).reshape([count]);
-        losses::binary_cross_entropy(logits, &wanted) * (self.config.loss_weight / count as f64)
+        let loss = match self.config.balance {
+            MaskBalance::Cells => losses::binary_cross_entropy(logits, &wanted),
+            MaskBalance::ThinParts => losses::weighted_binary_cross_entropy(logits, &wanted, &weights),
+        };
+        loss * (self.config.loss_weight / count as f64)
     }
 
     /// Reads the mask of every detection.

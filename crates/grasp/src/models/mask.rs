@@ -15,6 +15,12 @@ use crate::taught::TaughtDemonstration;
 /// Pixels kept around a mask, so that keypoints near its rim see what surrounds them.
 const MARGIN_PX: f64 = 24.0;
 
+/// The mask of a pipe, read off 28 cells a side, overlaps the pipe's outline by a third when it lies right on it. Whether
+/// it is the part, the demonstration says.
+fn rotation() -> RotationConfig {
+    RotationConfig { min_overlap: 0.3, ..RotationConfig::default() }
+}
+
 /// The demonstrations as the mask's content is compared with them.
 #[derive(Clone)]
 pub(crate) struct MaskMatcher {
@@ -36,7 +42,7 @@ impl MaskMatcher {
     /// # Errors
     /// A demonstration that shows neither.
     pub(crate) fn new(demonstrations: &[TaughtDemonstration]) -> Result<Self> {
-        let estimator = RotationEstimator::new(Sift::new(SiftConfig::default())?, RotationConfig::default())?;
+        let estimator = RotationEstimator::new(Sift::new(SiftConfig::default())?, rotation())?;
         let templates = demonstrations
             .iter()
             .map(|demonstration| {
