@@ -4,7 +4,7 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, InstantSearch, Match, Refinement, SearchConfig, ShapeConfig, ShapeTemplate, Surface};
+use sdg_shape::{Comparison, GradientField, InstantSearch, Match, SearchConfig, ShapeConfig, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
 
 use crate::decimal::decimal;
@@ -126,19 +126,14 @@ impl TaughtDemonstration {
         }
     }
 
-    /// Lays the cut-out over an image near `initial` and lets it climb to where its edges agree best.
-    pub fn refine(&self, field: &GradientField, initial: &PlanarSimilarity) -> Refinement {
-        self.template.refine(field, initial)
+    /// The cut-out against an image, whose gradients are `field`.
+    pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
+        Comparison { template: &self.template, surface: &self.surface, image, field }
     }
 
     /// Looks for the part in the whole image, with no network's help.
     pub fn search(&self, image: &RgbImage, field: &GradientField) -> Vec<Match> {
         self.search.search_field(image, field)
-    }
-
-    /// How much the part's surface looks like the image there, in `[0, 1]`; see [`Surface`].
-    pub fn surface_agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
-        self.surface.agreement(image, image_from_cutout)
     }
 }
 

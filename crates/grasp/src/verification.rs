@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use image::RgbImage;
 use sdg_geometry::{Angle, PlanarSimilarity};
-use sdg_shape::{GradientField, SURFACE_SHARE};
+use sdg_shape::GradientField;
 
 use crate::models::Candidate;
 use crate::taught::TaughtDemonstration;
@@ -54,30 +54,29 @@ pub(crate) fn verify<'a>(
     better_way_round(demonstration, &rescaled, scene)
 }
 
-/// Refined from `start` and from half a turn further; the one that agrees better.
+/// Refined from `start` and from half a turn further; the one that agrees better, brought to rest.
 pub(crate) fn better_way_round<'a>(
     demonstration: &'a TaughtDemonstration,
     start: &PlanarSimilarity,
     scene: &Scene<'_>,
 ) -> Overlay<'a> {
+    let comparison = demonstration.comparison(scene.image, &scene.field);
     let turned = about_middle(demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
-    let [straight, turned] = [*start, turned].map(|start| refined(demonstration, &start, scene));
-    if turned.agreement > straight.agreement { turned } else { straight }
+    let [straight, turned] = [*start, turned].map(|start| {
+        let refined = comparison.refined_by_edges(&start);
+        (start, refined, comparison.agreement(&refined).both())
+    });
+    let (start, refined, _) = if turned.2 > straight.2 { turned } else { straight };
+    let usual = usual_scale(demonstration, scene);
+    let scales = usual * SCALES.start()..=usual * SCALES.end();
+    let image_from_cutout = comparison.settled(&start, refined, &scales);
+    let is_of_its_size = scales.contains(&image_from_cutout.scale);
+    let agreement = if is_of_its_size { comparison.agreement(&image_from_cutout).both() } else { 0.0 };
+    Overlay { demonstration, image_from_cutout, agreement }
 }
 
 fn usual_scale(demonstration: &TaughtDemonstration, scene: &Scene<'_>) -> f64 {
     demonstration.usual_scale(scene.image.width(), scene.image.height())
-}
-
-/// The demonstration where it agrees best near `start`.
-fn refined<'a>(demonstration: &'a TaughtDemonstration, start: &PlanarSimilarity, scene: &Scene<'_>) -> Overlay<'a> {
-    let refined = demonstration.refine(&scene.field, start);
-    let image_from_cutout = refined.image_from_demonstration;
-    let surface = demonstration.surface_agreement(scene.image, &image_from_cutout);
-    let seen = (1.0 - SURFACE_SHARE) * refined.agreement + SURFACE_SHARE * surface;
-    let agreement =
-        if SCALES.contains(&(image_from_cutout.scale / usual_scale(demonstration, scene))) { seen } else { 0.0 };
-    Overlay { demonstration, image_from_cutout, agreement }
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.

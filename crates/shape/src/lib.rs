@@ -12,7 +12,7 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] is a second witness: the colours inside the outline. [`InstantSearch`] needs no detector: it tries every
+//! [`Surface`] is a second witness: the colours inside the outline; a [`Comparison`] hears both. [`InstantSearch`] needs no detector: it tries every
 //! place, turn and scale of a whole image coarsely and refines the best.
 //!
 //! What this crate leaves out: it knows no grasp and no camera, and a part lies flat: poses are turns, shifts and scales
@@ -52,6 +52,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod comparison;
 mod consensus;
 mod edge_points;
 mod error;
@@ -63,6 +64,7 @@ mod search;
 mod surface;
 mod template;
 
+pub use comparison::{Agreement, Comparison};
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
 pub use refinement::Refinement;

@@ -143,6 +143,11 @@ impl ShapeTemplate {
         Ok(Self { config: config.clone(), center, levels, agreement_level_idx })
     }
 
+    /// Root mean square distance of the finest edges from the pivot, in demonstration pixels.
+    pub(crate) fn radius_px(&self) -> f64 {
+        self.levels[0].radius_px
+    }
+
     /// How well the part's edges at this pose agree with the image's, in `[0, 1]`.
     ///
     /// 1: every edge of the demonstration lies on an edge of the same direction. Random directions give

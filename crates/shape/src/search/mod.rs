@@ -21,6 +21,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::comparison::{Agreement, Comparison, SURE};
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::GradientField;
@@ -30,7 +31,7 @@ use crate::refinement::CaptureRange;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::sweep;
-use crate::surface::{SURFACE_SHARE, Surface};
+use crate::surface::Surface;
 use crate::template::{ShapeConfig, ShapeTemplate};
 
 /// What is looked for, and what is reported.
@@ -58,7 +59,7 @@ impl Default for SearchConfig {
 pub struct Match {
     /// Where the demonstration lies in the image.
     pub image_from_demonstration: PlanarSimilarity,
-    /// Edges and surface together, in `[0, 1]`: [`SURFACE_SHARE`] of the latter.
+    /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
     /// [`ShapeTemplate::agreement`] alone.
     pub edges: f64,
@@ -85,7 +86,8 @@ const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
 /// How many of the best matches are refined again, where they agree less than surely.
 const NUM_POLISHED: usize = 3;
-const SURE: f64 = 0.65;
+/// A match that agrees less than this is nothing, and not made something by refining it.
+const LEAST_POLISHED: f64 = 0.25;
 /// Share of the part's area that two matches may both claim.
 const MAX_OVERLAP: f64 = 0.3;
 
@@ -166,20 +168,25 @@ impl InstantSearch {
     }
 
     fn matched(&self, image: &RgbImage, field: &GradientField, image_from_demonstration: PlanarSimilarity) -> Match {
-        let edges = self.template.agreement(field, &image_from_demonstration);
-        let surface = self.surface.agreement(image, &image_from_demonstration);
-        Match { image_from_demonstration, agreement: combined(edges, surface), edges, surface }
+        let seen = self.comparison(image, field).agreement(&image_from_demonstration);
+        let Agreement { edges, surface } = seen;
+        Match { image_from_demonstration, agreement: seen.both(), edges, surface }
+    }
+
+    fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
+        Comparison { template: &self.template, surface: &self.surface, image, field }
     }
 
     /// Refined from all around, where the match is poor: its start may have been on the wrong side of a shadow.
     fn polished(&self, image: &RgbImage, field: &GradientField, found: &Match) -> Match {
-        if found.agreement >= SURE {
+        if found.agreement >= SURE || found.agreement < LEAST_POLISHED {
             return *found;
         }
-        let refined = self.template.refine(field, &found.image_from_demonstration);
-        let refined = self.matched(image, field, refined.image_from_demonstration);
-        let is_in_range = self.config.scales.contains(&refined.image_from_demonstration.scale);
-        if is_in_range && refined.agreement > found.agreement { refined } else { *found }
+        let (comparison, start) = (self.comparison(image, field), &found.image_from_demonstration);
+        let settled = comparison.settled(start, comparison.refined_by_edges(start), &self.config.scales);
+        let settled = self.matched(image, field, settled);
+        let is_in_range = self.config.scales.contains(&settled.image_from_demonstration.scale);
+        if is_in_range && settled.agreement > found.agreement { settled } else { *found }
     }
 
     /// The best first; of those that claim the same area, the best alone.
@@ -209,7 +216,7 @@ impl InstantSearch {
         let mut climbed = parallel::map(poses, |&pose| {
             let (pose, edges) = self.template.climb_coarsest(field, &self.range_about(pose), pose);
             let surface = self.surface.agreement(image, &pose.to_similarity(self.template.center));
-            (pose, combined(edges, surface))
+            (pose, Agreement { edges, surface }.both())
         });
         climbed.sort_by(|a, b| b.1.total_cmp(&a.1));
         let pitch = self.place_pitch();
@@ -233,11 +240,6 @@ impl InstantSearch {
         let one_from_other = one.image_from_demonstration.inverse().compose(&other.image_from_demonstration);
         self.surface.share_inside(&self.outline, &one_from_other) <= MAX_OVERLAP
     }
-}
-
-/// Edges and surface together, as detections are verified.
-fn combined(edges: f64, surface: f64) -> f64 {
-    (1.0 - SURFACE_SHARE) * edges + SURFACE_SHARE * surface
 }
 
 /// The coarsest level that still shows the part well, and its edge points there.
