@@ -3,8 +3,9 @@
 //! How well a demonstration agrees with what it is not depends on the part: a ring agrees with anything round, a housing
 //! full of edges with nothing. Composed scenes tell by how much before a single real one was seen. Their highest
 //! agreement varies with the seed more than parts differ, and was no guide; their mean is one. Over the eight shipped
-//! parts it was 0.21 to 0.34 in composed scenes, and within 0.03 of that in the simulator's pictures, where the highest
-//! wrong agreement lay 0.06 to 0.19 above it (480 pictures).
+//! parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures, where
+//! the highest wrong agreement lay 0.03 to 0.17 above it. At 0.2 above, 10 of 960 right poses are refused; 0.545 for all
+//! parts, as agreement was measured then, refused 83.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
 
@@ -19,11 +20,11 @@ use crate::verification::{Scene, better_way_round, verify};
 const ABOVE_STRANGERS: f64 = 0.2;
 /// Where the threshold may lie. The lower bound is for look-alikes that composed scenes know nothing of, the upper one for
 /// the part itself in bad light.
-const THRESHOLDS: (f64, f64) = (0.42, 0.54);
+const THRESHOLDS: (f64, f64) = (0.44, 0.6);
 /// Without strangers that agree at all there is no mean.
 const LEAST_SCENES: usize = 3;
 /// The threshold then.
-const THRESHOLD_UNSEEN: f64 = 0.48;
+const THRESHOLD_UNSEEN: f64 = 0.5;
 /// The logistic's slope: 0.08 above the threshold is a score of 0.88.
 const SLOPE: f64 = 25.0;
 
