@@ -1,5 +1,7 @@
 //! Edges and surface together: poor refinements are brought to rest on the part.
 
+#![allow(clippy::unwrap_used)]
+
 mod scenes;
 
 use nalgebra::Point2;
