@@ -112,7 +112,7 @@ impl RcnnConfig {
 /// # Errors
 /// An image without pixels, or targets in the reference that do not fit each other.
 pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDict) -> Result<VerificationReport> {
-    let mut comparer = Comparer { reference, stages: Vec::new() };
+    let mut comparer = Comparer::new(reference);
     let transformed = detector.image_transform().apply(image)?;
     comparer.inference(&detector.valid(), &transformed);
     if reference.keys().any(|name| name.starts_with("losses.") || name.starts_with("gradients.")) {
@@ -121,14 +121,40 @@ pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDic
     Ok(VerificationReport { stages: comparer.stages })
 }
 
+/// Runs `detector` on `image` and gives what [`verify`] would compare, as a reference for another device or another
+/// precision. Where `targets` has the tensors that a step of training needs, losses and the gradients of all parameters
+/// are among it, and the targets themselves.
+///
+/// # Errors
+/// An image without pixels, or targets that do not fit each other.
+pub fn record(detector: &GeneralizedRcnn, image: &RgbImage, targets: &StateDict) -> Result<StateDict> {
+    let mut comparer = Comparer { recorded: Some(targets.clone()), ..Comparer::new(targets) };
+    let transformed = detector.image_transform().apply(image)?;
+    comparer.inference(&detector.valid(), &transformed);
+    if targets.contains_key("targets.boxes") {
+        comparer.training(detector, &transformed)?;
+    }
+    Ok(comparer.recorded.unwrap_or_default())
+}
+
 struct Comparer<'a> {
     reference: &'a StateDict,
     stages: Vec<StageComparison>,
+    /// Where there is one, what is found is put there and not compared.
+    recorded: Option<StateDict>,
 }
 
-impl Comparer<'_> {
+impl<'a> Comparer<'a> {
+    fn new(reference: &'a StateDict) -> Self {
+        Self { reference, stages: Vec::new(), recorded: None }
+    }
+
     /// Compares one tensor, unless the reference lacks it.
     fn compare(&mut self, name: &str, shape: &[usize], values: &[f32], tolerance: Tolerance) {
+        if let Some(recorded) = &mut self.recorded {
+            recorded.insert(name.to_owned(), WeightTensor { shape: shape.to_vec(), values: values.to_vec() });
+            return;
+        }
         let Some(expected) = self.reference.get(name) else {
             return;
         };
@@ -222,14 +248,21 @@ impl Comparer<'_> {
 
     /// Places and scores of the reference's `[N, K, 3]`, which have a tolerance each.
     fn keypoints(&mut self, found: &Detections) {
-        let Some(expected) = self.reference.get("detections.keypoints") else {
+        let name = "detections.keypoints";
+        if self.recorded.is_some() {
+            let shape = [found.keypoints.len(), found.keypoints.first().map_or(0, Vec::len), 3];
+            if shape[1] > 0 {
+                self.compare(name, &shape, &keypoint_values(found), Tolerance::Absolute(0.0));
+            }
+            return;
+        }
+        let Some(expected) = self.reference.get(name) else {
             return;
         };
         let column = |values: &[f32], columns: std::ops::Range<usize>| -> Vec<f32> {
             values.chunks_exact(3).flat_map(|row| row[columns.clone()].to_vec()).collect()
         };
-        let values: Vec<f32> =
-            found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect();
+        let values = keypoint_values(found);
         let shape = [
             found.keypoints.len(),
             found.keypoints.first().map_or(expected.shape.get(1).copied().unwrap_or(0), Vec::len),
@@ -241,7 +274,7 @@ impl Comparer<'_> {
                 WeightTensor { shape: expected.shape.clone(), values: column(&expected.values, columns.clone()) };
             let name = format!("detections.keypoints.{part}");
             let reference = StateDict::from([(name.clone(), wanted)]);
-            let mut comparer = Comparer { reference: &reference, stages: Vec::new() };
+            let mut comparer = Comparer::new(&reference);
             comparer.compare(&name, &shape, &column(&values, columns), tolerance);
             self.stages.append(&mut comparer.stages);
         }
@@ -257,11 +290,15 @@ impl Comparer<'_> {
         let mut visitor = GradientVisitor {
             path: Vec::new(),
             gradients: &losses.total().backward(),
-            wanted: self.reference,
+            wanted: self.recorded.is_none().then_some(self.reference),
             found: StateDict::new(),
         };
         detector.visit(&mut visitor);
         let found = visitor.found;
+        if let Some(recorded) = &mut self.recorded {
+            recorded.extend(found);
+            return Ok(());
+        }
         let reference = self.reference;
         for name in reference.keys().filter(|name| name.starts_with("gradients.")) {
             let (shape, values) = found.get(name).map_or((&[][..], &[][..]), |g| (&g.shape, &g.values));
@@ -350,11 +387,16 @@ impl Comparer<'_> {
     }
 }
 
-/// Collects the gradients that the reference has.
+/// Place and score of every keypoint of every detection.
+fn keypoint_values(found: &Detections) -> Vec<f32> {
+    found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect()
+}
+
+/// Collects the gradients that the reference has, or all.
 struct GradientVisitor<'a> {
     path: Vec<String>,
     gradients: &'a Gradients,
-    wanted: &'a StateDict,
+    wanted: Option<&'a StateDict>,
     found: StateDict,
 }
 
@@ -369,7 +411,7 @@ impl ModuleVisitor for GradientVisitor<'_> {
 
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
         let name = format!("gradients.{}", self.path.join("."));
-        if !self.wanted.contains_key(&name) {
+        if self.wanted.is_some_and(|wanted| !wanted.contains_key(&name)) {
             return;
         }
         if let Some(gradient) = param.val().grad(self.gradients) {

@@ -10,7 +10,7 @@ use std::process::Command;
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_detection::verification::{StageComparison, VerificationReport, verify};
+use sdg_detection::verification::{StageComparison, VerificationReport, record, verify};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 
 fn golden(path: &str) -> PathBuf {
@@ -142,9 +142,22 @@ fn torchvision_mask_agrees_at_every_stage() {
     agrees(&golden("torchvision/mask"));
 }
 
-/// Relative difference of gradients in a whole network, where one of millions of activations lies within rounding of
-/// zero and lets a gradient through here and not there. 1.7e-3 was measured, behind eight convolutions with a ReLU each.
-const WHOLE_GRADIENTS: f64 = 5e-3;
+/// Relative difference of a gradient from the one in double precision.
+///
+/// In a whole network some of millions of activations lie within rounding of zero, and a ReLU lets a gradient through in
+/// one precision and not in the other. torch's own single precision is so up to 1.65e-3 from its double precision (behind
+/// the keypoint head's eight convolutions with a ReLU each), ours 1.1e-3, and the two are 1.7e-3 apart. So both are
+/// compared with double precision: ours must be within the bound that is owed, or at least as near as torch's.
+const WHOLE_GRADIENTS: f64 = 1e-3;
+
+/// The largest difference over the largest magnitude expected.
+fn relative_difference(found: &WeightTensor, expected: &WeightTensor) -> f64 {
+    assert_eq!(found.shape, expected.shape);
+    assert!(found.values.iter().all(|value| value.is_finite()));
+    let largest = |values: &mut dyn Iterator<Item = f32>| f64::from(values.fold(0.0f32, |most, v| most.max(v.abs())));
+    let difference = largest(&mut found.values.iter().zip(&expected.values).map(|(a, b)| a - b));
+    difference / largest(&mut expected.values.iter().copied())
+}
 
 #[test]
 fn a_whole_torchvision_network_agrees_where_torch_is_present() {
@@ -156,8 +169,21 @@ fn a_whole_torchvision_network_agrees_where_torch_is_present() {
     let script = golden("torchvision/export.py");
     let status = Command::new(python).arg(script).arg("--whole").arg(&folder).status().unwrap();
     assert!(status.success(), "the exporter ended with {status}");
-    agrees_but_for(&folder, &|stage| stage.name.starts_with("gradients.") && stage.max_relative < WHOLE_GRADIENTS);
-    assert!(read(&folder.join("expected.safetensors"))["detections.scores"].values.len() >= 4, "nothing to compare");
+    agrees_but_for(&folder, &|stage| stage.name.starts_with("gradients."));
+    let theirs = read(&folder.join("expected.safetensors"));
+    assert!(theirs["detections.scores"].values.len() >= 4, "nothing to compare");
+
+    let exact = read(&folder.join("exact.safetensors"));
+    let targets = theirs.iter().filter(|(name, _)| name.starts_with("targets."));
+    let targets: StateDict = targets.map(|(name, target)| (name.clone(), target.clone())).collect();
+    let image = image::open(golden("detectron2/input.png")).unwrap().to_rgb8();
+    let ours = record(&detector(&folder), &image, &targets).unwrap();
+    assert!(exact.len() >= 8, "{:?}", exact.keys());
+    for (name, exact) in &exact {
+        let [ours, theirs] = [&ours[name], &theirs[name]].map(|found| relative_difference(found, exact));
+        println!("{name}: from double precision {ours:.1e}, torch {theirs:.1e}");
+        assert!(ours <= WHOLE_GRADIENTS.max(theirs), "{name}: from double precision {ours:.1e}, torch {theirs:.1e}");
+    }
     std::fs::remove_dir_all(folder).unwrap();
 }
 

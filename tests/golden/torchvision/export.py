@@ -2,7 +2,7 @@
 
     python export.py            the three small ones, with expected outputs
     python export.py --whole D  a whole R50 keypoint network into folder D, for the test that compares it when torch
-                                is present
+                                is present; exact.safetensors there holds its gradients computed in double precision
 
 The three small ones were made with torch 2.7.1, torchvision 0.22.1, Pillow 11.1.0 and numpy 2.2.6; the whole one is
 made with whatever is there. The weights have torchvision's names. Losses have this project's names, detections are in pixels of the image, targets in those of the resized image.
@@ -131,8 +131,7 @@ def randomize(model, seed, residual_gain=1.0):
 
 
 def export(folder, kind, model, limits, narrow):
-    picture = Image.open(IMAGE).convert("RGB")
-    image = torch.from_numpy(np.array(picture)).permute(2, 0, 1).float() / 255
+    image = read_image()
     model.eval()
     tensors = {}
     with torch.no_grad():
@@ -183,9 +182,20 @@ def export(folder, kind, model, limits, narrow):
     (folder / "config.json").write_text(json.dumps(config, indent=1) + "\n")
 
 
+def export_exact_gradients(folder, kind, model):
+    """The gradients of the same step in double precision: what single precision's own rounding is told by."""
+    tensors = training_step(model.double(), kind, read_image().double())
+    gradients = {k: v.float().contiguous() for k, v in tensors.items() if k.startswith("gradients.")}
+    save_file(gradients, folder / "exact.safetensors")
+
+
+def read_image():
+    return torch.from_numpy(np.array(Image.open(IMAGE).convert("RGB"))).permute(2, 0, 1).float() / 255
+
+
 def count_detections(model):
     model.eval()
-    image = torch.from_numpy(np.array(Image.open(IMAGE).convert("RGB"))).permute(2, 0, 1).float() / 255
+    image = read_image()
     with torch.no_grad():
         return len(model([image])[0]["scores"])
 
@@ -198,7 +208,7 @@ def randomize_until_found(model, seed, residual_gain=1.0):
 
 def training_step(model, kind, image):
     height, width = image.shape[1:]
-    boxes = torch.tensor([[90.0, 70.0, 330.0, 300.0], [300.0, 200.0, 610.0, 430.0]])
+    boxes = torch.tensor([[90.0, 70.0, 330.0, 300.0], [300.0, 200.0, 610.0, 430.0]], dtype=image.dtype)
     target = {"boxes": boxes, "labels": torch.tensor([1, 1 if kind == "keypoint" else 2])}
     if kind == "keypoint":
         # Not on the border of two cells, where rounding would decide.
@@ -207,7 +217,8 @@ def training_step(model, kind, image):
         y = boxes[:, 1, None] + steps.flip(0) ** 2 * (boxes[:, 3] - boxes[:, 1])[:, None]
         visible = torch.ones_like(x)
         visible[1, 2] = 0
-        target["keypoints"] = torch.stack([x, y, visible], 2)
+        # Taken in single precision only.
+        target["keypoints"] = torch.stack([x, y, visible], 2).float()
     if kind == "mask":
         masks = []
         for x1, y1, x2, y2 in boxes.tolist():
@@ -245,6 +256,7 @@ def main():
         model = build("keypoint", False, limits)
         randomize_until_found(model, 7, 0.2)
         export(whole, "keypoint", model, limits, False)
+        export_exact_gradients(whole, "keypoint", model)
         return
     # The committed files change with the version; the test that runs where torch is present takes any.
     assert torchvision.__version__.startswith("0.22.1"), torchvision.__version__
