@@ -24,16 +24,17 @@ pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command:
         let label = format!("held by model {}, {}", model.model, model.verified.held);
         report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
     }
-    if summary.cells.iter().any(|cell| cell.verified.held.of > 0) {
-        report = report.section(at_a_glance(summary));
-    }
+    // In the first section, whichever that is.
     let mut notice = notice(summary);
+    let mut begun = |section: Section| match notice.take() {
+        Some(notice) => section.notice(Tone::Warning, notice),
+        None => section,
+    };
+    if summary.cells.iter().any(|cell| cell.verified.held.of > 0) {
+        report = report.section(plots(summary, begun(Section::new("At a glance"))));
+    }
     for Titled { title, lead, table } in tables(summary) {
-        let mut section = Section::new(title).lead(lead);
-        if let Some(notice) = notice.take() {
-            section = section.notice(Tone::Warning, notice);
-        }
-        report = report.section(section.table(table));
+        report = report.section(begun(Section::new(title).lead(lead)).table(table));
     }
     let figures = pictures(summary, store)?;
     if !figures.is_empty() {
@@ -54,7 +55,7 @@ pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command:
 }
 
 /// Success beside the paper's, and where the attempts of each model and on each part ended.
-fn at_a_glance(summary: &Summary) -> Section {
+fn plots(summary: &Summary, section: Section) -> Section {
     let mut shares = ShareChart::new("Attempts that held the part").reference_name("the paper");
     let mut by_model = outcomes("Where attempts end, by model");
     for model in &summary.models {
@@ -71,7 +72,7 @@ fn at_a_glance(summary: &Summary) -> Section {
         let cells = summary.cells.iter().filter(|cell| cell.object == object);
         matrix.row(object.replace('_', " "), counts(cells.map(|cell| &cell.verified)))
     });
-    Section::new("At a glance")
+    section
         .lead("With the check against the demonstration; the tables below give the numbers, and those without it.")
         .shares(shares)
         .matrix(by_model)
