@@ -29,8 +29,14 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
+    /// Annotation files from one tool's format to another's
+    Annotation(AnnotationArgs),
     /// Detectron2 and torchvision checkpoints: convert, inspect, verify
     Weights(WeightsArgs),
+    /// A completion script for your shell, on standard output
+    Completions(CompletionsArgs),
+    /// Manual pages
+    Man(ManArgs),
 }
 
 /// `sdg demo`
@@ -63,7 +69,7 @@ pub struct TeachArgs {
     /// texture or outline) or S (no network: the demonstration looked for in the whole image, ready at once)
     #[arg(long, default_value = "C", value_name = "LETTER")]
     pub model: String,
-    /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
+    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
     #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
     pub demonstrations: Vec<String>,
     /// The file to write
@@ -91,6 +97,9 @@ pub struct TeachArgs {
     /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
     #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
     pub reinitialized: Vec<String>,
+    /// Folder for a page about the teaching: photo and marks, samples, curves
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -192,7 +201,7 @@ pub struct EvaluateArgs {
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
 pub struct AugmentArgs {
-    /// A photo and its annotation (LabelMe or COCO JSON); repeat for several views
+    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
     #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
     pub demonstrations: Vec<String>,
     /// Samples to write
@@ -210,6 +219,58 @@ pub struct AugmentArgs {
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
+}
+
+/// `sdg annotation`
+#[derive(Debug, ClapArgs)]
+#[command(arg_required_else_help = true)]
+pub struct AnnotationArgs {
+    /// What to do with the annotation.
+    #[command(subcommand)]
+    pub command: AnnotationCommand,
+}
+
+/// The verbs of `sdg annotation`.
+#[derive(Debug, Subcommand)]
+pub enum AnnotationCommand {
+    /// What is marked on one image, written in another format
+    Convert(ConvertAnnotationArgs),
+}
+
+/// `sdg annotation convert`
+#[derive(Debug, ClapArgs)]
+pub struct ConvertAnnotationArgs {
+    /// COCO, LabelMe, YOLO-pose (data.yaml beside or above it), OpenDR's boxes_*.npy (kps_*.npy beside it): told by content
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// The image, where IN is of several images or does not say how large its image is
+    #[arg(long, value_name = "IMAGE")]
+    pub image: Option<PathBuf>,
+    /// The format to write: coco, labelme or yolo-pose; without it, coco for .json and yolo-pose for .txt
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg completions`
+#[derive(Debug, ClapArgs)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+/// `sdg man`
+#[derive(Debug, ClapArgs)]
+pub struct ManArgs {
+    /// Write a page of every command into this folder; without it, the page of sdg goes to standard output
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// `sdg weights`
@@ -322,12 +383,15 @@ mod tests {
         for line in [
             "sdg demo",
             "sdg demo --json",
-            "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60",
+            "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60 --report r",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg evaluate",
             "sdg evaluate --models B,C --objects pendulum,rod_end --attempts 2 --seed 3 --out d --report r --json",
             "sdg augment --demo a.png:a.json --count 5 --out samples",
+            "sdg annotation convert photo.json photo.txt --image photo.png --format yolo-pose --json",
+            "sdg completions bash",
+            "sdg man --out pages",
             "sdg weights convert model.pkl model.safetensors --preset r50-detectron2 --f16 --reinit roi_heads --json",
             "sdg weights inspect model.pth --json",
             "sdg weights verify model.pkl --config c.json --image i.png --against expected.safetensors --json",

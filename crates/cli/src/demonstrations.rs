@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use anyhow::{Result, bail};
+use sdg_demonstration::{Demonstration, ImageFacts};
 
+use crate::annotation_files::AnnotationFile;
 use crate::exit::Usage;
 use crate::files;
 
@@ -16,10 +17,9 @@ pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
 fn read(argument: &str) -> Result<Demonstration> {
     let (image_path, annotation_path) = split(argument)?;
     let image = files::read_image(&image_path)?;
-    let bytes = files::read(&annotation_path, files::MOST_ANNOTATION_BYTES)?;
     let file_name = image_path.file_name().and_then(|name| name.to_str());
     let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
-    let mut objects = Annotation::read(&bytes, &facts).with_context(|| annotation_path.display().to_string())?;
+    let mut objects = AnnotationFile::read(&annotation_path)?.objects(&facts)?;
     if objects.len() != 1 {
         let labels: Vec<&str> = objects.iter().map(|object| object.label.as_str()).collect();
         bail!(

@@ -17,6 +17,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod against_truth;
+mod annotation_files;
 pub mod args;
 pub mod base_weights;
 mod commands;
@@ -31,6 +32,7 @@ mod pictures;
 pub mod rehearsal;
 mod run_page;
 pub mod shipped;
+mod teaching_page;
 mod teaching_progress;
 pub mod trial;
 
@@ -48,7 +50,10 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         Command::Augment(augment) => commands::augment::run(augment),
+        Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),
+        Command::Completions(completions) => commands::completions::run(completions),
+        Command::Man(man) => commands::man::run(man),
     };
     match done {
         Ok(outcome) => outcome.into(),

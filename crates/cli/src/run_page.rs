@@ -1,19 +1,18 @@
 //! The page of a run: what was taught, how it went, what was found, what was grasped.
 
 use anyhow::Result;
-use image::RgbImage;
-use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
-use sdg_geometry::PlanarGrasp;
-use sdg_grasp::{GraspModel, History, TaughtDemonstration, ValidationRecord};
+use sdg_demonstration::Demonstration;
+use sdg_grasp::{GraspModel, History};
 use sdg_report::{
-    Animation, AnimationOptions, Axis, Chart, Color, Figure, GallerySize, KeyFigure, Pen, Report, Section, Series,
-    Tone, attempts_table, draw_box, draw_demonstration, draw_line, median,
+    Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, median,
+    outcome_matrix,
 };
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
 use crate::machine::machine;
 use crate::rehearsal::Rehearsed;
+use crate::teaching_page::{self, FOOTER};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// What every page is made from.
@@ -42,8 +41,6 @@ pub struct TaughtHere<'a> {
 
 /// The film runs at twice the robot's speed.
 const FILM_SPEED: f64 = 2.0;
-/// Augmented samples shown.
-const SHEET: u64 = 24;
 
 /// The page of `sdg rehearse`.
 pub fn rehearsal(page: &RunPage) -> Result<Report> {
@@ -78,14 +75,16 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
                 .tone(tone),
         );
     }
-    let mut report = with_film(report, page)?.section(demonstration(page, taught)?);
+    let mut report = with_film(report, page)?.section(teaching_page::demonstration(
+        page.model,
+        std::slice::from_ref(taught.demonstration),
+        taught.seed,
+    )?);
     if let Some(history) = taught.history {
-        report = report.section(teaching(history));
+        report = report.section(teaching_page::teaching(history));
     }
     Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
 }
-
-const FOOTER: &str = "Made by sdg. This page is one file: it fetches nothing and runs no script.";
 
 fn with_key_figures(report: Report, page: &RunPage) -> Report {
     let attempts = &page.rehearsed.attempts;
@@ -115,98 +114,6 @@ fn with_film(report: Report, page: &RunPage) -> Result<Report> {
             .alt("The robot looks, moves over the part, comes down, closes its jaws and lifts the part.")
             .caption("One attempt, at twice its speed: look, hover, approach, close, lift, hold."),
     ))
-}
-
-fn demonstration(page: &RunPage, taught: &TaughtHere) -> Result<Section> {
-    let annotation = &taught.demonstration.annotation;
-    let mut marked = taught.demonstration.image.clone();
-    let grasp = annotation.grasp.map(|line| PlanarGrasp::from_line(&line, jaw_width_px(page.model)));
-    draw_demonstration(
-        &mut marked,
-        &annotation.bbox,
-        annotation.outline.as_ref(),
-        annotation.grasp.as_ref(),
-        grasp.as_ref(),
-    );
-    Ok(Section::new("Demonstration")
-        .lead("All that a person gave: a photo, a box, an outline, and a line along which to grasp.")
-        .gallery(
-            GallerySize::Large,
-            vec![
-                Figure::photo(taught.demonstration.image.clone()).caption("As the wrist camera saw it."),
-                Figure::photo(marked).caption(
-                    "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws that follow (orange).",
-                ),
-            ],
-        )
-        .captioned_gallery(
-            GallerySize::Small,
-            sheet(taught.demonstration, taught.seed)?.into_iter().map(Figure::photo).collect(),
-            "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
-             things in the way. Scenes without a box lack the part, so that the model learns to say no.",
-        ))
-}
-
-fn jaw_width_px(model: &GraspModel) -> f64 {
-    model.demonstrations().first().map_or(0.0, |TaughtDemonstration { marks, .. }| marks.width_px)
-}
-
-/// The first training samples with their marks.
-fn sheet(demonstration: &Demonstration, seed: u64) -> Result<Vec<RgbImage>> {
-    let config = AugmentationConfig::default().with_output_size(320, 240);
-    let augmenter = Augmenter::new(std::slice::from_ref(demonstration), config, seed)?;
-    Ok((0..SHEET)
-        .map(|i| {
-            let sample = augmenter.sample(i);
-            let mut drawn = sample.image;
-            for object in &sample.objects {
-                draw_box(&mut drawn, &object.bbox, &Pen::new(Color::BOX));
-                if let (Some(start), Some(end)) = (object.keypoints.first(), object.keypoints.last()) {
-                    draw_line(&mut drawn, start.point(), end.point(), &Pen::new(Color::GRASP).width(3.0));
-                }
-            }
-            drawn
-        })
-        .collect())
-}
-
-fn teaching(history: &History) -> Section {
-    let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
-        history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
-    };
-    let losses = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
-        .series(Series::new("keypoints", loss(|l| l.keypoint)).noisy())
-        .series(Series::new("class and box", loss(|l| l.cls + l.box_reg)).noisy())
-        .series(Series::new("proposals", loss(|l| l.rpn_cls + l.rpn_loc)).noisy())
-        .caption("Each step, and its running mean.");
-    let curve = |pick: fn(&ValidationRecord) -> f64| -> Vec<(f64, f64)> {
-        history.validations.iter().map(|record| (record.steps_done as f64, pick(record))).collect()
-    };
-    let kept = history.best.steps_done as f64;
-    let place = Chart::new("Held-back samples: place", Axis::new("step"), Axis::new("error").unit("px").from_zero())
-        .series(Series::new("median", curve(|r| r.validation.median_error_px)).with_markers())
-        .moment(kept, "kept")
-        .caption("The network alone, in pixels of the photo; before the demonstration is laid over.");
-    let angle = Chart::new("Held-back samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
-        .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
-        .moment(kept, "kept");
-    let found = Chart::new("Held-back samples: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
-        .series(Series::new("within 10 mm and 10°", curve(|r| 100.0 * r.validation.hit_rate())).with_markers())
-        .series(
-            Series::new(
-                "false alarms",
-                curve(|r| 100.0 * r.validation.false_alarms as f64 / r.validation.negatives.max(1) as f64),
-            )
-            .with_markers(),
-        )
-        .caption("The network alone: what is left of its false alarms, the demonstration refuses.");
-    Section::new("Teaching")
-        .lead(format!(
-            "{} steps in {:.0} s; the network with the best validation was kept.",
-            history.steps.len(),
-            history.elapsed_secs
-        ))
-        .charts(vec![losses, place, angle, found])
 }
 
 fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
@@ -239,6 +146,7 @@ fn attempts(page: &RunPage) -> Section {
             "Random poses of the part, of the robot at the start, of light, table and things lying about. Held means: \
              at least 10 cm above the table between both fingers, one second after lifting.",
         )
+        .matrix(outcome_matrix(&page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
         .table(attempts_table(&page.rehearsed.attempts).caption(
             "Where the part lay is in the robot's base frame. Errors are those of the second look, from above the part.",
         ))

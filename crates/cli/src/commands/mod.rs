@@ -1,9 +1,12 @@
 //! One file for each verb.
 
+pub mod annotation;
 pub mod augment;
+pub mod completions;
 pub mod demo;
 pub mod detect;
 pub mod evaluate;
+pub mod man;
 pub mod rehearse;
 pub mod teach;
 pub mod weights;

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::Result;
+use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
@@ -16,6 +17,7 @@ use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
 
 /// Checks everything that can be wrong before it starts to take minutes.
@@ -30,6 +32,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     files::check_writable(&args.out)?;
+    if let Some(folder) = &args.report {
+        files::prepare_folder(folder)?;
+    }
     let report = read_base_weights(args, &mut options)?;
 
     let mut progress = TeachingProgress::new(Interrupt::watch());
@@ -41,6 +46,15 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     })?;
     let bytes = taught.model.to_bytes()?;
     write_atomically(&args.out, &bytes)?;
+    let page = match &args.report {
+        Some(folder) => {
+            let command = command(args);
+            let page =
+                TeachingPage { taught: &taught, demonstrations: &demonstrations, seed: args.seed, command: &command };
+            Some(page.report()?.write(folder)?)
+        }
+        None => None,
+    };
 
     let facts = taught.model.facts();
     if args.json {
@@ -53,13 +67,41 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "teach_seconds": facts.seconds,
             "teaching": facts,
             "base_weights": report,
+            "report": page.map(|path| path.display().to_string()),
         });
         println!("{line}");
     } else {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
+        if let Some(path) = page {
+            println!("report: {}", path.display());
+        }
     }
     Ok(Outcome::Done)
+}
+
+/// The command that makes the same model again.
+fn command(args: &TeachArgs) -> String {
+    let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
+    let mut option = |name: &str, value: String| command += &format!(" --{name} {value}");
+    if let Some(steps) = args.steps {
+        option("steps", steps.to_string());
+    }
+    if let Some(secs) = args.time_budget {
+        option("time-budget", secs.to_string());
+    }
+    match args.symmetry {
+        RotationalSymmetry::None => {}
+        RotationalSymmetry::Fold(count) => option("symmetry", count.to_string()),
+        RotationalSymmetry::Full => option("symmetry", "full".to_owned()),
+    }
+    if let Some(weights) = &args.base_weights {
+        option("base-weights", weights.display().to_string());
+    }
+    args.reinitialized.iter().for_each(|part| option("reinit", part.clone()));
+    args.demonstrations.iter().for_each(|demonstration| option("demo", demonstration.clone()));
+    option("out", args.out.display().to_string());
+    command
 }
 
 /// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes

@@ -1,11 +1,13 @@
 //! The evaluation as a page.
 
 use anyhow::Result;
-use sdg_report::{Figure, GallerySize, KeyFigure, Report, Section, Tone};
+use sdg_report::{Figure, GallerySize, KeyFigure, Matrix, Report, Section, ShareChart, Step, Tone};
 
 use super::cell::Cell;
+use super::paper;
+use super::records::AttemptRecord;
 use super::store::Store;
-use super::summary::Summary;
+use super::summary::{Figures, Summary};
 use super::tables::{Titled, notice, tables};
 
 /// The tables, success at a glance, and a picture of every cell.
@@ -22,13 +24,17 @@ pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command:
         let label = format!("held by model {}, {}", model.model, model.verified.held);
         report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
     }
+    // In the first section, whichever that is.
     let mut notice = notice(summary);
+    let mut begun = |section: Section| match notice.take() {
+        Some(notice) => section.notice(Tone::Warning, notice),
+        None => section,
+    };
+    if summary.cells.iter().any(|cell| cell.verified.held.of > 0) {
+        report = report.section(plots(summary, begun(Section::new("At a glance"))));
+    }
     for Titled { title, lead, table } in tables(summary) {
-        let mut section = Section::new(title).lead(lead);
-        if let Some(notice) = notice.take() {
-            section = section.notice(Tone::Warning, notice);
-        }
-        report = report.section(section.table(table));
+        report = report.section(begun(Section::new(title).lead(lead)).table(table));
     }
     let figures = pictures(summary, store)?;
     if !figures.is_empty() {
@@ -46,6 +52,53 @@ pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command:
                 .command(command),
         )
         .footer("Made by sdg. This page is one file: it fetches nothing and runs no script."))
+}
+
+/// Success beside the paper's, and where the attempts of each model and on each part ended.
+fn plots(summary: &Summary, section: Section) -> Section {
+    let mut shares = ShareChart::new("Attempts that held the part").reference_name("the paper");
+    let mut by_model = outcomes("Where attempts end, by model");
+    for model in &summary.models {
+        let Some(percent) = model.verified.held.percent() else { continue };
+        let reference = paper::row(model.model).map(|row| row.success_percent);
+        let interval = model.verified.held_interval.map(|share| 100.0 * share);
+        shares = shares.row(model.model.letter(), percent, interval, reference);
+        by_model = by_model.row(model.model.letter(), counts([&model.verified]));
+    }
+    let mut objects: Vec<&str> = summary.cells.iter().map(|cell| cell.object.as_str()).collect();
+    objects.sort_unstable();
+    objects.dedup();
+    let by_part = objects.into_iter().fold(outcomes("Where attempts end, by part"), |matrix, object| {
+        let cells = summary.cells.iter().filter(|cell| cell.object == object);
+        matrix.row(object.replace('_', " "), counts(cells.map(|cell| &cell.verified)))
+    });
+    section
+        .lead("With the check against the demonstration; the tables below give the numbers, and those without it.")
+        .shares(shares)
+        .matrix(by_model)
+        .matrix(by_part)
+}
+
+fn outcomes(title: &str) -> Matrix {
+    let columns = steps().chain(["held"]);
+    Matrix::new(title, columns).good_column(steps().count())
+}
+
+/// Everything at which an attempt can end.
+fn steps() -> impl Iterator<Item = &'static str> {
+    [AttemptRecord::TEACH].into_iter().chain(Step::ALL.map(Step::name)).chain([AttemptRecord::SIMULATION])
+}
+
+/// How many attempts ended at each step, and how many held.
+fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
+    let mut counts = vec![0; steps().count() + 1];
+    for figures in figures {
+        for (count, step) in counts.iter_mut().zip(steps()) {
+            *count += figures.failures_by_step.get(step).copied().unwrap_or(0);
+        }
+        counts[steps().count()] += figures.held.count;
+    }
+    counts
 }
 
 fn pictures(summary: &Summary, store: &Store) -> Result<Vec<Figure>> {

@@ -1,0 +1,99 @@
+//! Annotation files on disk: some formats keep half of what they say in a file beside.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
+
+use crate::files;
+
+/// What a YOLO dataset calls the file of its labels.
+pub const DATA_YAML: &str = "data.yaml";
+/// How many folders above a label file its data.yaml may stand: labels/train/a.txt.
+const FOLDERS_UP: usize = 3;
+
+/// An annotation file that was read, with what stands beside it.
+pub struct AnnotationFile {
+    /// What the content says that it is.
+    pub format: AnnotationFormat,
+    path: PathBuf,
+    bytes: Vec<u8>,
+    beside: Option<(PathBuf, Vec<u8>)>,
+}
+
+impl AnnotationFile {
+    /// Reads a file of any format.
+    ///
+    /// # Errors
+    /// Files that cannot be read, and content of no known format.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = files::read(path, files::MOST_ANNOTATION_BYTES)?;
+        let format = AnnotationFormat::of(&bytes).with_context(|| path.display().to_string())?;
+        let beside = match beside(path, format) {
+            Some(beside) => {
+                let bytes = files::read(&beside, files::MOST_ANNOTATION_BYTES)?;
+                Some((beside, bytes))
+            }
+            None => None,
+        };
+        Ok(Self { format, path: path.to_owned(), bytes, beside })
+    }
+
+    /// What is marked on one image.
+    ///
+    /// # Errors
+    /// Whatever [`Annotation::read_with`] refuses.
+    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
+        let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
+        Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
+            Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),
+            None => self.path.display().to_string(),
+        })
+    }
+
+    /// The content of the file itself.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+/// The file that belongs to `path`, if it is there.
+fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
+    match format {
+        AnnotationFormat::OpenDr => {
+            let name = path.file_name()?.to_str()?;
+            let other = match (name.strip_prefix("boxes"), name.strip_prefix("kps")) {
+                (Some(rest), _) => format!("kps{rest}"),
+                (_, Some(rest)) => format!("boxes{rest}"),
+                _ => return None,
+            };
+            Some(path.with_file_name(other)).filter(|other| other.exists())
+        }
+        AnnotationFormat::YoloPose => {
+            path.ancestors().skip(1).take(FOLDERS_UP).map(|folder| folder.join(DATA_YAML)).find(|file| file.exists())
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn what_stands_beside_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("labels/train")).unwrap();
+        for name in ["boxes_train.npy", "kps_train.npy", "boxes_val.npy", DATA_YAML, "labels/train/a.txt"] {
+            fs::write(at(name), "").unwrap();
+        }
+        let found = |name: &str, format| beside(&at(name), format);
+        assert_eq!(found("boxes_train.npy", AnnotationFormat::OpenDr), Some(at("kps_train.npy")));
+        assert_eq!(found("kps_train.npy", AnnotationFormat::OpenDr), Some(at("boxes_train.npy")));
+        assert_eq!(found("boxes_val.npy", AnnotationFormat::OpenDr), None);
+        assert_eq!(found("labels/train/a.txt", AnnotationFormat::YoloPose), Some(at(DATA_YAML)));
+        assert_eq!(found("labels/train/a.json", AnnotationFormat::Coco), None);
+    }
+}

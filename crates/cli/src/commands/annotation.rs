@@ -1,0 +1,148 @@
+//! `sdg annotation`: annotation files from one tool's format to another's.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
+use sdg_report::write_atomically;
+use serde_json::json;
+
+use crate::annotation_files::{AnnotationFile, DATA_YAML};
+use crate::args::{AnnotationArgs, AnnotationCommand, ConvertAnnotationArgs};
+use crate::exit::{Outcome, Usage};
+use crate::files;
+
+/// Runs one of the verbs.
+pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
+    match &args.command {
+        AnnotationCommand::Convert(convert) => self::convert(convert),
+    }
+}
+
+/// What the output has no room for is told on standard error, and in the JSON.
+fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
+    let format = format_of_output(args)?;
+    if args.output.exists() && same_file(&args.input, &args.output) {
+        return Err(Usage(format!("{}: expected another file to write than to read", args.output.display())).into());
+    }
+    files::check_writable(&args.output)?;
+    let input = AnnotationFile::read(&args.input)?;
+    let (width, height, file_name) = image_of(args, &input)?;
+    let image = ImageFacts { width, height, file_name: file_name.as_deref() };
+    let objects = input.objects(&image)?;
+    let written = format.write(&image, &objects)?;
+
+    let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
+    write_atomically(&args.output, written.text.as_bytes())?;
+    for left_out in &written.left_out {
+        eprintln!("left out: {left_out}");
+    }
+    if args.json {
+        let line = json!({
+            "in": args.input.display().to_string(),
+            "in_format": input.format.name(),
+            "out": args.output.display().to_string(),
+            "out_format": format.name(),
+            "data_yaml": data_yaml.map(|path| path.display().to_string()),
+            "image": {"file_name": file_name, "width": width, "height": height},
+            "objects": objects.iter().map(|object| &object.label).collect::<Vec<_>>(),
+            "left_out": written.left_out,
+        });
+        println!("{line}");
+    } else {
+        let labels: Vec<_> = objects.iter().map(|object| object.label.as_str()).collect();
+        println!(
+            "wrote {} ({} from {}): {}",
+            args.output.display(),
+            format.name(),
+            input.format.name(),
+            labels.join(", ")
+        );
+        if let Some(path) = data_yaml {
+            println!("its labels are in {}", path.display());
+        }
+    }
+    Ok(Outcome::Done)
+}
+
+/// As asked for, or as the name's ending says.
+fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
+    let writable = AnnotationFormat::ALL.into_iter().filter(|format| *format != AnnotationFormat::OpenDr);
+    match &args.format {
+        Some(name) => writable.clone().find(|format| format.name() == name).ok_or_else(|| {
+            let names: Vec<_> = writable.map(AnnotationFormat::name).collect();
+            Usage(format!("--format: expected a format out of {}, found \"{name}\"", names.join(", "))).into()
+        }),
+        None => match args.output.extension().and_then(|ending| ending.to_str()) {
+            Some("json") => Ok(AnnotationFormat::Coco),
+            Some("txt") => Ok(AnnotationFormat::YoloPose),
+            _ => Err(Usage(format!(
+                "{}: expected a name that ends in .json (COCO) or .txt (YOLO-pose), or --format",
+                args.output.display()
+            ))
+            .into()),
+        },
+    }
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+/// Size and name of the image: the image's own, or what the file says of its only one.
+fn image_of(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Result<(u32, u32, Option<String>)> {
+    if let Some(path) = &args.image {
+        let image = files::read_image(path)?;
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        return Ok((image.width(), image.height(), name));
+    }
+    let mut declared =
+        AnnotationFormat::declared_images(input.bytes()).with_context(|| args.input.display().to_string())?;
+    match declared.len() {
+        1 => {
+            let image = declared.remove(0);
+            Ok((image.width, image.height, image.file_name))
+        }
+        0 => Err(Usage(format!(
+            "--image: {} does not say how large its image is; expected the image",
+            args.input.display()
+        ))
+        .into()),
+        several => {
+            Err(Usage(format!("--image: expected one of the {several} images of {}", args.input.display())).into())
+        }
+    }
+}
+
+/// Writes the labels beside the output. A data.yaml that is there already stays as it is and must say the same.
+fn write_data_yaml(
+    output: &Path,
+    written: &WrittenAnnotation,
+    image: &ImageFacts,
+    objects: &[Annotation],
+) -> Result<Option<PathBuf>> {
+    let Some(text) = &written.data_yaml else { return Ok(None) };
+    let path = output.with_file_name(DATA_YAML);
+    if !path.exists() {
+        write_atomically(&path, text.as_bytes())?;
+        return Ok(Some(path));
+    }
+    let there = files::read(&path, files::MOST_ANNOTATION_BYTES)?;
+    let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
+        .with_context(|| path.display().to_string())?;
+    for (found, expected) in read.iter().zip(objects) {
+        if found.label != expected.label {
+            bail!(
+                "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
+                 write into another folder",
+                path.display(),
+                expected.label,
+                found.label
+            );
+        }
+    }
+    Ok(Some(path))
+}

@@ -1,0 +1,39 @@
+//! `sdg man`: manual pages, made from the same definition as the help.
+
+use std::io::Write;
+
+use anyhow::Result;
+use clap::{Command, CommandFactory};
+use clap_mangen::Man;
+use sdg_report::write_atomically;
+
+use crate::args::{Args, ManArgs};
+use crate::exit::Outcome;
+use crate::files;
+
+/// The page of `sdg` itself to standard output, or a page of every command into a folder.
+pub fn run(args: &ManArgs) -> Result<Outcome> {
+    let mut root = Args::command().disable_help_subcommand(true);
+    root.build();
+    let Some(folder) = &args.out else {
+        std::io::stdout().lock().write_all(&render(&root)?)?;
+        return Ok(Outcome::Done);
+    };
+    files::prepare_folder(folder)?;
+    let mut commands = vec![&root];
+    let mut written = 0;
+    while let Some(command) = commands.pop() {
+        let name = Man::new(command.clone()).get_filename();
+        write_atomically(&folder.join(name), &render(command)?)?;
+        written += 1;
+        commands.extend(command.get_subcommands().filter(|command| !command.is_hide_set()));
+    }
+    println!("wrote {written} manual pages to {}", folder.display());
+    Ok(Outcome::Done)
+}
+
+fn render(command: &Command) -> Result<Vec<u8>> {
+    let mut page = Vec::new();
+    Man::new(command.clone()).render(&mut page)?;
+    Ok(page)
+}
