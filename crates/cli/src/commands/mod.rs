@@ -1,5 +1,6 @@
 //! One file for each verb.
 
+pub mod annotate;
 pub mod augment;
 pub mod demo;
 pub mod detect;
