@@ -8,7 +8,7 @@ const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
   ["C", "Keypoints", "The best all-round. Some two minutes on two cores."],
-  ["S", "Instant", "No network: looks for the photo’s part itself. Ready at once; weaker when the part is partly hidden."],
+  ["S", "Instant", "No network: looks for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
   ["A", "Box and turn", "A box, and its turn from what is in it. Some three minutes."],
   ["B", "Box and keypoints", "As C, but goes to the middle of the box. Some two minutes."],
   ["D", "Mask", "Texture or outline of what a mask shows. Some three minutes; needs the outline."],
@@ -113,7 +113,8 @@ function renderOutcome(news) {
   outcome.classList.toggle("good", news.status === "done");
   let text = "";
   if (news.status === "done" && summary) {
-    const found = summary.hit_rate === null ? "" : ` It finds ${percent(summary.hit_rate)} of new samples, off by ${summary.error_px.toFixed(1)} px and ${summary.error_degrees.toFixed(1)}°.`;
+    const off = summary.error_px === null ? "" : `, off by ${summary.error_px.toFixed(1)} px and ${summary.error_degrees.toFixed(1)}°`;
+    const found = summary.hit_rate === null ? "" : ` It finds ${percent(summary.hit_rate)} of new samples${off}.`;
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}.${found} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;
