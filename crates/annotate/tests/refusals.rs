@@ -32,7 +32,7 @@ fn wrong_and_missing_tokens_are_refused_everywhere() {
         ("POST", "/api/scenes?name=a.png"),
         ("GET", "/nowhere"),
     ] {
-        for headers in [vec![("Host", host.as_str())], vec![("Host", &host), ("Cookie", &wrong)]] {
+        for headers in [vec![("Host", host.as_str())], vec![("Host", host.as_str()), ("Cookie", wrong.as_str())]] {
             let answer = served.send(method, path, &headers, b"{}");
             assert_eq!(answer.status, 401, "{method} {path}");
             assert!(!answer.head.to_lowercase().contains("set-cookie"), "{method} {path}");
@@ -45,10 +45,13 @@ fn foreign_hosts_and_origins_are_refused_though_they_have_the_token() {
     let served = Served::start();
     let (host, cookie) = (served.host(), served.cookie());
     for foreign in ["evil.example", "127.0.0.1:1", "evil.example:80"] {
-        assert_eq!(served.send("GET", "/api/session", &[("Host", foreign), ("Cookie", &cookie)], b"").status, 403);
+        assert_eq!(
+            served.send("GET", "/api/session", &[("Host", foreign), ("Cookie", cookie.as_str())], b"").status,
+            403
+        );
     }
     for foreign in ["http://evil.example", "null", "http://127.0.0.1:1"] {
-        let headers = [("Host", host.as_str()), ("Cookie", &cookie), ("Origin", foreign)];
+        let headers = [("Host", host.as_str()), ("Cookie", cookie.as_str()), ("Origin", foreign)];
         let answer = served.send("PUT", "/api/images/0/marks", &headers, b"{\"box\": [1, 1, 50, 50]}");
         assert_eq!(answer.status, 403, "{foreign}");
     }

@@ -95,7 +95,7 @@ fn a_teaching_tells_its_news_and_ends_when_asked() {
     assert!(news["error"].as_str().unwrap().contains("stopped"), "{news}");
     let losses = news["losses"].as_array().unwrap();
     assert!((100..=240).contains(&losses.len()), "{} points", losses.len());
-    let [step, loss] = [0, 1].map(|i| losses.last().unwrap()[i].as_f64().unwrap());
+    let [step, loss] = [0usize, 1].map(|i| losses.last().unwrap()[i].as_f64().unwrap());
     assert!((loss - 1.0 / step).abs() < 1e-12);
     assert!(!served.folder.path().join("part.sdg").exists());
 }

@@ -166,7 +166,12 @@ impl Served {
     pub fn ask(&self, method: &str, path: &str, body: &[u8]) -> Answer {
         let (host, cookie) = (self.host(), self.cookie());
         let origin = format!("http://{host}");
-        self.send(method, path, &[("Host", &host), ("Cookie", &cookie), ("Origin", &origin)], body)
+        self.send(
+            method,
+            path,
+            &[("Host", host.as_str()), ("Cookie", cookie.as_str()), ("Origin", origin.as_str())],
+            body,
+        )
     }
 }
 

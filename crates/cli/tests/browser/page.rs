@@ -132,7 +132,7 @@ impl Page {
 }
 
 fn numbers(value: &Value) -> [f64; 2] {
-    [0, 1].map(|i| value[i].as_f64().unwrap())
+    [0usize, 1].map(|i| value[i].as_f64().unwrap())
 }
 
 impl Drop for Page {
