@@ -164,6 +164,12 @@ function draggingGripper(data, from) {
   return correcting((to) => setGripper({ ...gripper, center: add(gripper.center, sub(to, from)) }));
 }
 
+/** The handle of the outline's point nearest to a place: where points are close, their handles overlap. */
+function nearestVertex(place) {
+  const distances = marks().outline.map((point) => norm(sub(point, place)));
+  return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
+}
+
 /** What a pointer that goes down begins. */
 function begin(event, at) {
   const from = toPhoto(at);
@@ -173,10 +179,11 @@ function begin(event, at) {
     return { move() {}, end: () => closeOutline(state.draft.points) };
   }
   if (taken && state.tool === "select") {
-    const { dataset } = taken;
+    const handle = taken.dataset.vertex === undefined ? taken : nearestVertex(from);
+    const { dataset } = handle;
     state.selected = dataset.kind;
     state.vertex = null;
-    if (taken.tabIndex >= 0) taken.focus({ preventScroll: true });
+    if (handle.tabIndex >= 0) handle.focus({ preventScroll: true });
     if (dataset.kind === "box") return draggingBox(dataset.edge, from);
     if (dataset.kind === "grasp") return draggingGripper(dataset, from);
     return "line" in dataset ? draggingLine(from) : draggingVertex(Number(dataset.vertex));
