@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test lint bench clean
+.PHONY: help setup build demo test test-browser lint bench clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -28,6 +28,12 @@ test: setup ## Runs every test
 	else \
 		$(CARGO) test $(PROFILE) --locked --workspace; \
 	fi
+
+# Tests marked as needing Chromium; screenshots stay in target/browser-test.
+test-browser: build ## Tests our pages in headless Chromium
+	@scripts/install.sh chromium chromium-driver
+	@scripts/axe.sh
+	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
 
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check

@@ -19,6 +19,8 @@ pub struct Args {
 pub enum Command {
     /// The main job on shipped input: teach one object from one photo, then grasp it in simulation
     Demo(DemoArgs),
+    /// Mark the grasp on photos in the browser, see what will be learnt, teach and try
+    Annotate(AnnotateArgs),
     /// Demonstrations to a grasp model in one file
     Teach(TeachArgs),
     /// Planar grasps in images
@@ -58,6 +60,33 @@ pub struct DemoArgs {
     #[arg(long, default_value = "report", value_name = "DIR")]
     pub out: PathBuf,
     /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg annotate`
+#[derive(Debug, ClapArgs)]
+pub struct AnnotateArgs {
+    /// Photos of one part, PNG or JPEG. Marks are read from and written to the file of the same name with .json, or
+    /// to ANNOTATION; another tool's file is read and left as it is
+    #[arg(required = true, value_name = "IMAGE[:ANNOTATION]")]
+    pub images: Vec<String>,
+    /// A picture, or a folder of pictures, to try the taught model on; repeat for several. The page takes more
+    #[arg(long = "try", value_name = "PATH")]
+    pub scenes: Vec<PathBuf>,
+    /// Where a model taught on the page is written; without it, beside the first photo under the part's name
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Port on 127.0.0.1; without it, any that is free
+    #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
+    pub port: u16,
+    /// Network, training and augmentation
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Print the address and leave the browser to you
+    #[arg(long)]
+    pub no_browser: bool,
+    /// Print the address as one JSON object
     #[arg(long)]
     pub json: bool,
 }
@@ -383,6 +412,8 @@ mod tests {
         for line in [
             "sdg demo",
             "sdg demo --json",
+            "sdg annotate photo.png",
+            "sdg annotate a.png b.png:b.json --try table --out m.sdg --port 8080 --no-browser --json",
             "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60 --report r",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",

@@ -33,7 +33,7 @@ fn read(argument: &str) -> Result<Demonstration> {
 }
 
 /// Splits at a colon. Paths may have colons of their own: of several, the one between two files that exist.
-fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
+pub fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let splits: Vec<(PathBuf, PathBuf)> = argument
         .match_indices(':')
         .map(|(at, _)| (argument[..at].into(), argument[at + 1..].into()))

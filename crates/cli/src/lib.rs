@@ -28,6 +28,7 @@ mod exit;
 mod files;
 mod interrupt;
 mod machine;
+mod page_teacher;
 mod pictures;
 pub mod rehearsal;
 mod run_page;
@@ -45,6 +46,7 @@ use crate::exit::Outcome;
 pub fn run(args: &Args) -> ExitCode {
     let done = match &args.command {
         Command::Demo(demo) => commands::demo::run(demo),
+        Command::Annotate(annotate) => commands::annotate::run(annotate),
         Command::Teach(teach) => commands::teach::run(teach),
         Command::Detect(detect) => commands::detect::run(detect),
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),

@@ -125,6 +125,24 @@ fn a_folder_that_cannot_be_written_is_told_before_the_work() {
 }
 
 #[test]
+fn the_annotation_page_does_not_open_on_what_cannot_be_marked() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = folder.path().join("photo.png");
+    fs::copy(shipped("image.png"), &photo).unwrap();
+    let photo = photo.to_str().unwrap();
+    assert_refused(&["annotate", "/nowhere/photo.png"], 1, &["/nowhere", "cannot"]);
+    let text = folder.path().join("text.png");
+    fs::write(&text, "not a picture").unwrap();
+    assert_refused(&["annotate", photo, text.to_str().unwrap()], 1, &["text.png", "PNG or JPEG"]);
+    assert_refused(&["annotate", photo, "--try", "/nowhere"], 1, &["/nowhere", "cannot read"]);
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    assert_refused(&["annotate", "--no-browser", "--port", &port, photo], 1, &["127.0.0.1", &port]);
+    fs::write(folder.path().join("photo.json"), "{\"shapes\": [}").unwrap();
+    assert_refused(&["annotate", photo], 1, &["photo.json", "not JSON"]);
+}
+
+#[test]
 fn results_of_other_settings_are_not_mixed() {
     let folder = tempfile::tempdir().unwrap();
     let settings = Settings {
@@ -151,6 +169,9 @@ fn wrong_usage_is_exit_code_2() {
     for arguments in [
         vec![],
         vec!["fly"],
+        vec!["annotate"],
+        vec!["annotate", "photo.png", "--preset", "huge"],
+        vec!["annotate", "photo.png", "--port", "70000"],
         vec!["teach", "--out", "m.sdg"],
         vec!["teach", "--demo", "only-an-image.png", "--out", "m.sdg"],
         vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--model", "Z"],

@@ -123,7 +123,12 @@ fn drawn_part() -> Demonstration {
         }
     });
     let grasp = GraspLine::new(Point2::new(325.0, 233.0), Point2::new(400.0, 248.0));
-    let annotation =
-        Annotation { label: "lever".into(), bbox: outline.bounds(), grasp: Some(grasp), outline: Some(outline) };
+    let annotation = Annotation {
+        label: "lever".into(),
+        bbox: outline.bounds(),
+        grasp: Some(grasp),
+        jaw_width: None,
+        outline: Some(outline),
+    };
     Demonstration { image, annotation }
 }

@@ -21,6 +21,8 @@ pub struct Annotation {
     pub bbox: BoundingBox,
     /// The two points of the grasp, if marked.
     pub grasp: Option<GraspLine>,
+    /// How far apart the jaws are where they close on the part, in pixels, if marked; without it, the outline tells.
+    pub jaw_width: Option<f64>,
     /// The outline, if drawn.
     pub outline: Option<Polygon>,
 }
@@ -106,6 +108,7 @@ pub(crate) struct Draft {
     pub corners: Option<(Vec<Point2<f64>>, String)>,
     pub grasp_start: Option<(Point2<f64>, String)>,
     pub grasp_end: Option<(Point2<f64>, String)>,
+    pub jaw_width: Option<(f64, String)>,
     pub outline: Option<(Vec<Point2<f64>>, String)>,
 }
 
@@ -143,8 +146,9 @@ impl Draft {
                 });
             }
         };
+        let jaw_width = self.jaw_width.map(|(width, place)| check_jaw_width(width, place, image)).transpose()?;
         let label = self.label.filter(|label| !label.is_empty()).unwrap_or_else(|| "object".into());
-        Ok(Annotation { label, bbox, grasp, outline })
+        Ok(Annotation { label, bbox, grasp, jaw_width, outline })
     }
 }
 
@@ -172,6 +176,23 @@ fn check_box(corners: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result
             expected: "a box of at least 1×1 pixels".into(),
             found: "one without width or height".into(),
         })
+}
+
+/// No part is wider than the image's diagonal.
+fn check_jaw_width(width: f64, place: String, image: &ImageFacts) -> Result<f64> {
+    if !width.is_finite() {
+        return Err(Error::NotFinite { place, found: width.to_string() });
+    }
+    let most = f64::from(image.width).hypot(f64::from(image.height));
+    if (LEAST_EXTENT_PX..=most).contains(&width) {
+        Ok(width)
+    } else {
+        Err(Error::Malformed {
+            place,
+            expected: format!("jaws {LEAST_EXTENT_PX} to {most:.0} pixels apart"),
+            found: width.to_string(),
+        })
+    }
 }
 
 fn check_outline(points: &[Point2<f64>], place: &str, image: &ImageFacts) -> Result<Polygon> {

@@ -1,5 +1,7 @@
 //! COCO JSON, the canonical annotation: `bbox` xywh, `keypoints` x y v named `grasp_start` and `grasp_end`,
-//! `segmentation` polygons. Coordinates are this project's: the centre of the first pixel is (0.5, 0.5).
+//! `segmentation` polygons; under `attributes`, where CVAT keeps what COCO has no field for, `jaw_width` in pixels and
+//! `grasp_offset`, the grasp's middle seen from the box's. Coordinates are this project's: the centre of the first pixel
+//! is (0.5, 0.5).
 
 use nalgebra::Point2;
 use serde_json::{Value, json};
@@ -89,6 +91,11 @@ fn read_object(node: &Node, categories: &[Node], image: &ImageFacts) -> Result<A
     }
     if let Some(keypoints) = node.optional("keypoints")?.filter(not_empty_list) {
         read_keypoints(&keypoints, category, &mut draft)?;
+    }
+    if let Some(attributes) = node.optional("attributes")?.filter(|attributes| attributes.value.is_object())
+        && let Some(width) = attributes.optional("jaw_width")?
+    {
+        draft.jaw_width = Some((width.number()?, width.place));
     }
     if let Some(segmentation) = node.optional("segmentation")?.filter(not_empty_list) {
         if segmentation.value.is_object() {
@@ -204,6 +211,18 @@ impl CocoFile {
                 .map(|(i, &value)| if i % 3 == 2 { json!(value as u8) } else { json!(value) })
                 .collect();
             annotation["num_keypoints"] = json!(if object.grasp.is_some() { 2 } else { 0 });
+            let mut attributes = serde_json::Map::new();
+            if let Some(width) = object.jaw_width {
+                attributes.insert("jaw_width".into(), json!(width));
+            }
+            if let Some(line) = &object.grasp {
+                // For people and other programs: it follows from box and keypoints, and is not read.
+                let offset = line.center() - object.bbox.center();
+                attributes.insert("grasp_offset".into(), json!([offset.x, offset.y]));
+            }
+            if !attributes.is_empty() {
+                annotation["attributes"] = attributes.into();
+            }
             self.annotations.push(annotation);
         }
     }
@@ -235,6 +254,7 @@ mod tests {
             label: "pendulum".into(),
             bbox: BoundingBox { x1: 100.0, y1: 80.25, x2: 300.5, y2: 260.0 },
             grasp: Some(GraspLine::new(Point2::new(150.5, 120.0), Point2::new(250.0, 220.0))),
+            jaw_width: Some(42.5),
             outline: Some(Polygon {
                 vertices: vec![Point2::new(110.0, 90.0), Point2::new(290.0, 95.5), Point2::new(200.0, 250.0)],
             }),
@@ -264,13 +284,14 @@ mod tests {
         assert_eq!(annotation["bbox"], json!([100.0, 80.25, 200.5, 179.75]));
         assert_eq!(annotation["keypoints"], json!([150.5, 120.0, 2, 250.0, 220.0, 2]));
         assert_eq!(annotation["segmentation"], json!([[110.0, 90.0, 290.0, 95.5, 200.0, 250.0]]));
+        assert_eq!(annotation["attributes"], json!({"jaw_width": 42.5, "grasp_offset": [0.0, -0.125]}));
         assert_eq!(value["categories"][0]["keypoints"], json!(["grasp_start", "grasp_end"]));
     }
 
     #[test]
     fn one_of_several_images_is_chosen_by_name() {
         let mut file = CocoFile::new();
-        let other = Annotation { label: "rod".into(), grasp: None, outline: None, ..pendulum() };
+        let other = Annotation { label: "rod".into(), grasp: None, jaw_width: None, outline: None, ..pendulum() };
         file.push_image("a.png", 640, 480, &[pendulum()]);
         file.push_image("b.png", 640, 480, std::slice::from_ref(&other));
         let value: Value = serde_json::from_str(&file.to_json()).unwrap();
@@ -294,7 +315,12 @@ mod tests {
     #[test]
     fn each_fault_is_named_with_its_place() {
         let annotation = |v: &mut Value, field: &str, value: Value| v["annotations"][0][field] = value;
-        let cases: [(String, &str); 13] = [
+        let cases: [(String, &str); 15] = [
+            (
+                message(|v| annotation(v, "attributes", json!({"jaw_width": "wide"}))),
+                "attributes.jaw_width: expected a n",
+            ),
+            (message(|v| annotation(v, "attributes", json!({"jaw_width": -3}))), "expected jaws 1 to 800 pixels apart"),
             (message(|v| v["images"][0]["width"] = json!(1280)), "made on 1280×480"),
             (message(|v| annotation(v, "bbox", json!([1, 2, 0, 5]))), "annotations[0].bbox: expected a positive width"),
             (message(|v| annotation(v, "bbox", json!([1, 2, 5]))), "annotations[0].bbox: expected four numbers"),
@@ -325,6 +351,7 @@ mod tests {
                 label: "part".into(),
                 bbox,
                 grasp: Some(GraspLine::new(Point2::new(x, y), Point2::new(x + w, y + h))),
+                jaw_width: with_outline.then_some(h),
                 outline: with_outline.then(|| Polygon::from_box(&bbox)),
             };
             let mut file = CocoFile::new();
@@ -336,6 +363,8 @@ mod tests {
             let (grasp, wanted) = (read.grasp.unwrap(), made.grasp.unwrap());
             prop_assert!(close(grasp.start, wanted.start) && close(grasp.end, wanted.end));
             prop_assert_eq!(read.outline.is_some(), with_outline);
+            prop_assert_eq!(read.jaw_width.is_some(), with_outline);
+            prop_assert!(read.jaw_width.is_none_or(|width| (width - h).abs() < 1e-9));
             for (&a, b) in read.outline.iter().flat_map(|o| &o.vertices).zip(bbox.corners()) {
                 prop_assert!(close(a, b));
             }

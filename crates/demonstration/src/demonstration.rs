@@ -64,7 +64,7 @@ impl Demonstration {
     /// # Errors
     /// An annotation outside the image, without extent, not finite.
     pub fn check(&self) -> Result<()> {
-        let Annotation { label, bbox, grasp, outline } = &self.annotation;
+        let Annotation { label, bbox, grasp, jaw_width, outline } = &self.annotation;
         let place = |what: &str| format!("{what} of `{label}`");
         let draft = Draft {
             label: Some(label.clone()),
@@ -72,6 +72,7 @@ impl Demonstration {
             corners: Some((bbox.corners().to_vec(), place("box"))),
             grasp_start: grasp.map(|line| (line.start, place("grasp"))),
             grasp_end: grasp.map(|line| (line.end, place("grasp"))),
+            jaw_width: jaw_width.map(|width| (width, place("jaw width"))),
             outline: outline.as_ref().map(|outline| (outline.vertices.clone(), place("outline"))),
         };
         let facts = ImageFacts { width: self.image.width(), height: self.image.height(), file_name: None };

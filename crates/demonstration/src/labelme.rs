@@ -51,6 +51,8 @@ struct Shape {
     label: String,
     group: Option<String>,
     points: Vec<Point2<f64>>,
+    /// Of the grasp's start alone: LabelMe keeps fields that it does not know.
+    jaw_width: Option<(f64, String)>,
     place: String,
 }
 
@@ -91,7 +93,11 @@ impl Shape {
         if points.len() < least_points {
             return Err(points_node.malformed(format!("at least {least_points} points for a {shape_type}")));
         }
-        Ok(Self { kind, label, group, points, place: node.place.clone() })
+        let jaw_width = match node.optional("jaw_width")? {
+            Some(width) if matches!(kind, Kind::GraspStart) => Some((width.number()?, width.place)),
+            _ => None,
+        };
+        Ok(Self { kind, label, group, points, jaw_width, place: node.place.clone() })
     }
 }
 
@@ -109,7 +115,10 @@ fn object(shapes: Vec<Shape>, image: &ImageFacts) -> Result<Annotation> {
                 outline_label = Some(shape.label);
                 draft.outline.replace((shape.points, shape.place.clone())).is_some()
             }
-            Kind::GraspStart => draft.grasp_start.replace((shape.points[0], shape.place.clone())).is_some(),
+            Kind::GraspStart => {
+                draft.jaw_width = shape.jaw_width;
+                draft.grasp_start.replace((shape.points[0], shape.place.clone())).is_some()
+            }
             Kind::GraspEnd => draft.grasp_end.replace((shape.points[0], shape.place.clone())).is_some(),
         };
         if twice {
@@ -153,6 +162,12 @@ pub(crate) fn write(file_name: &str, image: &ImageFacts, objects: &[Annotation])
         }
         if let Some(outline) = &object.outline {
             push(&object.label, "polygon", &outline.vertices);
+        }
+        if let (Some(_), Some(width)) = (&object.grasp, object.jaw_width) {
+            let start = shapes.iter_mut().rfind(|shape: &&mut Value| shape["label"] == "grasp_start");
+            if let Some(start) = start {
+                start["jaw_width"] = json!(width);
+            }
         }
     }
     let file = json!({
@@ -291,9 +306,10 @@ mod tests {
                 label: "rod \"end\"".into(),
                 bbox,
                 grasp: whole.then(|| GraspLine::new(Point2::new(x, y + h), Point2::new(x + w, y))),
+                jaw_width: whole.then_some(h),
                 outline: whole.then(|| Polygon::from_box(&bbox)),
             };
-            let second = Annotation { label: "other".into(), grasp: None, ..first.clone() };
+            let second = Annotation { label: "other".into(), grasp: None, jaw_width: None, ..first.clone() };
             for marked in [vec![first.clone()], vec![first, second]] {
                 let written = AnnotationFormat::LabelMe.write(&IMAGE, &marked).unwrap();
                 prop_assert!(written.left_out.is_empty());
@@ -303,6 +319,8 @@ mod tests {
                     prop_assert_eq!(&found.label, &expected.label);
                     prop_assert!(points(found).zip(points(expected)).all(|(a, b)| (a - b).norm() < 1e-9));
                     prop_assert_eq!(points(found).count(), points(expected).count());
+                    prop_assert_eq!(found.jaw_width.is_some(), expected.jaw_width.is_some());
+                    prop_assert!(found.jaw_width.is_none_or(|width| (width - h).abs() < 1e-9));
                 }
             }
         }

@@ -171,6 +171,12 @@ pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnota
                 outline.vertices.len()
             ));
         }
+        if let Some(width) = object.jaw_width {
+            left_out.push(format!(
+                "the jaws of `{}`, {width} pixels apart: a YOLO-pose line has a box and keypoints only",
+                object.label
+            ));
+        }
     }
     let data_yaml = DataYaml { names, keypoint_shape: Some([2, 3]) }.to_text();
     WrittenAnnotation { text, data_yaml: Some(data_yaml), left_out }
@@ -238,10 +244,17 @@ mod tests {
     #[test]
     fn an_outline_is_left_out_aloud() {
         let bbox = BoundingBox { x1: 10.0, y1: 20.0, x2: 110.0, y2: 220.0 };
-        let marked = Annotation { label: "rod".into(), bbox, grasp: None, outline: Some(Polygon::from_box(&bbox)) };
+        let marked = Annotation {
+            label: "rod".into(),
+            bbox,
+            grasp: None,
+            jaw_width: Some(30.0),
+            outline: Some(Polygon::from_box(&bbox)),
+        };
         let written = AnnotationFormat::YoloPose.write(&IMAGE, &[marked]).unwrap();
-        assert_eq!(written.left_out.len(), 1);
+        assert_eq!(written.left_out.len(), 2);
         assert!(written.left_out[0].contains("outline of `rod` (4 points)"), "{:?}", written.left_out);
+        assert!(written.left_out[1].contains("the jaws of `rod`, 30 pixels apart"), "{:?}", written.left_out);
     }
 
     proptest! {
@@ -250,8 +263,8 @@ mod tests {
             let bbox = BoundingBox { x1: x, y1: y, x2: x + w, y2: y + h };
             let grasp = (!graspless).then(|| GraspLine::new(Point2::new(x, y + h), Point2::new(x + w, y)));
             let marked = [
-                Annotation { label: "rod end: left".into(), bbox, grasp, outline: None },
-                Annotation { label: "it's".into(), bbox, grasp: None, outline: None },
+                Annotation { label: "rod end: left".into(), bbox, grasp, jaw_width: None, outline: None },
+                Annotation { label: "it's".into(), bbox, grasp: None, jaw_width: None, outline: None },
             ];
             let written = AnnotationFormat::YoloPose.write(&IMAGE, &marked).unwrap();
             let yaml = written.data_yaml.as_deref().map(str::as_bytes);

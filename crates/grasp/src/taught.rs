@@ -28,7 +28,7 @@ pub struct TaughtMarks {
     pub grasp: GraspLine,
     /// The outline, if it was drawn.
     pub outline: Option<Polygon>,
-    /// The part's width between the jaws, measured across the outline.
+    /// The part's width between the jaws: as marked, or measured across the outline.
     pub width_px: f64,
     /// Width and height of the photo that the cut-out is from; files of older versions do not tell.
     #[serde(default)]
@@ -53,7 +53,7 @@ impl TaughtDemonstration {
     /// # Errors
     /// No grasp marked, or nothing in the outline to compare.
     pub fn new(demonstration: &Demonstration) -> Result<Self, GraspError> {
-        let Annotation { label, bbox, outline, .. } = &demonstration.annotation;
+        let Annotation { label, bbox, jaw_width, outline, .. } = &demonstration.annotation;
         let grasp = *demonstration.annotation.require_grasp()?;
         let (width, height) = demonstration.image.dimensions();
         let cut = BoundingBox {
@@ -81,7 +81,7 @@ impl TaughtDemonstration {
         let bbox = BoundingBox { x1: upper_left.x, y1: upper_left.y, x2: lower_right.x, y2: lower_right.y };
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
-        let width_px = decimal(width_across(&grasp, outline.as_ref(), &bbox));
+        let width_px = decimal(jaw_width.unwrap_or_else(|| width_across(&grasp, outline.as_ref(), &bbox)));
         Self::from_parts(
             cutout,
             TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px, photo_size: Some([width, height]) },

@@ -116,7 +116,13 @@ mod tests {
         let bbox = outline.bounds();
         Demonstration {
             image,
-            annotation: Annotation { label: "L".into(), bbox, grasp: Some(grasp), outline: Some(outline) },
+            annotation: Annotation {
+                label: "L".into(),
+                bbox,
+                grasp: Some(grasp),
+                jaw_width: None,
+                outline: Some(outline),
+            },
         }
     }
 

@@ -1,5 +1,6 @@
 //! One file for each verb.
 
+pub mod annotate;
 pub mod annotation;
 pub mod augment;
 pub mod completions;

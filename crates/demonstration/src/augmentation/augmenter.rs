@@ -86,6 +86,7 @@ impl SampleObject {
             label: label.into(),
             bbox: self.bbox,
             grasp,
+            jaw_width: None,
             outline: outline.filter(|outline| outline.vertices.len() >= 3),
         }
     }

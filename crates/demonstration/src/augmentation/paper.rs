@@ -93,8 +93,13 @@ mod tests {
     fn prepared(output: [u32; 2]) -> Prepared {
         let image = RgbImage::from_fn(200, 150, |x, y| Rgb([(x + 40) as u8, (y + 90) as u8, (x / 2 + y) as u8]));
         let bbox = BoundingBox { x1: 60.0, y1: 50.0, x2: 140.0, y2: 100.0 };
-        let annotation =
-            Annotation { label: "part".into(), bbox, grasp: None, outline: Some(Polygon::from_box(&bbox)) };
+        let annotation = Annotation {
+            label: "part".into(),
+            bbox,
+            grasp: None,
+            jaw_width: None,
+            outline: Some(Polygon::from_box(&bbox)),
+        };
         Prepared::new(&Demonstration { image, annotation }, output, &mut sample_rng(1, Stream::Preparation, 0))
     }
 

@@ -31,7 +31,10 @@ fn demonstration(with_outline: bool) -> Demonstration {
     });
     let bbox = outline.bounds();
     let outline = with_outline.then_some(outline);
-    Demonstration { image, annotation: Annotation { label: "L".into(), bbox, grasp: Some(grasp), outline } }
+    Demonstration {
+        image,
+        annotation: Annotation { label: "L".into(), bbox, grasp: Some(grasp), jaw_width: None, outline },
+    }
 }
 
 fn augmenter(style: SceneStyle) -> Augmenter {

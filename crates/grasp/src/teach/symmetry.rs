@@ -72,7 +72,7 @@ mod tests {
     fn square() -> Demonstration {
         let bbox = BoundingBox { x1: 60.0, y1: 40.0, x2: 120.0, y2: 100.0 };
         let grasp = Some(GraspLine::new(Point2::new(110.0, 60.0), Point2::new(110.0, 80.0)));
-        let annotation = Annotation { label: "square".into(), bbox, grasp, outline: None };
+        let annotation = Annotation { label: "square".into(), bbox, grasp, jaw_width: None, outline: None };
         Demonstration { image: RgbImage::new(180, 140), annotation }
     }
 

@@ -28,7 +28,8 @@ pub(super) fn demonstration() -> Demonstration {
         Rgb(if mask.get(x, y) { part } else { [table, table, 70] })
     });
     let grasp = Some(GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0)));
-    let annotation = Annotation { label: "L".into(), bbox: outline.bounds(), grasp, outline: Some(outline) };
+    let annotation =
+        Annotation { label: "L".into(), bbox: outline.bounds(), grasp, jaw_width: None, outline: Some(outline) };
     Demonstration { image, annotation }
 }
 

@@ -119,7 +119,8 @@ mod tests {
         });
         let bbox = BoundingBox { x1: 110.0, y1: 105.0, x2: 210.0, y2: 135.0 };
         let grasp = Some(GraspLine::new([120.0, 120.0].into(), [200.0, 120.0].into()));
-        let annotation = Annotation { label: "bar".into(), bbox, grasp, outline: Some(Polygon::from_box(&bbox)) };
+        let annotation =
+            Annotation { label: "bar".into(), bbox, grasp, jaw_width: None, outline: Some(Polygon::from_box(&bbox)) };
         Demonstration { image, annotation }
     }
 

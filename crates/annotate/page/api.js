@@ -1,0 +1,47 @@
+// Requests to the server, whose errors come as one line for people.
+
+/** A failed request; `message` is fit to be shown. `lost` when the server did not answer at all. */
+export class RequestError extends Error {
+  constructor(message, lost = false) {
+    super(message);
+    this.lost = lost;
+  }
+}
+
+async function send(method, path, body, options = {}) {
+  let response;
+  try {
+    response = await fetch(path, { method, body, ...options });
+  } catch {
+    throw new RequestError("No answer from sdg annotate. Is it still running in the terminal?", true);
+  }
+  if (response.ok) return response.json();
+  if (response.status === 413) throw new RequestError("That is too large to be taken.");
+  const text = await response.text();
+  let message = text.trim() || `The server answered ${response.status}.`;
+  try {
+    message = JSON.parse(text).error ?? message;
+  } catch {
+    // Refusals by the guard are plain text.
+  }
+  throw new RequestError(message);
+}
+
+const json = (method, path, value, options) => send(method, path, JSON.stringify(value), options);
+
+export const api = {
+  session: () => send("GET", "/api/session"),
+  rename: (label) => json("PUT", "/api/label", { label }),
+  // `keepalive`: marks made just before the page is closed are saved, too.
+  saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: true }),
+  proposeOutline: (id, box) => json("POST", `/api/images/${id}/outline`, { box }),
+  imageUrl: (id) => `/api/images/${id}/picture`,
+  sampleUrl: (id, index, seed, revision) => `/api/images/${id}/samples/${index}?seed=${seed}&revision=${revision}`,
+  teach: (request) => json("POST", "/api/teaching", request),
+  teaching: () => send("GET", "/api/teaching"),
+  stopTeaching: () => send("DELETE", "/api/teaching"),
+  addScene: (file) => send("POST", `/api/scenes?name=${encodeURIComponent(file.name)}`, file),
+  sceneUrl: (id) => `/api/scenes/${id}/picture`,
+  detect: (id) => send("POST", `/api/scenes/${id}/detect`),
+  accept: (id, marks) => json("POST", `/api/scenes/${id}/accept`, marks),
+};

@@ -1,0 +1,89 @@
+// Plane geometry in pixels of the photo: x right, y down. Points are [x, y].
+
+export const add = ([ax, ay], [bx, by]) => [ax + bx, ay + by];
+export const sub = ([ax, ay], [bx, by]) => [ax - bx, ay - by];
+export const times = ([x, y], k) => [x * k, y * k];
+export const dot = ([ax, ay], [bx, by]) => ax * bx + ay * by;
+export const norm = ([x, y]) => Math.hypot(x, y);
+export const direction = (radians) => [Math.cos(radians), Math.sin(radians)];
+/** A quarter turn on, clockwise as seen: from along the jaws to across them. */
+export const quarter = ([x, y]) => [-y, x];
+export const clamp = (value, least, most) => Math.min(Math.max(value, least), most);
+
+/** The gripper that marks describe: its middle, its turn in radians, how wide its jaws are and how far apart. */
+export function gripperOf({ start, end, jaw_width }) {
+  const line = sub(end, start);
+  return { center: times(add(start, end), 0.5), angle: Math.atan2(line[1], line[0]), length: norm(line), width: jaw_width };
+}
+
+/** The marks of a gripper, with its ends kept inside a photo of `size`: the jaws grow shorter where they must. */
+export function graspOf({ center, angle, length, width }, size) {
+  const middle = [clamp(center[0], 1, size[0] - 1), clamp(center[1], 1, size[1] - 1)];
+  const along = direction(angle);
+  const inside = ([x, y]) => x >= 0 && y >= 0 && x <= size[0] && y <= size[1];
+  let half = Math.max(length, 2) / 2;
+  while (half > 1 && !(inside(add(middle, times(along, half))) && inside(sub(middle, times(along, half))))) half *= 0.97;
+  const most = Math.hypot(...size);
+  return { start: sub(middle, times(along, half)), end: add(middle, times(along, half)), jaw_width: clamp(width, 1, most) };
+}
+
+export const boxPolygon = ([x1, y1, x2, y2]) => [[x1, y1], [x2, y1], [x2, y2], [x1, y2]];
+
+export function boundsOf(points) {
+  const xs = points.map((p) => p[0]);
+  const ys = points.map((p) => p[1]);
+  return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
+}
+
+/** Cuts a polygon at the line `dot(p, normal) = bound`, keeping what lies below. */
+function cut(polygon, normal, bound) {
+  const kept = [];
+  polygon.forEach((to, i) => {
+    const from = polygon.at(i - 1);
+    const [a, b] = [dot(from, normal) - bound, dot(to, normal) - bound];
+    if (a <= 0 !== b <= 0) kept.push(add(from, times(sub(to, from), a / (a - b))));
+    if (b <= 0) kept.push(to);
+  });
+  return kept;
+}
+
+/** How far the part reaches to both sides of the line within the strip that jaws of `length` sweep; null beside it. */
+export function reach({ center, angle, length }, part) {
+  const along = direction(angle);
+  const across = quarter(along);
+  const at = dot(center, along);
+  const swept = cut(cut(part, along, at + length / 2), times(along, -1), length / 2 - at);
+  if (!swept.length) return null;
+  const offsets = swept.map((p) => dot(sub(p, center), across));
+  return { least: Math.min(...offsets), most: Math.max(...offsets) };
+}
+
+/** Tried turns when a gripper is placed by a click: every five degrees. */
+const TURNS = Array.from({ length: 36 }, (_, i) => (i * Math.PI) / 36 - Math.PI / 2);
+/** Room between a jaw and the part when the gripper is placed, as a share of the part's width, and at least so many pixels. */
+const ROOM = 0.08;
+const LEAST_ROOM_PX = 2;
+
+export const withRoom = (width) => width + Math.max(2 * LEAST_ROOM_PX, width * ROOM);
+
+/** The gripper at `point` turned so that it closes over the narrowest of the part, with the middle moved between its sides. */
+export function placedAt(point, part) {
+  const [x1, y1, x2, y2] = boundsOf(part);
+  const length = Math.max(Math.hypot(x2 - x1, y2 - y1) / 6, 12);
+  let best = null;
+  for (const angle of TURNS) {
+    const sides = reach({ center: point, angle, length }, part);
+    if (!sides || sides.least > 0 || sides.most < 0) continue;
+    const width = sides.most - sides.least;
+    if (!best || width < best.width - 1e-9) best = { angle, width, middle: (sides.least + sides.most) / 2 };
+  }
+  if (!best) return { center: point, angle: 0, length, width: length };
+  const across = quarter(direction(best.angle));
+  return { center: add(point, times(across, best.middle)), angle: best.angle, length, width: withRoom(best.width) };
+}
+
+/** Jaws that just let the part between them, for a gripper that was drawn as a line. */
+export function fittedWidth(gripper, part) {
+  const sides = part && reach(gripper, part);
+  return sides ? withRoom(2 * Math.max(-sides.least, sides.most, 1)) : gripper.length * 0.7;
+}

@@ -1,0 +1,279 @@
+// What mouse, pen and fingers do on the photo.
+
+import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
+import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool } from "./editing.js";
+import { changed, image, marks, region, size, state } from "./store.js";
+import { KNOB_PX } from "./overlay.js";
+import { pan, toPhoto, zoom } from "./view.js";
+
+const stage = document.getElementById("stage");
+const overlay = document.getElementById("overlay");
+/** A pointer that moved less has clicked. */
+const CLICK_PX = 5;
+/** The jaws grow wider only when an end's knob is dragged this much out or in: turning alone should not do it. */
+const LENGTH_SLACK_PX = 12;
+/** A second click within this time closes the outline. */
+const DOUBLE_MS = 400;
+const SNAP_RAD = Math.PI / 12;
+
+/** Pointers that are down, by their id: where they are on the stage. */
+const pointers = new Map();
+/** What the pointer that went down first does: `move(point, event)`, `end(clicked)`. */
+let gesture = null;
+let spaceHeld = false;
+/** Where and when the outline got its last point. */
+let lastPoint = null;
+
+const place = (event) => {
+  const { left, top } = stage.getBoundingClientRect();
+  return [event.clientX - left, event.clientY - top];
+};
+
+function panning() {
+  let last = null;
+  stage.classList.add("panning");
+  return {
+    move(at) {
+      if (last) pan(sub(at, last));
+      last = at;
+    },
+    end: () => stage.classList.remove("panning"),
+  };
+}
+
+function drawingBox(from) {
+  return {
+    move(at) {
+      const to = toPhoto(at);
+      state.draft = { kind: "box", box: [from[0], from[1], to[0], to[1]] };
+      changed();
+    },
+    end(clicked) {
+      const { draft } = state;
+      state.draft = null;
+      if (clicked || !draft) return changed();
+      setBox(draft.box);
+      const [x1, y1, x2, y2] = marks().box;
+      if (x2 - x1 < 2 || y2 - y1 < 2) marks().box = JSON.parse(image().committed).box;
+      else boxDrawn();
+      changed();
+    },
+  };
+}
+
+function drawingGrasp(from) {
+  return {
+    move(at) {
+      state.draft = { kind: "grasp", from, to: toPhoto(at) };
+      changed();
+    },
+    end(clicked) {
+      const { draft } = state;
+      state.draft = null;
+      if (clicked || !draft) return placeGripper(from);
+      const gripper = gripperOf({ start: draft.from, end: draft.to, jaw_width: 1 });
+      setGripper({ ...gripper, width: fittedWidth(gripper, region()) });
+      Object.assign(state, { selected: "grasp", tool: "select" });
+      commit();
+    },
+  };
+}
+
+function addingPoint() {
+  return {
+    move() {},
+    end(clicked, at) {
+      if (!clicked) return;
+      state.draft ??= { kind: "outline", points: [] };
+      const { points } = state.draft;
+      const again = lastPoint && performance.now() - lastPoint.time < DOUBLE_MS && norm(sub(at, lastPoint.at)) < CLICK_PX;
+      lastPoint = { at, time: performance.now() };
+      if (again) return closeOutline(points);
+      const [w, h] = size();
+      const [x, y] = toPhoto(at);
+      points.push([Math.min(Math.max(x, 0), w), Math.min(Math.max(y, 0), h)]);
+      changed();
+    },
+  };
+}
+
+/** Changes marks while the pointer moves; what is there at the end is one step that can be undone. */
+function correcting(change) {
+  return {
+    move(at, event) {
+      change(toPhoto(at), event);
+      changed();
+    },
+    end: commit,
+  };
+}
+
+function draggingBox(edge, from) {
+  const [x1, y1, x2, y2] = marks().box;
+  return correcting((to) => {
+    const [dx, dy] = sub(to, from);
+    setBox([x1 + (edge.includes("w") ? dx : 0), y1 + (edge.includes("n") ? dy : 0),
+      x2 + (edge.includes("e") ? dx : 0), y2 + (edge.includes("s") ? dy : 0)]);
+  });
+}
+
+function draggingVertex(vertex) {
+  state.vertex = vertex;
+  return correcting((to) => {
+    const [w, h] = size();
+    marks().outline[vertex] = [Math.min(Math.max(to[0], 0), w), Math.min(Math.max(to[1], 0), h)];
+  });
+}
+
+/** A new point where the outline's line was taken hold of. */
+function draggingLine(from) {
+  const { outline } = marks();
+  const distance = (i) => {
+    const [a, b] = [outline[i], outline[(i + 1) % outline.length]];
+    const along = sub(b, a);
+    const t = Math.min(Math.max(dot(sub(from, a), along) / (dot(along, along) || 1), 0), 1);
+    return norm(sub(from, add(a, times(along, t))));
+  };
+  const nearest = outline.reduce((best, _, i) => (distance(i) < distance(best) ? i : best), 0);
+  outline.splice(nearest + 1, 0, from);
+  return draggingVertex(nearest + 1);
+}
+
+function draggingGripper(data, from) {
+  const gripper = gripperOf(marks().grasp);
+  const along = direction(gripper.angle);
+  if ("jaw" in data) {
+    const side = data.jaw === "0" ? -1 : 1;
+    return correcting((to) => {
+      const opened = 2 * side * dot(sub(to, from), quarter(along));
+      setGripper({ ...gripper, width: Math.max(gripper.width + opened, 1) });
+    });
+  }
+  if ("end" in data) {
+    const side = data.end === "start" ? -1 : 1;
+    return correcting((to, event) => {
+      const arm = times(sub(to, gripper.center), side);
+      let angle = Math.atan2(arm[1], arm[0]);
+      if (event.shiftKey) angle = Math.round(angle / SNAP_RAD) * SNAP_RAD;
+      const stretched = norm(arm) - KNOB_PX / state.view.scale - gripper.length / 2;
+      const slack = LENGTH_SLACK_PX / state.view.scale;
+      const grown = Math.sign(stretched) * Math.max(Math.abs(stretched) - slack, 0);
+      setGripper({ ...gripper, angle, length: Math.max(gripper.length + 2 * grown, 4) });
+    });
+  }
+  return correcting((to) => setGripper({ ...gripper, center: add(gripper.center, sub(to, from)) }));
+}
+
+/** The handle of the outline's point nearest to a place: where points are close, their handles overlap. */
+function nearestVertex(place) {
+  const distances = marks().outline.map((point) => norm(sub(point, place)));
+  return overlay.querySelector(`.vertex[data-vertex="${distances.indexOf(Math.min(...distances))}"]`);
+}
+
+/** What a pointer that goes down begins. */
+function begin(event, at) {
+  const from = toPhoto(at);
+  const taken = event.target.closest?.("[data-kind]");
+  if (event.button === 1 || spaceHeld || state.tab !== "mark") return panning();
+  if (taken?.dataset.kind === "draft" && taken.dataset.vertex === "0") {
+    return { move() {}, end: () => closeOutline(state.draft.points) };
+  }
+  if (taken && state.tool === "select") {
+    const handle = taken.dataset.vertex === undefined ? taken : nearestVertex(from);
+    const { dataset } = handle;
+    state.selected = dataset.kind;
+    state.vertex = null;
+    if (handle.tabIndex >= 0) handle.focus({ preventScroll: true });
+    if (dataset.kind === "box") return draggingBox(dataset.edge, from);
+    if (dataset.kind === "grasp") return draggingGripper(dataset, from);
+    return "line" in dataset ? draggingLine(from) : draggingVertex(Number(dataset.vertex));
+  }
+  if (state.tool === "box") return drawingBox(from);
+  if (state.tool === "grasp") return drawingGrasp(from);
+  if (state.tool === "outline") return addingPoint();
+  Object.assign(state, { selected: null, vertex: null });
+  changed();
+  return panning();
+}
+
+overlay.addEventListener("pointerdown", (event) => {
+  if (event.button > 1) return;
+  const at = place(event);
+  pointers.set(event.pointerId, at);
+  overlay.setPointerCapture(event.pointerId);
+  if (pointers.size > 1) {
+    // Two fingers look around; what the first one began is dropped.
+    if (gesture) abandon();
+    gesture = null;
+    return;
+  }
+  gesture = { ...begin(event, at), from: at };
+});
+
+overlay.addEventListener("pointermove", (event) => {
+  const at = place(event);
+  const known = pointers.get(event.pointerId);
+  if (!known) {
+    if (state.draft?.kind === "outline" && event.pointerType !== "touch") {
+      state.draft.pointer = toPhoto(at);
+      changed();
+    }
+    return;
+  }
+  if (pointers.size === 2) {
+    const [other] = [...pointers].filter(([id]) => id !== event.pointerId).map(([, p]) => p);
+    const before = norm(sub(known, other));
+    if (before > 0) zoom(norm(sub(at, other)) / before, other);
+    pan(times(sub(add(at, other), add(known, other)), 0.5));
+  } else if (gesture) {
+    gesture.moved ||= norm(sub(at, gesture.from)) > CLICK_PX;
+    if (gesture.moved) gesture.move(at, event);
+  }
+  pointers.set(event.pointerId, at);
+});
+
+function up(event) {
+  if (!pointers.delete(event.pointerId) || !gesture) return;
+  const ended = gesture;
+  gesture = null;
+  if (event.type === "pointercancel") return abandon();
+  ended.end(!ended.moved, place(event));
+}
+overlay.addEventListener("pointerup", up);
+overlay.addEventListener("pointercancel", up);
+
+/** Back to the marks before the gesture. */
+export function abandon() {
+  gesture = null;
+  stage.classList.remove("panning");
+  if (image()) image().marks = JSON.parse(image().committed);
+  state.draft = null;
+  changed();
+}
+
+overlay.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  const notch = event.deltaMode === 1 ? 33 : 1;
+  zoom(Math.exp(-event.deltaY * notch * (event.ctrlKey ? 0.01 : 0.0015)), place(event));
+}, { passive: false });
+
+/** A handle that the keyboard reaches is what is selected. */
+overlay.addEventListener("focusin", (event) => {
+  const { kind, vertex } = event.target.dataset;
+  if (!kind || gesture) return;
+  state.selected = kind;
+  state.vertex = vertex === undefined ? null : Number(vertex);
+  changed();
+});
+
+export function holdSpace(held) {
+  spaceHeld = held;
+}
+
+/** Ends what is being drawn; without, lets go of what is selected. */
+export function letGo() {
+  if (gesture || state.draft) return abandon();
+  Object.assign(state, { selected: null, vertex: null });
+  setTool("select");
+  overlay.focus({ preventScroll: true });
+}

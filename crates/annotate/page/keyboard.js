@@ -1,0 +1,118 @@
+// Shortcuts. In fields, keys are for writing.
+
+import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
+import { boundsOf } from "./geometry.js";
+import { holdSpace, letGo } from "./gestures.js";
+import { openImage } from "./strip.js";
+import { marks, region, size, state } from "./store.js";
+import { actualSize, fit, middle, showBox, zoom } from "./view.js";
+
+const DEGREE = Math.PI / 180;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const help = document.getElementById("help");
+
+/** The chosen mark without a pointer: in the middle of what is in view, to be moved from there. */
+function putInTheMiddle() {
+  if (state.tool === "outline") {
+    if (state.draft) closeOutline(state.draft.points);
+    else proposeOutline();
+  } else if (state.tool === "box") {
+    const [x, y] = middle();
+    const [w, h] = size().map((side) => side / 6);
+    setBox([x - w, y - h, x + w, y + h]);
+    boxDrawn();
+    setTool("select");
+    state.selected = "box";
+  } else if (state.tool === "grasp") {
+    const part = region();
+    if (!part) return placeGripper(middle());
+    const [x1, y1, x2, y2] = boundsOf(part);
+    placeGripper([(x1 + x2) / 2, (y1 + y2) / 2]);
+  } else return false;
+  return true;
+}
+
+/** The whole photo; when that is shown already, the part. */
+export function fitOrPart() {
+  const part = state.tab === "try" ? null : region();
+  if (state.view.fitted && part) showBox(boundsOf(part));
+  else fit();
+}
+
+const MARKING = {
+  v: () => setTool("select"),
+  b: () => setTool("box"),
+  g: () => setTool("grasp"),
+  o: () => setTool("outline"),
+  p: () => proposeOutline(),
+  "[": () => adjustGripper({ turn: -DEGREE }),
+  "]": () => adjustGripper({ turn: DEGREE }),
+  "{": () => adjustGripper({ turn: -15 * DEGREE }),
+  "}": () => adjustGripper({ turn: 15 * DEGREE }),
+  ",": () => adjustGripper({ open: -1 }),
+  ".": () => adjustGripper({ open: 1 }),
+  "<": () => adjustGripper({ open: -10 }),
+  ">": () => adjustGripper({ open: 10 }),
+  delete: deleteSelected,
+  backspace: deleteSelected,
+};
+
+const LOOKING = {
+  "+": () => zoom(1.25),
+  "=": () => zoom(1.25),
+  "-": () => zoom(0.8),
+  f: fitOrPart,
+  0: fit,
+  1: actualSize,
+  n: () => openImage(state.current + 1),
+  m: () => openImage(state.current - 1),
+  "?": () => help.showModal(),
+  escape: letGo,
+};
+
+/** What the handle in focus is, for the arrow keys. */
+function focused() {
+  const data = document.activeElement?.dataset;
+  if (!data?.kind) return null;
+  const vertex = data.vertex === undefined ? undefined : Number(data.vertex);
+  return { kind: data.kind, edge: data.edge, end: data.end, jaw: data.jaw !== undefined, vertex };
+}
+
+// Where the focus is on the photo is shown to those who move it by keys: browsers cannot tell for drawings.
+document.addEventListener("keydown", () => document.documentElement.toggleAttribute("data-keys", true), true);
+document.addEventListener("pointerdown", () => document.documentElement.removeAttribute("data-keys"), true);
+
+document.addEventListener("keydown", (event) => {
+  const writing = event.target.matches("input:not([type=radio]):not([type=file]), select, textarea");
+  if (help.open || event.altKey) return;
+  const key = event.key.toLowerCase();
+  if (event.ctrlKey || event.metaKey) {
+    const action = { z: event.shiftKey ? redo : undo, y: redo }[key];
+    if (key === "s") event.preventDefault();
+    if (!action || writing || state.tab !== "mark") return;
+    event.preventDefault();
+    return action();
+  }
+  if (writing) return;
+  const onPhoto = event.target === document.body || event.target.closest("#stage");
+  const marking = state.tab === "mark";
+  if (key === " " && onPhoto) {
+    event.preventDefault();
+    return holdSpace(true);
+  }
+  if (marking && ARROWS[event.key] && onPhoto) {
+    const [x, y] = ARROWS[event.key];
+    const step = event.shiftKey ? 10 : 1;
+    if (nudge([x * step, y * step], focused())) event.preventDefault();
+    return;
+  }
+  if (marking && key === "enter" && onPhoto && putInTheMiddle()) return event.preventDefault();
+  const action = (marking && (MARKING[event.key] ?? MARKING[key])) || LOOKING[event.key] || LOOKING[key];
+  if (!action) return;
+  event.preventDefault();
+  action();
+});
+
+document.addEventListener("keyup", (event) => {
+  if (event.key === " ") holdSpace(false);
+});

@@ -1,0 +1,60 @@
+// The page: asks the server what there is, then shows what `state` says, again after every change.
+
+import { api } from "./api.js";
+import { adopt } from "./editing.js";
+import "./gestures.js";
+import { renderMarkPanel } from "./mark_panel.js";
+import { renderOverlay } from "./overlay.js";
+import { renderSamples } from "./samples.js";
+import { onChange, state } from "./store.js";
+import { openImage, renderStrip, shownName } from "./strip.js";
+import { renderTabs } from "./tabs.js";
+import { renderTeach, watch } from "./teach.js";
+import { renderTry } from "./try.js";
+import { fitOrPart } from "./keyboard.js";
+import { renderView, zoom } from "./view.js";
+
+const by = (id) => document.getElementById(id);
+
+/** The theme outlives the page, as far as the browser keeps it. */
+const THEMES = ["auto", "light", "dark"];
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  by("theme-name").textContent = theme;
+  localStorage.setItem("theme", theme);
+}
+by("theme").addEventListener("click", () => {
+  const now = THEMES.indexOf(document.documentElement.dataset.theme);
+  setTheme(THEMES[(now + 1) % THEMES.length]);
+});
+setTheme(THEMES.includes(localStorage.getItem("theme")) ? localStorage.getItem("theme") : "auto");
+
+by("help-button").addEventListener("click", () => by("help").showModal());
+by("zoom-in").addEventListener("click", () => zoom(1.25));
+by("zoom-out").addEventListener("click", () => zoom(0.8));
+by("zoom-fit").addEventListener("click", fitOrPart);
+
+onChange(() => {
+  // Until the server has answered there is nothing to show.
+  if (!state.images.length) return;
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderTry]) render();
+  document.title = `${shownName()} · Teach a grasp`;
+});
+
+// The key in the address is in a cookie now: out of sight, and out of the history.
+history.replaceState(null, "", "/");
+
+try {
+  const [session, teaching] = await Promise.all([api.session(), api.teaching()]);
+  Object.assign(state, {
+    label: session.label,
+    modelPath: session.model_path,
+    images: session.images.map(adopt),
+    scenes: session.scenes.map((scene) => ({ ...scene, detections: null })),
+    teaching,
+  });
+  openImage(0);
+  watch();
+} catch (error) {
+  by("hint").textContent = error.message;
+}

@@ -1,0 +1,188 @@
+// The first step's panel: what to mark next, in numbers too, what looks odd, and what it is enough for.
+
+import { api } from "./api.js";
+import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, undo } from "./editing.js";
+import { gripperOf } from "./geometry.js";
+import { changed, image, marks, state } from "./store.js";
+import { toast } from "./toast.js";
+
+const by = (id) => document.getElementById(id);
+const label = by("label");
+const inputs = { angle: by("grasp-angle"), width: by("grasp-width"), length: by("grasp-length") };
+
+const DOES = {
+  C: "keypoints",
+  A: "box and crop",
+  B: "box and keypoints",
+  D: "mask",
+  S: "instant",
+};
+const ORDER = ["C", "A", "B", "D", "S"];
+
+for (const button of document.querySelectorAll("button[data-tool]")) {
+  button.addEventListener("click", () => setTool(button.dataset.tool));
+}
+for (const button of document.querySelectorAll("[data-draw]")) {
+  button.addEventListener("click", () => {
+    setTool(button.dataset.draw);
+    by("stage").scrollIntoView({ block: "nearest" });
+  });
+}
+for (const button of document.querySelectorAll("[data-clear]")) {
+  button.addEventListener("click", () => clear(button.dataset.clear));
+}
+for (const kind of ["box", "grasp", "outline"]) {
+  // The way to a mark that lies under another one.
+  by(`do-${kind}`).addEventListener("click", (event) => {
+    if (event.target.closest("button, input") || !marks()[kind] || state.draft) return;
+    Object.assign(state, { selected: kind, vertex: null, tool: "select" });
+    changed();
+  });
+}
+by("propose").addEventListener("click", () => proposeOutline());
+by("turn-around").addEventListener("click", swapEnds);
+by("undo").addEventListener("click", undo);
+by("redo").addEventListener("click", redo);
+by("delete").addEventListener("click", deleteSelected);
+
+label.addEventListener("change", async () => {
+  try {
+    const session = await api.rename(label.value);
+    Object.assign(state, { label: session.label, modelPath: session.model_path });
+    session.images.forEach((view, i) => Object.assign(state.images[i], { saved: view.saved }));
+  } catch (error) {
+    toast(error.message);
+  }
+  label.value = state.label;
+  changed();
+});
+
+for (const [what, input] of Object.entries(inputs)) {
+  input.addEventListener("change", () => {
+    const value = input.valueAsNumber;
+    if (Number.isFinite(value) && marks().grasp) {
+      setGripper({ ...gripperOf(marks().grasp), [what]: what === "angle" ? (value * Math.PI) / 180 : value });
+      commit();
+    }
+    changed();
+  });
+}
+
+function renderSaved({ saved }) {
+  const line = by("saved");
+  const text = {
+    written: () => (image().saving ? "Saving…" : `Saved in ${saved.file}`),
+    nothing: () => (marks().grasp ? "Kept here; saved as soon as there is a box" : "Nothing marked yet"),
+    refused: () => `Not saved: ${saved.why}`,
+  }[saved.state]();
+  if (line.textContent !== text) line.textContent = text;
+  line.className = `saved ${saved.state}`;
+}
+
+function renderTodo() {
+  const { box, grasp, outline } = marks();
+  const done = { box: box || outline, grasp, outline };
+  const next = ["box", "grasp", "outline"].find((kind) => !done[kind]);
+  for (const kind of ["box", "grasp", "outline"]) {
+    const item = by(`do-${kind}`);
+    item.classList.toggle("done", Boolean(done[kind]));
+    item.classList.toggle("next", kind === next);
+    item.classList.toggle("selected", kind === state.selected);
+    item.querySelector(`[data-clear]`).hidden = !marks()[kind];
+    const draw = item.querySelector(`[data-draw]`);
+    if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw anew" : kind === "box" ? "Draw" : "Place";
+  }
+  by("turn-around").hidden = !grasp;
+  by("grasp-numbers").hidden = !grasp;
+  by("propose").disabled = state.proposing;
+  by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
+  if (!grasp) return;
+  const { angle, width, length } = gripperOf(grasp);
+  const numbers = { angle: (angle * 180) / Math.PI, width, length };
+  for (const [what, input] of Object.entries(inputs)) {
+    if (document.activeElement !== input) input.value = Math.round(numbers[what] * 10) / 10;
+  }
+}
+
+function fix(remedy) {
+  if (remedy.jaw_width !== undefined) setGripper({ ...gripperOf(marks().grasp), width: remedy.jaw_width });
+  if (remedy.box) marks().box = remedy.box;
+  commit();
+}
+
+function renderAdvice({ advice }) {
+  const list = by("remarks");
+  const said = JSON.stringify(advice.remarks);
+  if (list.dataset.said !== said) {
+    list.dataset.said = said;
+    list.replaceChildren(...advice.remarks.map((remark) => {
+      const item = document.createElement("li");
+      item.dataset.code = remark.code;
+      item.append(remark.text);
+      if (remark.fix) {
+        const button = document.createElement("button");
+        button.textContent = remark.fix.box ? "Fit the box" : "Fit the jaws";
+        button.addEventListener("click", () => fix(remark.fix));
+        item.append(button);
+      }
+      return item;
+    }));
+  }
+  const enough = by("enough");
+  const models = ORDER.map((letter) => advice.models.find((m) => m.model === letter));
+  const text = JSON.stringify(models);
+  if (enough.dataset.said === text) return;
+  enough.dataset.said = text;
+  const title = document.createElement("h3");
+  const ready = models.filter((m) => !m.lacks.length).length;
+  title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : "Not enough to teach yet";
+  if (!ready) {
+    const needed = document.createElement("p");
+    needed.textContent = `Every model needs ${models[0].lacks.join(" and ")}${marks().outline ? "" : "; model D the outline, too"}.`;
+    return enough.replaceChildren(title, needed);
+  }
+  const items = document.createElement("ul");
+  for (const { model, lacks } of models) {
+    const item = document.createElement("li");
+    item.className = lacks.length ? "" : "ready";
+    item.textContent = lacks.length ? `${model} needs ${lacks.join(" and ")}` : `${model}, ${DOES[model]}`;
+    items.append(item);
+  }
+  enough.replaceChildren(title, items);
+}
+
+function hint() {
+  const { box, grasp, outline } = marks();
+  if (state.proposing) return "Looking for the outline…";
+  if (state.tool === "box") return "Drag a box around the whole part";
+  if (state.tool === "grasp") return "Click the part where the gripper is to hold it, or drag along it";
+  if (state.tool === "outline") {
+    const count = state.draft?.points?.length ?? 0;
+    return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";
+  }
+  if (state.selected === "grasp" && grasp) return "Drag between the jaws to move, a jaw to open, an end to turn";
+  if (state.selected === "outline" && outline) return "Drag a point, or the line to add one; Del deletes";
+  return box || grasp || outline ? "" : "Choose Box to begin";
+}
+
+export function renderMarkPanel() {
+  const target = image();
+  renderSaved(target);
+  renderTodo();
+  renderAdvice(target);
+  const note = by("note");
+  note.hidden = !target.note;
+  note.textContent = target.note ?? "";
+  if (document.activeElement !== label) label.value = state.label;
+  const marking = state.tab === "mark";
+  for (const button of document.querySelectorAll("button[data-tool]")) {
+    button.setAttribute("aria-pressed", String(button.dataset.tool === state.tool));
+  }
+  by("undo").disabled = !target.past.length;
+  by("redo").disabled = !target.future.length;
+  by("delete").disabled = !(state.draft || (state.selected && marks()[state.selected]));
+  by("mark-tools").hidden = by("edit-tools").hidden = !marking;
+  by("stage").dataset.tool = marking ? state.tool : "select";
+  const said = marking ? hint() : "";
+  if (by("hint").textContent !== said) by("hint").textContent = said;
+}

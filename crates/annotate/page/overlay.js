@@ -1,0 +1,192 @@
+// Marks as they are drawn over the photo. Elements are kept from frame to frame, so that a handle in focus stays so.
+
+import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
+import { image, marks, scene, state } from "./store.js";
+import { toScreen } from "./view.js";
+
+const SVG = "http://www.w3.org/2000/svg";
+const overlay = document.getElementById("overlay");
+/** How far around a handle a pointer takes hold of it: fingers are thicker. */
+const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
+/** Between the end of the line and its knob, so that knob and jaws are apart however small the gripper is. */
+export const KNOB_PX = 20;
+const JAW_PX = 12;
+
+const CORNERS = { nw: [0, 1], n: [0.5, 1], ne: [2, 1], e: [2, 1.5], se: [2, 3], s: [0.5, 3], sw: [0, 3], w: [0, 1.5] };
+const SIDES = { nw: "top left", n: "top", ne: "top right", e: "right", se: "bottom right", s: "bottom", sw: "bottom left", w: "left" };
+
+let drawn = new Map();
+let next = new Map();
+
+/** An element by its key, made if it is new; those not asked for in a frame are removed after it. */
+function element(key, name, attributes, parent = overlay) {
+  let found = drawn.get(key);
+  if (!found) {
+    found = document.createElementNS(SVG, name);
+    drawn.set(key, found);
+  }
+  if (found.parentNode !== parent) parent.append(found);
+  for (const [attribute, value] of Object.entries(attributes)) {
+    if (found.getAttribute(attribute) !== String(value)) found.setAttribute(attribute, value);
+  }
+  next.set(key, found);
+  return found;
+}
+
+const path = (points, closed = true) => `M${points.map((p) => p.map((v) => v.toFixed(1)).join(" ")).join("L")}${closed ? "Z" : ""}`;
+const group = (key, classes) => element(key, "g", { class: classes });
+
+/** A line with its rim. */
+function line(key, parent, d) {
+  element(`${key}/rim`, "path", { class: "rim", d }, parent);
+  element(`${key}/line`, "path", { class: "line", d }, parent);
+}
+
+/** A handle that mouse, finger and keyboard take hold of. What it is stands in its data. */
+function handle(key, parent, data, label, classes = "") {
+  const attributes = { class: `handle ${classes}`, tabindex: 0, role: "button", "aria-label": label };
+  for (const [name, value] of Object.entries(data)) attributes[`data-${name}`] = value;
+  return element(key, "g", attributes, parent);
+}
+
+function knob(key, parent, [x, y], r = 5) {
+  element(`${key}/reach`, "circle", { class: "reach", cx: x, cy: y, r: REACH_PX }, parent);
+  element(`${key}/knob`, "circle", { class: "knob", cx: x, cy: y, r }, parent);
+}
+
+function drawBox(box, correcting) {
+  const parent = group("box", "box");
+  const corners = boxPolygon(box).map(toScreen);
+  line("box", parent, path(corners));
+  if (!correcting) return;
+  const [x1, y1, x2, y2] = [...corners[0], ...corners[2]];
+  for (const edge of Object.keys(CORNERS)) {
+    const x = edge.includes("w") ? x1 : edge.includes("e") ? x2 : (x1 + x2) / 2;
+    const y = edge.includes("n") ? y1 : edge.includes("s") ? y2 : (y1 + y2) / 2;
+    const part = handle(`box/${edge}`, parent, { kind: "box", edge }, `Box, ${SIDES[edge]}`, "box");
+    element(`box/${edge}/reach`, "circle", { class: "reach", cx: x, cy: y, r: REACH_PX }, part);
+    const half = edge.length === 2 ? 5 : 4;
+    element(`box/${edge}/knob`, "rect", { class: "knob", x: x - half, y: y - half, width: 2 * half, height: 2 * half, rx: 1 }, part);
+  }
+}
+
+function drawOutline(outline, correcting) {
+  const parent = group("outline", "outline");
+  const points = outline.map(toScreen);
+  const d = path(points);
+  element("outline/area", "path", { class: "area", d }, parent);
+  line("outline", parent, d);
+  if (!correcting) return;
+  element("outline/grab", "path", { class: "grab", d, "data-kind": "outline", "data-line": "" }, parent);
+  points.forEach((point, i) => {
+    const chosen = state.selected === "outline" && state.vertex === i;
+    const label = `Outline, point ${i + 1} of ${points.length}`;
+    const part = handle(`outline/${i}`, parent, { kind: "outline", vertex: i }, label, `vertex${chosen ? " selected" : ""}`);
+    knob(`outline/${i}`, part, point, chosen ? 6 : state.selected === "outline" ? 4 : 2.5);
+  });
+}
+
+/** The shapes of a gripper on the screen. */
+function gripperShapes(grasp) {
+  const { center, angle, length, width } = gripperOf(grasp);
+  const along = direction(angle);
+  const across = quarter(along);
+  const scale = state.view.scale;
+  const middle = toScreen(center);
+  const reach = times(along, Math.max((length / 2) * scale, 5));
+  const jaw = (side) => {
+    const face = add(middle, times(across, (side * width * scale) / 2));
+    const back = add(face, times(across, side * JAW_PX));
+    const barb = (turn, out) => add(add(back, times(across, side * out)), times(along, turn));
+    return {
+      face,
+      pad: [sub(face, reach), add(face, reach), add(back, reach), sub(back, reach)],
+      arrow: [barb(0, 2), barb(6, 10), barb(2, 10), barb(2, 20), barb(-2, 20), barb(-2, 10), barb(-6, 10)],
+    };
+  };
+  const jaws = [jaw(-1), jaw(1)];
+  const between = [sub(jaws[0].face, reach), add(jaws[0].face, reach), add(jaws[1].face, reach), sub(jaws[1].face, reach)];
+  const [start, end] = [sub(middle, reach), add(middle, reach)];
+  return { middle, along, jaws, between, start, end };
+}
+
+function drawGrasp(grasp, correcting) {
+  const parent = group("grasp", "grasp");
+  const { along, jaws, between, start, end } = gripperShapes(grasp);
+  const out = times(along, KNOB_PX);
+  const body = correcting
+    ? handle("grasp/body", parent, { kind: "grasp", body: "" }, "Gripper: move it with the arrow keys", "body")
+    : group("grasp/body", "grasp");
+  if (!correcting) parent.append(body);
+  element("grasp/between", "path", { class: "between", d: path(between) }, body);
+  element("grasp/along/rim", "path", { class: "rim", d: path([start, end], false) }, parent);
+  const reachOut = correcting ? [sub(start, out), add(end, out)] : [start, end];
+  element("grasp/along", "path", { class: "along", d: path(reachOut, false) }, parent);
+  jaws.forEach(({ pad, arrow }, i) => {
+    const holder = correcting ? handle(`grasp/jaw${i}`, parent, { kind: "grasp", jaw: i }, `Jaw ${i + 1}: open and close`) : parent;
+    if (correcting) element(`grasp/jaw${i}/reach`, "path", { class: "reach", d: path(arrow.concat(pad)) }, holder);
+    element(`grasp/jaw${i}/pad`, "path", { class: "jaw", d: path(pad) }, holder);
+    element(`grasp/jaw${i}/arrow`, "path", { class: "arrow", d: path(arrow) }, holder);
+  });
+  if (!correcting) return;
+  const from = handle("grasp/start", parent, { kind: "grasp", end: "start" }, "Gripper, start of its line: turn", "end");
+  knob("grasp/start", from, sub(start, out), 6);
+  const to = handle("grasp/end", parent, { kind: "grasp", end: "end" }, "Gripper, end of its line: turn", "end to");
+  knob("grasp/end", to, add(end, out), 7);
+}
+
+function drawDraft(draft) {
+  if (draft.kind === "box") line("draft", group("draft", "box draft"), path(boxPolygon(draft.box).map(toScreen)));
+  if (draft.kind === "grasp") line("draft", group("draft", "grasp draft"), path([draft.from, draft.to].map(toScreen), false));
+  if (draft.kind !== "outline" || !draft.points.length) return;
+  const parent = group("draft", "outline draft");
+  const points = draft.points.map(toScreen);
+  line("draft", parent, path(draft.pointer ? [...points, toScreen(draft.pointer)] : points, false));
+  points.forEach((point, i) => {
+    const part = element(`draft/${i}`, "g", { class: "handle vertex", "data-kind": "draft", "data-vertex": i }, parent);
+    knob(`draft/${i}`, part, point, i === 0 ? 6 : 4);
+  });
+}
+
+/** A grasp that a model found: drawn alike, but not to be taken hold of. */
+function drawDetection(detection, i) {
+  const parent = group(`found${i}`, detection.is_accepted ? "" : "refused");
+  const { outline, grasp, box } = detection.marks;
+  if (outline) {
+    const within = element(`found${i}/outline`, "g", { class: "outline" }, parent);
+    line(`found${i}/outline`, within, path(outline.map(toScreen)));
+  }
+  const { jaws, start, end } = gripperShapes(grasp);
+  const gripper = element(`found${i}/grasp`, "g", { class: "grasp" }, parent);
+  element(`found${i}/along`, "path", { class: "along", d: path([start, end], false) }, gripper);
+  jaws.forEach(({ pad, arrow }, j) => {
+    element(`found${i}/pad${j}`, "path", { class: "jaw", d: path(pad) }, gripper);
+    element(`found${i}/arrow${j}`, "path", { class: "arrow", d: path(arrow) }, gripper);
+  });
+  const [x, y] = toScreen(boundsOf(outline ?? boxPolygon(box)).slice(0, 2));
+  element(`found${i}/tag`, "text", { class: "tag", x, y: y - 6 }, parent).textContent = detection.score.toFixed(2);
+}
+
+export function renderOverlay() {
+  next = new Map();
+  if (state.tab === "try") {
+    const shown = scene()?.detections?.filter((d) => d.is_accepted || state.showRefused) ?? [];
+    // Worst first, so that the best is on top.
+    shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => drawDetection(d, i));
+  } else if (image()) {
+    const correcting = state.tool === "select" && state.tab === "mark";
+    const { box, outline, grasp } = marks();
+    if (outline) drawOutline(outline, correcting);
+    if (box) drawBox(box, correcting);
+    if (grasp) drawGrasp(grasp, correcting);
+    if (state.draft) drawDraft(state.draft);
+  }
+  for (const [key, found] of drawn) if (!next.has(key)) found.remove();
+  drawn = next;
+  // What is selected lies on top, so that nothing else is in its way. It has the focus: the others are moved under it.
+  const order = ["grasp", "outline", "box"].filter((key) => key !== state.selected);
+  const groups = [...order, state.selected, "draft"].map((key) => drawn.get(key)).filter(Boolean);
+  for (let i = groups.length - 2; i >= 0; i -= 1) {
+    if (groups[i].nextSibling !== groups[i + 1]) overlay.insertBefore(groups[i], groups[i + 1]);
+  }
+}

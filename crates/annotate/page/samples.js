@@ -1,0 +1,50 @@
+// The second step: a sheet of samples made from the marks.
+
+import { api } from "./api.js";
+import { image, state } from "./store.js";
+
+const COUNT = 12;
+const sheet = document.getElementById("sheet");
+const problem = document.getElementById("samples-error");
+let first = 0;
+
+document.getElementById("other-samples").addEventListener("click", () => {
+  first += COUNT;
+  renderSamples();
+});
+
+/** Shows samples of the marks as they are; pictures are asked for anew only when the marks have changed. */
+export function renderSamples() {
+  if (state.tab !== "samples") return;
+  const { id, marks, committed } = image();
+  const wanted = `${id} ${first} ${committed}`;
+  if (sheet.dataset.shown === wanted) return;
+  sheet.dataset.shown = wanted;
+  problem.hidden = Boolean(marks.box || marks.outline);
+  if (!problem.hidden) {
+    problem.textContent = "There is nothing to show yet: draw a box around the part first.";
+    return sheet.replaceChildren();
+  }
+  // The revision keeps apart pictures of the same address.
+  const revision = image().revision;
+  sheet.replaceChildren(...Array.from({ length: COUNT }, (_, i) => {
+    const item = document.createElement("li");
+    const picture = document.createElement("img");
+    picture.alt = `Sample ${first + i + 1}`;
+    picture.width = image().width;
+    picture.height = image().height;
+    picture.src = api.sampleUrl(id, first + i, 1, revision);
+    picture.addEventListener("error", explain);
+    item.append(picture);
+    return item;
+  }));
+}
+
+/** What went wrong with a sample, in the server's words. */
+async function explain(event) {
+  if (!problem.hidden) return;
+  problem.hidden = false;
+  const response = await fetch(event.target.src).catch(() => null);
+  const answer = await response?.json().catch(() => null);
+  problem.textContent = answer?.error ?? "The samples could not be made.";
+}

@@ -1,0 +1,75 @@
+// The photos of the part, or the pictures to try, in a row.
+
+import { api } from "./api.js";
+import { nextTool } from "./editing.js";
+import { changed, image, marks, scene, state } from "./store.js";
+import { show } from "./view.js";
+
+const strip = document.getElementById("strip");
+const empty = document.getElementById("empty");
+
+/** Opens another photo of the part for marking. */
+export function openImage(index) {
+  if (index < 0 || index >= state.images.length) return;
+  Object.assign(state, { current: index, selected: null, vertex: null, draft: null });
+  state.tool = nextTool();
+  showCurrent();
+}
+
+/** Opens another picture to try. */
+export function openScene(index) {
+  if (index < 0 || index >= state.scenes.length) return;
+  state.scene = index;
+  showCurrent();
+}
+
+/** Shows what the present step is about. */
+export function showCurrent() {
+  const trying = state.tab === "try";
+  const shown = trying ? scene() : image();
+  document.getElementById("photo").hidden = !shown;
+  empty.hidden = Boolean(shown);
+  if (!shown) empty.textContent = "Drop pictures of the table here, or add them on the side.";
+  else show(trying ? api.sceneUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`);
+  changed();
+}
+
+function words(entry, trying) {
+  if (!trying) {
+    const { box, outline, grasp } = entry.marks;
+    return (box || outline) && grasp ? "✓ marked" : box || outline || grasp ? "half marked" : "not marked";
+  }
+  if (entry.became !== null) return "✓ added";
+  if (entry.detecting) return "looking…";
+  if (!entry.detections) return "not tried";
+  const count = entry.detections.filter((d) => d.is_accepted).length;
+  return count ? `${count} found` : "nothing found";
+}
+
+export function renderStrip() {
+  const trying = state.tab === "try";
+  const entries = trying ? state.scenes : state.images;
+  strip.setAttribute("aria-label", trying ? "Pictures to try" : "Photos of the part");
+  strip.hidden = state.tab === "samples" ? state.images.length < 2 : trying ? !entries.length : entries.length < 2;
+  const current = trying ? state.scene : state.current;
+  while (strip.children.length > entries.length) strip.lastChild.remove();
+  entries.forEach((entry, i) => {
+    let item = strip.children[i];
+    if (!item) {
+      item = document.createElement("li");
+      item.innerHTML = '<button><img alt="" loading="lazy"><span></span><span></span></button>';
+      item.firstChild.addEventListener("click", () => (state.tab === "try" ? openScene(i) : openImage(i)));
+      strip.append(item);
+    }
+    const [picture, name, word] = item.firstChild.children;
+    const url = trying ? api.sceneUrl(entry.id) : api.imageUrl(entry.id);
+    if (picture.getAttribute("src") !== url) picture.src = url;
+    name.textContent = entry.name;
+    word.textContent = words(entry, trying);
+    item.firstChild.setAttribute("aria-current", String(i === current));
+  });
+}
+
+/** For the title of the window. */
+export const shownName = () => (state.tab === "try" ? scene() : image())?.name ?? "";
+export const isMarked = () => Boolean((marks().box || marks().outline) && marks().grasp);

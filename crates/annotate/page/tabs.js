@@ -1,0 +1,51 @@
+// The four steps, as tabs.
+
+import { showCurrent } from "./strip.js";
+import { isMarked } from "./strip.js";
+import { changed, state } from "./store.js";
+
+const NAMES = ["mark", "samples", "teach", "try"];
+const tab = (name) => document.getElementById(`tab-${name}`);
+
+export function openTab(name) {
+  if (state.tab === name) return;
+  const wasTrying = state.tab === "try";
+  Object.assign(state, { tab: name, draft: null });
+  // Only then is another picture shown: the view of one that stays is kept.
+  if (wasTrying !== (name === "try")) showCurrent();
+  changed();
+  document.querySelector(".panel").scrollTop = 0;
+}
+
+for (const name of NAMES) {
+  tab(name).addEventListener("click", () => openTab(name));
+  tab(name).addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const next = NAMES[(NAMES.indexOf(name) + step + NAMES.length) % NAMES.length];
+    openTab(next);
+    tab(next).focus();
+  });
+}
+for (const button of document.querySelectorAll("[data-next]")) {
+  button.addEventListener("click", () => {
+    openTab(button.dataset.next);
+    tab(button.dataset.next).focus();
+  });
+}
+
+export function renderTabs() {
+  const done = { mark: isMarked(), samples: false, teach: state.hasModel, try: state.images.length > 0 && state.scenes.some((s) => s.became !== null) };
+  for (const name of NAMES) {
+    const open = name === state.tab;
+    tab(name).setAttribute("aria-selected", String(open));
+    tab(name).tabIndex = open ? 0 : -1;
+    tab(name).classList.toggle("done", Boolean(done[name]) && !open);
+    document.getElementById(`panel-${name}`).hidden = !open;
+  }
+  const samples = state.tab === "samples";
+  document.getElementById("stage").hidden = samples;
+  document.getElementById("tools").hidden = samples;
+  document.getElementById("sheet").hidden = !samples;
+}

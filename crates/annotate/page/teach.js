@@ -1,0 +1,144 @@
+// The third step: teaching, and how it goes.
+
+import { api } from "./api.js";
+import { changed, image, state } from "./store.js";
+import { toast } from "./toast.js";
+
+const by = (id) => document.getElementById(id);
+const POLL_MS = 400;
+const MODELS = [
+  ["C", "Keypoints", "The best all-round. Some two minutes on two cores."],
+  ["S", "Instant", "No network: looks for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
+  ["A", "Box and turn", "A box, and its turn from what is in it. Some three minutes."],
+  ["B", "Box and keypoints", "As C, but goes to the middle of the box. Some two minutes."],
+  ["D", "Mask", "Texture or outline of what a mask shows. Some three minutes; needs the outline."],
+];
+
+for (const [letter, name, says] of MODELS) {
+  const item = document.createElement("label");
+  item.className = "model";
+  item.innerHTML = `<input type="radio" name="model" value="${letter}"><span><b>${letter}</b> ${name}</span><small></small>`;
+  item.lastChild.textContent = says;
+  item.firstChild.checked = letter === "C";
+  by("models").append(item);
+}
+
+const isRunning = () => ["running", "stopping"].includes(state.teaching.status);
+const seconds = (s) => (s < 90 ? `${Math.round(s)} s` : `${Math.floor(s / 60)} min ${Math.round(s % 60)} s`);
+const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
+
+by("teach-form").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const number = (id) => (by(id).value === "" ? null : by(id).valueAsNumber);
+  const minutes = number("budget");
+  const request = {
+    model: new FormData(by("teach-form")).get("model"),
+    time_budget_secs: minutes === null ? null : minutes * 60,
+    steps: number("steps"),
+    symmetry: Number(by("symmetry").value),
+    seed: number("seed") ?? 1,
+  };
+  by("teach-error").hidden = true;
+  try {
+    state.teaching = await api.teach(request);
+    watch();
+  } catch (error) {
+    state.teaching = { ...state.teaching, status: "failed", error: error.message };
+  }
+  changed();
+});
+
+by("teach-stop").addEventListener("click", async () => {
+  state.teaching = await api.stopTeaching().catch(() => state.teaching);
+  changed();
+});
+
+/** Asks for news until the teaching has ended. */
+export async function watch() {
+  while (isRunning()) {
+    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    try {
+      state.teaching = await api.teaching();
+    } catch (error) {
+      if (!error.lost) toast(error.message);
+    }
+    changed();
+  }
+  if (state.teaching.status === "done") {
+    // What another model found is old news.
+    for (const scene of state.scenes) scene.detections = null;
+    changed();
+  }
+}
+
+function renderCurve(losses) {
+  const curve = by("curve");
+  by("curve-figure").hidden = losses.length < 2;
+  if (losses.length < 2) return;
+  const logs = losses.map(([step, loss]) => [step, Math.log(Math.max(loss, 1e-6))]);
+  const [least, most] = [Math.min(...logs.map((p) => p[1])), Math.max(...logs.map((p) => p[1]))];
+  const last = Math.max(state.teaching.planned, logs.at(-1)[0]);
+  const at = ([step, log]) => `${((step / last) * 340).toFixed(1)},${(8 + ((most - log) / (most - least || 1)) * 104).toFixed(1)}`;
+  curve.innerHTML = `<polyline points="${logs.map(at).join(" ")}"/>`;
+}
+
+function renderProgress(news) {
+  by("progress").hidden = news.status === "idle" || news.model === "S" && !isRunning();
+  by("progress-title").textContent = {
+    running: `Teaching ${news.of || `model ${news.model}`}`,
+    stopping: "Stopping, with what there is…",
+    done: `Taught model ${news.model}`,
+    failed: "Not taught",
+  }[news.status] ?? "";
+  by("progress-bar").value = news.planned ? news.done / news.planned : 0;
+  by("progress-bar").hidden = !isRunning();
+  const left = news.left_secs === null || !isRunning() ? "" : `, about ${seconds(news.left_secs)} left`;
+  by("progress-text").textContent = news.planned
+    ? `Step ${news.done} of ${news.planned}, ${seconds(news.elapsed_secs)} gone${left}`
+    : isRunning() ? "Getting ready…" : "";
+  by("teach-form").hidden = isRunning();
+  by("teach-stop").hidden = !isRunning();
+  by("teach-stop").disabled = news.status === "stopping";
+  renderCurve(news.losses);
+  by("validations").replaceChildren(...news.validations.map(([step, share]) => {
+    const item = document.createElement("li");
+    item.textContent = `After ${step} steps it finds ${percent(share)} of new samples`;
+    return item;
+  }));
+}
+
+function renderOutcome(news) {
+  const { summary } = news;
+  const outcome = by("teach-outcome");
+  outcome.classList.toggle("good", news.status === "done");
+  let text = "";
+  if (news.status === "done" && summary) {
+    const off = summary.error_px === null ? "" : `, off by ${summary.error_px.toFixed(1)} px and ${summary.error_degrees.toFixed(1)}°`;
+    const found = summary.hit_rate === null ? "" : ` It finds ${percent(summary.hit_rate)} of new samples${off}.`;
+    text = `Taught “${summary.object}” in ${seconds(summary.seconds)}.${found} Written to ${news.written_to}`;
+  }
+  if (outcome.textContent !== text) outcome.textContent = text;
+  by("teach-error").hidden = news.status !== "failed";
+  by("teach-error").textContent = news.error ?? "";
+  by("go-try").hidden = news.status !== "done";
+}
+
+export function renderTeach() {
+  const news = state.teaching;
+  const marked = state.images.filter((i) => (i.marks.box || i.marks.outline) && i.marks.grasp);
+  by("teach-from").textContent = marked.length
+    ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”.`
+    : "Mark the part on a photo first: box and grasp.";
+  for (const input of document.querySelectorAll("[name=model]")) {
+    const lacks = image().advice.models.find((m) => m.model === input.value).lacks;
+    const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
+    input.disabled = needsOutline || (!marked.length && lacks.length > 0);
+    if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;
+  }
+  const start = by("teach-start");
+  start.disabled = isRunning() || !marked.length;
+  start.textContent = news.status === "done" ? "Teach again" : "Teach";
+  start.classList.toggle("primary", news.status !== "done");
+  renderProgress(news);
+  renderOutcome(news);
+}

@@ -1,0 +1,173 @@
+// The fourth step: the taught model on other pictures. What it got right, or is put right, becomes a demonstration.
+
+import { api } from "./api.js";
+import { adopt } from "./editing.js";
+import { openImage, openScene } from "./strip.js";
+import { changed, scene, state } from "./store.js";
+import { openTab } from "./tabs.js";
+import { toast } from "./toast.js";
+
+const by = (id) => document.getElementById(id);
+const stage = by("stage");
+const PICTURE = /\.(png|jpe?g)$/i;
+const isTaught = () => Boolean(state.hasModel);
+
+by("add-pictures").addEventListener("click", () => by("picture-input").click());
+by("add-folder").addEventListener("click", () => by("folder-input").click());
+for (const id of ["picture-input", "folder-input"]) {
+  by(id).addEventListener("change", () => {
+    // A copy: emptying the field, so that the same files can be chosen again, empties its list.
+    const files = [...by(id).files];
+    by(id).value = "";
+    addPictures(files);
+  });
+}
+
+for (const kind of ["dragover", "dragleave", "drop"]) {
+  stage.addEventListener(kind, (event) => {
+    event.preventDefault();
+    stage.classList.toggle("dropping", kind === "dragover");
+    if (kind !== "drop") return;
+    const files = [...event.dataTransfer.files];
+    if (files.length) {
+      openTab("try");
+      addPictures(files);
+    }
+  });
+}
+
+async function addPictures(files) {
+  const pictures = files.filter((file) => PICTURE.test(file.name));
+  const problem = by("try-error");
+  problem.hidden = true;
+  if (!pictures.length) {
+    problem.hidden = false;
+    problem.textContent = "There was no PNG or JPEG picture among them.";
+    return;
+  }
+  const first = state.scenes.length;
+  for (const file of pictures) {
+    try {
+      state.scenes.push({ ...(await api.addScene(file)), detections: null });
+      changed();
+    } catch (error) {
+      problem.hidden = false;
+      problem.textContent = `${file.name}: ${error.message}`;
+    }
+  }
+  if (state.scenes.length > first) openScene(first);
+}
+
+/** Looks at every picture that was not looked at yet, the shown one first. */
+let looking = false;
+async function lookAtAll() {
+  if (looking || !isTaught()) return;
+  looking = true;
+  for (;;) {
+    const waiting = (s) => s && !s.detections && !s.failed;
+    const next = waiting(scene()) ? scene() : state.scenes.find(waiting);
+    if (!next || state.tab !== "try") break;
+    next.detecting = true;
+    changed();
+    try {
+      const answer = await api.detect(next.id);
+      Object.assign(next, { detections: answer.detections, seconds: answer.seconds });
+    } catch (error) {
+      next.failed = error.message;
+    }
+    next.detecting = false;
+    changed();
+  }
+  looking = false;
+}
+
+async function accept(marks, { correct }) {
+  const target = scene();
+  try {
+    const view = await api.accept(target.id, marks);
+    state.images.push(adopt(view));
+    target.became = view.id;
+    if (correct) {
+      openTab("mark");
+      openImage(state.images.length - 1);
+      toast("Correct the marks; they are saved as you go.");
+    } else toast("Now a demonstration. Teach again to learn from it.");
+  } catch (error) {
+    toast(error.message);
+  }
+  changed();
+}
+
+function button(text, action, classes = "") {
+  const made = document.createElement("button");
+  Object.assign(made, { textContent: text, className: classes });
+  made.addEventListener("click", action);
+  return made;
+}
+
+function text(tag, content, classes = "") {
+  return Object.assign(document.createElement(tag), { textContent: content, className: classes });
+}
+
+function card(detection, i, shown) {
+  const item = document.createElement("section");
+  item.className = "found";
+  item.setAttribute("aria-label", `Grasp ${i + 1}`);
+  const title = text("h3", detection.is_accepted ? "Found the part" : "Refused: too unlike the demonstration");
+  title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
+  const row = text("div", "", "row");
+  if (shown.became === null) {
+    if (detection.is_accepted) row.append(button("Right: learn from it", () => accept(detection.marks, { correct: false })));
+    row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
+  }
+  item.append(title, row);
+  return item;
+}
+
+function renderFound() {
+  const found = by("found");
+  const shown = scene();
+  const said = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
+  if (found.dataset.said === said) return;
+  found.dataset.said = said;
+  found.replaceChildren();
+  if (!shown || !isTaught()) return;
+  if (shown.failed) return found.append(text("p", shown.failed, "error"));
+  if (!shown.detections) return found.append(text("p", "Looking…"));
+  const accepted = shown.detections.filter((d) => d.is_accepted);
+  const refused = shown.detections.length - accepted.length;
+  const time = `Looked for ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
+  found.append(text("p", time + (accepted.length ? "" : "There is nothing to grasp.")));
+  const listed = shown.detections.filter((d) => d.is_accepted || state.showRefused);
+  listed.forEach((detection, i) => found.append(card(detection, i, shown)));
+  if (shown.became !== null) {
+    const index = state.images.findIndex((image) => image.id === shown.became);
+    found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {
+      openTab("mark");
+      openImage(index);
+    }), button("Teach again", () => openTab("teach"), "primary"));
+  } else if (!accepted.length) {
+    const nothing = { box: null, grasp: null, outline: null };
+    found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
+  }
+  if (refused) {
+    const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${refused})`;
+    found.append(button(words, () => {
+      state.showRefused = !state.showRefused;
+      changed();
+    }, "plain"));
+  }
+}
+
+export function renderTry() {
+  if (state.teaching.status === "done") state.hasModel = true;
+  if (state.tab !== "try") return;
+  by("try-intro").textContent = !isTaught()
+    ? "Nothing is taught yet. Teach a model first; pictures can be added already."
+    : state.scenes.length
+      ? "Each picture is looked at as it comes in. Score 0.5 decides."
+      : "Add pictures that were taken as the first one was, with the part lying in other ways.";
+  renderFound();
+  lookAtAll();
+}
+

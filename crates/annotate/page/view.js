@@ -1,0 +1,88 @@
+// The part of the photo that is in view: screen = photo · scale + [x, y].
+
+import { clamp } from "./geometry.js";
+import { changed, state } from "./store.js";
+
+const LEAST_SCALE = 0.05;
+const MOST_SCALE = 40;
+/** Room around a photo that is shown whole, so that marks at its border can be taken hold of. */
+const MARGIN_PX = 24;
+/** From this scale on, pixels are shown as squares. */
+const CRISP_FROM = 4;
+
+const stage = document.getElementById("stage");
+const photo = document.getElementById("photo");
+
+/** Width and height of what is shown. */
+let shown = [1, 1];
+
+export const toScreen = ([x, y]) => [x * state.view.scale + state.view.x, y * state.view.scale + state.view.y];
+export const toPhoto = ([x, y]) => [(x - state.view.x) / state.view.scale, (y - state.view.y) / state.view.scale];
+
+/** The middle of the view, in the photo. */
+export function middle() {
+  const [x, y] = toPhoto([stage.clientWidth / 2, stage.clientHeight / 2]);
+  return [clamp(x, 0, shown[0]), clamp(y, 0, shown[1])];
+}
+
+/** Shows another picture, whole. */
+export function show(url, size, alt) {
+  shown = size;
+  if (photo.getAttribute("src") !== url) photo.src = url;
+  photo.alt = alt;
+  [photo.width, photo.height] = size;
+  fit();
+}
+
+export function fit() {
+  const { clientWidth, clientHeight } = stage;
+  const room = Math.min(MARGIN_PX, clientWidth / 20);
+  const scale = Math.min((clientWidth - 2 * room) / shown[0], (clientHeight - 2 * room) / shown[1]);
+  const [x, y] = [(clientWidth - shown[0] * scale) / 2, (clientHeight - shown[1] * scale) / 2];
+  // A stage that is hidden has no size: it is fitted as soon as it has one.
+  state.view = scale > 0 ? { scale, x, y, fitted: true } : { ...state.view, fitted: true };
+  changed();
+}
+
+/** Shows a box of the photo, with as much again around it. */
+export function showBox([x1, y1, x2, y2]) {
+  const { clientWidth, clientHeight } = stage;
+  const scale = clamp(Math.min(clientWidth / (2 * (x2 - x1)), clientHeight / (2 * (y2 - y1))), LEAST_SCALE, MOST_SCALE);
+  move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
+}
+
+/** Whether the stage is so small that a part on the whole photo is no target for a finger. */
+export const isSmall = () => stage.clientWidth < 600;
+
+/** Zooms by `factor` so that the place under `at` (on the screen) stays. */
+export function zoom(factor, at = [stage.clientWidth / 2, stage.clientHeight / 2]) {
+  const [px, py] = toPhoto(at);
+  const scale = clamp(state.view.scale * factor, LEAST_SCALE, MOST_SCALE);
+  move(scale, at[0] - px * scale, at[1] - py * scale);
+}
+
+/** Pixel for pixel. */
+export const actualSize = () => zoom(1 / state.view.scale);
+
+export const pan = ([dx, dy]) => move(state.view.scale, state.view.x + dx, state.view.y + dy);
+
+/** Some of the photo stays in view whatever is done. */
+function move(scale, x, y) {
+  const kept = 40;
+  state.view = {
+    scale,
+    x: clamp(x, kept - shown[0] * scale, stage.clientWidth - kept),
+    y: clamp(y, kept - shown[1] * scale, stage.clientHeight - kept),
+    fitted: false,
+  };
+  changed();
+}
+
+export function renderView() {
+  const { scale, x, y } = state.view;
+  photo.style.transform = `translate(${x}px, ${y}px) scale(${scale})`;
+  photo.classList.toggle("crisp", scale >= CRISP_FROM);
+  document.getElementById("zoom").textContent = `${Math.round(scale * 100)} %`;
+}
+
+new ResizeObserver(() => (state.view.fitted ? fit() : changed())).observe(stage);

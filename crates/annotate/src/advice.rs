@@ -1,0 +1,228 @@
+//! What the marks are good for, and what is odd about them: told at once, while they can still be mended.
+
+use sdg_geometry::Polygon;
+use serde::Serialize;
+
+use crate::gripper::Gripper;
+use crate::marks::Marks;
+use crate::teacher::ModelLetter;
+
+/// A mark this near to the picture's border is cut by it.
+const BORDER_PX: f64 = 1.0;
+/// Least overlap (IoU) of the box with the outline's own.
+const LEAST_BOX_AGREEMENT: f64 = 0.8;
+/// A line shorter than this gives its angle by luck: a pixel's slip is more than five degrees.
+const LEAST_LINE_PX: f64 = 12.0;
+/// Fewer pixels show too little of a part.
+const LEAST_PART_PX: f64 = 24.0;
+/// The part may reach this far beyond a jaw: outlines are drawn by hand.
+const JAW_SLACK_PX: f64 = 1.5;
+/// Jaws farther from the part than this share of its width were left wide open by mistake.
+const MOST_CLEARANCE: f64 = 1.0;
+
+/// What the marks of one picture suffice for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Advice {
+    /// Every model, in the order of their letters.
+    pub models: Vec<ModelAdvice>,
+    /// What is odd, worst first.
+    pub remarks: Vec<Remark>,
+}
+
+/// Whether a model can be taught from the marks.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ModelAdvice {
+    /// The letter.
+    pub model: ModelLetter,
+    /// What is missing; empty when nothing is.
+    pub lacks: Vec<&'static str>,
+}
+
+/// Something that the person should look at.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Remark {
+    /// A name for programs.
+    pub code: &'static str,
+    /// For people.
+    pub text: String,
+    /// What the page offers to do about it.
+    pub fix: Option<Fix>,
+}
+
+/// A remedy, with what the page then sets.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fix {
+    /// Opens or closes the jaws to so many pixels.
+    JawWidth(f64),
+    /// Draws this box.
+    Box([f64; 4]),
+}
+
+/// Looks the marks over on a picture of `size` pixels.
+pub fn advise(marks: &Marks, size: [u32; 2]) -> Advice {
+    let lacks = |model: ModelLetter| {
+        let mut lacks = Vec::new();
+        if !marks.has_object() {
+            lacks.push("the box");
+        }
+        if marks.grasp.is_none() {
+            lacks.push("the grasp");
+        }
+        if model == ModelLetter::D && marks.outline.is_none() {
+            lacks.push("the outline");
+        }
+        lacks
+    };
+    let models = ModelLetter::ALL.map(|model| ModelAdvice { model, lacks: lacks(model) }).to_vec();
+    let mut remarks = Vec::new();
+    about_outline(marks, &mut remarks);
+    about_grasp(marks, &mut remarks);
+    about_place(marks, size, &mut remarks);
+    Advice { models, remarks }
+}
+
+fn remark(code: &'static str, text: impl Into<String>, fix: Option<Fix>) -> Remark {
+    Remark { code, text: text.into(), fix }
+}
+
+fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
+    let Some(outline) = marks.polygon() else { return };
+    if outline.crosses_itself() {
+        remarks.push(remark("outline_crosses", "The outline crosses itself. Drag its points apart.", None));
+    }
+    if let Some(bbox) = marks.bounding_box() {
+        let around = outline.bounds();
+        if around.iou(&bbox) < LEAST_BOX_AGREEMENT {
+            let text = if around.intersection(&bbox) == 0.0 {
+                "The outline lies outside the box. One of them is on the wrong thing."
+            } else {
+                "Outline and box do not go together: the box should just hold the outline."
+            };
+            let fix = Fix::Box([around.x1, around.y1, around.x2, around.y2]);
+            remarks.push(remark("outline_misses_box", text, Some(fix)));
+        }
+    }
+}
+
+fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
+    let (Some(grasp), Some(part)) = (&marks.grasp, marks.region()) else { return };
+    let gripper = Gripper { line: grasp.line(), jaw_width: grasp.jaw_width };
+    if gripper.line.length() < LEAST_LINE_PX {
+        let text = "The jaws are very short, so their angle is uncertain. Pull the ends of the line apart.";
+        remarks.push(remark("line_short", text, None));
+    }
+    let Some(reach) = gripper.reach(&part) else {
+        remarks.push(remark("grasp_beside", "The jaws close beside the part. Drag the gripper onto it.", None));
+        return;
+    };
+    // Rounded up, so that what the button sets passes the check.
+    let fitting = (2.0 * reach.left.max(reach.right)).max(1.0).ceil();
+    let half = 0.5 * grasp.jaw_width;
+    // Without an outline the box is all there is, and it is wider than a part that lies askew.
+    if reach.left <= 0.0 || reach.right <= 0.0 {
+        remarks.push(remark(
+            "grasp_off_middle",
+            "The middle of the gripper is beside the part. Drag it onto it.",
+            None,
+        ));
+    } else if marks.outline.is_some() && reach.left.max(reach.right) > half + JAW_SLACK_PX {
+        let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
+        remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
+    } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MOST_CLEARANCE) {
+        let text = "The jaws stand far from the part. Close them until they almost touch it.";
+        remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
+    }
+}
+
+fn about_place(marks: &Marks, size: [u32; 2], remarks: &mut Vec<Remark>) {
+    let Some(part) = marks.region() else { return };
+    let [width, height] = size.map(f64::from);
+    let around = Polygon::bounds(&part);
+    if around.x1 < BORDER_PX || around.y1 < BORDER_PX || around.x2 > width - BORDER_PX || around.y2 > height - BORDER_PX
+    {
+        let text = "The part touches the border of the photo and may be cut. A photo of the whole part teaches better.";
+        remarks.push(remark("part_cut", text, None));
+    }
+    if around.width().max(around.height()) < LEAST_PART_PX {
+        let text = "The part is very small in the photo. Go closer, so that there is more of it to learn.";
+        remarks.push(remark("part_small", text, None));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::marks::GraspMarks;
+
+    const SIZE: [u32; 2] = [640, 480];
+
+    fn good() -> Marks {
+        Marks {
+            bbox: Some([100.0, 100.0, 300.0, 160.0]),
+            grasp: Some(GraspMarks { start: [180.0, 130.0], end: [220.0, 130.0], jaw_width: 66.0 }),
+            outline: Some(vec![[100.0, 100.0], [300.0, 100.0], [300.0, 160.0], [100.0, 160.0]]),
+        }
+    }
+
+    fn codes(marks: &Marks) -> Vec<&'static str> {
+        advise(marks, SIZE).remarks.iter().map(|remark| remark.code).collect()
+    }
+
+    fn with_grasp(start: [f64; 2], end: [f64; 2], jaw_width: f64) -> Marks {
+        Marks { grasp: Some(GraspMarks { start, end, jaw_width }), ..good() }
+    }
+
+    #[test]
+    fn good_marks_suffice_for_all_and_earn_no_remark() {
+        let advice = advise(&good(), SIZE);
+        assert!(advice.models.iter().all(|model| model.lacks.is_empty()));
+        assert!(advice.remarks.is_empty(), "{advice:?}");
+    }
+
+    #[test]
+    fn what_is_missing_is_named_for_each_model() {
+        let lacks = |marks: &Marks| advise(marks, SIZE).models.into_iter().map(|m| m.lacks).collect::<Vec<_>>();
+        let no_outline = Marks { outline: None, ..good() };
+        assert_eq!(lacks(&no_outline), [vec![], vec![], vec![], vec!["the outline"], vec![]]);
+        let nothing = lacks(&Marks::default());
+        assert_eq!(nothing[3], ["the box", "the grasp", "the outline"]);
+        assert_eq!(nothing[4], ["the box", "the grasp"]);
+        let no_box = Marks { bbox: None, ..good() };
+        assert_eq!(lacks(&no_box)[2], [""; 0], "a box follows from the outline");
+    }
+
+    #[test]
+    fn a_narrow_gripper_is_told_and_the_remedy_passes() {
+        let narrow = with_grasp([180.0, 130.0], [220.0, 130.0], 40.0);
+        let advice = advise(&narrow, SIZE);
+        assert_eq!(advice.remarks[0].code, "gripper_narrow");
+        let Some(Fix::JawWidth(jaw_width)) = advice.remarks[0].fix else { panic!("{advice:?}") };
+        assert_eq!(codes(&with_grasp([180.0, 130.0], [220.0, 130.0], jaw_width)), [""; 0]);
+    }
+
+    #[test]
+    fn other_grasps_that_cannot_be_meant_are_told() {
+        assert_eq!(codes(&with_grasp([180.0, 130.0], [220.0, 130.0], 200.0)), ["gripper_wide"]);
+        assert_eq!(codes(&with_grasp([180.0, 300.0], [220.0, 300.0], 60.0)), ["grasp_off_middle"]);
+        assert_eq!(codes(&with_grasp([400.0, 130.0], [440.0, 130.0], 60.0)), ["grasp_beside"]);
+        assert_eq!(codes(&with_grasp([196.0, 130.0], [204.0, 130.0], 66.0)), ["line_short"]);
+    }
+
+    #[test]
+    fn an_outline_that_misses_the_box_is_told_with_the_box_that_fits() {
+        let apart = Marks { bbox: Some([400.0, 300.0, 500.0, 400.0]), ..good() };
+        let advice = advise(&apart, SIZE);
+        assert_eq!(advice.remarks[0].code, "outline_misses_box");
+        assert_eq!(advice.remarks[0].fix, Some(Fix::Box([100.0, 100.0, 300.0, 160.0])));
+    }
+
+    #[test]
+    fn a_part_at_the_border_and_a_crossing_outline_are_told() {
+        let cut = Marks { bbox: Some([0.0, 100.0, 300.0, 160.0]), outline: None, ..good() };
+        assert_eq!(codes(&cut), ["part_cut"]);
+        let crossing =
+            Marks { outline: Some(vec![[100.0, 100.0], [300.0, 160.0], [300.0, 100.0], [100.0, 160.0]]), ..good() };
+        assert!(codes(&crossing).contains(&"outline_crosses"));
+    }
+}

@@ -1,0 +1,203 @@
+//! Where the marks of a picture stand on the disk: read from any format that `sdg_demonstration` knows, written as COCO.
+//!
+//! ```text
+//! photo.png ─┬─ photo.coco.json   where marks are written if photo.json is another tool's file
+//!            └─ photo.json        where marks are written otherwise
+//! ```
+//!
+//! A file that holds more than this page would write back (LabelMe's flags, further objects, further pictures) is read
+//! and never written.
+
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use sdg_demonstration::{Annotation, ImageFacts};
+use sdg_report::write_atomically;
+use serde_json::Value;
+
+use crate::error::{Error, Result};
+use crate::marks::Marks;
+
+/// Larger annotations than any tool writes.
+const MOST_BYTES: u64 = 64 << 20;
+
+/// What stood beside a picture when it was opened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opened {
+    /// The object's name, where one is marked.
+    pub label: Option<String>,
+    /// Its marks; none where the file marks nothing.
+    pub marks: Marks,
+    /// Where marks will be written.
+    pub path: PathBuf,
+    /// What the person should know about the file, if anything.
+    pub note: Option<String>,
+}
+
+/// Reads the marks beside a picture; `annotation` names their file, which otherwise is the picture's name with `.json`.
+///
+/// # Errors
+/// A file that is there and cannot be read, is no annotation, or belongs to another picture.
+pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result<Opened> {
+    let own = annotation.map_or_else(|| picture.with_extension("json"), Path::to_owned);
+    let spare = own.with_extension("coco.json");
+    let file_name = picture.file_name().and_then(|name| name.to_str());
+    let facts = ImageFacts { width: size[0], height: size[1], file_name };
+    for path in [&spare, &own] {
+        let Some(bytes) = read_if_there(path)? else { continue };
+        let complain = |source| Error::Demonstration { name: path.display().to_string(), source };
+        let objects = match Annotation::read(&bytes, &facts) {
+            Err(sdg_demonstration::Error::NoObject { .. }) => Vec::new(),
+            read => read.map_err(complain)?,
+        };
+        let writable = is_ours(&bytes);
+        let target = if writable { path.clone() } else { spare.clone() };
+        let named = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let note = match (objects.len(), writable) {
+            (0 | 1, true) => None,
+            (0 | 1, false) => Some(format!("{} stays as it is; changes go to {}.", named(path), named(&target))),
+            (count, _) => Some(format!(
+                "{} marks {count} objects; the first is shown. Changes go to {}.",
+                named(path),
+                named(&spare)
+            )),
+        };
+        let target = if objects.len() > 1 { spare.clone() } else { target };
+        let first = objects.first();
+        return Ok(Opened {
+            label: first.map(|object| object.label.clone()),
+            marks: first.map(Marks::of).unwrap_or_default(),
+            path: target,
+            note,
+        });
+    }
+    Ok(Opened { label: None, marks: Marks::default(), path: own, note: None })
+}
+
+fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
+    match fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(Error::file(path, "cannot read")(source)),
+        Ok(metadata) if metadata.len() > MOST_BYTES => {
+            return Err(Error::TooLarge { path: path.to_owned(), most: MOST_BYTES, found: metadata.len() });
+        }
+        Ok(_) => {}
+    }
+    fs::read(path).map(Some).map_err(Error::file(path, "cannot read"))
+}
+
+/// Whether the file is a COCO file of one picture and at most one object, with nothing that [`Marks::to_coco`] would
+/// drop: then it may be written over.
+fn is_ours(bytes: &[u8]) -> bool {
+    let Ok(Value::Object(file)) = serde_json::from_slice(bytes) else { return false };
+    let count = |name: &str| file.get(name).and_then(Value::as_array).map_or(0, Vec::len);
+    let only_known = |value: &Value, known: &[&str]| {
+        value.as_object().is_some_and(|object| object.keys().all(|key| known.contains(&key.as_str())))
+    };
+    let items = |name: &str| file.get(name).and_then(Value::as_array).into_iter().flatten();
+    const ANNOTATION: [&str; 10] = [
+        "id",
+        "image_id",
+        "category_id",
+        "bbox",
+        "area",
+        "iscrowd",
+        "segmentation",
+        "keypoints",
+        "num_keypoints",
+        "attributes",
+    ];
+    file.keys().all(|key| ["images", "annotations", "categories"].contains(&key.as_str()))
+        && count("images") == 1
+        && count("annotations") <= 1
+        && count("categories") <= 1
+        && items("images").all(|image| only_known(image, &["id", "file_name", "width", "height"]))
+        && items("annotations").all(|object| {
+            only_known(object, &ANNOTATION)
+                && object.get("attributes").is_none_or(|a| only_known(a, &["jaw_width", "grasp_offset"]))
+        })
+        && items("categories").all(|category| only_known(category, &["id", "name", "keypoints", "skeleton"]))
+}
+
+/// Writes the marks, whole or not at all. Where nothing is marked and no file stands, none is made.
+///
+/// # Errors
+/// Marks that could not be taught, a file that cannot be written. `Ok(false)` where there was nothing to write.
+pub fn save(path: &Path, marks: &Marks, label: &str, picture: &str, size: [u32; 2]) -> Result<bool> {
+    if !marks.has_object() && !path.exists() {
+        return Ok(false);
+    }
+    let facts = ImageFacts { width: size[0], height: size[1], file_name: Some(picture) };
+    let text = marks.to_coco(label, &facts).map_err(|source| Error::Demonstration { name: picture.into(), source })?;
+    write_atomically(path, text.as_bytes())?;
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::marks::GraspMarks;
+
+    const SIZE: [u32; 2] = [200, 100];
+
+    fn marks() -> Marks {
+        Marks {
+            bbox: Some([10.0, 20.0, 110.0, 60.0]),
+            grasp: Some(GraspMarks { start: [40.0, 40.0], end: [80.0, 40.0], jaw_width: 44.0 }),
+            outline: None,
+        }
+    }
+
+    #[test]
+    fn saved_marks_are_opened_again_and_written_to_the_same_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = folder.path().join("photo.png");
+        let before = open(&picture, None, SIZE).unwrap();
+        assert_eq!((before.marks, &before.path), (Marks::default(), &folder.path().join("photo.json")));
+        assert!(!save(&before.path, &Marks::default(), "bar", "photo.png", SIZE).unwrap());
+        assert!(!before.path.exists(), "nothing marked leaves no file behind");
+        assert!(save(&before.path, &marks(), "bar", "photo.png", SIZE).unwrap());
+        let after = open(&picture, None, SIZE).unwrap();
+        assert_eq!((after.label.as_deref(), &after.marks), (Some("bar"), &marks()));
+        assert_eq!((after.path, after.note), (before.path.clone(), None));
+        // Cleared marks do not leave the old ones on the disk.
+        assert!(save(&before.path, &Marks::default(), "bar", "photo.png", SIZE).unwrap());
+        assert_eq!(open(&picture, None, SIZE).unwrap().marks, Marks::default());
+    }
+
+    #[test]
+    fn another_tool_s_file_is_read_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = folder.path().join("photo.png");
+        let labelme = r#"{"flags": {"checked": true}, "imageWidth": 200, "imageHeight": 100, "shapes": [
+            {"label": "bar", "shape_type": "rectangle", "points": [[10, 20], [110, 60]]}]}"#;
+        fs::write(folder.path().join("photo.json"), labelme).unwrap();
+        let opened = open(&picture, None, SIZE).unwrap();
+        assert_eq!(opened.marks.bbox, Some([10.0, 20.0, 110.0, 60.0]));
+        assert_eq!(opened.path, folder.path().join("photo.coco.json"));
+        assert!(opened.note.as_ref().unwrap().contains("photo.json stays as it is"), "{opened:?}");
+        save(&opened.path, &marks(), "bar", "photo.png", SIZE).unwrap();
+        assert_eq!(fs::read_to_string(folder.path().join("photo.json")).unwrap(), labelme);
+        assert_eq!(open(&picture, None, SIZE).unwrap().marks, marks(), "the newer file is the one that counts");
+    }
+
+    #[test]
+    fn a_coco_file_with_more_than_we_write_is_left_alone() {
+        let text = marks().to_coco("bar", &ImageFacts { width: 200, height: 100, file_name: Some("p.png") }).unwrap();
+        assert!(is_ours(text.as_bytes()));
+        for (field, more) in
+            [("\"iscrowd\"", "\"track_id\": 3, \"iscrowd\""), ("\"images\"", "\"info\": {}, \"images\"")]
+        {
+            assert!(!is_ours(text.replacen(field, more, 1).as_bytes()), "{field}");
+        }
+    }
+
+    #[test]
+    fn a_broken_file_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("photo.json"), "{").unwrap();
+        let error = open(&folder.path().join("photo.png"), None, SIZE).unwrap_err().to_string();
+        assert!(error.contains("photo.json") && error.contains("not JSON"), "{error}");
+    }
+}

@@ -1,0 +1,113 @@
+//! What can go wrong, each with what was expected and what was found.
+
+use std::io;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// The crate's result.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What a grasp model of the caller's failed with.
+pub type TeacherError = Box<dyn std::error::Error + Send + Sync>;
+
+/// Why the page could not be opened, or one of its requests not be answered.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// There is nothing to mark.
+    #[error("expected at least one image to mark, found none")]
+    NoImage,
+    /// A file could not be read or written.
+    #[error("{}: {action}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// The system's complaint.
+        source: io::Error,
+    },
+    /// A file is larger than any that makes sense.
+    #[error("{}: expected at most {most} bytes, found {found}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// The bound.
+        most: u64,
+        /// Its size.
+        found: u64,
+    },
+    /// A picture or its marks are not what they should be.
+    #[error("{name}: {source}")]
+    Demonstration {
+        /// The picture or annotation.
+        name: String,
+        /// What is wrong with it.
+        source: sdg_demonstration::Error,
+    },
+    /// An annotation could not be written.
+    #[error(transparent)]
+    Write(#[from] sdg_report::ReportError),
+    /// The marks are not enough for what was asked.
+    #[error("{name}: expected {expected}, found {found}")]
+    NotMarked {
+        /// The picture.
+        name: String,
+        /// What is needed.
+        expected: &'static str,
+        /// What is there.
+        found: &'static str,
+    },
+    /// No picture of that number.
+    #[error("expected a picture numbered below {count}, found {id}")]
+    NoSuchPicture {
+        /// The number asked for.
+        id: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// More pictures than a session keeps.
+    #[error("expected at most {most} pictures to try, found one more")]
+    TooManyPictures {
+        /// The bound.
+        most: usize,
+    },
+    /// The request makes no sense.
+    #[error("{what}: expected {expected}, found {found}")]
+    Request {
+        /// Which part of it.
+        what: &'static str,
+        /// What belongs there.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// Something else is going on that must end first.
+    #[error("{0}")]
+    Busy(&'static str),
+    /// Nothing has been taught yet.
+    #[error("expected a taught model, found none: teach one first")]
+    NotTaught,
+    /// The grasp model's own complaint.
+    #[error("{0}")]
+    Teacher(TeacherError),
+    /// The operating system gave no random bytes for the token.
+    #[error("no random token from the operating system: {0}")]
+    Random(getrandom::Error),
+    /// The page's port could not be opened or served.
+    #[error("port {port} on 127.0.0.1: {source}")]
+    Port {
+        /// The port asked for; 0 for any.
+        port: u16,
+        /// The system's complaint.
+        source: io::Error,
+    },
+}
+
+impl Error {
+    /// For `map_err` on what reads or writes `path`.
+    pub(crate) fn file(path: &std::path::Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::File { path: path.to_owned(), action, source }
+    }
+}

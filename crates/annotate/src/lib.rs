@@ -1,0 +1,55 @@
+//! The annotation page: mark a grasp on a photo in the browser, see what a model will learn from it, teach, try.
+//!
+//! ```text
+//! pictures ─ Session ─ marks ─┬─ advice (what they suffice for, what is odd)
+//!    │          │             ├─ COCO beside the picture
+//!    │          │             └─ samples
+//!    │          └─ teaching ── GraspTeacher (the caller's) ── detections in other pictures ─ accepted: marks again
+//!    └─ Server: 127.0.0.1 only, behind a Guard (token, Host, Origin) ─ routes ─ page/ (HTML, CSS, JavaScript)
+//! ```
+//!
+//! What is deliberately absent: grasp models and burn. Teaching and detecting come in through [`GraspTeacher`], so that
+//! this crate builds in seconds. No request names a path: pictures have numbers.
+//!
+//! ```no_run
+//! use std::sync::Arc;
+//! use sdg_annotate::{GraspTeacher, Server, Session, SessionOptions};
+//!
+//! # fn open(teacher: Arc<dyn GraspTeacher>) -> Result<(), sdg_annotate::Error> {
+//! let options = SessionOptions { images: vec![("photo.png".into(), None)], ..SessionOptions::default() };
+//! let server = Server::bind(Session::open(&options, teacher)?, 0)?;
+//! println!("open {}", server.url());
+//! server.run(|| false)
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod advice;
+mod annotation_file;
+mod error;
+mod gripper;
+mod guard;
+mod http;
+mod marks;
+mod names;
+mod outline;
+mod page;
+mod picture;
+mod preview;
+mod routes;
+mod server;
+mod session;
+mod teacher;
+mod teaching;
+mod views;
+
+pub use advice::{Advice, Fix, ModelAdvice, Remark};
+pub use error::{Error, Result, TeacherError};
+pub use gripper::{Gripper, Reach};
+pub use marks::{GraspMarks, Marks};
+pub use server::Server;
+pub use session::{Session, SessionOptions};
+pub use teacher::{FoundGrasp, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+pub use teaching::{News, Status};
+pub use views::{ImageView, Saved, SceneView, SessionView};

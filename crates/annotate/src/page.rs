@@ -1,0 +1,72 @@
+//! The page's own files, compiled in: it fetches nothing from elsewhere and needs no build step.
+
+/// The document.
+pub const INDEX: &str = include_str!("../page/index.html");
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const ICON: &str = "image/svg+xml";
+const STYLE: &str = "text/css; charset=utf-8";
+
+/// Name, media type and text of every other file. They stand flat under `/page/`.
+const FILES: &[(&str, &str, &str)] = &[
+    ("page.css", STYLE, include_str!("../page/page.css")),
+    ("icon.svg", ICON, include_str!("../page/icon.svg")),
+    ("api.js", SCRIPT, include_str!("../page/api.js")),
+    ("editing.js", SCRIPT, include_str!("../page/editing.js")),
+    ("geometry.js", SCRIPT, include_str!("../page/geometry.js")),
+    ("gestures.js", SCRIPT, include_str!("../page/gestures.js")),
+    ("keyboard.js", SCRIPT, include_str!("../page/keyboard.js")),
+    ("main.js", SCRIPT, include_str!("../page/main.js")),
+    ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
+    ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),
+    ("samples.js", SCRIPT, include_str!("../page/samples.js")),
+    ("store.js", SCRIPT, include_str!("../page/store.js")),
+    ("strip.js", SCRIPT, include_str!("../page/strip.js")),
+    ("tabs.js", SCRIPT, include_str!("../page/tabs.js")),
+    ("teach.js", SCRIPT, include_str!("../page/teach.js")),
+    ("toast.js", SCRIPT, include_str!("../page/toast.js")),
+    ("try.js", SCRIPT, include_str!("../page/try.js")),
+    ("view.js", SCRIPT, include_str!("../page/view.js")),
+];
+
+/// A file by its name, with its media type.
+pub fn file(name: &str) -> Option<(&'static str, &'static str)> {
+    FILES.iter().find(|(known, ..)| *known == name).map(|&(_, media_type, text)| (media_type, text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Issue 6: the page stays under 200 KB.
+    const MOST_BYTES: usize = 200_000;
+
+    #[test]
+    fn the_page_is_small() {
+        let bytes = INDEX.len() + FILES.iter().map(|(.., text)| text.len()).sum::<usize>();
+        assert!(bytes < MOST_BYTES, "{bytes} bytes");
+    }
+
+    #[test]
+    fn every_file_that_the_page_asks_for_is_there_and_none_beside() {
+        let texts = || FILES.iter().map(|&(.., text)| text).chain([INDEX]);
+        for (name, ..) in FILES {
+            let (imported, linked) = (format!("\"./{name}\""), format!("\"/page/{name}\""));
+            assert!(texts().any(|text| text.contains(&imported) || text.contains(&linked)), "nobody asks for {name}");
+        }
+        for text in texts() {
+            for line in text.lines().filter(|line| line.starts_with("import ")) {
+                let name = line.rsplit("\"./").next().and_then(|rest| rest.strip_suffix("\";"));
+                assert!(name.is_some_and(|name| file(name).is_some()), "no file for: {line}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_page_fetches_nothing_from_elsewhere() {
+        for text in FILES.iter().map(|&(.., text)| text).chain([INDEX]) {
+            let foreign = text.replace("http://www.w3.org/2000/svg", "");
+            assert!(!foreign.contains("http:") && !foreign.contains("https:"));
+        }
+    }
+}

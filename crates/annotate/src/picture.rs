@@ -1,0 +1,120 @@
+//! The picture files that the page may show, and no others.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use image::metadata::Orientation;
+use image::{ImageDecoder, ImageFormat, ImageReader, RgbImage};
+use sdg_demonstration::{ImageLimits, decode_image};
+
+use crate::error::{Error, Result};
+
+/// Larger photos than any camera makes.
+pub const MOST_PICTURE_BYTES: u64 = 64 << 20;
+/// Quality of pictures that are encoded for the page alone.
+const JPEG_QUALITY: u8 = 90;
+
+/// One picture on the disk, known to be readable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Where it is.
+    pub path: PathBuf,
+    /// What the page calls it.
+    pub name: String,
+    /// Pixels across and down, upright.
+    pub size: [u32; 2],
+}
+
+impl Picture {
+    /// Reads and decodes the file once, so that everything wrong with it is told now.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no picture.
+    pub fn open(path: &Path) -> Result<Self> {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let image = decode(&read(path)?, &path.display().to_string())?;
+        Ok(Self { path: path.to_owned(), name, size: [image.width(), image.height()] })
+    }
+
+    /// The pixels, upright.
+    ///
+    /// # Errors
+    /// A file that has become unreadable or another picture since it was opened.
+    pub fn pixels(&self) -> Result<RgbImage> {
+        let image = decode(&read(&self.path)?, &self.name)?;
+        if [image.width(), image.height()] == self.size {
+            return Ok(image);
+        }
+        let (annotated, found) = (self.size, [image.width(), image.height()]);
+        Err(Error::Demonstration {
+            name: self.name.clone(),
+            source: sdg_demonstration::Error::OtherImageSize { annotated, image: found },
+        })
+    }
+
+    /// Bytes for a browser, and their media type: the file itself, or, where its pixels lie on their side, a JPEG that
+    /// stands upright, so that places in both are the same.
+    ///
+    /// # Errors
+    /// A file that has become unreadable.
+    pub fn for_browser(&self) -> Result<(Vec<u8>, &'static str)> {
+        let bytes = read(&self.path)?;
+        if is_upright(&bytes) {
+            let media_type = match image::guess_format(&bytes) {
+                Ok(ImageFormat::Png) => "image/png",
+                _ => "image/jpeg",
+            };
+            return Ok((bytes, media_type));
+        }
+        Ok((jpeg(&decode(&bytes, &self.name)?), "image/jpeg"))
+    }
+}
+
+/// The pictures in a folder, by name; folders in it are left out.
+///
+/// # Errors
+/// A folder that cannot be listed.
+pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
+    let failed = || Error::file(folder, "cannot list this folder");
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed())? {
+        let path = entry.map_err(failed())?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        if path.is_file() && extension.is_some_and(|e| ["png", "jpg", "jpeg"].contains(&e.as_str())) {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    Ok(paths)
+}
+
+/// The picture as JPEG, for the page to show.
+pub fn jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY);
+    // Writing to memory fails for pictures beyond JPEG's 65535 pixels a side only, which no demonstration has.
+    match encoder.encode_image(image) {
+        Ok(()) => bytes,
+        Err(_) => Vec::new(),
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    let failed = || Error::file(path, "cannot read");
+    let found = fs::metadata(path).map_err(failed())?.len();
+    if found > MOST_PICTURE_BYTES {
+        return Err(Error::TooLarge { path: path.to_owned(), most: MOST_PICTURE_BYTES, found });
+    }
+    fs::read(path).map_err(failed())
+}
+
+fn decode(bytes: &[u8], name: &str) -> Result<RgbImage> {
+    decode_image(bytes, &ImageLimits::default()).map_err(|source| Error::Demonstration { name: name.into(), source })
+}
+
+fn is_upright(bytes: &[u8]) -> bool {
+    let decoder = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok().and_then(|r| r.into_decoder().ok());
+    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
+    orientation.is_none_or(|orientation| orientation == Orientation::NoTransforms)
+}

@@ -1,0 +1,49 @@
+//! Requests about marked pictures.
+
+use sdg_geometry::BoundingBox;
+use serde::{Deserialize, Serialize};
+
+use super::{json_of, picture_of, read};
+use crate::error::{Error, Result};
+use crate::http::{Request, Response};
+use crate::session::Session;
+use crate::{outline, preview};
+
+/// Answers what is asked of picture `id`; `None` where there is no such address.
+pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
+    let body = &request.body;
+    Some(match (method, rest) {
+        ("GET", ["picture"]) => picture_of(session.picture(id).and_then(|picture| picture.for_browser())),
+        ("PUT", ["marks"]) => json_of(read("marks", body).and_then(|marks| session.set_marks(id, marks))),
+        ("POST", ["outline"]) => json_of(propose_outline(session, id, body)),
+        ("GET", ["samples", index]) => {
+            let seed = request.head.query_value("seed").and_then(|seed| seed.parse().ok()).unwrap_or(1);
+            let index = index.parse::<u64>().ok()?;
+            picture_of(preview::sample(session, id, seed, index).map(|bytes| (bytes, "image/jpeg")))
+        }
+        _ => return None,
+    })
+}
+
+#[derive(Deserialize)]
+struct BoxRequest {
+    #[serde(rename = "box")]
+    bbox: [f64; 4],
+}
+
+#[derive(Serialize)]
+struct Proposal {
+    outline: Option<Vec<[f64; 2]>>,
+}
+
+fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal> {
+    let BoxRequest { bbox: [x1, y1, x2, y2] } = read("box", body)?;
+    let picture = session.picture(id)?;
+    let bbox = BoundingBox::new(x1, y1, x2, y2).map_err(|error| Error::Request {
+        what: "box",
+        expected: "two corners".into(),
+        found: error.to_string(),
+    })?;
+    let outline = outline::propose(&picture.pixels()?, &bbox);
+    Ok(Proposal { outline: outline.map(|outline| outline.vertices.into_iter().map(Into::into).collect()) })
+}

@@ -1,0 +1,359 @@
+//! One sitting at the page: the pictures given, what is marked on them, and what was tried.
+//!
+//! Everything that a request may reach hangs on a number in a list made here. No path comes from the page.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use tempfile::TempDir;
+
+use crate::advice::advise;
+use crate::annotation_file;
+use crate::error::{Error, Result};
+use crate::marks::Marks;
+use crate::names::{file_name, free_name, safe_stem};
+use crate::picture::{Picture, pictures_in};
+use crate::preview::Previews;
+use crate::teacher::{GraspTeacher, ModelLetter};
+use crate::teaching::Teaching;
+use crate::views::{ImageView, Saved, SceneView, SessionView};
+
+/// Pictures to try that one sitting keeps.
+const MOST_SCENES: usize = 500;
+/// The longest name of an object.
+const MOST_LABEL_CHARS: usize = 80;
+
+/// What the page is opened with.
+#[derive(Debug, Clone, Default)]
+pub struct SessionOptions {
+    /// Pictures of one object, each with the file of its marks if that has another name than the picture's.
+    pub images: Vec<(PathBuf, Option<PathBuf>)>,
+    /// Pictures, or folders of pictures, to try a taught model on.
+    pub scenes: Vec<PathBuf>,
+    /// Where a taught model is written; without it, beside the first picture under the object's name.
+    pub model_path: Option<PathBuf>,
+}
+
+/// One sitting.
+pub struct Session {
+    pub(crate) teacher: Arc<dyn GraspTeacher>,
+    pub(crate) teaching: Teaching,
+    pub(crate) previews: Previews,
+    model_path: Option<PathBuf>,
+    /// Pictures that came from the page, until one is accepted.
+    uploads: TempDir,
+    state: Mutex<State>,
+}
+
+struct State {
+    label: String,
+    images: Vec<MarkedPicture>,
+    scenes: Vec<Scene>,
+}
+
+/// A picture of the object and what is marked on it.
+#[derive(Clone)]
+struct MarkedPicture {
+    picture: Picture,
+    marks: Marks,
+    file: PathBuf,
+    note: Option<String>,
+    saved: Saved,
+}
+
+/// A picture that a taught model is tried on.
+#[derive(Clone)]
+pub(crate) struct Scene {
+    pub(crate) picture: Picture,
+    uploaded: bool,
+    /// The number of the marked picture that it became.
+    became: Option<usize>,
+}
+
+impl Session {
+    /// Opens pictures and their marks.
+    ///
+    /// # Errors
+    /// No picture, or one that cannot be read, or marks that belong to another.
+    pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
+        if options.images.is_empty() {
+            return Err(Error::NoImage);
+        }
+        let mut label = None;
+        let mut images = Vec::new();
+        for (path, annotation) in &options.images {
+            let picture = Picture::open(path)?;
+            let opened = annotation_file::open(&picture.path, annotation.as_deref(), picture.size)?;
+            let file = file_name(&opened.path);
+            let saved = if opened.marks.has_object() { Saved::Written { file } } else { Saved::Nothing };
+            label = label.or(opened.label);
+            images.push(MarkedPicture { picture, marks: opened.marks, file: opened.path, note: opened.note, saved });
+        }
+        let mut scenes = Vec::new();
+        for path in &options.scenes {
+            let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
+            for path in paths {
+                let taken = images.iter().any(|image| image.picture.path == path);
+                if !taken {
+                    scenes.push(Scene { picture: Picture::open(&path)?, uploaded: false, became: None });
+                }
+            }
+        }
+        if scenes.len() > MOST_SCENES {
+            return Err(Error::TooManyPictures { most: MOST_SCENES });
+        }
+        let uploads = tempfile::Builder::new()
+            .prefix("sdg-annotate-")
+            .tempdir()
+            .map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?;
+        let state = State { label: label.unwrap_or_else(|| "part".to_owned()), images, scenes };
+        Ok(Self {
+            teacher,
+            teaching: Teaching::default(),
+            previews: Previews::default(),
+            model_path: options.model_path.clone(),
+            uploads,
+            state: Mutex::new(state),
+        })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// All that the page starts from.
+    pub fn view(&self) -> SessionView {
+        let state = self.state();
+        SessionView {
+            label: state.label.clone(),
+            images: (0..state.images.len()).map(|id| state.image_view(id)).collect(),
+            scenes: (0..state.scenes.len()).map(|id| state.scene_view(id)).collect(),
+            model_path: self.model_path(&state).display().to_string(),
+        }
+    }
+
+    /// Where a model of the present label is written.
+    pub(crate) fn model_file(&self) -> PathBuf {
+        self.model_path(&self.state())
+    }
+
+    fn model_path(&self, state: &State) -> PathBuf {
+        self.model_path.clone().unwrap_or_else(|| {
+            let name = format!("{}.sdg", safe_stem(&state.label));
+            state.images[0].picture.path.with_file_name(name)
+        })
+    }
+
+    /// Takes new marks for a picture and writes them, if they are fit to be written; kept they are in any case.
+    ///
+    /// # Errors
+    /// No such picture.
+    pub fn set_marks(&self, id: usize, marks: Marks) -> Result<ImageView> {
+        let mut state = self.state();
+        state.image(id)?;
+        state.images[id].marks = marks;
+        state.save(id);
+        Ok(state.image_view(id))
+    }
+
+    /// Renames the object, in every file that is written already.
+    ///
+    /// # Errors
+    /// An empty or endless name.
+    pub fn set_label(&self, label: &str) -> Result<SessionView> {
+        let label = label.trim();
+        let count = label.chars().count();
+        if count == 0 || count > MOST_LABEL_CHARS || label.chars().any(char::is_control) {
+            return Err(Error::Request {
+                what: "name",
+                expected: format!("1 to {MOST_LABEL_CHARS} letters"),
+                found: if count > MOST_LABEL_CHARS { format!("{count}") } else { format!("{label:?}") },
+            });
+        }
+        let mut state = self.state();
+        label.clone_into(&mut state.label);
+        for id in 0..state.images.len() {
+            if matches!(state.images[id].saved, Saved::Written { .. }) {
+                state.save(id);
+            }
+        }
+        drop(state);
+        Ok(self.view())
+    }
+
+    /// A marked picture's file.
+    ///
+    /// # Errors
+    /// No such picture.
+    pub fn picture(&self, id: usize) -> Result<Picture> {
+        Ok(self.state().image(id)?.picture.clone())
+    }
+
+    /// What is marked on a picture.
+    ///
+    /// # Errors
+    /// No such picture.
+    pub fn marks(&self, id: usize) -> Result<Marks> {
+        Ok(self.state().image(id)?.marks.clone())
+    }
+
+    /// A picture to try.
+    ///
+    /// # Errors
+    /// No such picture.
+    pub(crate) fn scene(&self, id: usize) -> Result<Scene> {
+        Ok(self.state().scene(id)?.clone())
+    }
+
+    /// Takes a picture that came from the page; it is kept in a folder of this sitting.
+    ///
+    /// # Errors
+    /// Bytes that are no picture, more pictures than a sitting keeps.
+    pub fn add_scene(&self, name: &str, bytes: &[u8]) -> Result<SceneView> {
+        let count = self.state().scenes.len();
+        if count >= MOST_SCENES {
+            return Err(Error::TooManyPictures { most: MOST_SCENES });
+        }
+        // The name is for people; the file's own is ours.
+        let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
+        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MOST_LABEL_CHARS).collect();
+        let file = tempfile::Builder::new()
+            .suffix(&format!(".{extension}"))
+            .tempfile_in(self.uploads.path())
+            .map_err(Error::file(self.uploads.path(), "cannot make a file in it"))?;
+        std::fs::write(file.path(), bytes).map_err(Error::file(file.path(), "cannot write"))?;
+        let picture = Picture::open(file.path()).map_err(|error| match error {
+            Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
+            other => other,
+        })?;
+        let kept = file.into_temp_path().keep().map_err(|error| Error::File {
+            path: self.uploads.path().to_owned(),
+            action: "cannot keep a file in it",
+            source: error.error,
+        })?;
+        let mut state = self.state();
+        state.scenes.push(Scene {
+            picture: Picture { path: kept, name: shown, ..picture },
+            uploaded: true,
+            became: None,
+        });
+        let id = state.scenes.len() - 1;
+        Ok(state.scene_view(id))
+    }
+
+    /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
+    /// picture, under a name of its own.
+    ///
+    /// # Errors
+    /// No such picture, one that is a demonstration already, a file that cannot be written.
+    pub fn accept(&self, scene_id: usize, marks: Marks) -> Result<ImageView> {
+        let mut state = self.state();
+        let scene = state.scene(scene_id)?.clone();
+        if scene.became.is_some() {
+            return Err(Error::Busy("this picture is a demonstration already"));
+        }
+        let mut picture = scene.picture;
+        if scene.uploaded {
+            let beside = state.images[0].picture.path.clone();
+            let target = free_name(&beside, &picture);
+            let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
+            sdg_report::write_atomically(&target, &bytes)?;
+            picture.name = file_name(&target);
+            picture.path = target;
+        }
+        let opened = annotation_file::open(&picture.path, None, picture.size)?;
+        let id = state.images.len();
+        state.images.push(MarkedPicture {
+            picture,
+            marks,
+            file: opened.path,
+            note: opened.note,
+            saved: Saved::Nothing,
+        });
+        state.scenes[scene_id].became = Some(id);
+        state.save(id);
+        Ok(state.image_view(id))
+    }
+
+    /// One picture with its marks, as teaching takes it.
+    ///
+    /// # Errors
+    /// No such picture, nothing marked on it, or marks that cannot be taught.
+    pub fn demonstration(&self, id: usize) -> Result<Demonstration> {
+        let (label, marked) = {
+            let state = self.state();
+            (state.label.clone(), state.image(id)?.clone())
+        };
+        demonstration(&label, &marked)
+    }
+
+    /// Every picture that is marked for `model`. Pictures without any mark are left out.
+    ///
+    /// # Errors
+    /// None is marked, or one only in part.
+    pub fn demonstrations(&self, model: ModelLetter) -> Result<Vec<Demonstration>> {
+        let (label, marked) = {
+            let state = self.state();
+            (state.label.clone(), state.images.clone())
+        };
+        let begun: Vec<_> = marked.iter().filter(|image| image.marks != Marks::default()).collect();
+        if begun.is_empty() {
+            let name = marked[0].picture.name.clone();
+            return Err(Error::NotMarked { name, expected: "a box and a grasp", found: "no marks" });
+        }
+        for image in &begun {
+            let advice = advise(&image.marks, image.picture.size);
+            let lacks = advice.models.iter().find(|advice| advice.model == model).map(|advice| &advice.lacks);
+            if let Some(&missing) = lacks.and_then(|lacks| lacks.first()) {
+                let name = image.picture.name.clone();
+                return Err(Error::NotMarked { name, expected: missing, found: "none" });
+            }
+        }
+        begun.into_iter().map(|image| demonstration(&label, image)).collect()
+    }
+}
+
+impl State {
+    fn image(&self, id: usize) -> Result<&MarkedPicture> {
+        self.images.get(id).ok_or(Error::NoSuchPicture { id, count: self.images.len() })
+    }
+
+    fn scene(&self, id: usize) -> Result<&Scene> {
+        self.scenes.get(id).ok_or(Error::NoSuchPicture { id, count: self.scenes.len() })
+    }
+
+    fn save(&mut self, id: usize) {
+        let MarkedPicture { picture, marks, file, .. } = &self.images[id];
+        let written = annotation_file::save(file, marks, &self.label, &picture.name, picture.size);
+        self.images[id].saved = match written {
+            Ok(true) => Saved::Written { file: file_name(&self.images[id].file) },
+            Ok(false) => Saved::Nothing,
+            Err(error) => Saved::Refused { why: error.to_string() },
+        };
+    }
+
+    fn image_view(&self, id: usize) -> ImageView {
+        let MarkedPicture { picture, marks, note, saved, .. } = &self.images[id];
+        let Picture { name, size: [width, height], .. } = picture.clone();
+        let advice = advise(marks, picture.size);
+        ImageView { id, name, width, height, marks: marks.clone(), saved: saved.clone(), advice, note: note.clone() }
+    }
+
+    fn scene_view(&self, id: usize) -> SceneView {
+        let Scene { picture, became, .. } = &self.scenes[id];
+        let Picture { name, size: [width, height], .. } = picture.clone();
+        SceneView { id, name, width, height, became: *became }
+    }
+}
+
+fn demonstration(label: &str, marked: &MarkedPicture) -> Result<Demonstration> {
+    let MarkedPicture { picture, marks, .. } = marked;
+    let [width, height] = picture.size;
+    let facts = ImageFacts { width, height, file_name: Some(&picture.name) };
+    let complain = |source| Error::Demonstration { name: picture.name.clone(), source };
+    let coco = marks.to_coco(label, &facts).map_err(complain)?;
+    let mut objects = Annotation::read(coco.as_bytes(), &facts).map_err(complain)?;
+    // A file without an object is refused on reading, so there is one.
+    Ok(Demonstration { image: picture.pixels()?, annotation: objects.remove(0) })
+}

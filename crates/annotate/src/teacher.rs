@@ -1,0 +1,167 @@
+//! What the page needs of grasp models, which this crate does not see: whoever has them implements these traits.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use image::RgbImage;
+use sdg_demonstration::Demonstration;
+use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
+use serde::{Deserialize, Serialize};
+
+use crate::error::TeacherError;
+
+/// Teaches grasp models.
+pub trait GraspTeacher: Send + Sync + 'static {
+    /// Teaches a model; minutes for one with a network. `observe` hears of the progress and may end the teaching, which
+    /// then keeps what there is.
+    ///
+    /// # Errors
+    /// Whatever teaching complains of, in one line for the person at the page.
+    fn teach(
+        &self,
+        demonstrations: &[Demonstration],
+        request: &TeachRequest,
+        observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError>;
+}
+
+/// A model, ready to look for the part.
+pub trait TaughtModel: Send + Sync {
+    /// What it is and how good it was found to be.
+    fn summary(&self) -> TaughtSummary;
+
+    /// The model file.
+    ///
+    /// # Errors
+    /// A model that cannot be written down.
+    fn to_bytes(&self) -> Result<Vec<u8>, TeacherError>;
+
+    /// Finds the part, best score first; those below 0.5 are listed too.
+    ///
+    /// # Errors
+    /// An image that cannot be looked at.
+    fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError>;
+}
+
+/// How to teach, as asked on the page.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TeachRequest {
+    /// The model's letter.
+    pub model: ModelLetter,
+    /// Seconds that the training may take at most.
+    #[serde(default)]
+    pub time_budget_secs: Option<f64>,
+    /// Optimiser steps instead of the preset's.
+    #[serde(default)]
+    pub steps: Option<usize>,
+    /// Equal turns in a whole one; 0 for a part whose turn cannot be seen.
+    #[serde(default = "one")]
+    pub symmetry: u32,
+    /// Decides every random choice.
+    #[serde(default = "one_seed")]
+    pub seed: u64,
+}
+
+fn one() -> u32 {
+    1
+}
+
+fn one_seed() -> u64 {
+    1
+}
+
+impl TeachRequest {
+    /// The time budget, if it is one.
+    pub fn time_budget(&self) -> Option<Duration> {
+        self.time_budget_secs.and_then(|secs| Duration::try_from_secs_f64(secs).ok())
+    }
+}
+
+/// The grasp models by their letters; see the project's ARCHITECTURE.md.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ModelLetter {
+    /// Box, turn from its crop.
+    A,
+    /// Box, turn from keypoints.
+    B,
+    /// Keypoints.
+    C,
+    /// Mask, turn from texture or outline.
+    D,
+    /// No network.
+    S,
+}
+
+impl ModelLetter {
+    /// Every model.
+    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::S];
+
+    /// The letter itself.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::A => "A",
+            Self::B => "B",
+            Self::C => "C",
+            Self::D => "D",
+            Self::S => "S",
+        }
+    }
+}
+
+/// One piece of news from a teaching.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TeachingStep {
+    /// An optimiser step was done.
+    Step {
+        /// What is being taught: `the network`, `its angles`.
+        of: &'static str,
+        /// Steps done.
+        done: usize,
+        /// Steps that there will be, as known now.
+        planned: usize,
+        /// The loss before the step.
+        loss: f64,
+    },
+    /// The model was tried on held-back samples.
+    Validated {
+        /// Steps done before it.
+        done: usize,
+        /// Share of the parts that were found, in `[0, 1]`.
+        hit_rate: f64,
+    },
+}
+
+/// A model in figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TaughtSummary {
+    /// The letter.
+    pub model: ModelLetter,
+    /// The object's name.
+    pub object: String,
+    /// Wall-clock time of the teaching.
+    pub seconds: f64,
+    /// Share of held-back samples in which the part was found; `None` for a model without a network.
+    pub hit_rate: Option<f64>,
+    /// Median error on them in pixels.
+    pub error_px: Option<f64>,
+    /// Median error on them in degrees.
+    pub error_degrees: Option<f64>,
+}
+
+/// One grasp that a model found, in pixels of the image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundGrasp {
+    /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
+    pub score: f64,
+    /// Whether the part is there.
+    pub is_accepted: bool,
+    /// The box around the part.
+    pub bbox: BoundingBox,
+    /// Its outline as the demonstration lies in the image.
+    pub outline: Option<Polygon>,
+    /// Where to grasp.
+    pub grasp: PlanarGrasp,
+    /// Length of the marked line in this image.
+    pub line_length: f64,
+}

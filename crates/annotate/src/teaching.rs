@@ -1,0 +1,198 @@
+//! Teaching in the background, and its news for whoever asks.
+
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use sdg_report::write_atomically;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::session::Session;
+use crate::teacher::{ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+
+/// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
+const MOST_POINTS: usize = 240;
+/// More steps than any teaching has.
+const MOST_STEPS: usize = 1_000_000;
+
+/// How a teaching stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// None was asked for yet.
+    #[default]
+    Idle,
+    /// It goes on.
+    Running,
+    /// It was asked to end with what there is.
+    Stopping,
+    /// There is a model.
+    Done,
+    /// There is none.
+    Failed,
+}
+
+/// The news of a teaching.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct News {
+    /// How it stands.
+    pub status: Status,
+    /// The model being taught.
+    pub model: Option<ModelLetter>,
+    /// What is being taught just now.
+    pub of: &'static str,
+    /// Steps done.
+    pub done: usize,
+    /// Steps planned.
+    pub planned: usize,
+    /// Seconds since the start.
+    pub elapsed_secs: f64,
+    /// Seconds that are left, by the pace so far; `None` before the first step.
+    pub left_secs: Option<f64>,
+    /// `[step, loss]`, thinned.
+    pub losses: Vec<(usize, f64)>,
+    /// `[step, share found]`.
+    pub validations: Vec<(usize, f64)>,
+    /// The model, when done.
+    pub summary: Option<TaughtSummary>,
+    /// Where it was written.
+    pub written_to: Option<String>,
+    /// Why there is none.
+    pub error: Option<String>,
+}
+
+/// The one teaching that may go on.
+#[derive(Default)]
+pub struct Teaching {
+    news: Mutex<News>,
+    stop: AtomicBool,
+    model: Mutex<Option<Arc<dyn TaughtModel>>>,
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Teaching {
+    /// How it stands.
+    pub fn news(&self) -> News {
+        locked(&self.news).clone()
+    }
+
+    /// The model taught last.
+    ///
+    /// # Errors
+    /// [`Error::NotTaught`].
+    pub fn model(&self) -> Result<Arc<dyn TaughtModel>> {
+        locked(&self.model).clone().ok_or(Error::NotTaught)
+    }
+
+    /// Asks a running teaching to end with what there is.
+    pub fn stop(&self) {
+        let mut news = locked(&self.news);
+        if news.status == Status::Running {
+            news.status = Status::Stopping;
+            self.stop.store(true, Ordering::SeqCst);
+        }
+    }
+
+    fn hear(&self, step: TeachingStep, start: Instant, stride: &mut usize) -> ControlFlow<()> {
+        let mut news = locked(&self.news);
+        news.elapsed_secs = start.elapsed().as_secs_f64();
+        match step {
+            TeachingStep::Step { of, done, planned, loss } => {
+                if news.of != of {
+                    // Another network: its loss is on another scale.
+                    news.losses.clear();
+                    *stride = 1;
+                }
+                (news.of, news.done, news.planned) = (of, done, planned);
+                let pace = news.elapsed_secs / done.max(1) as f64;
+                news.left_secs = Some(pace * planned.saturating_sub(done) as f64);
+                if done % *stride == 0 && loss.is_finite() {
+                    news.losses.push((done, loss));
+                }
+                if news.losses.len() > MOST_POINTS {
+                    *stride *= 2;
+                    let stride = *stride;
+                    news.losses.retain(|(step, _)| step % stride == 0);
+                }
+            }
+            TeachingStep::Validated { done, hit_rate } => news.validations.push((done, hit_rate)),
+        }
+        if self.stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+/// Starts to teach from all marked pictures; the news tell how it goes.
+///
+/// # Errors
+/// A teaching that goes on already, a request without sense, marks that do not suffice.
+pub fn start(session: &Arc<Session>, request: TeachRequest) -> Result<News> {
+    check(&request)?;
+    let mut news = locked(&session.teaching.news);
+    if matches!(news.status, Status::Running | Status::Stopping) {
+        return Err(Error::Busy("a teaching is going on; stop it first, or wait"));
+    }
+    let demonstrations = session.demonstrations(request.model)?;
+    *news = News { status: Status::Running, model: Some(request.model), ..News::default() };
+    session.teaching.stop.store(false, Ordering::SeqCst);
+    let begun = news.clone();
+    drop(news);
+
+    let session = Arc::clone(session);
+    std::thread::spawn(move || {
+        let start = Instant::now();
+        let teaching = &session.teaching;
+        let mut stride = 1;
+        let mut observe = |step| teaching.hear(step, start, &mut stride);
+        let taught = catch_unwind(AssertUnwindSafe(|| session.teacher.teach(&demonstrations, &request, &mut observe)));
+        // A page that waited for a teaching which broke off would wait for ever.
+        let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
+        let outcome = taught.map_err(Error::Teacher).and_then(|model| keep(&session, model));
+        let mut news = locked(&teaching.news);
+        news.elapsed_secs = start.elapsed().as_secs_f64();
+        match outcome {
+            Ok((summary, written_to)) => {
+                news.status = Status::Done;
+                news.summary = Some(summary);
+                news.written_to = Some(written_to);
+            }
+            Err(error) => {
+                news.status = Status::Failed;
+                news.error = Some(error.to_string());
+            }
+        }
+    });
+    Ok(begun)
+}
+
+/// Writes the model down and keeps it for the pictures to try.
+fn keep(session: &Session, model: Box<dyn TaughtModel>) -> Result<(TaughtSummary, String)> {
+    let path = session.model_file();
+    write_atomically(&path, &model.to_bytes().map_err(Error::Teacher)?)?;
+    let summary = model.summary();
+    *locked(&session.teaching.model) = Some(Arc::from(model));
+    Ok((summary, path.display().to_string()))
+}
+
+fn check(request: &TeachRequest) -> Result<()> {
+    let refuse = |what, expected: &str, found: String| Err(Error::Request { what, expected: expected.into(), found });
+    if let Some(secs) = request.time_budget_secs
+        && (request.time_budget().is_none() || secs <= 0.0)
+    {
+        return refuse("time limit", "a positive number of seconds", secs.to_string());
+    }
+    if let Some(steps) = request.steps
+        && !(1..=MOST_STEPS).contains(&steps)
+    {
+        return refuse("steps", "1 to 1000000", steps.to_string());
+    }
+    if request.symmetry > 360 {
+        return refuse("symmetry", "0 to 360 equal turns", request.symmetry.to_string());
+    }
+    Ok(())
+}

@@ -1,0 +1,73 @@
+//! A sitting as the page sees it: what is answered, as JSON.
+
+use serde::Serialize;
+
+use crate::advice::Advice;
+use crate::marks::Marks;
+
+/// Whether the marks stand on the disk.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "state")]
+pub enum Saved {
+    /// There is nothing to write.
+    Nothing,
+    /// They do.
+    Written {
+        /// The file's name.
+        file: String,
+    },
+    /// They do not, and why.
+    Refused {
+        /// For people.
+        why: String,
+    },
+}
+
+/// A marked picture as the page sees it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImageView {
+    /// Its number.
+    pub id: usize,
+    /// Its file's name.
+    pub name: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// What is marked.
+    pub marks: Marks,
+    /// Whether that stands on the disk.
+    pub saved: Saved,
+    /// What the marks are good for.
+    pub advice: Advice,
+    /// What the person should know about the file.
+    pub note: Option<String>,
+}
+
+/// A picture to try, as the page sees it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SceneView {
+    /// Its number.
+    pub id: usize,
+    /// Its file's name.
+    pub name: String,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// The number of the marked picture that it became.
+    pub became: Option<usize>,
+}
+
+/// All that the page starts from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SessionView {
+    /// The object's name.
+    pub label: String,
+    /// The pictures of it.
+    pub images: Vec<ImageView>,
+    /// Pictures to try.
+    pub scenes: Vec<SceneView>,
+    /// Where a taught model is written.
+    pub model_path: String,
+}

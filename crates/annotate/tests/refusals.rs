@@ -1,0 +1,138 @@
+//! Who is turned away, on the real server.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod served;
+
+use served::Served;
+
+#[test]
+fn the_page_opens_with_its_address_and_leaves_a_cookie() {
+    let served = Served::start();
+    let page = served.send("GET", &format!("/?token={}", served.token), &[("Host", &served.host())], b"");
+    assert_eq!(page.status, 200);
+    assert!(page.text().contains("<title>Teach a grasp</title>"));
+    let head = page.head.to_lowercase();
+    assert!(head.contains(&format!("set-cookie: {}; path=/; httponly; samesite=strict", served.cookie())), "{head}");
+    assert!(head.contains("content-security-policy: default-src 'none'"), "{head}");
+    assert!(head.contains("referrer-policy: no-referrer"), "{head}");
+}
+
+#[test]
+fn wrong_and_missing_tokens_are_refused_everywhere() {
+    let served = Served::start();
+    let (host, wrong) = (served.host(), format!("sdg-annotate-{}={}", served.port, "0".repeat(32)));
+    for (method, path) in [
+        ("GET", "/"),
+        ("GET", "/?token=0123456789abcdef0123456789abcdef"),
+        ("GET", "/page/main.js"),
+        ("GET", "/api/session"),
+        ("GET", "/api/images/0/picture"),
+        ("PUT", "/api/images/0/marks"),
+        ("POST", "/api/teaching"),
+        ("POST", "/api/scenes?name=a.png"),
+        ("GET", "/nowhere"),
+    ] {
+        for headers in [vec![("Host", host.as_str())], vec![("Host", host.as_str()), ("Cookie", wrong.as_str())]] {
+            let answer = served.send(method, path, &headers, b"{}");
+            assert_eq!(answer.status, 401, "{method} {path}");
+            assert!(!answer.head.to_lowercase().contains("set-cookie"), "{method} {path}");
+        }
+    }
+}
+
+#[test]
+fn foreign_hosts_and_origins_are_refused_though_they_have_the_token() {
+    let served = Served::start();
+    let (host, cookie) = (served.host(), served.cookie());
+    for foreign in ["evil.example", "127.0.0.1:1", "evil.example:80"] {
+        assert_eq!(
+            served.send("GET", "/api/session", &[("Host", foreign), ("Cookie", cookie.as_str())], b"").status,
+            403
+        );
+    }
+    for foreign in ["http://evil.example", "null", "http://127.0.0.1:1"] {
+        let headers = [("Host", host.as_str()), ("Cookie", cookie.as_str()), ("Origin", foreign)];
+        let answer = served.send("PUT", "/api/images/0/marks", &headers, b"{\"box\": [1, 1, 50, 50]}");
+        assert_eq!(answer.status, 403, "{foreign}");
+    }
+    assert!(!served.folder.path().join("photo.json").exists(), "nothing was written");
+}
+
+#[test]
+fn no_path_leads_to_other_files() {
+    let served = Served::start();
+    for path in [
+        "/page/../Cargo.toml",
+        "/page/..%2f..%2fCargo.toml",
+        "/page/%2e%2e/%2e%2e/secret.txt",
+        "/page/secret.txt",
+        "/../secret.txt",
+        "/secret.txt",
+        "/api/images/../../secret.txt",
+        "/api/images/..%2fsecret.txt/picture",
+        "/api/images/1/picture",
+        "/api/images/-1/picture",
+        "/api/images/18446744073709551616/picture",
+        "/api/scenes/0/picture",
+        "/page//etc/passwd",
+    ] {
+        let answer = served.ask("GET", path, b"");
+        assert!([400, 404].contains(&answer.status), "{path}: {}", answer.status);
+        assert!(!answer.text().contains("not for the page"), "{path}");
+    }
+}
+
+#[test]
+fn a_picture_s_name_cannot_choose_where_it_is_written() {
+    let served = Served::start();
+    let scene = served.ask("POST", "/api/scenes?name=..%2f..%2f..%2ftmp%2fevil%00.png", &served::photo_png()).json();
+    assert_eq!(scene["name"], "evil\0.png");
+    let view = served.ask("POST", "/api/scenes/0/accept", b"{\"box\": [40, 40, 140, 60]}").json();
+    assert_eq!(view["name"], "evil_.png");
+    assert!(served.folder.path().join("evil_.png").exists() && served.folder.path().join("evil_.json").exists());
+}
+
+#[test]
+fn oversized_bodies_are_refused() {
+    let served = Served::start();
+    let large = vec![b' '; (1 << 20) + 1];
+    for (method, path) in [
+        ("PUT", "/api/images/0/marks"),
+        ("POST", "/api/images/0/outline"),
+        ("PUT", "/api/label"),
+        ("POST", "/api/teaching"),
+        ("POST", "/api/scenes/0/accept"),
+    ] {
+        assert_eq!(served.ask(method, path, &large).status, 413, "{path}");
+    }
+    let picture = vec![0; (64 << 20) + 1];
+    assert_eq!(served.ask("POST", "/api/scenes?name=a.png", &picture).status, 413);
+    // Pictures may be larger than marks: what follows the end of a PNG does not count.
+    let mut photo = served::photo_png();
+    photo.resize(3 << 20, 0);
+    assert_eq!(served.ask("POST", "/api/scenes?name=a.png", &photo).status, 200);
+}
+
+#[test]
+fn requests_without_sense_are_told_in_one_line() {
+    let served = Served::start();
+    let refused = |method: &str, path: &str, body: &[u8], parts: &[&str]| {
+        let answer = served.ask(method, path, body);
+        let text = answer.text();
+        assert!((400..500).contains(&answer.status), "{path}: {} {text}", answer.status);
+        let error: serde_json::Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{path}: {text}"));
+        let error = error["error"].as_str().unwrap();
+        assert!(!error.contains('\n'), "{error}");
+        parts.iter().for_each(|part| assert!(error.contains(part), "expected \"{part}\" in: {error}"));
+    };
+    refused("PUT", "/api/images/0/marks", b"box", &["marks", "JSON"]);
+    refused("PUT", "/api/images/0/marks", b"{\"bux\": 1}", &["bux"]);
+    refused("PUT", "/api/images/7/marks", b"{}", &["numbered below 1", "7"]);
+    refused("PUT", "/api/label", b"{\"label\": \"  \"}", &["name", "letters"]);
+    refused("POST", "/api/scenes?name=a.png", b"GIF89a....", &["a.png", "PNG or JPEG"]);
+    refused("POST", "/api/teaching", b"{\"model\": \"Z\"}", &["teaching", "unknown variant"]);
+    refused("POST", "/api/teaching", b"{\"model\": \"C\"}", &["photo.png", "a box and a grasp"]);
+    refused("POST", "/api/teaching", b"{\"model\": \"C\", \"steps\": 0}", &["steps", "1 to 1000000"]);
+    refused("POST", "/api/teaching", b"{\"model\": \"C\", \"time_budget_secs\": -1}", &["time limit", "-1"]);
+    refused("GET", "/api/images/0/samples/0", b"", &["photo.png"]);
+}

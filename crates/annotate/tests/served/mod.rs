@@ -1,0 +1,185 @@
+//! A real server on a real port, and a client that sends what it is told.
+
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, TcpStream};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use image::{Rgb, RgbImage};
+use sdg_annotate::{
+    FoundGrasp, GraspTeacher, Server, Session, SessionOptions, TaughtModel, TaughtSummary, TeachRequest, TeacherError,
+    TeachingStep,
+};
+use sdg_demonstration::Demonstration;
+use sdg_geometry::{GraspLine, PlanarGrasp};
+use serde_json::Value;
+
+/// A teacher whose model finds its demonstration where it was photographed; quick, for the page's own sake.
+struct InPlace;
+
+struct InPlaceModel(Demonstration);
+
+impl GraspTeacher for InPlace {
+    fn teach(
+        &self,
+        demonstrations: &[Demonstration],
+        request: &TeachRequest,
+        observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let planned = request.steps.unwrap_or(3);
+        for done in 1..=planned {
+            // Slow enough that a test can stop it.
+            std::thread::sleep(Duration::from_millis(2));
+            let step = TeachingStep::Step { of: "the place", done, planned, loss: 1.0 / done as f64 };
+            if observe(step).is_break() {
+                return Err("stopped before anything was learnt".into());
+            }
+        }
+        let _ = observe(TeachingStep::Validated { done: planned, hit_rate: 1.0 });
+        Ok(Box::new(InPlaceModel(demonstrations[0].clone())))
+    }
+}
+
+impl TaughtModel for InPlaceModel {
+    fn summary(&self) -> TaughtSummary {
+        TaughtSummary {
+            model: sdg_annotate::ModelLetter::S,
+            object: self.0.annotation.label.clone(),
+            seconds: 0.1,
+            hit_rate: None,
+            error_px: None,
+            error_degrees: None,
+        }
+    }
+
+    fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
+        Ok(b"a model".to_vec())
+    }
+
+    fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
+        let bbox = self.0.annotation.bbox;
+        let place = bbox.center().map(|v| v as u32);
+        let same = image.get_pixel(place.x, place.y) == self.0.image.get_pixel(place.x, place.y);
+        let line: GraspLine = *self.0.annotation.require_grasp()?;
+        Ok(vec![FoundGrasp {
+            score: if same { 0.9 } else { 0.1 },
+            is_accepted: same,
+            bbox,
+            outline: self.0.annotation.outline.clone(),
+            grasp: PlanarGrasp::from_line(&line, self.0.annotation.jaw_width.unwrap_or(30.0)),
+            line_length: line.length(),
+        }])
+    }
+}
+
+/// A server over a folder with one photo, ended when dropped.
+pub struct Served {
+    pub folder: tempfile::TempDir,
+    pub port: u16,
+    pub token: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// An answer, taken apart.
+pub struct Answer {
+    pub status: u16,
+    pub head: String,
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(&self.body).into_owned()
+    }
+
+    pub fn json(&self) -> Value {
+        assert_eq!(self.status, 200, "{}", self.text());
+        serde_json::from_slice(&self.body).unwrap()
+    }
+}
+
+/// A light bar on a dark table with some grain.
+pub fn photo() -> RgbImage {
+    RgbImage::from_fn(200, 100, |x, y| {
+        let grain = ((x * 7 + y * 13) % 11) as u8;
+        let on_part = (40..140).contains(&x) && (40..60).contains(&y);
+        Rgb(if on_part { [200 + grain, 190, 170 + (x % 40) as u8] } else { [40 + grain, 45, 50] })
+    })
+}
+
+pub fn photo_png() -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    photo().write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    bytes.into_inner()
+}
+
+impl Served {
+    pub fn start() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let image: PathBuf = folder.path().join("photo.png");
+        std::fs::write(&image, photo_png()).unwrap();
+        std::fs::write(folder.path().join("secret.txt"), "not for the page").unwrap();
+        let options = SessionOptions { images: vec![(image, None)], ..SessionOptions::default() };
+        let server = Server::bind(Session::open(&options, Arc::new(InPlace)).unwrap(), 0).unwrap();
+        let url = server.url();
+        let (address, token) = url.split_once("/?token=").unwrap();
+        let (port, token) = (address.rsplit(':').next().unwrap().parse().unwrap(), token.to_owned());
+        let stop = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&stop);
+        let thread = std::thread::spawn(move || server.run(move || asked.load(Ordering::SeqCst)).unwrap());
+        Self { folder, port, token, stop, thread: Some(thread) }
+    }
+
+    /// Sends exactly these headers.
+    pub fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]) -> Answer {
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        let mut head = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\nContent-Length: {}\r\n", body.len());
+        for (name, value) in headers {
+            head += &format!("{name}: {value}\r\n");
+        }
+        stream.write_all(format!("{head}\r\n").as_bytes()).unwrap();
+        // A server that refuses by the head alone may close before it has read the body.
+        let _ = stream.write_all(body);
+        let mut answer = Vec::new();
+        let _ = stream.read_to_end(&mut answer);
+        let end = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("a whole head");
+        let head = String::from_utf8_lossy(&answer[..end]).into_owned();
+        let status = head.split(' ').nth(1).unwrap().parse().unwrap();
+        Answer { status, head, body: answer[end + 4..].to_vec() }
+    }
+
+    pub fn host(&self) -> String {
+        format!("127.0.0.1:{}", self.port)
+    }
+
+    pub fn cookie(&self) -> String {
+        format!("sdg-annotate-{}={}", self.port, self.token)
+    }
+
+    /// A request as the page makes it.
+    pub fn ask(&self, method: &str, path: &str, body: &[u8]) -> Answer {
+        let (host, cookie) = (self.host(), self.cookie());
+        let origin = format!("http://{host}");
+        self.send(
+            method,
+            path,
+            &[("Host", host.as_str()), ("Cookie", cookie.as_str()), ("Origin", origin.as_str())],
+            body,
+        )
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::SeqCst);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

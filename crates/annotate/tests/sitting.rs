@@ -1,0 +1,127 @@
+//! A sitting from the first mark to another demonstration, on the real server.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod served;
+
+use std::time::{Duration, Instant};
+
+use sdg_demonstration::{Annotation, ImageFacts};
+use serde_json::{Value, json};
+use served::Served;
+
+const FACTS: ImageFacts = ImageFacts { width: 200, height: 100, file_name: Some("photo.png") };
+
+fn marks() -> Value {
+    json!({
+        "box": [40.0, 40.0, 140.0, 60.0],
+        "grasp": {"start": [80.0, 50.0], "end": [100.0, 50.0], "jaw_width": 24.0},
+        "outline": [[40.0, 40.0], [140.0, 40.0], [140.0, 60.0], [40.0, 60.0]],
+    })
+}
+
+fn put_marks(served: &Served, marks: &Value) -> Value {
+    served.ask("PUT", "/api/images/0/marks", marks.to_string().as_bytes()).json()
+}
+
+fn wait_for(served: &Served, statuses: &[&str]) -> Value {
+    let start = Instant::now();
+    loop {
+        let news = served.ask("GET", "/api/teaching", b"").json();
+        if statuses.contains(&news["status"].as_str().unwrap()) {
+            return news;
+        }
+        assert!(start.elapsed() < Duration::from_secs(30), "{news}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn marks_are_written_as_they_are_made() {
+    let served = Served::start();
+    let file = served.folder.path().join("photo.json");
+    let grasp_alone = put_marks(&served, &json!({"grasp": marks()["grasp"]}));
+    assert_eq!(grasp_alone["saved"]["state"], "nothing");
+    assert!(!file.exists());
+    assert_eq!(served.ask("GET", "/api/session", b"").json()["images"][0]["marks"]["grasp"], marks()["grasp"]);
+
+    served.ask("PUT", "/api/label", b"{\"label\": \"bar\"}").json();
+    let whole = put_marks(&served, &marks());
+    assert_eq!(whole["saved"], json!({"state": "written", "file": "photo.json"}));
+    assert_eq!(whole["advice"]["remarks"], json!([]));
+    let read = Annotation::read(&std::fs::read(&file).unwrap(), &FACTS).unwrap().remove(0);
+    assert_eq!((read.label.as_str(), read.jaw_width), ("bar", Some(24.0)));
+
+    served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}").json();
+    assert_eq!(Annotation::read(&std::fs::read(&file).unwrap(), &FACTS).unwrap()[0].label, "rod");
+
+    let crossing = json!({"outline": [[40, 40], [140, 60], [140, 40], [40, 60]]});
+    let refused = put_marks(&served, &crossing);
+    assert_eq!(refused["saved"]["state"], "refused");
+    assert!(refused["saved"]["why"].as_str().unwrap().contains("does not cross itself"));
+    assert!(Annotation::read(&std::fs::read(&file).unwrap(), &FACTS).is_ok(), "the last good marks stand");
+}
+
+#[test]
+fn samples_are_pictures_that_change_with_number_and_marks() {
+    let served = Served::start();
+    put_marks(&served, &marks());
+    let sample = |path: &str| {
+        let answer = served.ask("GET", path, b"");
+        assert_eq!(answer.status, 200, "{}", answer.text());
+        assert!(answer.head.to_lowercase().contains("content-type: image/jpeg"));
+        image::load_from_memory(&answer.body).unwrap().into_rgb8()
+    };
+    let first = sample("/api/images/0/samples/0?seed=1");
+    assert_eq!(first.dimensions(), (200, 100));
+    assert_eq!(first, sample("/api/images/0/samples/0?seed=1"));
+    assert_ne!(first, sample("/api/images/0/samples/1?seed=1"));
+    assert_ne!(first, sample("/api/images/0/samples/0?seed=2"));
+}
+
+#[test]
+fn a_teaching_tells_its_news_and_ends_when_asked() {
+    let served = Served::start();
+    put_marks(&served, &marks());
+    let body = json!({"model": "S", "steps": 100_000}).to_string();
+    assert_eq!(served.ask("POST", "/api/teaching", body.as_bytes()).json()["status"], "running");
+    assert_eq!(served.ask("POST", "/api/teaching", body.as_bytes()).status, 409, "one at a time");
+    let start = Instant::now();
+    while served.ask("GET", "/api/teaching", b"").json()["done"].as_u64().unwrap() < 300 {
+        assert!(start.elapsed() < Duration::from_secs(30));
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    served.ask("DELETE", "/api/teaching", b"").json();
+    let news = wait_for(&served, &["failed"]);
+    assert!(news["error"].as_str().unwrap().contains("stopped"), "{news}");
+    let losses = news["losses"].as_array().unwrap();
+    assert!((100..=240).contains(&losses.len()), "{} points", losses.len());
+    let [step, loss] = [0usize, 1].map(|i| losses.last().unwrap()[i].as_f64().unwrap());
+    assert!((loss - 1.0 / step).abs() < 1e-12);
+    assert!(!served.folder.path().join("part.sdg").exists());
+}
+
+#[test]
+fn a_taught_model_is_tried_and_what_it_found_becomes_a_demonstration() {
+    let served = Served::start();
+    put_marks(&served, &marks());
+    assert_eq!(served.ask("POST", "/api/scenes?name=table.png", &served::photo_png()).json()["id"], 0);
+    assert_eq!(served.ask("POST", "/api/scenes/0/detect", b"").status, 409, "nothing is taught yet");
+    served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
+    let news = wait_for(&served, &["done", "failed"]);
+    assert_eq!(news["status"], "done", "{news}");
+    assert_eq!(std::fs::read(served.folder.path().join("part.sdg")).unwrap(), b"a model");
+
+    let found = served.ask("POST", "/api/scenes/0/detect", b"").json();
+    let detection = &found["detections"][0];
+    assert_eq!((&detection["is_accepted"], &detection["marks"]["grasp"]), (&json!(true), &marks()["grasp"]));
+    let body = detection["marks"].to_string();
+    let view = served.ask("POST", "/api/scenes/0/accept", body.as_bytes()).json();
+    assert_eq!(
+        (&view["id"], &view["name"], &view["saved"]["state"]),
+        (&json!(1), &json!("table.png"), &json!("written"))
+    );
+    let read = Annotation::read(&std::fs::read(served.folder.path().join("table.json")).unwrap(), &FACTS).unwrap();
+    assert!(read[0].grasp.is_some() && read[0].outline.is_some());
+    assert_eq!(served.ask("POST", "/api/scenes/0/accept", body.as_bytes()).status, 409, "once is enough");
+    assert_eq!(served.ask("GET", "/api/images/1/picture", b"").body, served::photo_png());
+}

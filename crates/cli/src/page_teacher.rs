@@ -1,0 +1,113 @@
+//! Grasp models for the annotation page, which does not see them.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use image::RgbImage;
+use sdg_annotate::{
+    FoundGrasp, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingStep,
+};
+use sdg_demonstration::Demonstration;
+use sdg_geometry::RotationalSymmetry;
+use sdg_grasp::{Event, GraspDetection, GraspModel, ModelKind, Preset, TeachOptions, Verification, teach};
+
+/// Teaches with one preset.
+pub struct PageTeacher {
+    /// Network, training and augmentation.
+    pub preset: Preset,
+}
+
+impl GraspTeacher for PageTeacher {
+    fn teach(
+        &self,
+        demonstrations: &[Demonstration],
+        request: &TeachRequest,
+        observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
+    ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let options = TeachOptions {
+            kind: request.model.as_str().parse()?,
+            preset: self.preset,
+            symmetry: match request.symmetry {
+                0 => RotationalSymmetry::Full,
+                1 => RotationalSymmetry::None,
+                count => RotationalSymmetry::Fold(count),
+            },
+            time_budget: request.time_budget(),
+            steps: request.steps,
+            ..TeachOptions::new(request.seed)
+        };
+        let taught = teach(demonstrations, &options, &mut |event| observe(step(event)))?;
+        Ok(Box::new(PageModel(Mutex::new(taught.model))))
+    }
+}
+
+fn step(event: &Event) -> TeachingStep {
+    match event {
+        Event::OrientationStep { step, planned_steps, loss, .. } => {
+            TeachingStep::Step { of: "its turns", done: step + 1, planned: *planned_steps, loss: *loss }
+        }
+        Event::Step { record, planned_steps, .. } => TeachingStep::Step {
+            of: "the network",
+            done: record.step + 1,
+            planned: *planned_steps,
+            loss: record.losses.total(),
+        },
+        Event::Validated(record) => {
+            TeachingStep::Validated { done: record.steps_done, hit_rate: record.validation.hit_rate() }
+        }
+    }
+}
+
+/// One look at a time: each uses every core.
+struct PageModel(Mutex<GraspModel>);
+
+impl PageModel {
+    fn model(&self) -> MutexGuard<'_, GraspModel> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl TaughtModel for PageModel {
+    fn summary(&self) -> TaughtSummary {
+        let model = self.model();
+        let facts = model.facts();
+        TaughtSummary {
+            model: match model.kind() {
+                ModelKind::A => ModelLetter::A,
+                ModelKind::B => ModelLetter::B,
+                ModelKind::C => ModelLetter::C,
+                ModelKind::D => ModelLetter::D,
+                ModelKind::S => ModelLetter::S,
+            },
+            object: model.object().to_owned(),
+            seconds: facts.seconds,
+            hit_rate: facts.validation.map(|held_back| held_back.hit_rate),
+            error_px: facts.validation.map(|held_back| held_back.error_px),
+            error_degrees: facts.validation.map(|held_back| held_back.error_degrees),
+        }
+    }
+
+    fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
+        Ok(self.model().to_bytes()?)
+    }
+
+    fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
+        let model = self.model();
+        let found = model.detect(image, Verification::ByShape)?;
+        Ok(found.iter().map(|detection| found_grasp(&model, detection)).collect())
+    }
+}
+
+/// The marked line is as long, against the part, as the first demonstration's: detections tell its middle only.
+fn found_grasp(model: &GraspModel, detection: &GraspDetection) -> FoundGrasp {
+    let taught = &model.demonstrations()[0].marks;
+    let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
+    FoundGrasp {
+        score: detection.score,
+        is_accepted: detection.is_accepted(),
+        bbox: detection.bbox,
+        outline: detection.outline.clone(),
+        grasp: detection.grasp,
+        line_length: taught.grasp.length() * scale,
+    }
+}

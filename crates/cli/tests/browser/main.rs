@@ -1,0 +1,10 @@
+//! The annotation page in headless Chromium, as a new user goes through it: from a photo to a taught model and back.
+//!
+//! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
+//! target/browser-test.
+#![allow(clippy::unwrap_used)]
+
+mod keyboard;
+mod page;
+mod photo_to_grasp;
+mod small_screen;

@@ -1,0 +1,143 @@
+//! `sdg annotate` on a folder of its own, opened in a browser.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use sdg_demonstration::{Annotation, ImageFacts};
+use sdg_webdriver::{Browser, BrowserOptions};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// The pendulum lies here on its photo; its handle's middle is a good place to grasp it.
+pub const BOX: [f64; 4] = [255.0, 164.0, 392.0, 282.0];
+pub const HOLD: [f64; 2] = [325.0, 225.0];
+
+/// The page and all that is behind it; everything ends when dropped.
+pub struct Page {
+    pub browser: Browser,
+    pub folder: TempDir,
+    server: Child,
+    pub url: String,
+}
+
+pub fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
+}
+
+pub fn shipped_photo() -> PathBuf {
+    repository().join("datasets/demonstrations/pendulum/image.png")
+}
+
+impl Page {
+    /// Opens the page on a copy of the shipped pendulum's photo, which nothing is marked on.
+    pub fn open() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("photo.png");
+        std::fs::copy(shipped_photo(), &photo).unwrap();
+        let mut server = Command::new(env!("CARGO_BIN_EXE_sdg"))
+            .args(["annotate", "--no-browser", "--json"])
+            .arg(&photo)
+            // It is ended without a word, and what it keeps for the sitting goes with the folder.
+            .env("TMPDIR", folder.path())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let told: Value = serde_json::from_str(&line).unwrap();
+        let url = told["url"].as_str().unwrap().to_owned();
+        let browser = Browser::start(&BrowserOptions::default()).unwrap();
+        browser.emulate(1280, 800, false).unwrap();
+        let page = Self { browser, folder, server, url };
+        page.browser.open(&page.url).unwrap();
+        page.wait_for("the photo", "const p = document.getElementById('photo'); return p.complete && p.naturalWidth");
+        page
+    }
+
+    pub fn wait_for(&self, what: &str, script: &str) -> Value {
+        self.browser.wait_for(what, script).unwrap()
+    }
+
+    pub fn click(&self, css: &str) {
+        // Scrolled first: on a narrow screen most of the page is below the photo.
+        let script = "document.querySelector(arguments[0]).scrollIntoView({block: 'center'})";
+        self.browser.run(script, &[json!(css)]).unwrap();
+        self.browser.find(css).unwrap().click().unwrap();
+    }
+
+    pub fn text(&self, css: &str) -> String {
+        let text = self.browser.run("return document.querySelector(arguments[0]).innerText", &[json!(css)]).unwrap();
+        text.as_str().unwrap_or_default().to_owned()
+    }
+
+    /// Where a place of the photo is on the screen.
+    pub fn on_screen(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let script = "const p = document.getElementById('photo'), r = p.getBoundingClientRect();
+            const k = r.width / p.naturalWidth; return [r.left + arguments[0] * k, r.top + arguments[1] * k]";
+        numbers(&self.browser.run(script, &[json!(x), json!(y)]).unwrap())
+    }
+
+    /// The middle of a handle on the screen.
+    pub fn handle(&self, css: &str) -> [f64; 2] {
+        let script = "const r = document.querySelector(arguments[0]).getBoundingClientRect();
+            return [r.left + r.width / 2, r.top + r.height / 2]";
+        numbers(&self.browser.run(script, &[json!(css)]).unwrap())
+    }
+
+    pub fn draw_box(&self) {
+        let corner = |x, y| self.on_screen([x, y]);
+        let middle = corner(0.5 * (BOX[0] + BOX[2]), 0.5 * (BOX[1] + BOX[3]));
+        self.browser.drag(&[corner(BOX[0], BOX[1]), middle, corner(BOX[2], BOX[3])]).unwrap();
+    }
+
+    /// Waits until what was just done is shown, sent and answered.
+    pub fn settle(&self) {
+        let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(
+            !document.getElementById('propose').disabled && document.getElementById('saved').innerText !== 'Saving…'))))";
+        self.wait_for("the page to settle", script);
+    }
+
+    /// Waits until all is saved and reads what stands on the disk.
+    pub fn saved(&self) -> Annotation {
+        self.settle();
+        self.wait_for(
+            "everything to be saved",
+            "return document.getElementById('saved').innerText.startsWith('Saved in')",
+        );
+        let bytes = std::fs::read(self.folder.path().join("photo.json")).unwrap();
+        let facts = ImageFacts { width: 640, height: 480, file_name: Some("photo.png") };
+        Annotation::read(&bytes, &facts).unwrap().remove(0)
+    }
+
+    pub fn screenshot(&self, name: &str) {
+        self.browser.screenshot(&repository().join(format!("target/browser-test/annotate-{name}.png"))).unwrap();
+    }
+
+    /// What axe-core finds wrong with the page as it is now.
+    pub fn assert_accessible(&self, about: &str) {
+        let path = repository().join("target/browser-test/npm/node_modules/axe-core/axe.min.js");
+        let axe =
+            std::fs::read_to_string(&path).unwrap_or_else(|_| panic!("make test-browser installs {}", path.display()));
+        self.browser.run(&format!("if (!window.axe) {{ {axe}\n }}"), &[]).unwrap();
+        let script = "return axe.run(document).then((found) => found.violations.map((v) =>
+            `${v.id} (${v.help}): ${v.nodes.map((n) => n.target.join(' ')).join(', ')}`))";
+        let violations = self.browser.run(script, &[]).unwrap();
+        assert_eq!(violations, json!([]), "{about}");
+    }
+
+    pub fn assert_quiet(&self) {
+        assert_eq!(self.browser.console_errors().unwrap(), [""; 0]);
+    }
+}
+
+fn numbers(value: &Value) -> [f64; 2] {
+    [0usize, 1].map(|i| value[i].as_f64().unwrap())
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
