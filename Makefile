@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-browser lint bench clean
+.PHONY: help setup build demo edge test test-browser lint bench clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -20,6 +20,9 @@ build: setup ## Builds target/release/sdg
 
 demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
 	target/release/sdg demo
+
+edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
+	@scripts/edge.sh $(EDGE)
 
 # nextest where it is installed, cargo's own runner elsewhere; nextest leaves the examples in the docs to cargo.
 test: setup ## Runs every test

@@ -15,9 +15,11 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod compare;
+mod edge;
 mod network;
 mod protocol;
 mod registry;
+mod results;
 mod scene;
 mod works;
 
@@ -40,6 +42,8 @@ struct Args {
 enum Command {
     /// Runs ours and theirs turn by turn and writes medians
     Compare(compare::CompareArgs),
+    /// Size, start, memory and frames a second of the program for small machines, on one core
+    Edge(edge::EdgeArgs),
     /// Runs one of our works when asked on standard input; `compare` starts it
     Work(WorkArgs),
     /// Writes a network's weights for both sides to load
@@ -74,6 +78,7 @@ fn main() -> ExitCode {
     sdg_grasp::keep_freed_memory();
     let result = match Args::parse().command {
         Command::Compare(args) => compare::run(&args),
+        Command::Edge(args) => edge::run(&args),
         Command::Work(args) => protocol::serve(|| works::build(&args)),
         Command::Weights { network, out } => network.write_weights(&out),
     };

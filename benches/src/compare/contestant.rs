@@ -152,7 +152,7 @@ impl Drop for Contestant {
 }
 
 /// `VmHWM` of `/proc/PID/status`, in bytes.
-fn peak_of_status(status: &str) -> Option<u64> {
+pub(crate) fn peak_of_status(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
 }

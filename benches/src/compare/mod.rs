@@ -1,7 +1,7 @@
 //! The driver: starts both sides of every work, lets them run turn by turn, writes medians.
 
 mod contestant;
-mod machine;
+pub(crate) mod machine;
 mod pace;
 mod prepare;
 mod report;
@@ -13,6 +13,7 @@ use clap::Args as ClapArgs;
 
 use crate::protocol::Facts;
 use crate::registry::{GEMM, WORKS, WorkSpec};
+pub(crate) use contestant::peak_of_status;
 use contestant::{Contestant, Side};
 use machine::Machine;
 use pace::Pace;

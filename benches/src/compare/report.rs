@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde::Serialize;
 
 use crate::compare::contestant::{Contestant, Side};
 use crate::compare::machine::Machine;
 use crate::registry::{Peer, WorkSpec};
+use crate::results::{duration, median, rewrite, write_whole};
 
 /// One side of a work, measured.
 #[derive(Debug, Clone)]
@@ -206,27 +207,8 @@ impl Report {
 
     /// Puts heading and table between the marks of a file.
     pub fn rewrite(&self, results: &Path) -> Result<()> {
-        let text = std::fs::read_to_string(results).with_context(|| results.display().to_string())?;
-        let text = between_marks(&text, &self.markdown())
-            .with_context(|| format!("{}: expected the lines {BEGIN} and {END}", results.display()))?;
-        write_whole(results, &text)
+        rewrite(results, "measured", &self.markdown())
     }
-}
-
-const BEGIN: &str = "<!-- measured: begin -->";
-const END: &str = "<!-- measured: end -->";
-
-/// `text` with what stands between the marks replaced.
-fn between_marks(text: &str, new: &str) -> Option<String> {
-    let (before, rest) = text.split_once(BEGIN)?;
-    let (_, after) = rest.split_once(END)?;
-    Some(format!("{before}{BEGIN}\n{}\n{END}{after}", new.trim_end()))
-}
-
-fn write_whole(path: &Path, text: &str) -> Result<()> {
-    let unfinished = path.with_extension("unfinished");
-    std::fs::write(&unfinished, text).with_context(|| unfinished.display().to_string())?;
-    std::fs::rename(&unfinished, path).with_context(|| path.display().to_string())
 }
 
 fn wanted(side: &Side) -> Option<f64> {
@@ -236,28 +218,8 @@ fn wanted(side: &Side) -> Option<f64> {
     }
 }
 
-/// Three significant digits, in milliseconds below a second.
-fn duration(secs: f64) -> String {
-    match secs {
-        s if s >= 100.0 => format!("{s:.0} s"),
-        s if s >= 10.0 => format!("{s:.1} s"),
-        s if s >= 1.0 => format!("{s:.2} s"),
-        s if s >= 0.1 => format!("{:.0} ms", 1e3 * s),
-        s if s >= 0.01 => format!("{:.1} ms", 1e3 * s),
-        s => format!("{:.2} ms", 1e3 * s),
-    }
-}
-
 fn memory(bytes: Option<u64>) -> String {
     bytes.map_or("?".to_owned(), |bytes| format!("{:.0} MiB", bytes as f64 / f64::from(1 << 20)))
-}
-
-/// The middle value, of an even number the mean of the middle two. Panics without values.
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }
 
 #[cfg(test)]
@@ -293,13 +255,6 @@ mod tests {
     }
 
     #[test]
-    fn medians_by_hand() {
-        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&[4.0, 1.0, 2.0, 8.0]), 3.0);
-        assert_eq!(median(&[5.0]), 5.0);
-    }
-
-    #[test]
     fn peers_json_has_the_agreed_columns() {
         let folder = tempfile::tempdir().unwrap();
         report().write_json(folder.path()).unwrap();
@@ -319,13 +274,5 @@ mod tests {
         // The peak is 17.2 GFLOP in 0.1 s; 43 GFLOP in 0.625 s are 69 of its 172 GFLOP/s.
         let row = "| R50-FPN backbone forward, 480×640 | 625 ms | PyTorch | 2.00 s | 3.20 | 2.0 | 3 MiB / 3 MiB | 43.0 | 40 % |";
         assert!(table.contains("172 GFLOP/s") && table.contains(row), "{table}");
-    }
-
-    #[test]
-    fn a_file_keeps_what_stands_around_the_marks() {
-        let text = format!("# Title\n\n{BEGIN}\nold\n{END}\n\nafter\n");
-        let new = between_marks(&text, "new\n").unwrap();
-        assert_eq!(new, format!("# Title\n\n{BEGIN}\nnew\n{END}\n\nafter\n"));
-        assert_eq!(between_marks("no marks", "new"), None);
     }
 }

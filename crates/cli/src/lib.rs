@@ -4,6 +4,9 @@
 //! args ─ commands/<verb>.rs ─ grasp, simulation, report
 //! ```
 //!
+//! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) it is a small program for
+//! small machines: it teaches and detects, and neither MuJoCo nor EGL nor the annotation page is in it.
+//!
 //! The binary is a thin shell around [`run`]; [`rehearsal`], [`trial`] and [`evaluation`] are open to the end-to-end tests.
 //!
 //! ```
@@ -16,6 +19,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+#[cfg(feature = "simulation")]
 pub mod against_truth;
 mod annotation_files;
 pub mod args;
@@ -23,18 +27,25 @@ pub mod base_weights;
 mod commands;
 mod demonstrations;
 pub mod detector_config;
+#[cfg(feature = "simulation")]
 pub mod evaluation;
 mod exit;
 mod files;
 mod interrupt;
+#[cfg(feature = "simulation")]
 mod machine;
+#[cfg(feature = "annotate")]
 mod page_teacher;
 mod pictures;
+#[cfg(feature = "simulation")]
 pub mod rehearsal;
+#[cfg(feature = "simulation")]
 mod run_page;
+#[cfg(feature = "simulation")]
 pub mod shipped;
 mod teaching_page;
 mod teaching_progress;
+#[cfg(feature = "simulation")]
 pub mod trial;
 
 use std::process::ExitCode;
@@ -45,12 +56,28 @@ use crate::exit::Outcome;
 /// Runs one command; prints the one line of an error and returns the exit code.
 pub fn run(args: &Args) -> ExitCode {
     let done = match &args.command {
+        #[cfg(feature = "simulation")]
         Command::Demo(demo) => commands::demo::run(demo),
+        #[cfg(feature = "annotate")]
         Command::Annotate(annotate) => commands::annotate::run(annotate),
+        #[cfg(not(feature = "annotate"))]
+        Command::Annotate(_) => Err(exit::Usage(
+            "this sdg was built without the annotation page: expected a build with cargo's feature \"annotate\"".to_owned(),
+        )
+        .into()),
         Command::Teach(teach) => commands::teach::run(teach),
         Command::Detect(detect) => commands::detect::run(detect),
+        #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
+        #[cfg(feature = "simulation")]
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
+        #[cfg(not(feature = "simulation"))]
+        Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) => Err(exit::Usage(
+            "this sdg was built without the simulator, which demo, rehearse and evaluate need: expected a build with \
+             cargo's feature \"simulation\""
+                .to_owned(),
+        )
+        .into()),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),

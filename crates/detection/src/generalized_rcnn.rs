@@ -83,8 +83,19 @@ impl RcnnConfig {
     /// # Errors
     /// Where [`RcnnConfig::validate`] finds one.
     pub fn init(&self, device: &Device, seed: u64) -> Result<GeneralizedRcnn> {
+        self.build(Initializer::new(device, seed))
+    }
+
+    /// Builds the detector on `device` without drawing its parameters, for who sets all of them next.
+    ///
+    /// # Errors
+    /// A configuration that contradicts itself.
+    pub fn init_blank(&self, device: &Device) -> Result<GeneralizedRcnn> {
+        self.build(Initializer::blank(device))
+    }
+
+    fn build(&self, mut init: Initializer) -> Result<GeneralizedRcnn> {
         self.validate()?;
-        let mut init = Initializer::new(device, seed);
         let stage_channels = self.backbone.stage_channels();
         Ok(GeneralizedRcnn {
             backbone: Backbone {

@@ -11,7 +11,8 @@ use rand_pcg::Pcg64Mcg;
 /// Draws the parameters of one model.
 #[derive(Debug)]
 pub struct Initializer {
-    rng: Pcg64Mcg,
+    /// `None` draws nothing: zeros stand where numbers would.
+    rng: Option<Pcg64Mcg>,
     device: Device,
 }
 
@@ -47,7 +48,13 @@ impl Distribution {
 impl Initializer {
     /// An initialiser for parameters on `device`.
     pub fn new(device: &Device, seed: u64) -> Self {
-        Self { rng: Pcg64Mcg::seed_from_u64(seed), device: device.clone() }
+        Self { rng: Some(Pcg64Mcg::seed_from_u64(seed)), device: device.clone() }
+    }
+
+    /// An initialiser for a network that is given all its parameters next: drawing millions of numbers to throw them
+    /// away took a third of the time to open a grasp model.
+    pub fn blank(device: &Device) -> Self {
+        Self { rng: None, device: device.clone() }
     }
 
     /// Draws a trainable parameter.
@@ -63,21 +70,24 @@ impl Initializer {
     }
 
     fn values(&mut self, count: usize, distribution: Distribution) -> Vec<f32> {
-        match distribution {
-            Distribution::Constant(value) => vec![value as f32; count],
-            Distribution::Normal { std } => (0..count).map(|_| (std * self.standard_normal()) as f32).collect(),
-            Distribution::Uniform { bound } => {
-                (0..count).map(|_| (bound * (2.0 * self.rng.random::<f64>() - 1.0)) as f32).collect()
+        match (distribution, &mut self.rng) {
+            (Distribution::Constant(value), _) => vec![value as f32; count],
+            (_, None) => vec![0.0; count],
+            (Distribution::Normal { std }, Some(rng)) => {
+                (0..count).map(|_| (std * standard_normal(rng)) as f32).collect()
+            }
+            (Distribution::Uniform { bound }, Some(rng)) => {
+                (0..count).map(|_| (bound * (2.0 * rng.random::<f64>() - 1.0)) as f32).collect()
             }
         }
     }
+}
 
-    /// Box and Muller's transform.
-    fn standard_normal(&mut self) -> f64 {
-        // 1 - u lies in (0, 1], where the logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.rng.random::<f64>()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.rng.random::<f64>()).cos()
-    }
+/// Box and Muller's transform.
+fn standard_normal(rng: &mut Pcg64Mcg) -> f64 {
+    // 1 - u lies in (0, 1], where the logarithm is finite.
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
 #[cfg(test)]
@@ -94,6 +104,13 @@ mod tests {
         let uniform = init.values(20_000, Distribution::lecun_uniform(12));
         assert!(uniform.iter().all(|v| v.abs() <= 0.5));
         assert!(uniform.iter().any(|v| v.abs() > 0.49));
+    }
+
+    #[test]
+    fn blank_parameters_are_zeros_but_for_constants() {
+        let mut init = Initializer::blank(&Device::flex());
+        assert_eq!(init.values(3, Distribution::he_normal(8)), [0.0; 3]);
+        assert_eq!(init.values(3, Distribution::Constant(1.5)), [1.5; 3]);
     }
 
     #[test]

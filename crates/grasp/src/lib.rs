@@ -14,15 +14,18 @@
 //! a browser), the robot and the simulator. Without the feature `teach` no autodiff, optimiser or augmentation is
 //! compiled.
 //!
+//! From the bytes of a model and of an image to a grasp:
+//!
 //! ```no_run
-//! use burn::tensor::Device;
-//! use sdg_grasp::{GraspModel, Verification};
+//! use sdg_grasp::{Device, GraspModel, ImageLimits, Verification, decode_image};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let model = GraspModel::from_bytes(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
-//! let image = image::open("table.png")?.to_rgb8();
-//! for detection in model.detect(&image, Verification::ByShape)? {
-//!     println!("{:?} with score {:.2}", detection.grasp, detection.score);
+//! let image = decode_image(&std::fs::read("table.png")?, &ImageLimits::default())?;
+//! let found = model.detect(&image, Verification::ByShape)?;
+//! match found.first().filter(|best| best.is_accepted()) {
+//!     Some(best) => println!("grasp at ({:.1}, {:.1}), {:.1}°", best.grasp.x, best.grasp.y, best.grasp.angle.degrees()),
+//!     None => println!("nothing to grasp"),
 //! }
 //! # Ok(())
 //! # }
@@ -40,6 +43,7 @@ mod model;
 mod model_file;
 mod models;
 mod pose;
+mod record;
 mod safetensors_file;
 mod taught;
 #[cfg(feature = "teach")]
@@ -55,7 +59,8 @@ pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, Validati
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use pose::{GraspPlane, GraspPose};
-pub use sdg_demonstration::NUM_KEYPOINTS;
+pub use record::{DetectionRecord, GraspRecord};
+pub use sdg_demonstration::{ImageLimits, NUM_KEYPOINTS, decode_image};
 pub use sdg_detection::keep_freed_memory;
 #[cfg(feature = "teach")]
 pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, ValidationRecord};

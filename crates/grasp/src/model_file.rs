@@ -164,7 +164,7 @@ fn read_network(
         ModelKind::S => return Ok(None),
         ModelKind::A => {
             let config: OrientationConfig = metadata.json("orientation")?;
-            let (orientation, report) = state_dict::import(config.init(device, 0)?, &weights(file, "orientation")?);
+            let (orientation, report) = state_dict::import(config.init_blank(device)?, &weights(file, "orientation")?);
             check_complete(&report, "orientation CNN")?;
             Reading::BoxAndCrop(Box::new(orientation))
         }
@@ -174,7 +174,7 @@ fn read_network(
     };
     let config: RcnnConfig = metadata.json("network")?;
     models::check_heads(kind, &config)?;
-    let (detector, report) = state_dict::import(config.init(device, 0)?, &weights(file, "network")?);
+    let (detector, report) = state_dict::import(config.init_blank(device)?, &weights(file, "network")?);
     check_complete(&report, "network")?;
     Ok(Some(Network { detector, reading }))
 }

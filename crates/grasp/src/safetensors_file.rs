@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 use serde_json::{Map, Value, json};
 
 /// Element type and bytes of a tensor.
@@ -32,7 +33,11 @@ impl TensorBytes {
 
 /// Reads half-precision bytes.
 pub(crate) fn values_from_halves(bytes: &[u8]) -> Vec<f32> {
-    bytes.chunks_exact(2).map(|pair| f16::from_le_bytes([pair[0], pair[1]]).to_f32()).collect()
+    let halves: Vec<f16> = bytes.chunks_exact(2).map(|pair| f16::from_le_bytes([pair[0], pair[1]])).collect();
+    let mut values = vec![0.0; halves.len()];
+    // Eight at a time, where the processor can.
+    halves.convert_to_f32_slice(&mut values);
+    values
 }
 
 /// Puts a file together: header length, header, tensors in the order of their names.

@@ -14,6 +14,9 @@ pub(crate) enum Isa {
     Avx512,
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// WebAssembly's: a module has them or not when it is compiled, because a page cannot ask inside it.
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    Simd128,
     Portable,
 }
 
@@ -37,6 +40,8 @@ impl Isa {
                 available.push(Self::Avx2);
             }
         }
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        available.push(Self::Simd128);
         available.push(Self::Portable);
         available
     }
@@ -71,6 +76,8 @@ macro_rules! widest {
                 #[cfg(target_arch = "x86_64")]
                 // SAFETY: the machine has AVX2 (`Isa::available`).
                 $crate::simd::Isa::Avx2 => unsafe { avx2($($arg),*) },
+                #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                $crate::simd::Isa::Simd128 => plain($($arg),*),
                 $crate::simd::Isa::Portable => plain($($arg),*),
             }
         }
@@ -110,6 +117,8 @@ macro_rules! lanes_kernel {
                     $crate::simd::Isa::Avx512 => avx512($($arg),*),
                     #[cfg(target_arch = "x86_64")]
                     $crate::simd::Isa::Avx2 => avx2($($arg),*),
+                    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+                    $crate::simd::Isa::Simd128 => $generic::<$crate::simd::lanes::V128x4>($($arg),*),
                     $crate::simd::Isa::Portable => $generic::<$crate::simd::lanes::Plain>($($arg),*),
                 }
             }

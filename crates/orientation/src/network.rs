@@ -93,8 +93,19 @@ impl OrientationConfig {
     /// # Errors
     /// Where [`OrientationConfig::validate`] finds one.
     pub fn init(&self, device: &Device, seed: u64) -> Result<OrientationCnn> {
+        self.build(Initializer::new(device, seed))
+    }
+
+    /// Builds the network on `device` without drawing its parameters, for who sets all of them next.
+    ///
+    /// # Errors
+    /// As [`Self::init`].
+    pub fn init_blank(&self, device: &Device) -> Result<OrientationCnn> {
+        self.build(Initializer::blank(device))
+    }
+
+    fn build(&self, mut init: Initializer) -> Result<OrientationCnn> {
         self.validate()?;
-        let mut init = Initializer::new(device, seed);
         let mut in_channels = 3;
         let mut stages = Vec::with_capacity(self.stage_channels.len());
         for (stage, (&channels, &num_convs)) in self.stage_channels.iter().zip(&self.stage_convs).enumerate() {

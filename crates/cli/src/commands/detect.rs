@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image::{ImageFormat, RgbImage};
-use sdg_grasp::{GraspDetection, TurnSource, Verification};
+use sdg_grasp::{DetectionRecord, GraspDetection, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
@@ -85,30 +85,7 @@ struct ImageLine {
     width: u32,
     height: u32,
     seconds: f64,
-    detections: Vec<DetectionJson>,
-}
-
-#[derive(Serialize)]
-struct DetectionJson {
-    score: f64,
-    network_score: f64,
-    /// Null without verification.
-    agreement: Option<f64>,
-    #[serde(rename = "box")]
-    bounds: [f64; 4],
-    keypoints: Vec<[f64; 3]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    polygon: Option<Vec<[f64; 2]>>,
-    grasp: GraspJson,
-    turn_source: TurnSource,
-}
-
-#[derive(Serialize)]
-struct GraspJson {
-    x: f64,
-    y: f64,
-    angle_deg: f64,
-    width_px: f64,
+    detections: Vec<DetectionRecord>,
 }
 
 impl ImageLine {
@@ -118,24 +95,7 @@ impl ImageLine {
             width: image.width(),
             height: image.height(),
             seconds,
-            detections: detections.iter().map(DetectionJson::new).collect(),
-        }
-    }
-}
-
-impl DetectionJson {
-    fn new(detection: &GraspDetection) -> Self {
-        let b = detection.bbox;
-        let grasp = detection.grasp;
-        Self {
-            score: detection.score,
-            network_score: detection.network_score,
-            agreement: detection.agreement,
-            bounds: [b.x1, b.y1, b.x2, b.y2],
-            keypoints: detection.keypoints.iter().map(|(point, score)| [point.x, point.y, *score]).collect(),
-            polygon: detection.outline.as_ref().map(|o| o.vertices.iter().map(|v| [v.x, v.y]).collect()),
-            grasp: GraspJson { x: grasp.x, y: grasp.y, angle_deg: grasp.angle.degrees(), width_px: grasp.width },
-            turn_source: detection.turn_source,
+            detections: detections.iter().map(DetectionRecord::from).collect(),
         }
     }
 }

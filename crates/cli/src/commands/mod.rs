@@ -1,13 +1,17 @@
 //! One file for each verb.
 
+#[cfg(feature = "annotate")]
 pub mod annotate;
 pub mod annotation;
 pub mod augment;
 pub mod completions;
+#[cfg(feature = "simulation")]
 pub mod demo;
 pub mod detect;
+#[cfg(feature = "simulation")]
 pub mod evaluate;
 pub mod man;
+#[cfg(feature = "simulation")]
 pub mod rehearse;
 pub mod teach;
 pub mod weights;

@@ -1,0 +1,68 @@
+//! Figures as text, and the file that keeps them.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+/// Puts `new` between the marks `<!-- NAME: begin -->` and `<!-- NAME: end -->` of a file.
+pub fn rewrite(results: &Path, name: &str, new: &str) -> Result<()> {
+    let text = std::fs::read_to_string(results).with_context(|| results.display().to_string())?;
+    let text = between_marks(&text, name, new)
+        .with_context(|| format!("{}: expected the marks \"{name}: begin\" and \"{name}: end\"", results.display()))?;
+    write_whole(results, &text)
+}
+
+/// `text` with what stands between the marks replaced.
+fn between_marks(text: &str, name: &str, new: &str) -> Option<String> {
+    let [begin, end] = ["begin", "end"].map(|which| format!("<!-- {name}: {which} -->"));
+    let (before, rest) = text.split_once(&begin)?;
+    let (_, after) = rest.split_once(&end)?;
+    Some(format!("{before}{begin}\n{}\n{end}{after}", new.trim_end()))
+}
+
+/// Writes a file whole or not at all.
+pub fn write_whole(path: &Path, text: &str) -> Result<()> {
+    let unfinished = path.with_extension("unfinished");
+    std::fs::write(&unfinished, text).with_context(|| unfinished.display().to_string())?;
+    std::fs::rename(&unfinished, path).with_context(|| path.display().to_string())
+}
+
+/// Three significant digits, in milliseconds below a second.
+pub fn duration(secs: f64) -> String {
+    match secs {
+        s if s >= 100.0 => format!("{s:.0} s"),
+        s if s >= 10.0 => format!("{s:.1} s"),
+        s if s >= 1.0 => format!("{s:.2} s"),
+        s if s >= 0.1 => format!("{:.0} ms", 1e3 * s),
+        s if s >= 0.01 => format!("{:.1} ms", 1e3 * s),
+        s => format!("{:.2} ms", 1e3 * s),
+    }
+}
+
+/// The middle value, of an even number the mean of the middle two. Panics without values.
+pub fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_by_hand() {
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 8.0]), 3.0);
+        assert_eq!(median(&[5.0]), 5.0);
+    }
+
+    #[test]
+    fn a_file_keeps_what_stands_around_the_marks() {
+        let text = "# Title\n\n<!-- a: begin -->\nold\n<!-- a: end -->\n\nafter\n";
+        let new = between_marks(text, "a", "new\n").unwrap();
+        assert_eq!(new, "# Title\n\n<!-- a: begin -->\nnew\n<!-- a: end -->\n\nafter\n");
+        assert_eq!(between_marks(text, "b", "new"), None);
+    }
+}

@@ -1,0 +1,89 @@
+//! A detection as other programs read it: what `sdg detect --json` prints and what the browser's page is handed.
+
+use serde::Serialize;
+
+use crate::TurnSource;
+use crate::model::GraspDetection;
+
+/// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DetectionRecord {
+    /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
+    pub score: f64,
+    /// The network's own, in `[0, 1]`.
+    pub network_score: f64,
+    /// How well the demonstration agrees with the image, in `[0, 1]`; null without verification.
+    pub agreement: Option<f64>,
+    /// Left, top, right, bottom.
+    #[serde(rename = "box")]
+    pub bounds: [f64; 4],
+    /// x, y and the network's score of each; empty for models without.
+    pub keypoints: Vec<[f64; 3]>,
+    /// The outline's corners; absent without verification.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polygon: Option<Vec<[f64; 2]>>,
+    /// Where to grasp.
+    pub grasp: GraspRecord,
+    /// What the turn was first read from.
+    pub turn_source: TurnSource,
+}
+
+/// A [`sdg_geometry::PlanarGrasp`] in pixels and degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GraspRecord {
+    /// Pixels to the right.
+    pub x: f64,
+    /// Pixels down.
+    pub y: f64,
+    /// Direction of the marked line, in (-180, 180], y down; the jaws close across it.
+    pub angle_deg: f64,
+    /// The part's width between the jaws, in pixels.
+    pub width_px: f64,
+}
+
+impl From<&GraspDetection> for DetectionRecord {
+    fn from(detection: &GraspDetection) -> Self {
+        let b = detection.bbox;
+        let grasp = detection.grasp;
+        Self {
+            score: detection.score,
+            network_score: detection.network_score,
+            agreement: detection.agreement,
+            bounds: [b.x1, b.y1, b.x2, b.y2],
+            keypoints: detection.keypoints.iter().map(|(point, score)| [point.x, point.y, *score]).collect(),
+            polygon: detection.outline.as_ref().map(|o| o.vertices.iter().map(|v| [v.x, v.y]).collect()),
+            grasp: GraspRecord { x: grasp.x, y: grasp.y, angle_deg: grasp.angle.degrees(), width_px: grasp.width },
+            turn_source: detection.turn_source,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+    use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, Polygon};
+
+    #[test]
+    fn names_and_units_are_the_contract_s() {
+        let bbox = BoundingBox { x1: 1.0, y1: 2.0, x2: 3.0, y2: 4.0 };
+        let detection = GraspDetection {
+            score: 0.75,
+            network_score: 0.5,
+            agreement: None,
+            bbox,
+            keypoints: vec![(Point2::new(1.5, 2.5), 0.25)],
+            outline: None,
+            grasp: PlanarGrasp { x: 2.0, y: 3.0, angle: Angle::from_degrees(90.0), width: 8.0 },
+            turn_source: TurnSource::Keypoints,
+        };
+        let json = serde_json::to_string(&DetectionRecord::from(&detection)).unwrap();
+        let expected = r#"{"score":0.75,"network_score":0.5,"agreement":null,"box":[1.0,2.0,3.0,4.0],"#.to_owned()
+            + r#""keypoints":[[1.5,2.5,0.25]],"grasp":{"x":2.0,"y":3.0,"angle_deg":90.0,"width_px":8.0},"#
+            + r#""turn_source":"keypoints"}"#;
+        assert_eq!(json, expected);
+        let verified = GraspDetection { outline: Some(Polygon::from_box(&bbox)), agreement: Some(0.9), ..detection };
+        let json = serde_json::to_string(&DetectionRecord::from(&verified)).unwrap();
+        assert!(json.contains(r#""agreement":0.9"#) && json.contains(r#""polygon":[[1.0,2.0],"#), "{json}");
+    }
+}
