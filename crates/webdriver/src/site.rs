@@ -1,0 +1,94 @@
+//! A folder served as a static host would, on a port of this machine.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Result, WebDriverError};
+
+/// A served folder; the thread behind it ends with the process.
+#[derive(Debug)]
+pub struct Site {
+    address: SocketAddr,
+}
+
+impl Site {
+    /// The address of a file.
+    pub fn url(&self, file: &str) -> String {
+        format!("http://{}/{file}", self.address)
+    }
+}
+
+/// Serves the files that lie directly in a folder.
+///
+/// # Errors
+/// No such folder, or no free port.
+pub fn serve_folder(folder: PathBuf) -> Result<Site> {
+    if !folder.is_dir() {
+        return Err(WebDriverError::NoFolder(folder));
+    }
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).map_err(WebDriverError::io("a free port"))?;
+    let address = listener.local_addr().map_err(WebDriverError::io("the port's number"))?;
+    std::thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let folder = folder.clone();
+            // A browser opens more connections than it uses; none may hold up the others.
+            std::thread::spawn(move || answer(&stream, &folder));
+        }
+    });
+    Ok(Site { address })
+}
+
+/// Answers one request; a browser that went away is no failure.
+fn answer(mut stream: &TcpStream, folder: &Path) {
+    let mut lines = BufReader::new(stream).lines().map_while(std::io::Result::ok);
+    let request = lines.next().unwrap_or_default();
+    lines.take_while(|line| !line.is_empty()).for_each(drop);
+    let path = request.split(' ').nth(1).unwrap_or_default();
+    let name = path.split('?').next().unwrap_or_default().trim_start_matches('/');
+    let name = if name.is_empty() { "index.html" } else { name };
+    let file = if name.contains('/') || name.contains("..") { None } else { std::fs::read(folder.join(name)).ok() };
+    let (status, body) = match file {
+        Some(body) => ("200 OK", body),
+        None => ("404 Not Found", b"no such file".to_vec()),
+    };
+    let head = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        media_type(name),
+        body.len()
+    );
+    let _ = stream.write_all(head.as_bytes()).and_then(|()| stream.write_all(&body));
+}
+
+fn media_type(name: &str) -> &'static str {
+    match Path::new(name).extension().and_then(|extension| extension.to_str()) {
+        Some("html") => "text/html; charset=utf-8",
+        Some("css") => "text/css",
+        Some("js" | "mjs") => "text/javascript",
+        Some("wasm") => "application/wasm",
+        _ => "application/octet-stream",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http;
+
+    #[test]
+    fn files_of_the_folder_are_served_and_no_others() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("index.html"), "hello").unwrap();
+        let site = serve_folder(folder.path().to_owned()).unwrap();
+        let get = |path: &str| http::request(site.address, "GET", path, None).unwrap();
+        assert_eq!(get("/"), (200, "hello".to_owned()));
+        assert_eq!(get("/index.html?again"), (200, "hello".to_owned()));
+        assert_eq!(get("/other.html").0, 404);
+        assert_eq!(get("/../../etc/passwd").0, 404);
+    }
+
+    #[test]
+    fn a_missing_folder_is_an_error() {
+        assert!(serve_folder("/nowhere/at/all".into()).unwrap_err().to_string().contains("expected a folder"));
+    }
+}
