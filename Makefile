@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo edge test test-browser lint bench clean
+.PHONY: help setup build demo web edge test test-browser lint bench bench-browser clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -21,6 +21,9 @@ build: setup ## Builds target/release/sdg
 demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
 	target/release/sdg demo
 
+web: setup ## Builds the page that detects in the browser into target/web
+	@scripts/web.sh
+
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
 
@@ -33,7 +36,7 @@ test: setup ## Runs every test
 	fi
 
 # Tests marked as needing Chromium; screenshots stay in target/browser-test.
-test-browser: build ## Tests our pages in headless Chromium
+test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
@@ -45,6 +48,12 @@ lint: setup ## Formatting and lints, as CI denies them
 bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
 	benches/peers/install.sh target/bench/venv
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
+
+# After `make bench`, which leaves PyTorch and a taught model; npm fetches onnxruntime-web.
+bench-browser: build web ## The page's speed against onnxruntime-web in headless Chromium
+	benches/peers/install.sh target/bench/venv
+	benches/browser/install.sh target/bench/onnxruntime-web
+	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
 clean: ## Removes what was built and reported
 	$(CARGO) clean

@@ -28,18 +28,19 @@ TORCHVISION = [
 ]
 
 
-def read(path):
-    """Arrays by our names, from a safetensors file of floats."""
+def read(path, module=""):
+    """Arrays by our names, from a safetensors file of floats; of a grasp model, those of one module."""
     with open(path, "rb") as file:
         header = json.loads(file.read(int.from_bytes(file.read(8), "little")))
-        data = np.frombuffer(file.read(), dtype=np.float32)
+        data = file.read()
     arrays = {}
     for name, entry in header.items():
-        if name != "__metadata__":
-            if entry["dtype"] != "F32":
-                raise ValueError(f"{path}: {name}: expected F32, found {entry['dtype']}")
-            begin, end = (offset // 4 for offset in entry["data_offsets"])
-            arrays[name] = data[begin:end].reshape(entry["shape"])
+        if name != "__metadata__" and name.startswith(module):
+            if entry["dtype"] not in ("F32", "F16"):
+                raise ValueError(f"{path}: {name}: expected F32 or F16, found {entry['dtype']}")
+            begin, end = entry["data_offsets"]
+            values = np.frombuffer(data[begin:end], dtype=np.float32 if entry["dtype"] == "F32" else np.float16)
+            arrays[name.removeprefix(module)] = values.astype(np.float32).reshape(entry["shape"])
     return arrays
 
 

@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod browser;
 mod compare;
 mod edge;
 mod network;
@@ -42,6 +43,8 @@ struct Args {
 enum Command {
     /// Runs ours and theirs turn by turn and writes medians
     Compare(compare::CompareArgs),
+    /// The page's detection against onnxruntime-web's in the same page of a headless Chromium
+    Browser(browser::BrowserArgs),
     /// Size, start, memory and frames a second of the program for small machines, on one core
     Edge(edge::EdgeArgs),
     /// Runs one of our works when asked on standard input; `compare` starts it
@@ -78,6 +81,7 @@ fn main() -> ExitCode {
     sdg_grasp::keep_freed_memory();
     let result = match Args::parse().command {
         Command::Compare(args) => compare::run(&args),
+        Command::Browser(args) => browser::run(&args),
         Command::Edge(args) => edge::run(&args),
         Command::Work(args) => protocol::serve(|| works::build(&args)),
         Command::Weights { network, out } => network.write_weights(&out),

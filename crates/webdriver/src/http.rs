@@ -1,6 +1,6 @@
 //! As much of HTTP as ChromeDriver on this machine needs: one request, one answer, one connection.
 
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::time::Duration;
 

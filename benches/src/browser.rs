@@ -1,0 +1,239 @@
+//! `sdg-bench browser`: the page's detection against onnxruntime-web's, in one page of a headless Chromium.
+//!
+//! Both run the network of one taught model on one picture: ours as the page does, from the picture's file to grasps;
+//! onnxruntime-web the export from PyTorch (`peers/export_edge.py`), from the normalised input to keypoints. One thread
+//! each, turn by turn. What both found must agree before times count.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args as ClapArgs;
+use sdg_detection::ImageTransform;
+use sdg_webdriver::{Browser, BrowserOptions, serve_folder};
+use serde_json::{Value, json};
+
+use crate::compare::machine::Machine;
+use crate::network::Network;
+use crate::results::{duration, median, rewrite};
+
+const PICTURE: &str = "datasets/demonstrations/pendulum/image.png";
+/// What is ours and what is theirs of a download, without weights.
+const OUR_MODULE: [&str; 2] = ["sdg_web_bg.wasm", "sdg_web.js"];
+const THEIR_MODULE: [&str; 3] = ["ort-wasm-simd-threaded.wasm", "ort-wasm-simd-threaded.mjs", "ort.wasm.min.mjs"];
+/// Between the same network's answers here and there: sums in another order.
+const MOST_SCORE: f64 = 0.01;
+const MOST_PX: f64 = 0.5;
+/// Frames a second that we promise, without WebGPU.
+const LEAST_FRAMES: f64 = 5.0;
+
+/// `sdg-bench browser`
+#[derive(Debug, ClapArgs)]
+pub struct BrowserArgs {
+    /// A grasp model C of the preset `edge`; `make bench` leaves one in target/bench/pendulum.sdg
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Timed runs of each side
+    #[arg(long, default_value_t = 30, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    rounds: u32,
+    /// The repository
+    #[arg(long, default_value = ".", value_name = "DIR")]
+    root: PathBuf,
+    /// Rewrite the table in this file
+    #[arg(long, value_name = "FILE")]
+    results: Option<PathBuf>,
+}
+
+/// Lays out the folder, runs the page, prints the table; fails where a promise is broken.
+pub fn run(args: &BrowserArgs) -> Result<()> {
+    let folder = args.root.join("target/bench/browser");
+    let model = args.model.clone().unwrap_or_else(|| args.root.join("target/bench/pendulum.sdg"));
+    ensure!(
+        model.is_file(),
+        "{}: expected a grasp model, which the work `teaching` of `make bench` writes",
+        model.display()
+    );
+    lay_out(&args.root, &folder, &model)?;
+
+    let site = serve_folder(folder.clone())?;
+    let browser = Browser::start(&BrowserOptions::default())?;
+    browser.open(&site.url("compare.html"))?;
+    browser.wait_for("the page's script", "return window.ready === true")?;
+    let script = "return window.compare(...arguments)";
+    let measured = browser.run(script, &[json!(args.rounds), json!(3)])?;
+    let errors = browser.console_errors()?;
+    ensure!(errors.is_empty(), "the page's console says {errors:?}");
+    check_same(&measured)?;
+
+    let table = markdown(&measured, &folder)?;
+    println!("{table}");
+    if let Some(results) = &args.results {
+        rewrite(results, "browser", &table)?;
+    }
+    let frames = 1e3 / times(&measured, "verified")?;
+    ensure!(frames >= LEAST_FRAMES, "expected {LEAST_FRAMES} frames a second, found {frames:.1}");
+    Ok(())
+}
+
+/// Puts everything that the page asks for into one folder.
+fn lay_out(root: &Path, folder: &Path, model: &Path) -> Result<()> {
+    let peer = root.join("target/bench/onnxruntime-web/node_modules/onnxruntime-web/dist");
+    std::fs::create_dir_all(folder)?;
+    let copy = |from: &Path, name: &str| {
+        std::fs::copy(from, folder.join(name)).map(drop).with_context(|| format!("{}: cannot copy", from.display()))
+    };
+    let page = root.join("target/web");
+    for name in [&OUR_MODULE[..], &["detector.js", "worker.js"]].concat() {
+        copy(&page.join(name), name)?;
+    }
+    for name in THEIR_MODULE {
+        copy(&peer.join(name), name)?;
+    }
+    for name in ["compare.html", "compare.js"] {
+        copy(&root.join("benches/browser").join(name), name)?;
+    }
+    copy(&root.join(PICTURE), "picture.png")?;
+    copy(model, "model.sdg")?;
+
+    let python = root.join("target/bench/venv/bin/python");
+    let output = Command::new(&python)
+        .arg(root.join("benches/peers/export_edge.py"))
+        .arg(model)
+        .arg(folder.join("edge.onnx"))
+        .output()
+        .with_context(|| format!("{}: `make bench` installs it", python.display()))?;
+    ensure!(output.status.success(), "export_edge.py failed: {}", String::from_utf8_lossy(&output.stderr));
+    std::fs::write(folder.join("input.f32"), network_input(&root.join(PICTURE))?)?;
+    Ok(())
+}
+
+/// The picture as the network takes it, `[3, H, W]` padded with zeros, as bytes.
+fn network_input(picture: &Path) -> Result<Vec<u8>> {
+    let config = Network::Edge.config().input;
+    let image = image::open(picture).with_context(|| picture.display().to_string())?.to_rgb8();
+    let transformed = ImageTransform::new(&config).apply(&image)?;
+    let [height, width] =
+        [transformed.height, transformed.width].map(|side| side.next_multiple_of(config.size_divisibility));
+    let mut padded = vec![0.0_f32; 3 * height * width];
+    for (row, pixels) in transformed.pixels.chunks_exact(transformed.width).enumerate() {
+        let (channel, y) = (row / transformed.height, row % transformed.height);
+        padded[(channel * height + y) * width..][..transformed.width].copy_from_slice(pixels);
+    }
+    Ok(padded.iter().flat_map(|value| value.to_le_bytes()).collect())
+}
+
+/// The best detection's score and keypoints, here and there.
+fn check_same(measured: &Value) -> Result<()> {
+    let ours = &measured["network"]["detections"][0];
+    let number = |value: &Value| value.as_f64().context("a number is missing in what the page measured");
+    let (our_score, their_score) = (number(&ours["network_score"])?, number(&measured["theirs"]["scores"][0])?);
+    if (our_score - their_score).abs() > MOST_SCORE {
+        bail!("not the same network: our best score is {our_score}, onnxruntime-web's {their_score}");
+    }
+    // Theirs are in pixels of the network's input, half as large as the picture.
+    let image_over_input = number(&measured["network"]["width"])? / 320.0;
+    for (idx, keypoint) in ours["keypoints"].as_array().context("no keypoints")?.iter().enumerate() {
+        for axis in 0..2 {
+            let theirs = number(&measured["theirs"]["keypoints"][3 * idx + axis])? * image_over_input;
+            let distance = (number(&keypoint[axis])? - theirs).abs();
+            ensure!(distance <= MOST_PX, "not the same network: keypoint {idx} lies {distance:.2} px apart");
+        }
+    }
+    Ok(())
+}
+
+/// The median of one side, milliseconds.
+fn times(measured: &Value, side: &str) -> Result<f64> {
+    let times = measured["times"][side].as_array().context("no times")?;
+    let times: Vec<f64> = times.iter().filter_map(Value::as_f64).collect();
+    ensure!(!times.is_empty(), "{side} was never timed");
+    Ok(median(&times))
+}
+
+fn markdown(measured: &Value, folder: &Path) -> Result<String> {
+    let Machine { processor, commit, .. } = Machine::read();
+    let version = measured["version"].as_str().unwrap_or("?");
+    let [network, verified, theirs] = ["network", "verified", "theirs"].map(|side| times(measured, side));
+    let (network, verified, theirs) = (network?, verified?, theirs?);
+    let (our_bytes, their_bytes) = (compressed(folder, &OUR_MODULE)?, compressed(folder, &THEIR_MODULE)?);
+    let mut text = format!(
+        "{processor}, one thread; {}; commit {commit}.\n\n\
+         | edge in the browser, 480×640 | ours | onnxruntime-web {version} | ratio |\n|---|--:|--:|--:|\n",
+        chromium(),
+    );
+    let row = |what: &str, milliseconds: f64| format!("{what} | {}", duration(1e-3 * milliseconds));
+    let _ = writeln!(
+        text,
+        "| {} | {} | {:.2} |",
+        row("one frame, network (ours from the file's bytes to grasps)", network),
+        duration(1e-3 * theirs),
+        theirs / network
+    );
+    let _ = writeln!(text, "| {}, {:.1} a second | | |", row("one frame, verified", verified), 1e3 / verified);
+    let mb = |bytes: usize| format!("{:.2} MB", bytes as f64 / 1e6);
+    let _ = writeln!(
+        text,
+        "| download, compressed (gzip -9), without weights | {} | {} | {:.1} |",
+        mb(our_bytes),
+        mb(their_bytes),
+        their_bytes as f64 / our_bytes as f64
+    );
+    Ok(text)
+}
+
+fn chromium() -> String {
+    let output = Command::new("chromium").arg("--version").output();
+    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    said.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
+}
+
+/// Bytes of files as a host sends them.
+fn compressed(folder: &Path, names: &[&str]) -> Result<usize> {
+    names
+        .iter()
+        .map(|name| -> Result<usize> {
+            let bytes = std::fs::read(folder.join(name)).with_context(|| (*name).to_owned())?;
+            let mut gzip =
+                Command::new("gzip").args(["-9", "-c"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+            let mut input = gzip.stdin.take().context("gzip's input was asked for")?;
+            let writer = std::thread::spawn(move || input.write_all(&bytes));
+            let output = gzip.wait_with_output()?;
+            ensure!(matches!(writer.join(), Ok(Ok(()))) && output.status.success(), "gzip failed on {name}");
+            Ok(output.stdout.len())
+        })
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn measured(x: f64) -> Value {
+        json!({
+            "times": {"network": [90.0, 100.0, 110.0], "verified": [125.0], "theirs": [200.0]},
+            "network": {"width": 640, "detections": [{"network_score": 0.9, "keypoints": [[x, 20.0, 0.5]]}]},
+            "theirs": {"scores": [0.905], "keypoints": [5.0, 10.0, 0.5]},
+            "version": "1.0",
+        })
+    }
+
+    #[test]
+    fn another_network_is_seen() {
+        assert!(check_same(&measured(10.2)).is_ok());
+        let error = check_same(&measured(11.0)).unwrap_err().to_string();
+        assert!(error.contains("keypoint 0 lies 1.00 px apart"), "{error}");
+    }
+
+    #[test]
+    fn the_table_tells_times_ratio_and_sizes() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [&OUR_MODULE[..], &THEIR_MODULE[..]].concat() {
+            std::fs::write(folder.path().join(name), vec![7; 100_000]).unwrap();
+        }
+        let table = markdown(&measured(10.0), folder.path()).unwrap();
+        assert!(table.contains("| 100 ms | 200 ms | 2.00 |") && table.contains("8.0 a second"), "{table}");
+        assert!(table.contains("0.00 MB | 0.00 MB | 1.5"), "{table}");
+    }
+}

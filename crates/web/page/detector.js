@@ -1,0 +1,65 @@
+// The worker seen from the page: a promise for each request, and a new worker where one stopped.
+
+export class Detector {
+  #worker = null;
+  #model = null; // The open model's bytes, for a worker that has to be started again.
+  #waiting = new Map();
+  #nextId = 1;
+
+  constructor() {
+    this.#start();
+  }
+
+  /** Opens a grasp model; what its file says of itself. The bytes stay in the page. */
+  async open(bytes) {
+    const { summary } = await this.#ask({ open: bytes });
+    this.#model = bytes;
+    return summary;
+  }
+
+  /** Looks at a file, or at an `ImageBitmap`, which is given away: `{record, milliseconds, decoded}`. */
+  look(image, verify) {
+    return this.#ask({ look: image, verify }, image instanceof ImageBitmap ? [image] : []);
+  }
+
+  #start() {
+    this.#worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+    this.#worker.onmessage = ({ data }) => this.#receive(data);
+    this.#worker.onerror = (event) => {
+      event.preventDefault();
+      this.#startAgain(event.message || "the worker could not be started");
+    };
+  }
+
+  #ask(request, transfer = []) {
+    const id = this.#nextId++;
+    return new Promise((resolve, reject) => {
+      this.#waiting.set(id, { resolve, reject });
+      this.#worker.postMessage({ id, ...request }, transfer);
+    });
+  }
+
+  #receive({ id, error, stopped, ...result }) {
+    const waiting = this.#waiting.get(id);
+    this.#waiting.delete(id);
+    if (error) {
+      waiting?.reject(new Error(error));
+    } else {
+      waiting?.resolve(result);
+    }
+    if (stopped) {
+      this.#startAgain("the model had to be started again");
+    }
+  }
+
+  #startAgain(reason) {
+    this.#worker.terminate();
+    const lost = [...this.#waiting.values()];
+    this.#waiting.clear();
+    lost.forEach(({ reject }) => reject(new Error(reason)));
+    if (this.#model) {
+      this.#start();
+      this.#ask({ open: this.#model }).catch(() => {});
+    }
+  }
+}

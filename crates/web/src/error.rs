@@ -1,0 +1,23 @@
+//! What can be wrong with what a page hands over.
+
+/// Why a model could not be opened or an image not be looked at.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WebError {
+    /// The model file, or the look itself.
+    #[error(transparent)]
+    Grasp(#[from] sdg_grasp::GraspError),
+    /// An image file that is none, is damaged, or is enormous.
+    #[error(transparent)]
+    Image(#[from] sdg_demonstration::Error),
+    /// Pixels of another number than the size says.
+    #[error("expected {width} × {height} pixels of four bytes, found {found} bytes")]
+    Pixels {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// Bytes handed over.
+        found: usize,
+    },
+}

@@ -1,0 +1,37 @@
+//! Grasps in the browser: a grasp model's detection as a WebAssembly module.
+//!
+//! ```text
+//! page/main.js ─ page/worker.js ─ sdg_web.js ─ Model ─ Looker ─ sdg_grasp::GraspModel
+//!  canvas, camera  a thread        wasm-bindgen  bindings  plain Rust   the crates of the command line
+//! ```
+//!
+//! Bytes of a model file and of an image go in, [`sdg_grasp::DetectionRecord`]s come out as JSON, under the names of
+//! `sdg detect --json`. Image files are decoded by the very decoder that the command line uses, so that both see the
+//! same pixels; frames of a camera come as RGBA.
+//!
+//! Left out on purpose: teaching, threads (a page may use them only where its host sends special headers), and any
+//! request to anywhere: what is dropped on the page stays in it. WebGPU too: detection reads results back in its middle
+//! (top-k, suppression, which ROIs go on), and a browser hands those back only to who waits asynchronously, which the
+//! detector of the command line does not. `make web` builds module and page into target/web.
+//!
+//! ```no_run
+//! use sdg_grasp::Verification;
+//! use sdg_web::Looker;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let looker = Looker::open(&std::fs::read("pendulum.sdg")?)?;
+//! println!("{}", looker.look_at_file(&std::fs::read("table.png")?, Verification::ByShape)?);
+//! # Ok(())
+//! # }
+//! ```
+// What wasm-bindgen writes for `bindings` has to be unsafe.
+#![cfg_attr(not(target_arch = "wasm32"), forbid(unsafe_code))]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
+mod bindings;
+mod error;
+mod looker;
+
+pub use error::WebError;
+pub use looker::Looker;

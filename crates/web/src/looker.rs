@@ -1,0 +1,84 @@
+//! A model that looks at images: bytes in, JSON out.
+
+use image::RgbImage;
+use sdg_grasp::{
+    DetectionRecord, Device, GraspModel, ImageLimits, ModelSummary, Verification, decode_image, summarize,
+};
+use serde::Serialize;
+
+use crate::error::WebError;
+
+/// An opened grasp model.
+#[derive(Debug)]
+pub struct Looker {
+    model: GraspModel,
+    summary: ModelSummary,
+}
+
+/// What was found in one image; the names are those of `sdg detect --json`.
+#[derive(Serialize)]
+struct ImageRecord {
+    width: u32,
+    height: u32,
+    /// Best first, refused ones (score below 0.5) included.
+    detections: Vec<DetectionRecord>,
+}
+
+impl Looker {
+    /// Opens a model from its file's bytes.
+    ///
+    /// # Errors
+    /// No grasp model, one of another version, or a damaged one.
+    pub fn open(bytes: &[u8]) -> Result<Self, WebError> {
+        let summary = summarize(bytes)?;
+        Ok(Self { model: GraspModel::from_bytes(bytes, &Device::flex())?, summary })
+    }
+
+    /// What the file says of itself, as JSON: `model`, `preset`, `object`, `teaching`.
+    pub fn summary(&self) -> String {
+        to_json(&self.summary)
+    }
+
+    /// Looks at a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, refused detections included.
+    ///
+    /// # Errors
+    /// A file that is no image, is damaged, or has more pixels than [`ImageLimits`] allows.
+    pub fn look_at_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
+        self.look_at(&decode_image(bytes, &ImageLimits::default())?, verification)
+    }
+
+    /// Looks at opaque pixels as a canvas gives them: rows of red, green, blue and an alpha that is passed over.
+    ///
+    /// # Errors
+    /// Bytes that do not fit the size, or more pixels than [`ImageLimits`] allows.
+    pub fn look_at_pixels(
+        &self,
+        rgba: &[u8],
+        width: u32,
+        height: u32,
+        verification: Verification,
+    ) -> Result<String, WebError> {
+        let max_pixels = ImageLimits::default().max_pixels;
+        if u64::from(width) * u64::from(height) > max_pixels {
+            return Err(sdg_demonstration::Error::EnormousImage { width, height, max_pixels }.into());
+        }
+        let pixels = || WebError::Pixels { width, height, found: rgba.len() };
+        if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) {
+            return Err(pixels());
+        }
+        let rgb = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let image = RgbImage::from_raw(width, height, rgb).ok_or_else(pixels)?;
+        self.look_at(&image, verification)
+    }
+
+    fn look_at(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
+        let found = self.model.detect(image, verification)?;
+        let detections = found.iter().map(DetectionRecord::from).collect();
+        Ok(to_json(&ImageRecord { width: image.width(), height: image.height(), detections }))
+    }
+}
+
+fn to_json<T: Serialize>(value: &T) -> String {
+    // Plain data of our own; serialisation to a string cannot fail.
+    serde_json::to_string(value).unwrap_or_default()
+}

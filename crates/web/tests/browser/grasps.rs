@@ -1,0 +1,156 @@
+//! The page against the command line, and against the clock.
+
+use std::path::PathBuf;
+use std::process::Command;
+
+use sdg_webdriver::Browser;
+use serde_json::{Value, json};
+
+use crate::taught::{Made, array, detect};
+use crate::{assert_quiet, choose, open_model, open_page, repository, screenshots, site};
+
+/// What the issue allows between page and command line.
+const MOST_PX: f64 = 0.5;
+const MOST_DEGREES: f64 = 0.5;
+/// Scores are sums of products that each instruction set rounds in its own order.
+const MOST_SCORE: f64 = 0.01;
+/// A frame of an `edge` model on one core, without WebGPU: five a second.
+const MOST_MILLISECONDS: f64 = 200.0;
+/// Longer gaps between two of the page's frames are seen as freezing.
+const MOST_PAGE_GAP_MS: f64 = 150.0;
+const MOST_DOWNLOAD_BYTES: usize = 4_000_000;
+
+/// Looks at the files of the page's own input, through the page's own modules, and keeps every digit.
+const LOOK: &str = "return (async () => {
+    const { Detector } = await import(new URL('./detector.js', location.href).href);
+    const detector = new Detector();
+    await detector.open(await document.getElementById('model-file').chosen.arrayBuffer());
+    const results = [];
+    for (const file of document.getElementById('image-files').chosen) {
+        results.push(await detector.look(file, true));
+    }
+    return results;
+})()";
+
+/// Keeps what is chosen, because the page empties its inputs so that the same file can be chosen again.
+const KEEP: &str = "
+    for (const id of ['model-file', 'image-files']) {
+        const input = document.getElementById(id);
+        input.addEventListener('change', () => (input.chosen = input.multiple ? [...input.files] : input.files[0]), true);
+    }";
+
+fn number(value: &Value, path: &str) -> f64 {
+    value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
+}
+
+fn look_at_all(browser: &Browser, model: PathBuf, pictures: &[PathBuf]) -> Vec<Value> {
+    browser.run(KEEP, &[]).unwrap();
+    open_model(browser, &model);
+    choose(browser, "#image-files", pictures);
+    let done = format!(
+        "const texts = [...document.querySelectorAll('#pictures small')].map((small) => small.textContent);
+         return texts.length === {} && texts.every((text) => /grasp/.test(text))",
+        pictures.len()
+    );
+    browser.wait_for("every picture to be looked at", &done).unwrap();
+    array(browser.run(LOOK, &[]).unwrap())
+}
+
+fn assert_same(found: &Value, expected: &Value, about: &str) {
+    for (path, most) in [
+        ("/grasp/x", MOST_PX),
+        ("/grasp/y", MOST_PX),
+        ("/grasp/width_px", MOST_PX),
+        ("/score", MOST_SCORE),
+        ("/network_score", MOST_SCORE),
+        ("/agreement", MOST_SCORE),
+    ] {
+        let difference = (number(found, path) - number(expected, path)).abs();
+        assert!(difference <= most, "{about}: {path} differs by {difference}\n{found}\n{expected}");
+    }
+    let turn = number(found, "/grasp/angle_deg") - number(expected, "/grasp/angle_deg");
+    let turn = (turn + 540.0).rem_euclid(360.0) - 180.0;
+    assert!(turn.abs() <= MOST_DEGREES, "{about}: angle differs by {turn}");
+}
+
+#[test]
+#[ignore = "needs Chromium and target/web: make test-browser"]
+fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
+    let made = Made::new();
+    let pictures = made.pictures();
+    let site = site();
+    for letter in ["C", "S"] {
+        let model = made.model(letter);
+        let expected = detect(&model, &pictures);
+        let browser = open_page(&site, &[]);
+        let results = look_at_all(&browser, model, &pictures);
+        assert_eq!(results.len(), expected.len());
+        let mut accepted = 0;
+        for ((result, expected), picture) in results.iter().zip(&expected).zip(&pictures) {
+            let about = format!("model {letter}, {}", picture.display());
+            // Best first; those nobody would grasp may come and go with the last bit of a score.
+            let sure =
+                |found: &[Value]| found.iter().filter(|d| number(d, "/score") >= 0.5).cloned().collect::<Vec<_>>();
+            let (found, expected) = (sure(&array(result["record"]["detections"].clone())), sure(expected));
+            assert_eq!(found.len(), expected.len(), "{about}: grasps found");
+            found.iter().zip(&expected).for_each(|(found, expected)| assert_same(found, expected, &about));
+            accepted += found.len();
+        }
+        assert!(accepted > pictures.len() / 2, "model {letter}: {accepted} grasps are too few to compare");
+
+        // The first looks compile the module's functions.
+        let times: Vec<f64> = results.iter().skip(2).map(|result| number(result, "/milliseconds")).collect();
+        println!("model {letter}: milliseconds a frame {times:.1?}");
+        if letter == "C" {
+            let best = times.iter().copied().fold(f64::MAX, f64::min);
+            assert!(best <= MOST_MILLISECONDS, "{best} ms a frame");
+        }
+        browser.screenshot(&screenshots().join(format!("web-{letter}.png"))).unwrap();
+        assert_quiet(&browser);
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium and target/web: make test-browser"]
+fn the_page_stays_fluid_and_fits_small_screens() {
+    let made = Made::new();
+    let (model, pictures) = (made.model("S"), made.pictures());
+    let site = site();
+    let browser = open_page(&site, &[]);
+    browser.run(
+        "window.longestGap = 0;
+         let before = performance.now();
+         const tick = (now) => { window.longestGap = Math.max(window.longestGap, now - before); before = now; requestAnimationFrame(tick); };
+         requestAnimationFrame((now) => { before = now; tick(now); });",
+        &[],
+    )
+    .unwrap();
+    look_at_all(&browser, model, &pictures);
+    let gap = browser.run("return window.longestGap", &[]).unwrap().as_f64().unwrap();
+    println!("longest gap between two frames of the page: {gap:.0} ms");
+    assert!(gap < MOST_PAGE_GAP_MS, "the page froze for {gap} ms");
+
+    for (width, dark) in [(1280, false), (1280, true), (360, false), (360, true)] {
+        browser.emulate(width, 800, dark).unwrap();
+        let overflow = "return document.documentElement.scrollWidth - document.documentElement.clientWidth";
+        assert_eq!(browser.run(overflow, &[]).unwrap(), json!(0), "at {width} px something sticks out");
+        let scheme = if dark { "dark" } else { "light" };
+        browser.screenshot(&screenshots().join(format!("web-{width}-{scheme}.png"))).unwrap();
+    }
+    assert_quiet(&browser);
+}
+
+#[test]
+#[ignore = "needs target/web: make test-browser"]
+fn the_download_is_small() {
+    let folder = repository().join("target/web");
+    let mut total = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let compressed = Command::new("gzip").args(["-9", "-c"]).arg(&path).output().unwrap().stdout.len();
+        println!("{:>9} bytes compressed: {}", compressed, path.file_name().unwrap().display());
+        total += compressed;
+    }
+    assert!(total > 10_000, "{} is nearly empty", folder.display());
+    assert!(total <= MOST_DOWNLOAD_BYTES, "{total} bytes");
+}

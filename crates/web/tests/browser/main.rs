@@ -1,0 +1,64 @@
+//! The page in headless Chromium: the same grasps as `sdg detect`, fast enough, fluid, and clear about what is wrong.
+//!
+//! Needs what `make web` and `make build` write, and Chromium: `make test-browser` has all of it. Screenshots are kept in
+//! target/browser-test.
+#![allow(clippy::unwrap_used)]
+
+mod bad_input;
+mod camera;
+mod grasps;
+mod taught;
+
+use std::path::{Path, PathBuf};
+
+use sdg_webdriver::{Browser, BrowserOptions, Site, serve_folder};
+
+/// What cargo builds into: target/ of the workspace, or where CARGO_TARGET_DIR says.
+fn target() -> PathBuf {
+    // target/release/deps/browser-0123456789abcdef
+    std::env::current_exe().unwrap().ancestors().nth(3).unwrap().to_owned()
+}
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
+}
+
+fn screenshots() -> PathBuf {
+    repository().join("target/browser-test")
+}
+
+/// The page as a static host serves it.
+fn site() -> Site {
+    let folder = repository().join("target/web");
+    assert!(folder.join("sdg_web_bg.wasm").is_file(), "make web writes {}", folder.display());
+    serve_folder(folder).unwrap()
+}
+
+/// The page, opened in a browser with these flags.
+fn open_page(site: &Site, flags: &[&str]) -> Browser {
+    let flags = flags.iter().map(|flag| (*flag).to_owned()).collect();
+    let browser = Browser::start(&BrowserOptions { flags, ..BrowserOptions::default() }).unwrap();
+    browser.open(&site.url("index.html")).unwrap();
+    browser
+}
+
+/// Puts files into a file input, as its dialog would.
+fn choose(browser: &Browser, input: &str, files: &[PathBuf]) {
+    let paths: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    browser.find(input).unwrap().type_text(&paths.join("\n")).unwrap();
+}
+
+fn open_model(browser: &Browser, file: &Path) {
+    choose(browser, "#model-file", &[file.to_owned()]);
+    browser.wait_for("the model's facts", "return document.querySelector('#model-facts dl') !== null").unwrap();
+}
+
+/// The text of the page's alert, once there is one.
+fn complaint(browser: &Browser) -> String {
+    let shown = "const a = document.getElementById('alert'); return a.hidden ? '' : a.textContent";
+    browser.wait_for("a complaint", shown).unwrap().as_str().unwrap().to_owned()
+}
+
+fn assert_quiet(browser: &Browser) {
+    assert_eq!(browser.console_errors().unwrap(), Vec::<String>::new());
+}
