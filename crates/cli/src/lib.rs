@@ -62,7 +62,8 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Annotate(annotate) => commands::annotate::run(annotate),
         #[cfg(not(feature = "annotate"))]
         Command::Annotate(_) => Err(exit::Usage(
-            "this sdg was built without the annotation page: expected a build with cargo's feature \"annotate\"".to_owned(),
+            "this sdg was built without the annotation page: expected a build with cargo's feature \"annotate\""
+                .to_owned(),
         )
         .into()),
         Command::Teach(teach) => commands::teach::run(teach),

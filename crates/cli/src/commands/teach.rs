@@ -91,9 +91,9 @@ fn command(args: &TeachArgs) -> String {
         option("time-budget", secs.to_string());
     }
     match args.symmetry {
-        RotationalSymmetry::None => {}
         RotationalSymmetry::Fold(count) => option("symmetry", count.to_string()),
         RotationalSymmetry::Full => option("symmetry", "full".to_owned()),
+        _ => {}
     }
     if let Some(weights) = &args.base_weights {
         option("base-weights", weights.display().to_string());
