@@ -4,17 +4,18 @@
 use sdg_shape::Match;
 
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Overlay, Scene};
+use crate::verification::{Overlay, Scene, less_for_another_size, usual_scale};
 
 /// Every place in the image where a demonstration agrees well enough to be mentioned.
 pub(crate) fn search<'a>(demonstrations: &'a [TaughtDemonstration], scene: &Scene<'_>) -> Vec<Overlay<'a>> {
     let mut found = Vec::new();
     for demonstration in demonstrations {
+        let usual = usual_scale(demonstration, scene);
         let matches = demonstration.search(scene.image, &scene.field);
         found.extend(matches.into_iter().map(|Match { image_from_demonstration, agreement, .. }| Overlay {
             demonstration,
             image_from_cutout: image_from_demonstration,
-            agreement,
+            agreement: less_for_another_size(agreement, image_from_demonstration.scale / usual),
         }));
     }
     found
