@@ -181,7 +181,7 @@ impl GraspModel {
         keypoint_scores: impl Iterator<Item = f64>,
         turn_source: TurnSource,
     ) -> GraspDetection {
-        let &Overlay { demonstration, image_from_cutout: pose, agreement } = overlay;
+        let &Overlay { demonstration, image_from_cutout: pose, agreement, .. } = overlay;
         let outline = demonstration.outline(&pose);
         let taught = demonstration.keypoints();
         GraspDetection {

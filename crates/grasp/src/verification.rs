@@ -26,8 +26,10 @@ impl<'a> Scene<'a> {
 pub(crate) struct Overlay<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) image_from_cutout: PlanarSimilarity,
-    /// How well it agrees with the image there, in `[0, 1]`.
+    /// How well it agrees with the image there, in `[0, 1]`, less what another size than the usual one costs.
     pub(crate) agreement: f64,
+    /// The same whatever its size.
+    pub(crate) agreement_at_any_size: f64,
 }
 
 /// Sizes at which a part may lie in an image, over the usual one: those of teaching's augmentation, and a little more. The
@@ -73,7 +75,7 @@ pub(crate) fn better_way_round<'a>(
     let is_of_its_size = scales.contains(&image_from_cutout.scale);
     let seen = if is_of_its_size { comparison.agreement(&image_from_cutout).both() } else { 0.0 };
     let agreement = less_for_another_size(seen, image_from_cutout.scale / usual);
-    Overlay { demonstration, image_from_cutout, agreement }
+    Overlay { demonstration, image_from_cutout, agreement, agreement_at_any_size: seen }
 }
 
 /// What an agreement counts where the part lies `scale` times as large as usual.

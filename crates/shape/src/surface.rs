@@ -10,7 +10,7 @@
 //!                              cell's own mean, averaged               2/3 ─┘
 //! ```
 //! Across the whole part, bright against dark ends count; so does the edge of another thing's shadow that falls over it,
-//! and there the whole correlation is at a loss. Within a cell that shadow is in most cells no edge at all. On 475
+//! and there the whole correlation is at a loss. Within a cell that shadow is in most cells no edge at all. On 480
 //! pictures of the eight shipped parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right
 //! poses below the best wrong one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the
 //! best wrong one of their own part.

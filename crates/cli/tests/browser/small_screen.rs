@@ -23,7 +23,7 @@ fn every_step_fits_a_small_screen_in_light_and_dark() {
             for step in STEPS {
                 page.click(&format!("#tab-{step}"));
                 page.browser.run("scrollTo(0, 0)", &[]).unwrap();
-                let sticks_out = "return document.documentElement.scrollWidth - innerWidth";
+                let sticks_out = "return document.documentElement.scrollWidth - document.documentElement.clientWidth";
                 assert_eq!(page.browser.run(sticks_out, &[]).unwrap(), json!(0), "{step} at {width} px");
                 page.assert_accessible(&format!("{step} at {width} px, {scheme}"));
                 page.screenshot(&format!("{step}-{width}-{scheme}"));

@@ -15,6 +15,7 @@ pub(crate) fn search<'a>(demonstrations: &'a [TaughtDemonstration], scene: &Scen
         found.extend(matches.into_iter().map(|Match { image_from_demonstration, agreement, .. }| Overlay {
             demonstration,
             image_from_cutout: image_from_demonstration,
+            agreement_at_any_size: agreement,
             agreement: less_for_another_size(agreement, image_from_demonstration.scale / usual),
         }));
     }

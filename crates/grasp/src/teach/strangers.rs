@@ -18,6 +18,8 @@ use crate::verification::{Scene, better_way_round, verify};
 
 /// How far above the mean of strangers the threshold stands: beyond the highest of any shipped part.
 const ABOVE_STRANGERS: f64 = 0.2;
+// What another size costs is not counted for strangers: it is there to part them further from the part.
+
 /// Where the threshold may lie. The lower bound is for look-alikes that composed scenes know nothing of, the upper one for
 /// the part itself in bad light.
 const THRESHOLDS: (f64, f64) = (0.44, 0.6);
@@ -60,15 +62,16 @@ impl Strangers {
             let scene = Scene::new(&sample.image);
             let mut agreements = Vec::new();
             for overlay in instant::search(demonstrations, &scene) {
-                agreements.push(overlay.agreement);
+                agreements.push(overlay.agreement_at_any_size);
                 if network.is_some() {
                     // It may propose the same place, and what it proposes is refined from both ways round.
                     let refined = better_way_round(overlay.demonstration, &overlay.image_from_cutout, &scene);
-                    agreements.push(refined.agreement);
+                    agreements.push(refined.agreement_at_any_size);
                 }
             }
             for candidate in network.map_or(Ok(Vec::new()), |n| n.candidates(&sample.image, demonstrations))? {
-                agreements.push(verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene).agreement);
+                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
+                agreements.push(overlay.agreement_at_any_size);
             }
             highest.extend(agreements.into_iter().reduce(f64::max));
         }
