@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use serde_json::json;
 
 use crate::page::{BOX, HOLD, Page, shipped_photo};
 
@@ -182,7 +181,7 @@ fn try_on_another_picture(page: &Page) {
     assert!((turn - 180.0).abs() < 2.0, "{turn}°");
     page.click("#tab-teach");
     assert!(page.text("#teach-from").contains("2 marked photos"), "{}", page.text("#teach-from"));
-    assert_eq!(page.browser.run("return document.querySelectorAll('#strip button').length", &[]).unwrap(), json!(2));
+    page.wait_for("both photos in the strip", "return document.querySelectorAll('#strip button').length === 2");
 }
 
 impl Page {
