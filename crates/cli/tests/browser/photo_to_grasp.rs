@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-
 use crate::page::{BOX, HOLD, Page, shipped_photo};
 
 /// Issue 6: the page loads in under a second and stays under 200 KB, its photo apart.
