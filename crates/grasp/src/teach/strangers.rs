@@ -18,8 +18,6 @@ use crate::verification::{Scene, better_way_round, verify};
 
 /// How far above the mean of strangers the threshold stands: beyond the highest of any shipped part.
 const ABOVE_STRANGERS: f64 = 0.2;
-// What another size costs is not counted for strangers: it is there to part them further from the part.
-
 /// Where the threshold may lie. The lower bound is for look-alikes that composed scenes know nothing of, the upper one for
 /// the part itself in bad light.
 const THRESHOLDS: (f64, f64) = (0.44, 0.6);
@@ -60,6 +58,7 @@ impl Strangers {
         let mut highest = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
             let scene = Scene::new(&sample.image);
+            // At any size: what another size costs is there to part strangers further from the part, not to lower the bar.
             let mut agreements = Vec::new();
             for overlay in instant::search(demonstrations, &scene) {
                 agreements.push(overlay.agreement_at_any_size);
