@@ -32,7 +32,6 @@ pub mod evaluation;
 mod exit;
 mod files;
 mod interrupt;
-#[cfg(feature = "simulation")]
 mod machine;
 #[cfg(feature = "annotate")]
 mod page_teacher;
