@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser lint bench bench-browser clean
+.PHONY: help setup build demo web edge test test-browser test-wgpu test-ndarray lint bench bench-browser clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -40,6 +40,18 @@ test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
+
+# burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
+DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
+
+test-wgpu: ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
+	@scripts/setup.sh libvulkan1 mesa-vulkan-drivers
+	$(call DEVICE_TESTS,wgpu) --test device_parity --test devices
+	$(call DEVICE_TESTS,wgpu) -p sdg-grasp --lib -- device_parity
+
+test-ndarray: setup ## Tests ndarray against flex (its compile takes ten minutes)
+	$(call DEVICE_TESTS,ndarray) --test device_parity --test devices
+	$(call DEVICE_TESTS,ndarray) -p sdg-grasp --lib -- device_parity
 
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check

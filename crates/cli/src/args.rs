@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use sdg_geometry::RotationalSymmetry;
+use sdg_grasp::ComputeBackend;
 
 /// Teach a robot a grasp from one photo, on an ordinary computer.
 #[derive(Debug, Parser)]
@@ -39,6 +40,16 @@ pub enum Command {
     Completions(CompletionsArgs),
     /// Manual pages
     Man(ManArgs),
+    /// What this build and this machine can compute on
+    Devices(DevicesArgs),
+}
+
+/// `sdg devices`
+#[derive(Debug, ClapArgs)]
+pub struct DevicesArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `sdg demo`
@@ -129,6 +140,9 @@ pub struct TeachArgs {
     /// Folder for a page about the teaching: photo and marks, samples, curves
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -140,6 +154,9 @@ pub struct DetectArgs {
     /// A grasp model that `sdg teach` wrote
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
     /// Leave out the check against the demonstration: the network alone decides and places
     #[arg(long)]
     pub no_verify: bool,
@@ -172,6 +189,9 @@ pub struct RehearseArgs {
     /// Decides object poses, robot starts, lights and table
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
     /// Leave out the check against the demonstration
     #[arg(long)]
     pub no_verify: bool,
@@ -374,9 +394,17 @@ pub struct VerifyArgs {
     /// What the original gave at each stage: safetensors
     #[arg(long, value_name = "FILE")]
     pub against: PathBuf,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// A device's name.
+fn backend(text: &str) -> Result<ComputeBackend, String> {
+    text.parse().map_err(|error: sdg_grasp::GraspError| error.to_string())
 }
 
 /// Equal turns in a whole one, or that no turn can be seen.
@@ -416,6 +444,8 @@ mod tests {
             "sdg annotate a.png b.png:b.json --try table --out m.sdg --port 8080 --no-browser --json",
             "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60 --report r",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",
+            "sdg detect --grasp-model m.sdg --device wgpu a.png",
+            "sdg devices --json",
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg evaluate",
             "sdg evaluate --models B,C --objects pendulum,rod_end --attempts 2 --seed 3 --out d --report r --json",

@@ -42,10 +42,10 @@ pub fn read_image(path: &Path) -> Result<RgbImage> {
     decode_image(&bytes, &ImageLimits::default()).with_context(|| path.display().to_string())
 }
 
-/// Reads a grasp model onto the default device.
-pub fn read_model(path: &Path) -> Result<GraspModel> {
+/// Reads a grasp model onto a device.
+pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
     let bytes = read(path, MOST_MODEL_BYTES)?;
-    GraspModel::from_bytes(&bytes, &Device::flex()).with_context(|| path.display().to_string())
+    GraspModel::from_bytes(&bytes, device).with_context(|| path.display().to_string())
 }
 
 /// Makes sure, before minutes of work, that a file can be written beside `path` later.

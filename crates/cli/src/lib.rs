@@ -83,6 +83,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Weights(weights) => commands::weights::run(weights),
         Command::Completions(completions) => commands::completions::run(completions),
         Command::Man(man) => commands::man::run(man),
+        Command::Devices(devices) => commands::devices::run(devices),
     };
     match done {
         Ok(outcome) => outcome.into(),

@@ -20,6 +20,33 @@ pub enum GraspError {
         /// What was asked for.
         found: String,
     },
+    /// A device that no version has.
+    #[error("expected a device out of {}, found \"{found}\"", .known.join(", "))]
+    UnknownBackend {
+        /// The names that there are.
+        known: Vec<&'static str>,
+        /// What was asked for.
+        found: String,
+    },
+    /// A device that was not compiled in.
+    #[error(
+        "expected a device out of {}, which this build has; found \"{asked}\": build sdg-cli with --features {asked}",
+        .built.join(", ")
+    )]
+    BackendNotBuilt {
+        /// What was asked for.
+        asked: &'static str,
+        /// What this build has.
+        built: Vec<&'static str>,
+    },
+    /// A device that this machine does not have.
+    #[error("expected a device for {backend} on this machine, found {found}")]
+    NoSuchDevice {
+        /// The backend.
+        backend: &'static str,
+        /// What is there instead.
+        found: String,
+    },
     /// Bytes that are no grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {

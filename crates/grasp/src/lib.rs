@@ -37,6 +37,7 @@
 mod base_weights;
 mod calibration;
 mod decimal;
+mod device;
 mod error;
 mod facts;
 mod model;
@@ -54,6 +55,7 @@ mod verification;
 pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
+pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
 pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};

@@ -157,8 +157,8 @@ pub fn roi_align<B: Backend>(features: FloatTensor<B>, rois: FloatTensor<B>, par
         crops.push(B::float_permute(crop, &[0, 2, 1, 3]));
     }
     let crops = B::float_cat(crops, 0);
-    // Back from the order of images to that of the ROIs.
-    let order: Vec<i64> = row_of_roi.iter().map(|&row| row as i64).collect();
+    // Back from the order of images to that of the ROIs; in 32 bits, since graphics cards may have no wider integers.
+    let order: Vec<i32> = row_of_roi.iter().map(|&row| row as i32).collect();
     let order = TensorData::new(order, [bins.len()]);
     B::float_select(crops, 0, B::int_from_data(order, &device))
 }

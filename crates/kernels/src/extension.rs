@@ -17,7 +17,12 @@ use crate::roi_align::RoiAlignParams;
 /// The default bodies are differentiable compositions, so that implementing the trait for another backend
 /// takes no more than `impl KernelBackend for That {}`. Shapes were checked by the functions on
 /// [`Tensor`](burn::tensor::Tensor) that call these methods.
-#[backend_extension(Flex, Autodiff: cfg(feature = "autodiff"))]
+#[backend_extension(
+    Flex,
+    NdArray: cfg(feature = "ndarray"),
+    Cube: cfg(any(feature = "wgpu", feature = "cuda")),
+    Autodiff: cfg(feature = "autodiff")
+)]
 pub trait KernelBackend: Backend {
     /// See [`conv2d_fused`](crate::conv2d_fused). Where `params` say that there is no scale or residual, those are
     /// tensors of one zero.

@@ -46,11 +46,15 @@ mod adamw;
 mod autodiff;
 pub mod composed;
 mod conv;
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod cube;
 mod elementwise;
 mod extension;
 mod flex;
 mod group_norm;
 mod memory;
+#[cfg(feature = "ndarray")]
+mod ndarray;
 mod nms;
 mod packed;
 mod parallel;

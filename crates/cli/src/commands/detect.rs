@@ -11,13 +11,14 @@ use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::args::DetectArgs;
+use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::pictures;
 
 /// Every image gets its line; the first one that cannot be read ends the run, after the lines before it.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
-    let model = files::read_model(&args.grasp_model)?;
+    let model = files::read_model(&args.grasp_model, &devices::open(args.device)?)?;
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }

@@ -8,6 +8,7 @@ pub mod completions;
 #[cfg(feature = "simulation")]
 pub mod demo;
 pub mod detect;
+pub mod devices;
 #[cfg(feature = "simulation")]
 pub mod evaluate;
 pub mod man;

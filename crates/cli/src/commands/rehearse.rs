@@ -9,6 +9,7 @@ use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use crate::args::RehearseArgs;
+use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
@@ -18,7 +19,7 @@ use crate::run_page::{self, RunPage};
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let object = ObjectSpec::by_name(&args.object)?;
-    let model = files::read_model(&args.grasp_model)?;
+    let model = files::read_model(&args.grasp_model, &devices::open(args.device)?)?;
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal =

@@ -13,6 +13,7 @@ use serde_json::json;
 
 use crate::args::TeachArgs;
 use crate::base_weights;
+use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
@@ -28,6 +29,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         symmetry: args.symmetry,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         steps: args.steps.map(|steps| steps as usize),
+        device: devices::open(args.device)?,
         ..TeachOptions::new(args.seed)
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;

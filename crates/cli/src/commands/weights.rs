@@ -9,7 +9,6 @@ use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::verification;
-use sdg_grasp::Device;
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
@@ -17,6 +16,7 @@ use serde_json::json;
 
 use crate::args::{ConvertArgs, InspectArgs, VerifyArgs, WeightsArgs, WeightsCommand};
 use crate::base_weights::open;
+use crate::commands::devices;
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
 use crate::exit::Outcome;
 use crate::files;
@@ -166,7 +166,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
         .into_iter()
         .map(|(name, (shape, values))| (name, WeightTensor { shape, values }))
         .collect();
-    let (detector, imported) = state_dict::import(config.init(&Device::flex().autodiff(), 0)?, &weights);
+    let (detector, imported) = state_dict::import(config.init(&devices::open(args.device)?.autodiff(), 0)?, &weights);
     if !imported.is_complete() {
         bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
     }

@@ -1,7 +1,7 @@
 //! One model on one part: its name, and what the store has of it.
 
 use anyhow::{Result, anyhow};
-use sdg_grasp::{GraspModel, ModelKind, Verification};
+use sdg_grasp::{Device, GraspModel, ModelKind, Verification};
 
 use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
 use super::store::Store;
@@ -66,7 +66,7 @@ impl Cell<'_> {
             None => return Err(anyhow!("{self}: expected a taught model, found none")),
         }
         let path = store.path(&self.model_file());
-        let model = files::read_model(&path)?.read_as(self.model);
+        let model = files::read_model(&path, &Device::flex())?.read_as(self.model);
         Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
     }
 }

@@ -9,6 +9,8 @@
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
 //! ```
 
+#[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
+mod device_parity;
 mod event;
 mod held_back;
 mod orientation;

@@ -57,7 +57,7 @@ fn whole_plan(options: &TeachOptions) -> Plan {
 }
 
 /// A preset's plan, small enough for a test; any network is kept.
-fn small_plan(options: &TeachOptions) -> Plan {
+pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
     shrink(&mut plan.network);
     plan.least_hit_rate = 0.0;
@@ -72,7 +72,7 @@ fn small_plan(options: &TeachOptions) -> Plan {
     plan
 }
 
-fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
+pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
     let options = TeachOptions { kind, preset, ..TeachOptions::new(1) };
     teach_network(
         &[demonstration()],

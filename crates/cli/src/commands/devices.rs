@@ -1,0 +1,43 @@
+//! `sdg devices`: what this build and this machine can compute on.
+
+use std::io::Write;
+
+use anyhow::{Context, Result};
+use sdg_grasp::{ComputeBackend, Device};
+use serde_json::json;
+
+use crate::args::DevicesArgs;
+use crate::exit::Outcome;
+
+/// The device of `--device`, ready to compute.
+///
+/// # Errors
+/// One that this build or this machine lacks.
+pub fn open(backend: ComputeBackend) -> Result<Device> {
+    backend.open().context("--device")
+}
+
+/// A line for each device, and for each backend that has none, the reason.
+pub fn run(args: &DevicesArgs) -> Result<Outcome> {
+    let mut stdout = std::io::stdout().lock();
+    let backends = ComputeBackend::ALL.map(|backend| (backend, backend.devices()));
+    if args.json {
+        let listed = backends.map(
+            |(backend, devices)| json!({"backend": backend.name(), "built": backend.is_built(), "devices": devices}),
+        );
+        writeln!(stdout, "{}", json!({"default": ComputeBackend::default().name(), "backends": listed}))?;
+        return Ok(Outcome::Done);
+    }
+    for (backend, devices) in backends {
+        if !backend.is_built() {
+            writeln!(stdout, "{backend:8} not in this build: build sdg-cli with --features {backend}")?;
+        } else if devices.is_empty() {
+            writeln!(stdout, "{backend:8} no device on this machine")?;
+        }
+        let default = if backend == ComputeBackend::default() { " (default)" } else { "" };
+        for device in devices {
+            writeln!(stdout, "{backend:8} {device}{default}")?;
+        }
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,160 @@
+//! Where a network computes: the backends of this build, and what this machine offers them.
+//!
+//! `flex`, burn's CPU backend with this project's kernels, is always there. The others are cargo features, compiled only
+//! for who asks, since each brings minutes of compile time: `ndarray` (burn's older CPU backend, slow, a second
+//! opinion), `wgpu` (any graphics card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
+
+use std::fmt;
+use std::str::FromStr;
+
+use burn::tensor::Device;
+
+use crate::error::{GraspError, Result};
+
+/// A backend, by the name that `--device` takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum ComputeBackend {
+    /// The CPU, with this project's kernels.
+    #[default]
+    Flex,
+    /// The CPU, by burn's older backend.
+    NdArray,
+    /// Graphics cards of any maker.
+    Wgpu,
+    /// NVIDIA's graphics cards.
+    Cuda,
+}
+
+impl ComputeBackend {
+    /// All, the default first.
+    pub const ALL: [Self; 4] = [Self::Flex, Self::NdArray, Self::Wgpu, Self::Cuda];
+
+    /// As typed at the command line; also the cargo feature's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Flex => "flex",
+            Self::NdArray => "ndarray",
+            Self::Wgpu => "wgpu",
+            Self::Cuda => "cuda",
+        }
+    }
+
+    /// Whether it was compiled into this build.
+    pub fn is_built(self) -> bool {
+        match self {
+            Self::Flex => true,
+            Self::NdArray => cfg!(feature = "ndarray"),
+            Self::Wgpu => cfg!(feature = "wgpu"),
+            Self::Cuda => cfg!(feature = "cuda"),
+        }
+    }
+
+    /// The devices that it finds on this machine, by their own names; none where the build lacks it.
+    pub fn devices(self) -> Vec<String> {
+        let cpu = || format!("CPU, {} threads", std::thread::available_parallelism().map_or(1, usize::from));
+        match self {
+            Self::Flex => vec![cpu()],
+            Self::NdArray if self.is_built() => vec![cpu()],
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => names(burn::tensor::DeviceType::Wgpu),
+            #[cfg(feature = "cuda")]
+            Self::Cuda => names(burn::tensor::DeviceType::Cuda),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Its default device, ready to compute.
+    ///
+    /// # Errors
+    /// A backend that this build lacks, or that finds no device on this machine.
+    pub fn open(self) -> Result<Device> {
+        match self {
+            Self::Flex => Ok(Device::flex()),
+            #[cfg(feature = "ndarray")]
+            #[allow(deprecated)]
+            Self::NdArray => Ok(Device::ndarray()),
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => open_wgpu(),
+            #[cfg(feature = "cuda")]
+            Self::Cuda if self.devices().is_empty() => {
+                Err(self.not_there("a card of NVIDIA's with its driver (libcuda)"))
+            }
+            #[cfg(feature = "cuda")]
+            Self::Cuda => Ok(Device::cuda(0)),
+            #[allow(unreachable_patterns)]
+            _ => Err(GraspError::BackendNotBuilt {
+                asked: self.name(),
+                built: Self::ALL.into_iter().filter(|backend| backend.is_built()).map(Self::name).collect(),
+            }),
+        }
+    }
+
+    #[cfg(any(feature = "wgpu", feature = "cuda"))]
+    fn not_there(self, expected: impl fmt::Display) -> GraspError {
+        GraspError::NoSuchDevice { backend: self.name(), found: format!("none: it needs {expected}") }
+    }
+}
+
+/// The names that devices give themselves.
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+fn names(of: burn::tensor::DeviceType) -> Vec<String> {
+    let devices = Device::enumerate(of).into_vec();
+    let name = |device: Device| device.identity().map_or_else(|| format!("{device:?}"), |identity| identity.name);
+    devices.into_iter().map(name).collect()
+}
+
+/// Opened once, since a runtime is: later calls share the device.
+#[cfg(feature = "wgpu")]
+fn open_wgpu() -> Result<Device> {
+    use std::sync::OnceLock;
+
+    static OPENED: OnceLock<std::result::Result<Device, String>> = OnceLock::new();
+    let needed = "a graphics driver, such as Debian's mesa-vulkan-drivers";
+    let backend = ComputeBackend::Wgpu;
+    OPENED
+        .get_or_init(|| Device::wgpu_options().init().map_err(|error| error.to_string()))
+        .clone()
+        .map_err(|why| backend.not_there(format!("{needed} ({why})")))
+}
+
+impl fmt::Display for ComputeBackend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for ComputeBackend {
+    type Err = GraspError;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|backend| backend.name() == text).ok_or_else(|| GraspError::UnknownBackend {
+            known: Self::ALL.map(Self::name).to_vec(),
+            found: text.to_owned(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back_and_others_refused() {
+        for backend in ComputeBackend::ALL {
+            assert_eq!(backend.to_string().parse::<ComputeBackend>().unwrap(), backend);
+        }
+        let refused = "gpu".parse::<ComputeBackend>().unwrap_err().to_string();
+        assert_eq!(refused, "expected a device out of flex, ndarray, wgpu, cuda, found \"gpu\"");
+    }
+
+    #[test]
+    fn what_was_not_built_is_named_with_what_was() {
+        assert_eq!(ComputeBackend::default().open().unwrap(), Device::flex());
+        for backend in ComputeBackend::ALL.into_iter().filter(|backend| !backend.is_built()) {
+            assert!(backend.devices().is_empty());
+            let refused = backend.open().unwrap_err().to_string();
+            assert!(refused.starts_with("expected a device out of flex"), "{refused}");
+            assert!(refused.contains(&format!("--features {backend}")), "{refused}");
+        }
+    }
+}

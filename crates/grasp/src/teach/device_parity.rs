@@ -1,0 +1,147 @@
+//! Every model on every device that the build has besides flex, against flex: stage by stage, from end to end, and
+//! taught there.
+//!
+//! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
+
+use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_detection::verification::{record, verify};
+
+use super::tests::{demonstration, small_plan, taught};
+use super::*;
+use crate::device::ComputeBackend;
+use crate::model::{GraspDetection, Verification};
+
+/// What a place may differ, in pixels of the image as given: a fifth of what half precision may move it.
+const PLACE_PX: f64 = 0.02;
+/// What a turn may differ, in degrees.
+const TURN_DEGREES: f64 = 0.02;
+/// What a score or an agreement may differ.
+const SCORE: f64 = 1e-3;
+/// What the losses of the first steps may differ, relative: every step's differences are in the next one's weights.
+const LOSSES: f64 = 1e-3;
+/// Steps whose losses are compared.
+const COMPARED_STEPS: usize = 4;
+
+const NETWORK_MODELS: [ModelKind; 4] = [ModelKind::A, ModelKind::B, ModelKind::C, ModelKind::D];
+
+fn devices() -> Vec<(ComputeBackend, Device)> {
+    let others = ComputeBackend::ALL.into_iter().filter(|backend| *backend != ComputeBackend::Flex);
+    others.filter(|backend| backend.is_built()).map(|backend| (backend, backend.open().unwrap())).collect()
+}
+
+/// The photo's marks as a step of training wants them, in pixels of the resized image.
+fn targets(network: &RcnnConfig) -> StateDict {
+    let Demonstration { image, annotation } = demonstration();
+    let transformed = sdg_detection::ImageTransform::new(&network.input).apply(&image).unwrap();
+    let [sx, sy] =
+        [transformed.width as f64 / f64::from(image.width()), transformed.height as f64 / f64::from(image.height())]
+            .map(|scale| scale as f32);
+    let b = annotation.bbox;
+    let tensor = |shape: &[usize], values: Vec<f32>| WeightTensor { shape: shape.to_vec(), values };
+    let grasp = annotation.grasp.unwrap();
+    let along = |t: f64| grasp.start + (grasp.end - grasp.start) * t;
+    let keypoints: Vec<f32> = (0..crate::NUM_KEYPOINTS)
+        .map(|i| along(i as f64 / (crate::NUM_KEYPOINTS - 1) as f64))
+        .flat_map(|p| [p.x as f32 * sx, p.y as f32 * sy, 2.0])
+        .collect();
+    let vertices = annotation.outline.unwrap().vertices;
+    let outline: Vec<f32> = vertices.iter().flat_map(|v| [v.x as f32 * sx, v.y as f32 * sy]).collect();
+    let corners = vec![b.x1 as f32 * sx, b.y1 as f32 * sy, b.x2 as f32 * sx, b.y2 as f32 * sy];
+    StateDict::from([
+        ("targets.boxes".to_owned(), tensor(&[1, 4], corners)),
+        ("targets.classes".to_owned(), tensor(&[1], vec![0.0])),
+        ("targets.keypoints".to_owned(), tensor(&[1, crate::NUM_KEYPOINTS, 3], keypoints)),
+        ("targets.polygons".to_owned(), tensor(&[1, outline.len()], outline)),
+    ])
+}
+
+#[test]
+fn every_stage_of_every_network_agrees() {
+    for kind in [ModelKind::A, ModelKind::C, ModelKind::D] {
+        let Network { detector, .. } = taught(Preset::Edge, kind).network.unwrap();
+        let config = detector.config().clone().without_sampling();
+        let weights = state_dict::export(&detector);
+        let on = |device: &Device| {
+            let (detector, report) = state_dict::import(config.init(&device.clone().autodiff(), 1).unwrap(), &weights);
+            assert!(report.is_complete());
+            detector
+        };
+        let photo = demonstration().image;
+        let reference = record(&on(&Device::flex()), &photo, &targets(&config)).unwrap();
+        assert!(!reference["detections.scores"].values.is_empty(), "{kind}: nothing to compare");
+        assert!(reference.keys().filter(|name| name.starts_with("gradients.")).count() > 50);
+        for (backend, device) in devices() {
+            let report = verify(&on(&device), &photo, &reference).unwrap();
+            println!("{kind} on {backend}\n{report}");
+            assert!(report.passed(), "{kind} on {backend}\n{report}");
+        }
+    }
+}
+
+fn assert_same(found: &[GraspDetection], expected: &[GraspDetection], about: &str) {
+    assert_eq!(found.len(), expected.len(), "{about}: {found:#?}\n{expected:#?}");
+    for (found, expected) in found.iter().zip(expected) {
+        let (a, b) = (&found.bbox, &expected.bbox);
+        let place = [a.x1 - b.x1, a.y1 - b.y1, a.x2 - b.x2, a.y2 - b.y2]
+            .into_iter()
+            .chain((found.grasp.center() - expected.grasp.center()).iter().copied())
+            .fold(0.0f64, |most, difference| most.max(difference.abs()));
+        let turn = sdg_geometry::Angle::distance(found.grasp.angle, expected.grasp.angle).to_degrees();
+        let score = (found.score - expected.score).abs().max((found.network_score - expected.network_score).abs());
+        println!("{about}: {place:.1e} px, {turn:.1e}°, score {score:.1e}");
+        assert!(place < PLACE_PX && turn < TURN_DEGREES && score < SCORE, "{about}: {found:?}\n{expected:?}");
+    }
+}
+
+#[test]
+fn every_model_detects_the_same() {
+    let photo = demonstration().image;
+    for kind in NETWORK_MODELS {
+        let model = taught(Preset::Edge, kind);
+        let bytes = model.to_bytes().unwrap();
+        for (backend, device) in devices() {
+            let there = GraspModel::from_bytes(&bytes, &device).unwrap();
+            for verification in [Verification::Off, Verification::ByShape] {
+                let expected = model.detect(&photo, verification).unwrap();
+                let found = there.detect(&photo, verification).unwrap();
+                assert_same(&found, &expected, &format!("{kind} on {backend}, {verification:?}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn teaching_goes_the_same_way() {
+    let losses = |device: Device, kind: ModelKind| {
+        let options = TeachOptions { kind, device, ..TeachOptions::new(1) };
+        let mut losses = Vec::new();
+        let taught = teach_network(
+            &[demonstration()],
+            &small_plan(&options),
+            &options,
+            &mut |event| {
+                if let Event::Step { record, .. } = event {
+                    losses.push(record.losses.total());
+                }
+                ControlFlow::Continue(())
+            },
+            Instant::now(),
+        )
+        .unwrap();
+        // The part is found in its own photo, whatever the network has learnt.
+        let found = taught.model.detect(&demonstration().image, Verification::ByShape).unwrap();
+        assert!(found[0].is_accepted(), "{kind}: {found:?}");
+        losses
+    };
+    for kind in [ModelKind::A, ModelKind::C, ModelKind::D] {
+        let expected = losses(Device::flex(), kind);
+        for (backend, device) in devices() {
+            let found = losses(device, kind);
+            println!("{kind} on {backend}: {found:?}, on flex {expected:?}");
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(&expected).take(COMPARED_STEPS) {
+                assert!((found - expected).abs() < LOSSES * expected, "{kind} on {backend}: {found}, {expected}");
+            }
+        }
+    }
+}

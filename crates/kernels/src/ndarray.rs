@@ -1,0 +1,16 @@
+//! The extension on burn's `NdArray`: the composed defaults throughout. A second opinion, not a fast one.
+
+// burn deprecates the backend in favour of `Flex`; it stays for who compares.
+#![allow(deprecated)]
+
+use burn::backend::NdArray;
+
+use crate::extension::KernelBackend;
+
+impl KernelBackend for NdArray {}
+
+#[cfg(feature = "autodiff")]
+impl<C: burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy> KernelBackend
+    for burn::backend::Autodiff<NdArray, C>
+{
+}
