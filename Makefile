@@ -44,8 +44,8 @@ test-browser: build web ## Tests our pages in headless Chromium
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
 
-test-wgpu: ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
-	@scripts/setup.sh libvulkan1 mesa-vulkan-drivers
+test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
+	@scripts/install.sh libvulkan1 mesa-vulkan-drivers
 	$(call DEVICE_TESTS,wgpu) --test device_parity --test devices
 	$(call DEVICE_TESTS,wgpu) -p sdg-grasp --lib -- device_parity
 

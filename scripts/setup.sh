@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
 # Installs what the build and the simulator need from Debian, and nothing that is already there.
-# Uses sudo only when not root. Called by every make target, with the packages that only this target needs; finishes in
-# milliseconds when there is nothing to do.
+# Uses sudo only when not root. Called by every make target; finishes in milliseconds when there is nothing to do.
 set -euo pipefail
 
-packages=(gcc libc6-dev libmujoco-dev libegl1 libgl1-mesa-dri "$@")
+packages=(gcc libc6-dev libmujoco-dev libegl1 libgl1-mesa-dri)
 
 if ! command -v cargo >/dev/null; then
     echo "setup: Rust is missing: install it with rustup (https://rustup.rs), or your distribution's rustc 1.95 or later" >&2
