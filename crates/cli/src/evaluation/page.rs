@@ -1,13 +1,15 @@
 //! The evaluation as a page.
 
 use anyhow::Result;
-use sdg_report::{Figure, GallerySize, KeyFigure, Matrix, Report, Section, ShareChart, Step, Tone};
+use sdg_report::{
+    Axis, Chart, Figure, GallerySize, KeyFigure, Matrix, Report, Section, Series, ShareChart, Step, Tone,
+};
 
 use super::cell::Cell;
 use super::paper;
-use super::records::AttemptRecord;
+use super::records::{AttemptRecord, LOSS_STEPS, TeachingRecord};
 use super::store::Store;
-use super::summary::{Figures, Summary};
+use super::summary::{Figures, ModelSummary, Summary};
 use super::tables::{Titled, notice, tables};
 
 /// The tables, success at a glance, and a picture of every cell.
@@ -35,6 +37,11 @@ pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command:
     }
     for Titled { title, lead, table } in tables(summary) {
         report = report.section(begun(Section::new(title).lead(lead)).table(table));
+    }
+    if let Some(losses) = losses(summary) {
+        report = report.section(
+            Section::new("How they learn").lead("Models B and C are two readings of one network.").charts(vec![losses]),
+        );
     }
     let figures = pictures(summary, store)?;
     if !figures.is_empty() {
@@ -99,6 +106,30 @@ fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
         counts[steps().count()] += figures.held.count;
     }
     counts
+}
+
+/// The loss of each network, mean of the parts; `None` where no curve was kept.
+fn losses(summary: &Summary) -> Option<Chart> {
+    let mut chart = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
+        .caption(format!("Mean of the parts and of {LOSS_STEPS} steps each."));
+    let mut drawn = Vec::new();
+    for ModelSummary { model, network, .. } in &summary.models {
+        let cells = summary.cells.iter().filter(|cell| cell.model == *model);
+        let curves = cells.filter_map(|cell| match &cell.teaching {
+            Some(TeachingRecord::Taught { losses, .. }) if !losses.is_empty() => Some(losses),
+            _ => None,
+        });
+        let curves: Vec<_> = curves.collect();
+        let shortest = curves.iter().map(|losses| losses.len()).min().unwrap_or(0);
+        if shortest == 0 || drawn.contains(network) {
+            continue;
+        }
+        let mean = |at: usize| curves.iter().map(|losses| losses[at]).sum::<f64>() / curves.len() as f64;
+        let points = (0..shortest).map(|at| (((at + 1) * LOSS_STEPS) as f64, mean(at))).collect();
+        chart = chart.series(Series::new(format!("network of model {network}"), points));
+        drawn.push(*network);
+    }
+    (!drawn.is_empty()).then_some(chart)
 }
 
 fn pictures(summary: &Summary, store: &Store) -> Result<Vec<Figure>> {

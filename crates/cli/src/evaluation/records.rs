@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
+/// Steps that one value of a teaching's loss stands for.
+pub const LOSS_STEPS: usize = 10;
+
 /// How a teaching ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -18,6 +21,9 @@ pub enum TeachingRecord {
         bytes: usize,
         /// How many units ran side by side meanwhile.
         jobs: usize,
+        /// Mean loss of every [`LOSS_STEPS`] steps; none without a network.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        losses: Vec<f64>,
     },
     /// There is none.
     Failed {

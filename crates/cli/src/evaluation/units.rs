@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
-use sdg_grasp::{Event, ModelKind, Preset, TeachOptions, Verification, teach};
+use sdg_grasp::{Event, History, ModelKind, Preset, StepRecord, TeachOptions, Verification, teach};
 use sdg_simulation::SimulationError;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
@@ -13,7 +13,7 @@ use sdg_simulation::scene::{TestView, test_views};
 use super::cell::{Cell, attempts_of};
 use super::looking::{part_seed, picture_seed, scene_without, show};
 use super::progress::EvaluationProgress;
-use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
+use super::records::{AttemptRecord, AttemptsRecord, LOSS_STEPS, LookRecord, SpeedRecord, TeachingRecord};
 use super::schedule::{Task, run_all};
 use super::store::Store;
 use crate::exit::one_line;
@@ -207,7 +207,8 @@ impl Evaluation<'_> {
                 let said = facts.validation.map_or("nothing to train".to_owned(), |validation| {
                     format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
                 });
-                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs }, said)
+                let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
+                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs, losses }, said)
             }
             Err(error) => {
                 self.store.remove(&cell.model_file())?;
@@ -350,6 +351,12 @@ fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
         let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
         Err(anyhow!("a mistake in this program: {}", said.unwrap_or_else(|| "it panicked".to_owned())))
     })
+}
+
+/// The curve of a teaching, coarse enough to keep.
+fn mean_losses(history: &History) -> Vec<f64> {
+    let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
+    history.steps.chunks(LOSS_STEPS).map(mean).collect()
 }
 
 #[cfg(test)]

@@ -25,10 +25,27 @@ pub(crate) trait Lanes: Copy {
 
     unsafe fn splat(value: f32) -> Self;
     unsafe fn load(from: *const f32) -> Self;
-    /// The first `len` of sixteen, zeros behind them.
-    unsafe fn load_first(from: *const f32, len: usize) -> Self;
     unsafe fn store(self, to: *mut f32);
-    unsafe fn store_first(self, to: *mut f32, len: usize);
+    /// The first `len` of sixteen, zeros behind them.
+    #[inline(always)]
+    unsafe fn load_first(from: *const f32, len: usize) -> Self {
+        let mut values = [0.0_f32; LANES];
+        // SAFETY: good for `len` floats, which is at most 16.
+        unsafe {
+            std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
+            Self::load(values.as_ptr())
+        }
+    }
+    /// The first `len` of sixteen; what is behind them in memory stays.
+    #[inline(always)]
+    unsafe fn store_first(self, to: *mut f32, len: usize) {
+        let mut values = [0.0_f32; LANES];
+        // SAFETY: good for `len` floats, which is at most 16.
+        unsafe {
+            self.store(values.as_mut_ptr());
+            std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
+        }
+    }
     unsafe fn add(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
@@ -150,29 +167,11 @@ impl Lanes for Ymm2 {
         unsafe { Self([_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))]) }
     }
     #[inline(always)]
-    unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        let mut values = [0.0_f32; LANES];
-        // SAFETY: as for `Zmm`; `len` is at most 16.
-        unsafe {
-            std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
-            Self::load(values.as_ptr())
-        }
-    }
-    #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         // SAFETY: as for `Zmm`.
         unsafe {
             _mm256_storeu_ps(to, self.0[0]);
             _mm256_storeu_ps(to.add(8), self.0[1]);
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_first(self, to: *mut f32, len: usize) {
-        let mut values = [0.0_f32; LANES];
-        // SAFETY: as for `Zmm`; `len` is at most 16.
-        unsafe {
-            self.store(values.as_mut_ptr());
-            std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
         }
     }
     #[inline(always)]
@@ -243,28 +242,10 @@ impl Lanes for V128x4 {
         }
     }
     #[inline(always)]
-    unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
-        unsafe {
-            std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len);
-            Self::load(values.as_ptr())
-        }
-    }
-    #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         for (idx, vector) in self.0.into_iter().enumerate() {
             // SAFETY: good for 16 floats by the caller's promise; the instruction needs no alignment.
             unsafe { v128_store(to.add(4 * idx).cast(), vector) };
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_first(self, to: *mut f32, len: usize) {
-        let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
-        unsafe {
-            self.store(values.as_mut_ptr());
-            std::ptr::copy_nonoverlapping(values.as_ptr(), to, len);
         }
     }
     #[inline(always)]
@@ -320,21 +301,9 @@ impl Lanes for Plain {
         unsafe { Self(*from.cast::<[f32; LANES]>()) }
     }
     #[inline(always)]
-    unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        let mut values = [0.0_f32; LANES];
-        // SAFETY: good for `len` floats, which is at most 16.
-        unsafe { std::ptr::copy_nonoverlapping(from, values.as_mut_ptr(), len) };
-        Self(values)
-    }
-    #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
         // SAFETY: good for 16 floats by the caller's promise.
         unsafe { *to.cast::<[f32; LANES]>() = self.0 };
-    }
-    #[inline(always)]
-    unsafe fn store_first(self, to: *mut f32, len: usize) {
-        // SAFETY: good for `len` floats, which is at most 16.
-        unsafe { std::ptr::copy_nonoverlapping(self.0.as_ptr(), to, len) };
     }
     #[inline(always)]
     unsafe fn add(self, other: Self) -> Self {

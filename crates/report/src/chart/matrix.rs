@@ -1,5 +1,6 @@
 //! A matrix of counts: what led to what, and how often.
 
+use super::frame::framed;
 use crate::html::{escape, format_number};
 
 /// Widths that a matrix is drawn for, with the class that chooses one by the room there is.
@@ -65,14 +66,8 @@ impl Matrix {
     }
 
     pub(crate) fn to_html(&self) -> String {
-        let mut html = format!("<figure class=\"chart matrix\"><h3>{}</h3>", escape(&self.title));
-        for (width, class) in SIZES {
-            html += &self.to_svg(width, class);
-        }
-        if let Some(caption) = &self.caption {
-            html += &format!("<figcaption>{}</figcaption>", escape(caption));
-        }
-        html + "</figure>"
+        let drawings = SIZES.into_iter().map(|(width, class)| self.to_svg(width, class));
+        framed("chart matrix", &self.title, "", drawings, self.caption.as_deref())
     }
 
     fn to_svg(&self, width: f64, class: &str) -> String {

@@ -1,5 +1,6 @@
 //! Plots: line charts here (what a curve is, apart from how it is drawn), matrices of counts and shares beside them.
 
+mod frame;
 mod matrix;
 mod scale;
 mod shares;

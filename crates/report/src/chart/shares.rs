@@ -1,5 +1,6 @@
 //! Shares with the interval in which each truly lies, one below the other.
 
+use super::frame::framed;
 use crate::html::{escape, format_number};
 
 /// Widths that the chart is drawn for, with the class that chooses one by the room there is.
@@ -63,21 +64,15 @@ impl ShareChart {
     }
 
     pub(crate) fn to_html(&self) -> String {
-        let mut html = format!("<figure class=\"chart\"><h3>{}</h3>", escape(&self.title));
-        if let Some(name) = &self.reference_name {
-            html += &format!(
+        let legend = self.reference_name.as_ref().map_or_else(String::new, |name| {
+            format!(
                 "<ul class=\"legend\"><li><i class=\"swatch s3\"></i>measured, with 95 % interval</li>\
                  <li><i class=\"swatch hollow\"></i>{}</li></ul>",
                 escape(name)
-            );
-        }
-        for (width, class) in SIZES {
-            html += &self.to_svg(width, class);
-        }
-        if let Some(caption) = &self.caption {
-            html += &format!("<figcaption>{}</figcaption>", escape(caption));
-        }
-        html + "</figure>"
+            )
+        });
+        let drawings = SIZES.into_iter().map(|(width, class)| self.to_svg(width, class));
+        framed("chart", &self.title, &legend, drawings, self.caption.as_deref())
     }
 
     fn to_svg(&self, width: f64, class: &str) -> String {

@@ -4,6 +4,7 @@
 //! would make its text too small on a phone or too large on a desk. Colours are the page's own variables, so that
 //! the chart follows the theme.
 
+use super::frame::framed;
 use super::scale::FittedScale;
 use super::{Axis, Chart, Scale};
 use crate::html::{escape, format_number};
@@ -23,24 +24,17 @@ const NUM_COLORS: usize = 4;
 impl Chart {
     /// The whole figure: title, legend, drawings, caption.
     pub(crate) fn to_html(&self) -> String {
-        let mut html = String::from("<figure class=\"chart\">");
-        html += &format!("<h3>{}</h3>", escape(&self.title));
         // Even one curve is named: neighbouring charts then keep their plots on one line.
-        if !self.series.is_empty() {
-            html += "<ul class=\"legend\">";
-            for (order, series) in self.series.iter().enumerate() {
-                let color = order % NUM_COLORS + 1;
-                html += &format!("<li><i class=\"swatch s{color}\"></i>{}</li>", escape(&series.name));
-            }
-            html += "</ul>";
-        }
-        for (width, height, class) in SIZES {
-            html += &self.to_svg(width, height, class);
-        }
-        if let Some(caption) = &self.caption {
-            html += &format!("<figcaption>{}</figcaption>", escape(caption));
-        }
-        html + "</figure>"
+        let entries = self.series.iter().enumerate().map(|(order, series)| {
+            let color = order % NUM_COLORS + 1;
+            format!("<li><i class=\"swatch s{color}\"></i>{}</li>", escape(&series.name))
+        });
+        let legend = match self.series.len() {
+            0 => String::new(),
+            _ => format!("<ul class=\"legend\">{}</ul>", entries.collect::<String>()),
+        };
+        let drawings = SIZES.into_iter().map(|(width, height, class)| self.to_svg(width, height, class));
+        framed("chart", &self.title, &legend, drawings, self.caption.as_deref())
     }
 
     fn to_svg(&self, width: f64, height: f64, class: &str) -> String {

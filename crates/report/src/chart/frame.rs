@@ -1,0 +1,19 @@
+//! What all plots stand in: title, legend, the drawings for every width, caption.
+
+use crate::html::escape;
+
+/// A figure with the page style's classes. The legend and the drawings are HTML already.
+pub(super) fn framed(
+    class: &str,
+    title: &str,
+    legend: &str,
+    drawings: impl Iterator<Item = String>,
+    caption: Option<&str>,
+) -> String {
+    let mut html = format!("<figure class=\"{class}\"><h3>{}</h3>{legend}", escape(title));
+    html.extend(drawings);
+    if let Some(caption) = caption {
+        html += &format!("<figcaption>{}</figcaption>", escape(caption));
+    }
+    html + "</figure>"
+}
