@@ -9,6 +9,7 @@ use sdg_geometry::{BoundingBox, Mask};
 use crate::config::{MaskHeadConfig, RcnnConfig};
 use crate::error::{DetectionError, Result};
 use crate::fpn::Fpn;
+use crate::host::now;
 use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
 use crate::initialization::Initializer;
 use crate::losses::Losses;
@@ -173,6 +174,11 @@ impl GeneralizedRcnn {
     ///
     /// On a detector in training, call this on `valid()`, so that no gradients are recorded.
     pub fn detect(&self, images: &[TransformedImage]) -> Vec<Detections> {
+        now(self.detect_async(images))
+    }
+
+    /// [`Self::detect`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    pub async fn detect_async(&self, images: &[TransformedImage]) -> Vec<Detections> {
         if images.is_empty() {
             return Vec::new();
         }
@@ -180,19 +186,19 @@ impl GeneralizedRcnn {
         let [_, _, height, width] = tensor.dims();
         let features = self.backbone.forward(tensor);
         let predictions = self.proposal_generator.predict(&features, [height, width]);
-        let proposals = self.proposal_generator.propose(&predictions, &sizes, Mode::Test);
-        self.detections(images, &features, &proposals)
+        let proposals = self.proposal_generator.propose_async(&predictions, &sizes, Mode::Test).await;
+        self.detections(images, &features, &proposals).await
     }
 
     /// The second stage, back in pixels of the original images.
-    pub(crate) fn detections(
+    pub(crate) async fn detections(
         &self,
         images: &[TransformedImage],
         features: &[Tensor<4>; 5],
         proposals: &[Proposals],
     ) -> Vec<Detections> {
         let sizes: Vec<ImageSize> = images.iter().map(|i| [i.height, i.width]).collect();
-        let found = self.roi_heads.detect(features, proposals, &sizes);
+        let found = self.roi_heads.detect(features, proposals, &sizes).await;
         let mask_head = self.config.roi_heads.mask_head.as_ref();
         images.iter().zip(found).map(|(image, found)| original_detections(image, &found, mask_head)).collect()
     }

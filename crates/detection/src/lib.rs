@@ -42,6 +42,7 @@ mod config_file;
 mod error;
 pub mod fpn;
 mod generalized_rcnn;
+mod host;
 pub mod image_transform;
 pub mod initialization;
 pub mod layers;

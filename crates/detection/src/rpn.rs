@@ -15,6 +15,7 @@ use crate::anchors::{GridSize, grid_anchors};
 use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{AnchorConfig, NormKind, RpnConfig, RpnNormaliser};
+use crate::host::{now, read_both};
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Conv2d, Conv2dShape};
 use crate::losses;
@@ -127,8 +128,17 @@ impl RegionProposalNetwork {
 
     /// Picks the proposals of each image: best anchors of each level, decoded, clipped, NMS.
     pub fn propose(&self, predictions: &RpnPredictions, image_sizes: &[ImageSize], mode: Mode) -> Vec<Proposals> {
-        let logits = host_values(predictions.objectness_logits.clone());
-        let deltas = host_values(predictions.deltas.clone());
+        now(self.propose_async(predictions, image_sizes, mode))
+    }
+
+    /// [`Self::propose`], awaited.
+    pub async fn propose_async(
+        &self,
+        predictions: &RpnPredictions,
+        image_sizes: &[ImageSize],
+        mode: Mode,
+    ) -> Vec<Proposals> {
+        let [logits, deltas] = read_both(predictions.objectness_logits.clone(), predictions.deltas.clone()).await;
         let num_anchors: usize = predictions.anchors.iter().map(Vec::len).sum();
         image_sizes
             .iter()
@@ -227,11 +237,6 @@ impl RegionProposalNetwork {
         let loc = losses::regression(deltas, &delta_targets, self.config.regression_loss) / divisor;
         [cls, loc]
     }
-}
-
-/// Reads a tensor's values, row by row, without its gradient.
-pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    tensor.into_data().try_to_vec_as::<f32>().expect("a float tensor reads as f32")
 }
 
 /// Indices of the `k` largest values, largest first; of equal ones the earlier first.

@@ -21,9 +21,10 @@ use crate::boxes::Corners;
 use crate::config::RcnnConfig;
 use crate::error::{DetectionError, Result};
 use crate::generalized_rcnn::{Detections, GeneralizedRcnn};
+use crate::host::{host_values, now};
 use crate::image_transform::TransformedImage;
 use crate::roi_heads::ResizedTarget;
-use crate::rpn::{Mode, host_values};
+use crate::rpn::Mode;
 use crate::state_dict::{StateDict, WeightTensor};
 use crate::target::ObjectMask;
 
@@ -215,7 +216,7 @@ impl<'a> Comparer<'a> {
         self.boxes("proposals.boxes", &proposals[0].boxes, Tolerance::Relative(1e-4));
         let logits = &proposals[0].objectness_logits;
         self.compare("proposals.objectness_logits", &[logits.len()], logits, Tolerance::Relative(1e-4));
-        let mut found = detector.detections(images, &features, &proposals);
+        let mut found = now(detector.detections(images, &features, &proposals));
         self.detections(&found.remove(0));
     }
 

@@ -6,7 +6,7 @@
 //!                                                                                            PlanarGrasp ──┘
 //! ```
 
-use burn::tensor::Device;
+use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
@@ -118,17 +118,25 @@ impl GraspModel {
     /// # Errors
     /// An image too small to show anything.
     pub fn detect(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
+        read_sync(self.detect_async(image, verification))
+    }
+
+    /// [`Self::detect`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn detect_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
         let (width, height) = image.dimensions();
         if width.min(height) < LEAST_SIDE_PX {
             return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
         }
         let mut found: Vec<GraspDetection> = match (&self.network, verification) {
             (Some(network), Verification::Off) => {
-                network.candidates(image, &self.demonstrations)?.iter().map(|c| self.unverified(c)).collect()
+                network.candidates_async(image, &self.demonstrations).await?.iter().map(|c| self.unverified(c)).collect()
             }
             (Some(network), Verification::ByShape) => {
                 let scene = Scene::new(image);
-                let candidates = network.candidates(image, &self.demonstrations)?;
+                let candidates = network.candidates_async(image, &self.demonstrations).await?;
                 let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, &scene)).collect();
                 if !found.iter().any(GraspDetection::is_accepted) {
                     // A second opinion: the network finds nothing that the demonstration agrees with.

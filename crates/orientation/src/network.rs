@@ -5,7 +5,7 @@
 //! The last map is flattened, not averaged: where on the crop something is seen is what tells the angle.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData, activation};
+use burn::tensor::{Device, Tensor, TensorData, activation, read_sync};
 use image::RgbImage;
 use image::imageops::{rotate90, rotate180, rotate270};
 use sdg_detection::initialization::{Distribution, Initializer};
@@ -164,6 +164,14 @@ impl OrientationCnn {
     /// # Errors
     /// [`OrientationError::CropSize`] for a crop of another size than [`OrientationConfig::input_px`].
     pub fn predict(&self, crop: &RgbImage) -> Result<AngleReading> {
+        read_sync(self.predict_async(crop))
+    }
+
+    /// [`Self::predict`], awaited; for browsers, which hand over what a graphics card computed in no other way.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn predict_async(&self, crop: &RgbImage) -> Result<AngleReading> {
         let expected = self.config.input_px;
         if crop.dimensions() != (expected, expected) {
             let (width, height) = crop.dimensions();
@@ -172,17 +180,18 @@ impl OrientationCnn {
         let readout = self.config.readout;
         let logits = if readout.quarter_turns {
             let turned = [crop.clone(), rotate90(crop), rotate180(crop), rotate270(crop)];
-            self.log_probabilities(&turned)
+            self.log_probabilities(&turned).await
         } else {
-            self.log_probabilities(std::slice::from_ref(crop))
+            self.log_probabilities(std::slice::from_ref(crop)).await
         };
         Ok(self.config.classes.read(&self.combined(&logits), readout.window_classes))
     }
 
     /// Logarithms of the classes' probabilities on each crop.
-    fn log_probabilities(&self, crops: &[RgbImage]) -> Vec<Vec<f32>> {
+    async fn log_probabilities(&self, crops: &[RgbImage]) -> Vec<Vec<f32>> {
         let logits = self.forward(crop_batch(crops, &self.device()));
-        let values: Vec<f32> = activation::log_softmax(logits, 1).into_data().iter::<f32>().collect();
+        let read = activation::log_softmax(logits, 1).into_data_async().await;
+        let values: Vec<f32> = read.expect("what the device computes can be read").iter::<f32>().collect();
         values.chunks_exact(self.config.classes.num_classes).map(<[f32]>::to_vec).collect()
     }
 

@@ -8,11 +8,12 @@ use burn::tensor::{Int, Tensor, activation};
 use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{BackgroundClass, BoxDeltas, BoxHeadConfig, RoiPoolerConfig};
+use crate::host::read_both;
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Linear, relu};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
-use crate::rpn::{ImageSize, host_values};
+use crate::rpn::ImageSize;
 
 use super::{ResizedTarget, RoiDetection, SampledRoi};
 
@@ -156,9 +157,9 @@ impl BoxPredictor {
     }
 
     /// Gives the detections of each image, best first, without keypoints.
-    pub fn detect(&self, hidden: Tensor<2>, rois: &[Roi], image_sizes: &[ImageSize]) -> Vec<Vec<RoiDetection>> {
-        let scores = host_values(activation::softmax(self.cls_score.forward(hidden.clone()), 1));
-        let deltas = host_values(self.bbox_pred.forward(hidden));
+    pub async fn detect(&self, hidden: Tensor<2>, rois: &[Roi], image_sizes: &[ImageSize]) -> Vec<Vec<RoiDetection>> {
+        let scores = activation::softmax(self.cls_score.forward(hidden.clone()), 1);
+        let [scores, deltas] = read_both(scores, self.bbox_pred.forward(hidden)).await;
         let columns = num_delta_columns(&self.config, self.num_classes);
         let coder = BoxCoder::new(&self.config.box_coder);
         let mut candidates: Vec<(Vec<Corners>, Vec<f32>, Vec<usize>)> = vec![Default::default(); image_sizes.len()];

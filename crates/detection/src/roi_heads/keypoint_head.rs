@@ -10,11 +10,11 @@ use burn::module::Module;
 use burn::tensor::Tensor;
 
 use crate::config::{KeypointHeadConfig, NormKind};
+use crate::host::read;
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, upsample_bilinear_2x};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
-use crate::rpn::host_values;
 
 use super::box_head::RoiClass;
 use super::heatmap::{decode, encode};
@@ -88,7 +88,7 @@ impl KeypointHead {
     }
 
     /// Reads the keypoints of every detection.
-    pub fn read_keypoints(&self, features: &[Tensor<4>; 5], detections: &mut [Vec<RoiDetection>]) {
+    pub async fn read_keypoints(&self, features: &[Tensor<4>; 5], detections: &mut [Vec<RoiDetection>]) {
         let rois: Vec<Roi> = detections
             .iter()
             .enumerate()
@@ -100,7 +100,7 @@ impl KeypointHead {
             return;
         }
         let size = self.config.heatmap_size();
-        let logits = host_values(self.forward(features, &rois));
+        let logits = read(self.forward(features, &rois)).await;
         let maps_of_roi = logits.chunks_exact(self.config.num_keypoints * size * size);
         for (detection, maps) in detections.iter_mut().flatten().zip(maps_of_roi) {
             detection.keypoints = maps

@@ -10,11 +10,12 @@ use burn::module::Module;
 use burn::tensor::{Int, Tensor};
 
 use crate::config::{BackgroundClass, MaskBalance, MaskHeadConfig, NormKind};
+use crate::host::read;
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, relu};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
-use crate::rpn::{ImageSize, host_values};
+use crate::rpn::ImageSize;
 
 use super::box_head::RoiClass;
 use super::mask_paste::BoxMask;
@@ -136,7 +137,7 @@ impl MaskHead {
     }
 
     /// Reads the mask of every detection.
-    pub fn read_masks(&self, features: &[Tensor<4>; 5], detections: &mut [Vec<RoiDetection>]) {
+    pub async fn read_masks(&self, features: &[Tensor<4>; 5], detections: &mut [Vec<RoiDetection>]) {
         let (mut rois, mut classes) = (Vec::new(), Vec::new());
         for (image_idx, found) in detections.iter().enumerate() {
             rois.extend(found.iter().map(|detection| Roi { image_idx, corners: detection.corners }));
@@ -146,7 +147,7 @@ impl MaskHead {
             return;
         }
         let size = self.config.mask_size();
-        let logits = host_values(self.logits_of_classes(features, &rois, &classes));
+        let logits = read(self.logits_of_classes(features, &rois, &classes)).await;
         for (detection, logits) in detections.iter_mut().flatten().zip(logits.chunks_exact(size * size)) {
             let probabilities = logits.iter().map(|logit| 1.0 / (1.0 + (-logit).exp())).collect();
             detection.mask = Some(BoxMask { size, probabilities });

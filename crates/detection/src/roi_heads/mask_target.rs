@@ -8,7 +8,7 @@ use sdg_kernels::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};
 
 use crate::boxes::Corners;
 use crate::config::MaskTargets;
-use crate::rpn::host_values;
+use crate::host::host_values;
 use crate::target::ObjectMask;
 
 /// Sub-cells of a cell along each axis on which COCO's rasteriser walks.

@@ -181,7 +181,7 @@ impl RoiHeads {
     }
 
     /// Gives the detections of each image, best first.
-    pub fn detect(
+    pub async fn detect(
         &self,
         features: &[Tensor<4>; 5],
         proposals: &[Proposals],
@@ -198,12 +198,12 @@ impl RoiHeads {
             return vec![Vec::new(); proposals.len()];
         }
         let hidden = self.box_head.forward(features, &rois);
-        let mut detections = self.box_predictor.detect(hidden, &rois, image_sizes);
+        let mut detections = self.box_predictor.detect(hidden, &rois, image_sizes).await;
         if let Some(head) = &self.keypoint_head {
-            head.read_keypoints(features, &mut detections);
+            head.read_keypoints(features, &mut detections).await;
         }
         if let Some(head) = &self.mask_head {
-            head.read_masks(features, &mut detections);
+            head.read_masks(features, &mut detections).await;
         }
         detections
     }

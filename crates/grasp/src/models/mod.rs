@@ -16,6 +16,8 @@ mod placing;
 
 use burn::module::Module;
 use burn::tensor::Device;
+#[cfg(feature = "teach")]
+use burn::tensor::read_sync;
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_detection::presets::RcnnKind;
@@ -140,24 +142,37 @@ impl Network {
     ///
     /// # Errors
     /// An image that the network refuses.
+    #[cfg(feature = "teach")]
     pub(crate) fn candidates(
         &self,
         image: &RgbImage,
         demonstrations: &[TaughtDemonstration],
     ) -> Result<Vec<Candidate>> {
+        read_sync(self.candidates_async(image, demonstrations))
+    }
+
+    /// [`Self::candidates`], awaited.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) async fn candidates_async(
+        &self,
+        image: &RgbImage,
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Vec<Candidate>> {
         let transformed = self.detector.image_transform().apply(image)?;
-        let detections = self.detector.detect(&[transformed]).pop().unwrap_or_default();
+        let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
         let mut candidates = Vec::new();
         for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= LEAST_NETWORK_SCORE) {
             if i == MOST_CANDIDATES {
                 break;
             }
-            candidates.extend(self.read(image, &detections, i, demonstrations)?);
+            candidates.extend(self.read(image, &detections, i, demonstrations).await?);
         }
         Ok(candidates)
     }
 
-    fn read(
+    async fn read(
         &self,
         image: &RgbImage,
         detections: &Detections,
@@ -167,7 +182,7 @@ impl Network {
         let bbox = &detections.boxes[i];
         let keypoints = keypoints::scored(detections, i);
         let placement = match &self.reading {
-            Reading::BoxAndCrop(network) => orientation::box_and_crop(network, image, bbox, demonstrations)?,
+            Reading::BoxAndCrop(network) => orientation::box_and_crop(network, image, bbox, demonstrations).await?,
             Reading::BoxAndKeypoints => keypoints::box_and_turn(&keypoints, bbox, demonstrations),
             Reading::Keypoints => keypoints::on_line(&keypoints, bbox, demonstrations),
             Reading::Mask(matcher) => matcher.place(image, &detections.masks[i], bbox, demonstrations)?,

@@ -17,14 +17,14 @@ use crate::taught::TaughtDemonstration;
 ///
 /// # Errors
 /// A box without area.
-pub(super) fn box_and_crop(
+pub(super) async fn box_and_crop(
     network: &OrientationCnn,
     image: &RgbImage,
     bbox: &BoundingBox,
     demonstrations: &[TaughtDemonstration],
 ) -> Result<Option<Placement>> {
     let crop = crop_for(image, bbox, network.config().input_px)?;
-    let angle = network.predict(&crop)?.angle;
+    let angle = network.predict_async(&crop).await?.angle;
     Ok(nearest_demonstration(demonstrations, bbox, |_, demonstration| {
         Some((fill_box(demonstration, bbox, angle), TurnSource::Crop))
     }))

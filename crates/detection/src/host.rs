@@ -1,0 +1,29 @@
+//! From the device to the host: what is decided there (top-k, NMS, decoding) has to be read first.
+//!
+//! Inference is written asynchronously, because a browser hands results of its graphics card to nobody else. Everywhere
+//! else a read blocks, and [`now`] gives who does not care an ordinary function.
+
+use burn::tensor::{Tensor, Transaction, read_sync};
+
+/// The result of an inference of ours. Not in a browser on a graphics card, where it panics: there, await it.
+pub(crate) fn now<F: Future>(inference: F) -> F::Output {
+    read_sync(inference)
+}
+
+/// Reads a tensor's values, row by row, without its gradient.
+pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    now(read(tensor))
+}
+
+/// [`host_values`], awaited.
+pub(crate) async fn read<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    let data = tensor.into_data_async().await.expect("what the device computes can be read");
+    data.try_to_vec_as::<f32>().expect("a float tensor reads as f32")
+}
+
+/// Both at once: the device is waited for once.
+pub(crate) async fn read_both<const D: usize, const E: usize>(a: Tensor<D>, b: Tensor<E>) -> [Vec<f32>; 2] {
+    let read = Transaction::default().register(a).register(b).execute_async().await;
+    let read: [_; 2] = read.expect("what the device computes can be read").try_into().expect("two were asked for");
+    read.map(|data| data.try_to_vec_as::<f32>().expect("a float tensor reads as f32"))
+}
