@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds the browser's page into target/web: the WebAssembly module, the JavaScript that calls it, the page's own files.
+# Builds the browser's page into target/web: the WebAssembly modules (target/web/webgpu has the one for graphics cards), the
+# JavaScript that calls them, the page's own files.
 # The result is a folder that any static host serves. Called by `make web`.
 #
 # Rust's WebAssembly target comes from rustup. Where there is none to be had, Debian's compiler for it is taken, which
@@ -32,24 +33,29 @@ if ! has_target; then
     fi
 fi
 
-# Vectors of 128 bits: every browser has them (Chrome 91, Firefox 89, Safari 16.4); the page tells those that do not.
-RUSTFLAGS="-Ctarget-feature=+simd128" CARGO_TARGET_DIR=$build \
-    "${cargo_for_web[@]}" rustc --locked --profile web --package sdg-web --lib --crate-type cdylib --target "$target" \
-    "${standard_library[@]}"
+CARGO_TARGET_DIR=$build/bindgen env -u RUSTC -u RUSTC_BOOTSTRAP \
+    "$cargo" build --locked --release --manifest-path crates/web/bindgen/Cargo.toml
 
-unset RUSTC RUSTC_BOOTSTRAP
-CARGO_TARGET_DIR=$build/bindgen "$cargo" build --locked --release --manifest-path crates/web/bindgen/Cargo.toml
+# Builds a module into a folder; further arguments go to cargo.
+build_module() {
+    local folder=$1
+    shift
+    # Vectors of 128 bits: every browser has them (Chrome 91, Firefox 89, Safari 16.4); the page tells those that do not.
+    RUSTFLAGS="-Ctarget-feature=+simd128" CARGO_TARGET_DIR=$build \
+        "${cargo_for_web[@]}" rustc --locked --profile web --package sdg-web --lib --crate-type cdylib --target "$target" \
+        "${standard_library[@]}" "$@"
+    mkdir -p "$folder"
+    "$build/bindgen/release/sdg-web-bindgen" "$build/$target/web/sdg_web.wasm" "$folder"
+}
 
 rm -rf "$out.new"
-mkdir -p "$out.new"
-"$build/bindgen/release/sdg-web-bindgen" "$build/$target/web/sdg_web.wasm" "$out.new"
+build_module "$out.new"
+build_module "$out.new/webgpu" --features webgpu
 cp crates/web/page/* "$out.new"
 # Whole or not at all: a page that is open meanwhile never sees half of it.
 rm -rf "$out"
 mv "$out.new" "$out"
 
-compressed=0
-for file in "$out"/*; do
-    compressed=$((compressed + $(gzip -9 -c "$file" | wc -c)))
-done
-echo "$out: $(du -sk "$out" | cut -f1) KiB, $((compressed / 1024)) KiB to download compressed; for one, python3 -m http.server --directory $out"
+compressed() { find "$@" -type f -exec gzip -9 -c {} + | wc -c; }
+echo "$out: $(($(compressed "$out" -maxdepth 1) / 1024)) KiB to download compressed, and $(($(compressed "$out/webgpu") / 1024)) KiB" \
+    "more for who computes on the graphics card; for one, python3 -m http.server --directory $out"

@@ -1,13 +1,21 @@
 // The worker seen from the page: a promise for each request, and a new worker where one stopped.
 
 export class Detector {
+  #device;
   #worker = null;
   #model = null; // The open model's bytes, for a worker that has to be started again.
   #waiting = new Map();
   #nextId = 1;
 
-  constructor() {
+  /** On the processor, or on the graphics card that the browser lends. */
+  constructor(device = "processor") {
+    this.#device = device;
     this.#start();
+  }
+
+  /** Ends the worker; what was asked of it is answered with an error. */
+  close() {
+    this.#fail("the model was closed");
   }
 
   /** Opens a grasp model; what its file says of itself. The bytes stay in the page. */
@@ -23,7 +31,7 @@ export class Detector {
   }
 
   #start() {
-    this.#worker = new Worker(new URL("./worker.js", import.meta.url), { type: "module" });
+    this.#worker = new Worker(new URL(`./worker.js?device=${this.#device}`, import.meta.url), { type: "module" });
     this.#worker.onmessage = ({ data }) => this.#receive(data);
     this.#worker.onerror = (event) => {
       event.preventDefault();
@@ -52,11 +60,15 @@ export class Detector {
     }
   }
 
-  #startAgain(reason) {
+  #fail(reason) {
     this.#worker.terminate();
     const lost = [...this.#waiting.values()];
     this.#waiting.clear();
     lost.forEach(({ reject }) => reject(new Error(reason)));
+  }
+
+  #startAgain(reason) {
+    this.#fail(reason);
     if (this.#model) {
       this.#start();
       this.#ask({ open: this.#model }).catch(() => {});

@@ -13,6 +13,7 @@ const WIDEST_SHOWN = 2048;
 const camera = new Camera();
 const pictures = []; // {file, bitmap, result: {record, milliseconds, decoded}, error, button, small}
 let detector = null;
+let modelFile = null; // The file that is open.
 let modelOpen = false;
 let current = null; // A picture of the list, or the camera's last frame.
 let generation = 0; // Rises when model or settings change: what was asked for before is of no use.
@@ -37,6 +38,8 @@ function wire() {
   element("verify").onchange = lookAtAllAgain;
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
+  element("webgpu").onchange = changeDevice;
+  graphicsCard().then((card) => (element("webgpu-choice").hidden = !card));
   watchWidth(element("stage"), showCurrent);
 
   // Dropped anywhere: a model is told from a picture by its name.
@@ -69,21 +72,47 @@ function watchWidth(watched, redraw) {
   });
 }
 
+/** Whether the browser lends one; to pages served by https or from this very machine only. */
+async function graphicsCard() {
+  return Boolean(await navigator.gpu?.requestAdapter().catch(() => null));
+}
+
+/** Looks with the same model on the other device; where that fails, goes back. */
+async function changeDevice() {
+  stopCamera();
+  generation += 1; // What the old worker still has to say is of no use.
+  pictures.forEach(({ small }) => (small.textContent = "waiting"));
+  const opened = modelOpen ? modelFile : null;
+  modelOpen = false;
+  detector.close();
+  detector = new Detector(element("webgpu").checked ? "webgpu" : "processor");
+  if (opened && !(await openModel(opened)) && element("webgpu").checked) {
+    const complaint = element("alert").textContent;
+    element("webgpu").checked = false;
+    await changeDevice();
+    complain(`The graphics card cannot be used, the processor is. ${complaint}`);
+  }
+}
+
+/** Opens a model and looks at every picture with it; whether it could be opened. */
 async function openModel(file) {
   if (!file) {
-    return;
+    return false;
   }
   complain(null);
   say(`Opening ${file.name}…`);
   try {
     const summary = await detector.open(await file.arrayBuffer());
     modelOpen = true;
+    modelFile = file;
     showModel(file.name, summary);
     say("");
     lookAtAllAgain();
+    return true;
   } catch (error) {
     say("");
     complain(`${file.name}: ${error.message}`);
+    return false;
   }
 }
 
@@ -160,6 +189,9 @@ async function lookAtPicture(picture, mine) {
       picture.error = null;
       picture.small.textContent = inAWord(result);
     } catch (error) {
+      if (mine !== generation) {
+        return;
+      }
       picture.result = null;
       picture.error = error.message;
       picture.small.textContent = error.message;

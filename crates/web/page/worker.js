@@ -7,29 +7,33 @@
 //
 // `milliseconds` is the time of the look itself; `decoded` that of getting at the pixels. After a panic the module's
 // memory cannot be trusted: the answer says `stopped`, and the page starts another worker.
-
-import init, { Model } from "./sdg_web.js";
+//
+// The address says where to compute: `worker.js?device=webgpu` on the graphics card, which is another module.
 
 /** The limit of the command line: larger files than any camera makes. */
 const MOST_IMAGE_BYTES = 256 * 2 ** 20;
 
-const ready = load();
+const onCard = new URL(import.meta.url).searchParams.get("device") === "webgpu";
+const ready = load(onCard ? "./webgpu/sdg_web" : "./sdg_web");
+let Model = null;
 let model = null;
 
-async function load() {
+async function load(name) {
+  const module = await import(`${name}.js`);
   // Compiled while it arrives where the host names the type; some static hosts do not.
-  const response = await fetch(new URL("./sdg_web_bg.wasm", import.meta.url));
+  const response = await fetch(new URL(`${name}_bg.wasm`, import.meta.url));
   if (!response.ok) {
-    throw new Error(`the module sdg_web_bg.wasm is missing on this host (status ${response.status})`);
+    throw new Error(`the module ${name}_bg.wasm is missing on this host (status ${response.status})`);
   }
   const streams = (response.headers.get("content-type") ?? "").startsWith("application/wasm");
-  await init({ module_or_path: streams ? response : await response.arrayBuffer() });
+  await module.default({ module_or_path: streams ? response : await response.arrayBuffer() });
+  Model = module.Model;
 }
 
 async function answer(request) {
   await ready;
   if (request.open) {
-    const opened = new Model(new Uint8Array(request.open));
+    const opened = await Model.open(new Uint8Array(request.open));
     model?.free();
     model = opened;
     return { summary: JSON.parse(model.summary()) };
@@ -40,7 +44,7 @@ async function answer(request) {
   const begun = performance.now();
   const look = await prepared(request.look, request.verify);
   const decoded = performance.now() - begun;
-  const record = JSON.parse(look());
+  const record = JSON.parse(await look());
   return { record, decoded, milliseconds: performance.now() - begun - decoded };
 }
 

@@ -1,6 +1,6 @@
 //! What JavaScript sees: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
 
-use sdg_grasp::Verification;
+use sdg_grasp::{Device, Verification};
 use wasm_bindgen::prelude::*;
 
 use crate::looker::Looker;
@@ -27,10 +27,9 @@ impl Model {
     /// Opens a model from its file's bytes.
     ///
     /// # Errors
-    /// No grasp model, one of another version, or a damaged one.
-    #[wasm_bindgen(constructor)]
-    pub fn new(bytes: &[u8]) -> Result<Model, JsError> {
-        Ok(Self(Looker::open(bytes)?))
+    /// No grasp model, one of another version, or a damaged one; a browser without a graphics card that it lends.
+    pub async fn open(bytes: Vec<u8>) -> Result<Model, JsError> {
+        Ok(Self(Looker::open(&bytes, &device().await?)?))
     }
 
     /// What the file says of itself, as JSON; see [`Looker::summary`].
@@ -43,8 +42,8 @@ impl Model {
     /// # Errors
     /// No image, a damaged or an enormous one.
     #[wasm_bindgen(js_name = lookAtFile)]
-    pub fn look_at_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
-        Ok(self.0.look_at_file(bytes, verification(verify))?)
+    pub async fn look_at_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
+        Ok(self.0.look_at_file(bytes, verification(verify)).await?)
     }
 
     /// Looks at the pixels of a canvas; see [`Looker::look_at_pixels`].
@@ -52,11 +51,29 @@ impl Model {
     /// # Errors
     /// Bytes that do not fit the size, or an enormous image.
     #[wasm_bindgen(js_name = lookAtPixels)]
-    pub fn look_at_pixels(&self, rgba: &[u8], width: u32, height: u32, verify: bool) -> Result<String, JsError> {
-        Ok(self.0.look_at_pixels(rgba, width, height, verification(verify))?)
+    pub async fn look_at_pixels(&self, rgba: &[u8], width: u32, height: u32, verify: bool) -> Result<String, JsError> {
+        Ok(self.0.look_at_pixels(rgba, width, height, verification(verify)).await?)
     }
 }
 
 fn verification(verify: bool) -> Verification {
     if verify { Verification::ByShape } else { Verification::Off }
+}
+
+/// Where this module computes.
+async fn device() -> Result<Device, JsError> {
+    #[cfg(not(feature = "webgpu"))]
+    return Ok(Device::flex());
+    #[cfg(feature = "webgpu")]
+    {
+        thread_local! {
+            static OPENED: std::cell::RefCell<Option<Device>> = const { std::cell::RefCell::new(None) };
+        }
+        if let Some(device) = OPENED.with_borrow(Clone::clone) {
+            return Ok(device);
+        }
+        let device = Device::wgpu_options().init_async().await?;
+        OPENED.set(Some(device.clone()));
+        Ok(device)
+    }
 }

@@ -9,18 +9,20 @@
 //! `sdg detect --json`. Image files are decoded by the very decoder that the command line uses, so that both see the
 //! same pixels; frames of a camera come as RGBA.
 //!
+//! The module is built twice: once for the processor, and once (feature `webgpu`, several times as large, and fetched
+//! only when asked for) for the graphics card that a browser lends. What a card computed, a browser hands over only to
+//! who awaits it, so looking is asynchronous.
+//!
 //! Left out on purpose: teaching, threads (a page may use them only where its host sends special headers), and any
-//! request to anywhere: what is dropped on the page stays in it. WebGPU too: detection reads results back in its middle
-//! (top-k, suppression, which ROIs go on), and a browser hands those back only to who waits asynchronously, which the
-//! detector of the command line does not. `make web` builds module and page into target/web.
+//! request to anywhere: what is dropped on the page stays in it. `make web` builds modules and page into target/web.
 //!
 //! ```no_run
-//! use sdg_grasp::Verification;
+//! use sdg_grasp::{Device, Verification};
 //! use sdg_web::Looker;
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let looker = Looker::open(&std::fs::read("pendulum.sdg")?)?;
-//! println!("{}", looker.look_at_file(&std::fs::read("table.png")?, Verification::ByShape)?);
+//! # async fn look() -> Result<(), Box<dyn std::error::Error>> {
+//! let looker = Looker::open(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
+//! println!("{}", looker.look_at_file(&std::fs::read("table.png")?, Verification::ByShape).await?);
 //! # Ok(())
 //! # }
 //! ```

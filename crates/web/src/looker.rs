@@ -25,13 +25,13 @@ struct ImageRecord {
 }
 
 impl Looker {
-    /// Opens a model from its file's bytes.
+    /// Opens a model from its file's bytes, on a device.
     ///
     /// # Errors
     /// No grasp model, one of another version, or a damaged one.
-    pub fn open(bytes: &[u8]) -> Result<Self, WebError> {
+    pub fn open(bytes: &[u8], device: &Device) -> Result<Self, WebError> {
         let summary = summarize(bytes)?;
-        Ok(Self { model: GraspModel::from_bytes(bytes, &Device::flex())?, summary })
+        Ok(Self { model: GraspModel::from_bytes(bytes, device)?, summary })
     }
 
     /// What the file says of itself, as JSON: `model`, `preset`, `object`, `teaching`.
@@ -43,15 +43,15 @@ impl Looker {
     ///
     /// # Errors
     /// A file that is no image, is damaged, or has more pixels than [`ImageLimits`] allows.
-    pub fn look_at_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
-        self.look_at(&decode_image(bytes, &ImageLimits::default())?, verification)
+    pub async fn look_at_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
+        self.look_at(&decode_image(bytes, &ImageLimits::default())?, verification).await
     }
 
     /// Looks at opaque pixels as a canvas gives them: rows of red, green, blue and an alpha that is passed over.
     ///
     /// # Errors
     /// Bytes that do not fit the size, or more pixels than [`ImageLimits`] allows.
-    pub fn look_at_pixels(
+    pub async fn look_at_pixels(
         &self,
         rgba: &[u8],
         width: u32,
@@ -68,11 +68,11 @@ impl Looker {
         }
         let rgb = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         let image = RgbImage::from_raw(width, height, rgb).ok_or_else(pixels)?;
-        self.look_at(&image, verification)
+        self.look_at(&image, verification).await
     }
 
-    fn look_at(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
-        let found = self.model.detect(image, verification)?;
+    async fn look_at(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
+        let found = self.model.detect_async(image, verification).await?;
         let detections = found.iter().map(DetectionRecord::from).collect();
         Ok(to_json(&ImageRecord { width: image.width(), height: image.height(), detections }))
     }

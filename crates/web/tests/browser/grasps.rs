@@ -23,17 +23,23 @@ const MOST_MILLISECONDS: f64 = 200.0;
 const MOST_PAGE_GAP_MS: f64 = 150.0;
 const MOST_DOWNLOAD_BYTES: usize = 4_000_000;
 
+const PROCESSOR: &str = "processor";
+const CARD: &str = "webgpu";
+/// Has Chromium lend a graphics card that it computes itself.
+const SOFTWARE_CARD: [&str; 3] =
+    ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
+
 /// Looks at the files of the page's own input, through the page's own modules, and keeps every digit.
-const LOOK: &str = "return (async () => {
+const LOOK: &str = "return (async (device) => {
     const { Detector } = await import(new URL('./detector.js', location.href).href);
-    const detector = new Detector();
+    const detector = new Detector(device);
     await detector.open(await document.getElementById('model-file').chosen.arrayBuffer());
     const results = [];
     for (const file of document.getElementById('image-files').chosen) {
         results.push(await detector.look(file, true));
     }
     return results;
-})()";
+})(arguments[0])";
 
 /// Keeps what is chosen, because the page empties its inputs so that the same file can be chosen again.
 const KEEP: &str = "
@@ -46,7 +52,8 @@ fn number(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
 }
 
-fn look_at_all(browser: &Browser, model: PathBuf, pictures: &[PathBuf]) -> Vec<Value> {
+/// `device` as the page's `Detector` takes it.
+fn look_at_all(browser: &Browser, device: &str, model: PathBuf, pictures: &[PathBuf]) -> Vec<Value> {
     browser.run(KEEP, &[]).unwrap();
     open_model(browser, &model);
     choose(browser, "#image-files", pictures);
@@ -56,7 +63,7 @@ fn look_at_all(browser: &Browser, model: PathBuf, pictures: &[PathBuf]) -> Vec<V
         pictures.len()
     );
     browser.wait_for("every picture to be looked at", &done).unwrap();
-    array(browser.run(LOOK, &[]).unwrap())
+    array(browser.run(LOOK, &[json!(device)]).unwrap())
 }
 
 fn assert_same(found: &Value, expected: &Value, about: &str) {
@@ -76,6 +83,22 @@ fn assert_same(found: &Value, expected: &Value, about: &str) {
     assert!(turn.abs() <= MOST_DEGREES, "{about}: angle differs by {turn}");
 }
 
+/// Every grasp that one side accepts is the other's, too.
+fn assert_same_grasps(results: &[Value], expected: &[Vec<Value>], pictures: &[PathBuf], about: &str) {
+    assert_eq!(results.len(), expected.len());
+    let mut accepted = 0;
+    for ((result, expected), picture) in results.iter().zip(expected).zip(pictures) {
+        let about = format!("{about}, {}", picture.display());
+        // Best first; those nobody would grasp may come and go with the last bit of a score.
+        let sure = |found: &[Value]| found.iter().filter(|d| number(d, "/score") >= 0.5).cloned().collect::<Vec<_>>();
+        let (found, expected) = (sure(&array(result["record"]["detections"].clone())), sure(expected));
+        assert_eq!(found.len(), expected.len(), "{about}: grasps found");
+        found.iter().zip(&expected).for_each(|(found, expected)| assert_same(found, expected, &about));
+        accepted += found.len();
+    }
+    assert!(accepted > pictures.len() / 2, "{about}: {accepted} grasps are too few to compare");
+}
+
 #[test]
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
@@ -86,20 +109,8 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
         let model = made.model(letter);
         let expected = detect(&model, &pictures);
         let browser = open_page(&site, &[]);
-        let results = look_at_all(&browser, model, &pictures);
-        assert_eq!(results.len(), expected.len());
-        let mut accepted = 0;
-        for ((result, expected), picture) in results.iter().zip(&expected).zip(&pictures) {
-            let about = format!("model {letter}, {}", picture.display());
-            // Best first; those nobody would grasp may come and go with the last bit of a score.
-            let sure =
-                |found: &[Value]| found.iter().filter(|d| number(d, "/score") >= 0.5).cloned().collect::<Vec<_>>();
-            let (found, expected) = (sure(&array(result["record"]["detections"].clone())), sure(expected));
-            assert_eq!(found.len(), expected.len(), "{about}: grasps found");
-            found.iter().zip(&expected).for_each(|(found, expected)| assert_same(found, expected, &about));
-            accepted += found.len();
-        }
-        assert!(accepted > pictures.len() / 2, "model {letter}: {accepted} grasps are too few to compare");
+        let results = look_at_all(&browser, PROCESSOR, model, &pictures);
+        assert_same_grasps(&results, &expected, &pictures, &format!("model {letter}"));
 
         // The first looks compile the module's functions.
         let times: Vec<f64> = results.iter().skip(2).map(|result| number(result, "/milliseconds")).collect();
@@ -111,6 +122,32 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
         browser.screenshot(&screenshots().join(format!("web-{letter}.png"))).unwrap();
         assert_quiet(&browser);
     }
+}
+
+/// On SwiftShader, which Chromium brings along: slower than the processor, but the same shaders.
+#[test]
+#[ignore = "needs Chromium and target/web: make test-browser"]
+fn the_graphics_card_finds_what_the_command_line_finds() {
+    let made = Made::new();
+    let pictures = &made.pictures()[..3];
+    let model = made.model("C");
+    let expected = detect(&model, pictures);
+    let site = site();
+    let browser = open_page(&site, &SOFTWARE_CARD);
+    browser
+        .wait_for("a graphics card to be lent", "return !document.getElementById('webgpu-choice').hidden")
+        .unwrap();
+    let results = look_at_all(&browser, CARD, model, pictures);
+    assert_same_grasps(&results, &expected, pictures, "on the graphics card");
+    let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
+    println!("on SwiftShader: milliseconds a frame {times:.0?}");
+    // The page itself changes over, and says the same.
+    browser.find("#webgpu").unwrap().click().unwrap();
+    let done = "return [...document.querySelectorAll('#pictures small')].every((small) => /grasp/.test(small.textContent)) \
+                && document.getElementById('alert').hidden";
+    browser.wait_for("every picture to be looked at again", done).unwrap();
+    browser.screenshot(&screenshots().join("web-webgpu.png")).unwrap();
+    assert_quiet(&browser);
 }
 
 #[test]
@@ -128,7 +165,7 @@ fn the_page_stays_fluid_and_fits_small_screens() {
         &[],
     )
     .unwrap();
-    look_at_all(&browser, model, &pictures);
+    look_at_all(&browser, PROCESSOR, model, &pictures);
     let gap = browser.run("return window.longestGap", &[]).unwrap().as_f64().unwrap();
     println!("longest gap between two frames of the page: {gap:.0} ms");
     assert!(gap < MOST_PAGE_GAP_MS, "the page froze for {gap} ms");
@@ -148,8 +185,9 @@ fn the_page_stays_fluid_and_fits_small_screens() {
 fn the_download_is_small() {
     let folder = repository().join("target/web");
     let mut total = 0;
-    for entry in std::fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
+    // The module for graphics cards too, though few will fetch both.
+    let entries = [folder.clone(), folder.join("webgpu")].map(|folder| std::fs::read_dir(folder).unwrap());
+    for path in entries.into_iter().flatten().map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
         let compressed = Command::new("gzip").args(["-9", "-c"]).arg(&path).output().unwrap().stdout.len();
         println!("{:>9} bytes compressed: {}", compressed, path.file_name().unwrap().display());
         total += compressed;
