@@ -31,6 +31,10 @@ use crate::target::ObjectMask;
 /// Samples an image, so many that every anchor and proposal takes part in the reference's losses: nothing is drawn.
 const ALL_SAMPLES: usize = 1_000_000;
 
+/// Gradients this much smaller than the network's largest are zero but for rounding: that of a bias in front of a softmax over
+/// places, for one, since adding to all places changes nothing. Relative to themselves they are noise.
+const NOISE_OF_GRADIENTS: f32 = 1e-6;
+
 /// How far a stage may be off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -300,10 +304,14 @@ impl<'a> Comparer<'a> {
             recorded.extend(found);
             return Ok(());
         }
-        let reference = self.reference;
-        for name in reference.keys().filter(|name| name.starts_with("gradients.")) {
+        let gradients = self.reference.iter().filter(|(name, _)| name.starts_with("gradients."));
+        let sizes: Vec<(&String, f32)> = gradients.map(|(name, gradient)| (name, largest(&gradient.values))).collect();
+        let noise = NOISE_OF_GRADIENTS * sizes.iter().map(|(_, size)| *size).fold(0.0, f32::max);
+        for (name, size) in sizes {
             let (shape, values) = found.get(name).map_or((&[][..], &[][..]), |g| (&g.shape, &g.values));
-            self.compare(name, shape, values, Tolerance::Relative(1e-3));
+            let tolerance =
+                if size < noise { Tolerance::Absolute(f64::from(noise)) } else { Tolerance::Relative(1e-3) };
+            self.compare(name, shape, values, tolerance);
         }
         Ok(())
     }
@@ -389,6 +397,10 @@ impl<'a> Comparer<'a> {
 }
 
 /// Place and score of every keypoint of every detection.
+fn largest(values: &[f32]) -> f32 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
+
 fn keypoint_values(found: &Detections) -> Vec<f32> {
     found.keypoints.iter().flatten().flat_map(|k| [k.x as f32, k.y as f32, k.score as f32]).collect()
 }
