@@ -73,8 +73,11 @@ impl ComputeBackend {
             #[cfg(feature = "ndarray")]
             #[allow(deprecated)]
             Self::NdArray => Ok(Device::ndarray()),
-            #[cfg(feature = "wgpu")]
+            #[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
             Self::Wgpu => open_wgpu(),
+            // A browser lends a card to who awaits it only.
+            #[cfg(all(feature = "wgpu", target_family = "wasm"))]
+            Self::Wgpu => Err(self.not_there("Device::wgpu_options().init_async(), awaited")),
             #[cfg(feature = "cuda")]
             Self::Cuda if self.devices().is_empty() => {
                 Err(self.not_there("a card of NVIDIA's with its driver (libcuda)"))
@@ -104,7 +107,7 @@ fn names(of: burn::tensor::DeviceType) -> Vec<String> {
 }
 
 /// Opened once, since a runtime is: later calls share the device.
-#[cfg(feature = "wgpu")]
+#[cfg(all(feature = "wgpu", not(target_family = "wasm")))]
 fn open_wgpu() -> Result<Device> {
     use std::sync::OnceLock;
 
