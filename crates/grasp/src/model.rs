@@ -131,9 +131,12 @@ impl GraspModel {
             return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
         }
         let mut found: Vec<GraspDetection> = match (&self.network, verification) {
-            (Some(network), Verification::Off) => {
-                network.candidates_async(image, &self.demonstrations).await?.iter().map(|c| self.unverified(c)).collect()
-            }
+            (Some(network), Verification::Off) => network
+                .candidates_async(image, &self.demonstrations)
+                .await?
+                .iter()
+                .map(|c| self.unverified(c))
+                .collect(),
             (Some(network), Verification::ByShape) => {
                 let scene = Scene::new(image);
                 let candidates = network.candidates_async(image, &self.demonstrations).await?;
@@ -205,14 +208,54 @@ impl GraspModel {
     }
 }
 
-/// Detections that verification moved onto the same part, by the overlap of their boxes: the best one stays.
+/// Detections that verification moved onto the same part, by the overlap of their boxes: the best one stays. Of those that
+/// ended in the same pose it is the one that the network was surest of, and not a matter of the last bit.
 fn drop_repeated(found: &mut Vec<GraspDetection>) {
     const SAME_PART_IOU: f64 = 0.5;
+    const SAME_SCORE: f64 = 1e-4;
     let mut kept: Vec<GraspDetection> = Vec::with_capacity(found.len());
     for detection in found.drain(..) {
-        if kept.iter().all(|better| better.bbox.iou(&detection.bbox) < SAME_PART_IOU) {
-            kept.push(detection);
+        match kept.iter_mut().find(|better| better.bbox.iou(&detection.bbox) >= SAME_PART_IOU) {
+            None => kept.push(detection),
+            Some(better) => {
+                let as_good = better.score - detection.score < SAME_SCORE;
+                if as_good && detection.network_score > better.network_score {
+                    *better = detection;
+                }
+            }
         }
     }
     *found = kept;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::Angle;
+
+    fn detection(x: f64, score: f64, network_score: f64) -> GraspDetection {
+        GraspDetection {
+            score,
+            network_score,
+            agreement: Some(score),
+            bbox: BoundingBox { x1: x, y1: 0.0, x2: x + 20.0, y2: 10.0 },
+            keypoints: Vec::new(),
+            outline: None,
+            grasp: PlanarGrasp { x: x + 10.0, y: 5.0, angle: Angle::from_degrees(0.0), width: 4.0 },
+            turn_source: TurnSource::Keypoints,
+        }
+    }
+
+    #[test]
+    fn of_repeated_detections_the_best_stays_and_of_equals_the_surest() {
+        let mut found = vec![
+            detection(0.0, 0.900_000_1, 0.1),
+            detection(0.0, 0.9, 0.7),
+            detection(100.0, 0.8, 0.2),
+            detection(1.0, 0.7, 0.99),
+        ];
+        drop_repeated(&mut found);
+        let kept: Vec<_> = found.iter().map(|kept| (kept.bbox.x1, kept.network_score)).collect();
+        assert_eq!(kept, [(0.0, 0.7), (100.0, 0.2)]);
+    }
 }

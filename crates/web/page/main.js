@@ -39,7 +39,7 @@ function wire() {
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
-  graphicsCard().then((card) => (element("webgpu-choice").hidden = !card));
+  element("webgpu-choice").hidden = !navigator.gpu; // To pages served by https or from this very machine only.
   watchWidth(element("stage"), showCurrent);
 
   // Dropped anywhere: a model is told from a picture by its name.
@@ -72,14 +72,14 @@ function watchWidth(watched, redraw) {
   });
 }
 
-/** Whether the browser lends one; to pages served by https or from this very machine only. */
-async function graphicsCard() {
-  return Boolean(await navigator.gpu?.requestAdapter().catch(() => null));
-}
-
 /** Looks with the same model on the other device; where that fails, goes back. */
 async function changeDevice() {
   stopCamera();
+  if (element("webgpu").checked && !(await navigator.gpu.requestAdapter().catch(() => null))) {
+    element("webgpu").checked = false;
+    complain("This browser lends the page no graphics card; the processor goes on.");
+    return;
+  }
   generation += 1; // What the old worker still has to say is of no use.
   pictures.forEach(({ small }) => (small.textContent = "waiting"));
   const opened = modelOpen ? modelFile : null;

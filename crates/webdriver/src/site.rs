@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use crate::error::{Result, WebDriverError};
 
@@ -19,7 +19,7 @@ impl Site {
     }
 }
 
-/// Serves the files that lie directly in a folder.
+/// Serves the files of a folder.
 ///
 /// # Errors
 /// No such folder, or no free port.
@@ -47,7 +47,8 @@ fn answer(mut stream: &TcpStream, folder: &Path) {
     let path = request.split(' ').nth(1).unwrap_or_default();
     let name = path.split('?').next().unwrap_or_default().trim_start_matches('/');
     let name = if name.is_empty() { "index.html" } else { name };
-    let file = if name.contains('/') || name.contains("..") { None } else { std::fs::read(folder.join(name)).ok() };
+    let stays_inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    let file = if stays_inside { std::fs::read(folder.join(name)).ok() } else { None };
     let (status, body) = match file {
         Some(body) => ("200 OK", body),
         None => ("404 Not Found", b"no such file".to_vec()),
@@ -79,12 +80,17 @@ mod tests {
     fn files_of_the_folder_are_served_and_no_others() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("index.html"), "hello").unwrap();
+        std::fs::create_dir(folder.path().join("inner")).unwrap();
+        std::fs::write(folder.path().join("inner/page.html"), "inside").unwrap();
         let site = serve_folder(folder.path().to_owned()).unwrap();
         let get = |path: &str| http::request(site.address, "GET", path, None).unwrap();
         assert_eq!(get("/"), (200, "hello".to_owned()));
         assert_eq!(get("/index.html?again"), (200, "hello".to_owned()));
+        assert_eq!(get("/inner/page.html"), (200, "inside".to_owned()));
         assert_eq!(get("/other.html").0, 404);
         assert_eq!(get("/../../etc/passwd").0, 404);
+        assert_eq!(get("/inner/../../../etc/passwd").0, 404);
+        assert_eq!(get("/inner").0, 404);
     }
 
     #[test]

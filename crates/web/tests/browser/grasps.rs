@@ -22,6 +22,8 @@ const MOST_MILLISECONDS: f64 = 200.0;
 /// Longer gaps between two of the page's frames are seen as freezing.
 const MOST_PAGE_GAP_MS: f64 = 150.0;
 const MOST_DOWNLOAD_BYTES: usize = 4_000_000;
+/// What is fetched besides where somebody turns to the graphics card: compilers of shaders come along.
+const MOST_CARD_DOWNLOAD_BYTES: usize = 4_500_000;
 
 const PROCESSOR: &str = "processor";
 const CARD: &str = "webgpu";
@@ -129,19 +131,19 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
 #[ignore = "needs Chromium and target/web: make test-browser"]
 fn the_graphics_card_finds_what_the_command_line_finds() {
     let made = Made::new();
-    let pictures = &made.pictures()[..3];
+    let pictures = &made.pictures()[..2];
     let model = made.model("C");
     let expected = detect(&model, pictures);
     let site = site();
     let browser = open_page(&site, &SOFTWARE_CARD);
-    browser
-        .wait_for("a graphics card to be lent", "return !document.getElementById('webgpu-choice').hidden")
-        .unwrap();
     let results = look_at_all(&browser, CARD, model, pictures);
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
     // The page itself changes over, and says the same.
+    browser
+        .run("document.querySelectorAll('#pictures small').forEach((small) => (small.textContent = ''))", &[])
+        .unwrap();
     browser.find("#webgpu").unwrap().click().unwrap();
     let done = "return [...document.querySelectorAll('#pictures small')].every((small) => /grasp/.test(small.textContent)) \
                 && document.getElementById('alert').hidden";
@@ -183,15 +185,17 @@ fn the_page_stays_fluid_and_fits_small_screens() {
 #[test]
 #[ignore = "needs target/web: make test-browser"]
 fn the_download_is_small() {
-    let folder = repository().join("target/web");
-    let mut total = 0;
-    // The module for graphics cards too, though few will fetch both.
-    let entries = [folder.clone(), folder.join("webgpu")].map(|folder| std::fs::read_dir(folder).unwrap());
-    for path in entries.into_iter().flatten().map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
-        let compressed = Command::new("gzip").args(["-9", "-c"]).arg(&path).output().unwrap().stdout.len();
-        println!("{:>9} bytes compressed: {}", compressed, path.file_name().unwrap().display());
-        total += compressed;
+    let page = repository().join("target/web");
+    let downloads = [(page.clone(), MOST_DOWNLOAD_BYTES), (page.join("webgpu"), MOST_CARD_DOWNLOAD_BYTES)];
+    for (folder, most) in downloads {
+        let mut total = 0;
+        let paths = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        for path in paths.filter(|path| path.is_file()) {
+            let compressed = Command::new("gzip").args(["-9", "-c"]).arg(&path).output().unwrap().stdout.len();
+            println!("{:>9} bytes compressed: {}", compressed, path.display());
+            total += compressed;
+        }
+        assert!(total > 10_000, "{} is nearly empty", folder.display());
+        assert!(total <= most, "{}: {total} bytes", folder.display());
     }
-    assert!(total > 10_000, "{} is nearly empty", folder.display());
-    assert!(total <= MOST_DOWNLOAD_BYTES, "{total} bytes");
 }
