@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let sizes = vec![[240, 320]; batch];
         let proposals = valid.proposal_generator.propose(&predictions, &sizes, Mode::Test);
         lap("proposals");
-        let _ = valid.roi_heads.detect(&features, &proposals, &sizes);
+        let _ = burn::tensor::read_sync(valid.roi_heads.detect(&features, &proposals, &sizes));
         lap("roi heads");
     }
     for step in 0..5 {
