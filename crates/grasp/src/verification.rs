@@ -28,7 +28,8 @@ pub(crate) struct Overlay<'a> {
     pub(crate) image_from_cutout: PlanarSimilarity,
     /// How well it agrees with the image there, in `[0, 1]`, less what another size than the usual one costs.
     pub(crate) agreement: f64,
-    /// The same whatever its size.
+    /// The same whatever its size; by it, teaching counts strangers.
+    #[cfg_attr(not(feature = "teach"), expect(dead_code))]
     pub(crate) agreement_at_any_size: f64,
 }
 

@@ -20,6 +20,7 @@ use burn::tensor::Device;
 use burn::tensor::read_sync;
 use image::RgbImage;
 use nalgebra::Point2;
+#[cfg(any(feature = "teach", test))]
 use sdg_detection::presets::RcnnKind;
 #[cfg(feature = "teach")]
 use sdg_detection::state_dict;
@@ -82,6 +83,7 @@ struct Placement {
 }
 
 /// The detector that a model looks with; `None` for model S.
+#[cfg(any(feature = "teach", test))]
 pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
     match kind {
         ModelKind::A => Some(RcnnKind::Faster { num_classes: 1 }),

@@ -10,6 +10,7 @@ mod grasps;
 mod taught;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use sdg_webdriver::{Browser, BrowserOptions, Site, serve_folder};
 
@@ -37,7 +38,9 @@ fn site() -> Site {
 /// The page, opened in a browser with these flags.
 fn open_page(site: &Site, flags: &[&str]) -> Browser {
     let flags = flags.iter().map(|flag| (*flag).to_owned()).collect();
-    let browser = Browser::start(&BrowserOptions { flags, ..BrowserOptions::default() }).unwrap();
+    // A graphics card that Chromium imitates takes its time.
+    let patience = Duration::from_secs(180);
+    let browser = Browser::start(&BrowserOptions { flags, patience, ..BrowserOptions::default() }).unwrap();
     browser.open(&site.url("index.html")).unwrap();
     browser
 }
