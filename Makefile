@@ -49,7 +49,7 @@ test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa'
 	$(call DEVICE_TESTS,wgpu) --test device_parity --test devices
 	$(call DEVICE_TESTS,wgpu) -p sdg-grasp --lib -- device_parity
 
-test-ndarray: setup ## Tests ndarray against flex (its compile takes ten minutes)
+test-ndarray: setup ## Tests ndarray against flex (ten minutes to compile, three to run)
 	$(call DEVICE_TESTS,ndarray) --test device_parity --test devices
 	$(call DEVICE_TESTS,ndarray) -p sdg-grasp --lib -- device_parity
 
