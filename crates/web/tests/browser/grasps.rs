@@ -19,6 +19,8 @@ const MOST_SCORE: f64 = 0.01;
 const MOST_NETWORK_SCORE: f64 = 0.05;
 /// A frame of an `edge` model on one core, without WebGPU: five a second.
 const MOST_MILLISECONDS: f64 = 200.0;
+/// Looks that are timed, after those that had the module's functions compiled.
+const LOOKS: usize = 7;
 /// Longer gaps between two of the page's frames are seen as freezing.
 const MOST_PAGE_GAP_MS: f64 = 150.0;
 const MOST_DOWNLOAD_BYTES: usize = 4_000_000;
@@ -32,7 +34,7 @@ const SOFTWARE_CARD: [&str; 3] =
     ["--enable-unsafe-webgpu", "--enable-features=WebGPU,Vulkan", "--use-webgpu-adapter=swiftshader"];
 
 /// Looks at the files of the page's own input, through the page's own modules, and keeps every digit.
-const LOOK: &str = "return (async (device) => {
+const LOOK: &str = "return (async (device, looks) => {
     const { Detector } = await import(new URL('./detector.js', location.href).href);
     const detector = new Detector(device);
     await detector.open(await document.getElementById('model-file').chosen.arrayBuffer());
@@ -40,8 +42,12 @@ const LOOK: &str = "return (async (device) => {
     for (const file of document.getElementById('image-files').chosen) {
         results.push(await detector.look(file, true));
     }
-    return results;
-})(arguments[0])";
+    const again = [];
+    for (let look = 0; look < looks; look++) {
+        again.push(await detector.look(document.getElementById('image-files').chosen.at(-1), true));
+    }
+    return { results, again: again.map(({ milliseconds }) => milliseconds) };
+})(arguments[0], arguments[1])";
 
 /// Keeps what is chosen, because the page empties its inputs so that the same file can be chosen again.
 const KEEP: &str = "
@@ -54,8 +60,14 @@ fn number(value: &Value, path: &str) -> f64 {
     value.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path} in {value}"))
 }
 
-/// `device` as the page's `Detector` takes it.
-fn look_at_all(browser: &Browser, device: &str, model: PathBuf, pictures: &[PathBuf]) -> Vec<Value> {
+/// What the page finds, `device` as its `Detector` takes it; and the milliseconds of so many more looks at the last picture.
+fn look_at_all(
+    browser: &Browser,
+    device: &str,
+    model: PathBuf,
+    pictures: &[PathBuf],
+    looks: usize,
+) -> (Vec<Value>, Vec<f64>) {
     browser.run(KEEP, &[]).unwrap();
     open_model(browser, &model);
     choose(browser, "#image-files", pictures);
@@ -65,7 +77,9 @@ fn look_at_all(browser: &Browser, device: &str, model: PathBuf, pictures: &[Path
         pictures.len()
     );
     browser.wait_for("every picture to be looked at", &done).unwrap();
-    array(browser.run(LOOK, &[json!(device)]).unwrap())
+    let mut looked = browser.run(LOOK, &[json!(device), json!(looks)]).unwrap();
+    let times = array(looked["again"].take()).iter().map(|time| time.as_f64().unwrap()).collect();
+    (array(looked["results"].take()), times)
 }
 
 fn assert_same(found: &Value, expected: &Value, about: &str) {
@@ -111,15 +125,15 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
         let model = made.model(letter);
         let expected = detect(&model, &pictures);
         let browser = open_page(&site, &[]);
-        let results = look_at_all(&browser, PROCESSOR, model, &pictures);
+        let (results, times) = look_at_all(&browser, PROCESSOR, model, &pictures, LOOKS);
         assert_same_grasps(&results, &expected, &pictures, &format!("model {letter}"));
 
-        // The first looks compile the module's functions.
-        let times: Vec<f64> = results.iter().skip(2).map(|result| number(result, "/milliseconds")).collect();
         println!("model {letter}: milliseconds a frame {times:.1?}");
         if letter == "C" {
-            let best = times.iter().copied().fold(f64::MAX, f64::min);
-            assert!(best <= MOST_MILLISECONDS, "{best} ms a frame");
+            let mut ordered = times.clone();
+            ordered.sort_by(f64::total_cmp);
+            let median = ordered[LOOKS / 2];
+            assert!(median <= MOST_MILLISECONDS, "{median} ms a frame");
         }
         browser.screenshot(&screenshots().join(format!("web-{letter}.png"))).unwrap();
         assert_quiet(&browser);
@@ -136,7 +150,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     let expected = detect(&model, pictures);
     let site = site();
     let browser = open_page(&site, &SOFTWARE_CARD);
-    let results = look_at_all(&browser, CARD, model, pictures);
+    let (results, _) = look_at_all(&browser, CARD, model, pictures, 0);
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
@@ -167,7 +181,7 @@ fn the_page_stays_fluid_and_fits_small_screens() {
         &[],
     )
     .unwrap();
-    look_at_all(&browser, PROCESSOR, model, &pictures);
+    look_at_all(&browser, PROCESSOR, model, &pictures, 0);
     let gap = browser.run("return window.longestGap", &[]).unwrap().as_f64().unwrap();
     println!("longest gap between two frames of the page: {gap:.0} ms");
     assert!(gap < MOST_PAGE_GAP_MS, "the page froze for {gap} ms");
