@@ -140,9 +140,9 @@ pub struct TeachArgs {
     /// Folder for a page about the teaching: photo and marks, samples, curves
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
-    /// Where the network computes: flex, or what this build adds; see sdg devices
-    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
-    pub device: ComputeBackend,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -154,9 +154,9 @@ pub struct DetectArgs {
     /// A grasp model that `sdg teach` wrote
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
-    /// Where the network computes: flex, or what this build adds; see sdg devices
-    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
-    pub device: ComputeBackend,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
     /// Leave out the check against the demonstration: the network alone decides and places
     #[arg(long)]
     pub no_verify: bool,
@@ -189,9 +189,9 @@ pub struct RehearseArgs {
     /// Decides object poses, robot starts, lights and table
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
-    /// Where the network computes: flex, or what this build adds; see sdg devices
-    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
-    pub device: ComputeBackend,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
     /// Leave out the check against the demonstration
     #[arg(long)]
     pub no_verify: bool,
@@ -394,12 +394,20 @@ pub struct VerifyArgs {
     /// What the original gave at each stage: safetensors
     #[arg(long, value_name = "FILE")]
     pub against: PathBuf,
-    /// Where the network computes: flex, or what this build adds; see sdg devices
-    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
-    pub device: ComputeBackend,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// Where a network computes.
+#[derive(Debug, ClapArgs)]
+pub struct ComputeArgs {
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
 }
 
 /// A device's name.

@@ -1,7 +1,7 @@
 //! The whole detector: transform, backbone, proposals, ROI heads, back to the original image.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData, read_sync};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{BoundingBox, Mask};
@@ -9,7 +9,6 @@ use sdg_geometry::{BoundingBox, Mask};
 use crate::config::{MaskHeadConfig, RcnnConfig};
 use crate::error::{DetectionError, Result};
 use crate::fpn::Fpn;
-use crate::host::now;
 use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
 use crate::initialization::Initializer;
 use crate::losses::Losses;
@@ -174,7 +173,7 @@ impl GeneralizedRcnn {
     ///
     /// On a detector in training, call this on `valid()`, so that no gradients are recorded.
     pub fn detect(&self, images: &[TransformedImage]) -> Vec<Detections> {
-        now(self.detect_async(images))
+        read_sync(self.detect_async(images))
     }
 
     /// [`Self::detect`], awaited; for browsers, which hand over what a graphics card computed in no other way.

@@ -1,18 +1,13 @@
 //! From the device to the host: what is decided there (top-k, NMS, decoding) has to be read first.
 //!
 //! Inference is written asynchronously, because a browser hands results of its graphics card to nobody else. Everywhere
-//! else a read blocks, and [`now`] gives who does not care an ordinary function.
+//! else burn's `read_sync` makes an ordinary function of it, which in a browser on a graphics card panics.
 
 use burn::tensor::{Tensor, Transaction, read_sync};
 
-/// The result of an inference of ours. Not in a browser on a graphics card, where it panics: there, await it.
-pub(crate) fn now<F: Future>(inference: F) -> F::Output {
-    read_sync(inference)
-}
-
 /// Reads a tensor's values, row by row, without its gradient.
 pub(crate) fn host_values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    now(read(tensor))
+    read_sync(read(tensor))
 }
 
 /// [`host_values`], awaited.

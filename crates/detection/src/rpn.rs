@@ -8,14 +8,14 @@
 //! runs on the device; anchors, matching, decoding and NMS on the host, after one read each.
 
 use burn::module::Module;
-use burn::tensor::{Int, Tensor};
+use burn::tensor::{Int, Tensor, read_sync};
 use rand_pcg::Pcg64Mcg;
 
 use crate::anchors::{GridSize, grid_anchors};
 use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{AnchorConfig, NormKind, RpnConfig, RpnNormaliser};
-use crate::host::{now, read_both};
+use crate::host::read_both;
 use crate::initialization::{Distribution, Initializer};
 use crate::layers::{Conv2d, Conv2dShape};
 use crate::losses;
@@ -128,7 +128,7 @@ impl RegionProposalNetwork {
 
     /// Picks the proposals of each image: best anchors of each level, decoded, clipped, NMS.
     pub fn propose(&self, predictions: &RpnPredictions, image_sizes: &[ImageSize], mode: Mode) -> Vec<Proposals> {
-        now(self.propose_async(predictions, image_sizes, mode))
+        read_sync(self.propose_async(predictions, image_sizes, mode))
     }
 
     /// [`Self::propose`], awaited.

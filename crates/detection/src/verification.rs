@@ -12,7 +12,7 @@
 use std::fmt;
 
 use burn::module::{Module, ModuleVisitor, Param};
-use burn::tensor::{Gradients, Tensor};
+use burn::tensor::{Gradients, Tensor, read_sync};
 use image::RgbImage;
 use sdg_geometry::{Keypoint, Mask, Polygon, Visibility};
 use serde::Serialize;
@@ -21,7 +21,7 @@ use crate::boxes::Corners;
 use crate::config::RcnnConfig;
 use crate::error::{DetectionError, Result};
 use crate::generalized_rcnn::{Detections, GeneralizedRcnn};
-use crate::host::{host_values, now};
+use crate::host::host_values;
 use crate::image_transform::TransformedImage;
 use crate::roi_heads::ResizedTarget;
 use crate::rpn::Mode;
@@ -220,7 +220,7 @@ impl<'a> Comparer<'a> {
         self.boxes("proposals.boxes", &proposals[0].boxes, Tolerance::Relative(1e-4));
         let logits = &proposals[0].objectness_logits;
         self.compare("proposals.objectness_logits", &[logits.len()], logits, Tolerance::Relative(1e-4));
-        let mut found = now(detector.detections(images, &features, &proposals));
+        let mut found = read_sync(detector.detections(images, &features, &proposals));
         self.detections(&found.remove(0));
     }
 

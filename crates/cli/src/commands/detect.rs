@@ -18,7 +18,7 @@ use crate::pictures;
 
 /// Every image gets its line; the first one that cannot be read ends the run, after the lines before it.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
-    let model = files::read_model(&args.grasp_model, &devices::open(args.device)?)?;
+    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }

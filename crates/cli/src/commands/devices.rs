@@ -6,15 +6,15 @@ use anyhow::{Context, Result};
 use sdg_grasp::{ComputeBackend, Device};
 use serde_json::json;
 
-use crate::args::DevicesArgs;
+use crate::args::{ComputeArgs, DevicesArgs};
 use crate::exit::Outcome;
 
 /// The device of `--device`, ready to compute.
 ///
 /// # Errors
 /// One that this build or this machine lacks.
-pub fn open(backend: ComputeBackend) -> Result<Device> {
-    backend.open().context("--device")
+pub fn open(args: &ComputeArgs) -> Result<Device> {
+    args.device.open().context("--device")
 }
 
 /// A line for each device, and for each backend that has none, the reason.

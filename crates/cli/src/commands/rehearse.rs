@@ -19,7 +19,7 @@ use crate::run_page::{self, RunPage};
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let object = ObjectSpec::by_name(&args.object)?;
-    let model = files::read_model(&args.grasp_model, &devices::open(args.device)?)?;
+    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal =

@@ -29,7 +29,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         symmetry: args.symmetry,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         steps: args.steps.map(|steps| steps as usize),
-        device: devices::open(args.device)?,
+        device: devices::open(&args.compute)?,
         ..TeachOptions::new(args.seed)
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;

@@ -166,7 +166,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
         .into_iter()
         .map(|(name, (shape, values))| (name, WeightTensor { shape, values }))
         .collect();
-    let (detector, imported) = state_dict::import(config.init(&devices::open(args.device)?.autodiff(), 0)?, &weights);
+    let (detector, imported) = state_dict::import(config.init(&devices::open(&args.compute)?.autodiff(), 0)?, &weights);
     if !imported.is_complete() {
         bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
     }
