@@ -112,6 +112,16 @@ impl GraspModel {
         self
     }
 
+    /// The same model whose search of a whole image compares `num_points` edge points at each pose; taught models have 64.
+    /// The calibration stays.
+    ///
+    /// # Errors
+    /// A number of points outside 8 to 1024.
+    pub fn with_search_points(self, num_points: usize) -> Result<Self> {
+        let demonstrations = self.demonstrations.into_iter().map(|taught| taught.with_search_points(num_points));
+        Ok(Self { demonstrations: demonstrations.collect::<Result<_>>()?, ..self })
+    }
+
     /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for whoever wants to see
     /// what was refused and why: [`GraspDetection::is_accepted`] tells.
     ///

@@ -14,8 +14,13 @@ use crate::{GraspError, NUM_KEYPOINTS};
 const MARGIN_PX: f64 = 16.0;
 
 /// What the second opinion looks for: about the size that was taught, as the camera hovers about as high.
-const SECOND_OPINION: SearchConfig =
-    SearchConfig { scales: 0.88..=1.14, least_agreement: 0.2, max_matches: 3, shape: ShapeConfig::DEFAULT };
+const SECOND_OPINION: SearchConfig = SearchConfig {
+    scales: 0.88..=1.14,
+    least_agreement: 0.2,
+    max_matches: 3,
+    num_points: SearchConfig::DEFAULT_NUM_POINTS,
+    shape: ShapeConfig::DEFAULT,
+};
 
 /// The marks, in pixels of the kept cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -98,6 +103,17 @@ impl TaughtDemonstration {
         let surface = Surface::new(&cutout, &outline);
         let search = InstantSearch::new(&cutout, &outline, &SECOND_OPINION)?;
         Ok(Self { cutout, marks, template, surface, search })
+    }
+
+    /// The same demonstration, searched for with `num_points` edge points a pose.
+    ///
+    /// # Errors
+    /// A number of points that [`InstantSearch::new`] refuses.
+    pub(crate) fn with_search_points(self, num_points: usize) -> Result<Self, GraspError> {
+        let outline = self.marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.marks.bbox));
+        let config = SearchConfig { num_points, ..SECOND_OPINION };
+        let search = InstantSearch::new(&self.cutout, &outline, &config)?;
+        Ok(Self { search, ..self })
     }
 
     /// The scale at which the part lies in an image of that size that is taken as the photo was, with as many pixels or

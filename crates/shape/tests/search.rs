@@ -188,6 +188,19 @@ fn only_the_configured_scales_are_found() {
 }
 
 #[test]
+fn a_part_is_found_with_half_and_with_twice_the_points() {
+    for num_points in [32, 64, 128, 1024] {
+        let taught = taught(0, &SearchConfig { num_points, ..SearchConfig::default() });
+        let mut scene = scenes::Scene::plain(8);
+        let pose = scenes::pose(300.0, 240.0, 100.0, 1.0);
+        scene.place(&taught.part, pose);
+        let matches = taught.search.search(&scene.render());
+        let (px, deg) = taught.error(&matches[0].image_from_demonstration, &pose);
+        assert!(px < TOLERANCE_PX && deg < TOLERANCE_DEG, "{num_points} points: {px} px, {deg} degrees");
+    }
+}
+
+#[test]
 fn bad_configurations_are_refused() {
     let (image, outline, _) = scenes::demonstration(&scenes::parts()[0], 1, 0.05);
     let refused = |config: SearchConfig| match InstantSearch::new(&image, &outline, &config) {
@@ -199,6 +212,8 @@ fn bad_configurations_are_refused() {
     assert_eq!(refused(SearchConfig { scales: 1.2..=0.9, ..default() }), "scales");
     assert_eq!(refused(SearchConfig { scales: f64::NAN..=1.0, ..default() }), "scales");
     assert_eq!(refused(SearchConfig { least_agreement: 1.5, ..default() }), "least_agreement");
+    assert_eq!(refused(SearchConfig { num_points: 7, ..default() }), "num_points");
+    assert_eq!(refused(SearchConfig { num_points: 1025, ..default() }), "num_points");
     let shape = ShapeConfig { max_points: 3, ..ShapeConfig::default() };
     assert_eq!(refused(SearchConfig { shape, ..default() }), "max_points");
 }

@@ -167,6 +167,23 @@ fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
 }
 
 #[test]
+fn the_number_of_search_points_is_set_at_detection() {
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    let model = teach(&[demonstration()], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+    let photo = demonstration().image;
+    let detected = |model: &GraspModel| model.detect(&photo, Verification::ByShape).unwrap();
+    let with_points = |num_points: usize| model.clone().with_search_points(num_points);
+    assert_eq!(detected(&with_points(64).unwrap()), detected(&model));
+    let truth = demonstration().annotation.grasp.unwrap().center();
+    for num_points in [32, 128] {
+        let best = &detected(&with_points(num_points).unwrap())[0];
+        assert!(best.is_accepted() && (best.grasp.center() - truth).norm() < 1.0, "{num_points} points: {best:?}");
+    }
+    let refused = with_points(4).unwrap_err().to_string();
+    assert!(refused.contains("num_points from 8 to 1024, found 4"), "{refused}");
+}
+
+#[test]
 fn two_demonstrations_are_two_views() {
     let mut second = demonstration();
     second.image = image::imageops::flip_horizontal(&second.image);

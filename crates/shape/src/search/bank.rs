@@ -5,8 +5,6 @@ use std::f64::consts::TAU;
 use crate::edge_points::EdgePoint;
 use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
 
-/// Points read for a pose. More cost time in proportion and tell little new.
-const NUM_POINTS: usize = 64;
 /// How far the outer points may move from one pose to the next, in level pixels: half of it to either side is what
 /// directions are spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
@@ -40,10 +38,10 @@ pub(crate) struct Bank {
 }
 
 impl Bank {
-    /// Turns and scales `points`, seen on a level whose pixel is `pixel_size` demonstration pixels; `log_scales` are
-    /// the least and the largest ln scale.
-    pub(crate) fn new(points: &[EdgePoint], pixel_size: f64, log_scales: [f64; 2]) -> Self {
-        let sampled = sample_by_weight(points, NUM_POINTS);
+    /// Turns and scales at most `num_points` of `points`, seen on a level whose pixel is `pixel_size` demonstration
+    /// pixels; `log_scales` are the least and the largest ln scale.
+    pub(crate) fn new(points: &[EdgePoint], num_points: usize, pixel_size: f64, log_scales: [f64; 2]) -> Self {
+        let sampled = sample_by_weight(points, num_points);
         let outer = outer_radius(&sampled) / pixel_size;
         let step = POSE_STEP / outer.max(1.0);
         let num_angles = (TAU / step).ceil().max(8.0) as usize;

@@ -44,13 +44,27 @@ pub struct SearchConfig {
     pub least_agreement: f64,
     /// Most matches reported.
     pub max_matches: usize,
+    /// Edge points compared at every pose of the sweep over the image, 8 to 1024. The sweep's time is proportional to
+    /// it. Beyond the 128 points that are read at the swept level, points only repeat.
+    pub num_points: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
 }
 
+impl SearchConfig {
+    /// What [`Default`] gives for [`num_points`](Self::num_points).
+    pub const DEFAULT_NUM_POINTS: usize = 64;
+}
+
 impl Default for SearchConfig {
     fn default() -> Self {
-        Self { scales: 0.75..=1.3, least_agreement: 0.5, max_matches: 16, shape: ShapeConfig::default() }
+        Self {
+            scales: 0.75..=1.3,
+            least_agreement: 0.5,
+            max_matches: 16,
+            num_points: Self::DEFAULT_NUM_POINTS,
+            shape: ShapeConfig::default(),
+        }
     }
 }
 
@@ -73,6 +87,9 @@ const SWEEP_EXTENT: f64 = 50.0;
 const SWEEP_POINTS: usize = 128;
 /// With fewer edge points than this at a level, the next finer one is swept.
 const LEAST_SWEEP_POINTS: usize = 32;
+/// Bounds of [`SearchConfig::num_points`]: fewer points tell no pose from another, and the responses of 1024 points add up
+/// within the sweep's 16 bits.
+const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
 /// Bounds of the scales that may be looked for: beyond, the swept level shows too little or too much.
 const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
 /// Starts that are climbed at the coarsest level of the template.
@@ -112,8 +129,8 @@ impl InstantSearch {
     /// `outline` is in pixels of `image`, as for [`ShapeTemplate::new`].
     ///
     /// # Errors
-    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2 and for a least agreement
-    /// outside 0 to 1.
+    /// As [`ShapeTemplate::new`]; [`ShapeError::InvalidConfig`] for scales outside 0.5 to 2, a least agreement outside
+    /// 0 to 1 and fewer than 8 or more than 1024 points.
     pub fn new(image: &RgbImage, outline: &Polygon, config: &SearchConfig) -> Result<Self, ShapeError> {
         check_config(config)?;
         let template = ShapeTemplate::new(image, outline, &config.shape)?;
@@ -124,7 +141,7 @@ impl InstantSearch {
             config: config.clone(),
             surface: Surface::new(image, outline),
             outline: outline.clone(),
-            bank: Bank::new(&points, (1u32 << sweep_level_idx) as f64, log_scales),
+            bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
             sweep_level_idx,
         })
@@ -267,6 +284,9 @@ fn sweep_points(
     (idx, points)
 }
 
+const _: () =
+    assert!(NUM_POINTS_BOUNDS.1 * responses::FULL as usize <= i16::MAX as usize, "responses add up in 16 bits");
+
 fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
     let (least, largest) = (*config.scales.start(), *config.scales.end());
     let within = |scale: f64| (SCALE_BOUNDS.0..=SCALE_BOUNDS.1).contains(&scale);
@@ -274,6 +294,12 @@ fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
         ("scales", "from 0.5 on", least, within(least)),
         ("scales", "up to 2, and no less than they begin with", largest, within(largest) && largest >= least),
         ("least_agreement", "in [0, 1]", config.least_agreement, (0.0..=1.0).contains(&config.least_agreement)),
+        (
+            "num_points",
+            "from 8 to 1024",
+            config.num_points as f64,
+            (NUM_POINTS_BOUNDS.0..=NUM_POINTS_BOUNDS.1).contains(&config.num_points),
+        ),
     ];
     for (name, expected, found, ok) in checks {
         if !ok {

@@ -1,7 +1,7 @@
 //! All poses of a bank tried at all places of an image.
 //!
 //! ```text
-//! tables ─ per stretch of places, per variant: add 64 shifted table rows ─ best variant of each place and sector
+//! tables ─ per stretch of places, per variant: add a shifted table row per point ─ best variant of each place and sector
 //!        ─ local maxima ─ starts, the best first
 //! ```
 //! A place keeps its best variant for each quarter of the turn, so that a part which looks much the same turned by
@@ -149,7 +149,7 @@ mod tests {
                 }
             })
             .collect();
-        Bank::new(&points, 1.0, [-0.1, 0.1])
+        Bank::new(&points, 64, 1.0, [-0.1, 0.1])
     }
 
     /// One look at a time, with a case for the border.
