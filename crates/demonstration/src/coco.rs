@@ -8,10 +8,24 @@ use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, Draft, ImageFacts};
 use crate::json::{Node, describe, shorten};
+use crate::labelled::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
-/// Reads the objects of one image of a COCO file.
+/// Reads the objects of one image of a COCO file, which must have one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    let instances = read_instances(root, image)?;
+    if instances.is_empty() {
+        let id = choose_image(&root.field("images", "the list of images")?.items()?, image)?;
+        return Err(Error::NoObject {
+            expected: format!("an annotation with `image_id` {}", id.field("id", "the image's number")?.value),
+            found: "none".into(),
+        });
+    }
+    Ok(instances.into_iter().map(|instance| instance.annotation).collect())
+}
+
+/// Reads the objects of one image of a COCO file, if any.
+pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
     let images = root.field("images", "the list of images")?.items()?;
     let chosen = choose_image(&images, image)?;
     if let (Some(width), Some(height)) = (chosen.optional("width")?, chosen.optional("height")?) {
@@ -26,19 +40,18 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     let mut objects = Vec::new();
     for annotation in root.field("annotations", "the list of annotations")?.items()? {
         if annotation.field("image_id", "the number of its image")?.value == image_id.value {
-            objects.push(read_object(&annotation, &categories, image)?);
+            objects.push(LabelledInstance {
+                optional: is_optional(annotation.optional("attributes")?.as_ref())?,
+                annotation: read_object(&annotation, &categories, image)?,
+                place: annotation.place,
+            });
         }
-    }
-    if objects.is_empty() {
-        return Err(Error::NoObject {
-            expected: format!("an annotation with `image_id` {}", image_id.value),
-            found: "none".into(),
-        });
     }
     Ok(objects)
 }
 
-fn base_name(path: &str) -> &str {
+/// A path's last part, whichever system wrote it.
+pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 

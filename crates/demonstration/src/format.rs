@@ -64,15 +64,7 @@ impl AnnotationFormat {
         if yolo_pose::looks_like(bytes) {
             return Ok(Self::YoloPose);
         }
-        let value = json::parse(bytes)?;
-        let is_list = |name: &str| value.get(name).is_some_and(serde_json::Value::is_array);
-        if is_list("shapes") {
-            Ok(Self::LabelMe)
-        } else if is_list("images") && is_list("annotations") {
-            Ok(Self::Coco)
-        } else {
-            Err(Error::WrongFile { found: describe(&value) })
-        }
+        json_format(&json::parse(bytes)?)
     }
 
     /// The images and sizes that a file declares; none for formats that declare none.
@@ -125,6 +117,18 @@ impl AnnotationFormat {
             Self::LabelMe => labelme::read(&Node::root(&json::parse(bytes)?), image),
             Self::Coco => coco::read(&Node::root(&json::parse(bytes)?), image),
         }
+    }
+}
+
+/// Tells LabelMe from COCO by the lists that they have.
+pub(crate) fn json_format(value: &serde_json::Value) -> Result<AnnotationFormat> {
+    let is_list = |name: &str| value.get(name).is_some_and(serde_json::Value::is_array);
+    if is_list("shapes") {
+        Ok(AnnotationFormat::LabelMe)
+    } else if is_list("images") && is_list("annotations") {
+        Ok(AnnotationFormat::Coco)
+    } else {
+        Err(Error::WrongFile { found: describe(value) })
     }
 }
 

@@ -1,42 +1,63 @@
 //! LabelMe JSON: a `rectangle`, points `grasp_start` and `grasp_end`, an optional `polygon`, tied by `group_id`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, Draft, ImageFacts};
 use crate::json::{Node, shorten};
+use crate::labelled::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
-/// Reads every object of a LabelMe file.
+/// Reads every object of a LabelMe file, which must have one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
+    let instances = read_instances(root, image)?;
+    if instances.is_empty() {
+        return Err(Error::NoObject {
+            expected: "at least a `rectangle` or a `polygon`".into(),
+            found: "an empty list of shapes".into(),
+        });
+    }
+    Ok(instances.into_iter().map(|instance| instance.annotation).collect())
+}
+
+/// Reads every object of a LabelMe file, if there is one, in the order in which their first shapes stand.
+pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
     if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
         image.check_declared(width.pixels()?, height.pixels()?)?;
     }
     let shapes =
         root.field("shapes", "the list of shapes")?.items()?.iter().map(Shape::read).collect::<Result<Vec<_>>>()?;
     if shapes.is_empty() {
-        return Err(Error::NoObject {
-            expected: "at least a `rectangle` or a `polygon`".into(),
-            found: "an empty list of shapes".into(),
-        });
+        return Ok(Vec::new());
     }
 
     // One group or none at all is one object, whether or not every shape carries the id.
     let ids: BTreeSet<&str> = shapes.iter().filter_map(|shape| shape.group.as_deref()).collect();
     let ungrouped = shapes.iter().filter(|shape| shape.group.is_none()).count();
     if ids.len() <= 1 {
-        return Ok(vec![object(shapes, image)?]);
+        return Ok(vec![instance(shapes, image)?]);
     }
     if ungrouped > 0 {
         return Err(Error::Ungrouped { found: format!("{} groups and {ungrouped} shapes without one", ids.len()) });
     }
-    let mut groups: BTreeMap<String, Vec<Shape>> = BTreeMap::new();
+    let mut groups: Vec<Vec<Shape>> = Vec::new();
+    let mut group_idxs: HashMap<String, usize> = HashMap::new();
     for shape in shapes {
-        groups.entry(shape.group.clone().unwrap_or_default()).or_default().push(shape);
+        let at = *group_idxs.entry(shape.group.clone().unwrap_or_default()).or_insert(groups.len());
+        if at == groups.len() {
+            groups.push(Vec::new());
+        }
+        groups[at].push(shape);
     }
-    groups.into_values().map(|shapes| object(shapes, image)).collect()
+    groups.into_iter().map(|shapes| instance(shapes, image)).collect()
+}
+
+fn instance(shapes: Vec<Shape>, image: &ImageFacts) -> Result<LabelledInstance> {
+    let optional = shapes.iter().any(|shape| shape.optional);
+    let place = shapes.first().map(|shape| shape.place.clone()).unwrap_or_default();
+    Ok(LabelledInstance { annotation: object(shapes, image)?, optional, place })
 }
 
 enum Kind {
@@ -53,6 +74,7 @@ struct Shape {
     points: Vec<Point2<f64>>,
     /// Of the grasp's start alone: LabelMe keeps fields that it does not know.
     jaw_width: Option<(f64, String)>,
+    optional: bool,
     place: String,
 }
 
@@ -97,7 +119,8 @@ impl Shape {
             Some(width) if matches!(kind, Kind::GraspStart) => Some((width.number()?, width.place)),
             _ => None,
         };
-        Ok(Self { kind, label, group, points, jaw_width, place: node.place.clone() })
+        let optional = is_optional(node.optional("flags")?.as_ref())?;
+        Ok(Self { kind, label, group, points, jaw_width, optional, place: node.place.clone() })
     }
 }
 
