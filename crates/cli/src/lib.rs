@@ -36,12 +36,14 @@ mod machine;
 #[cfg(feature = "annotate")]
 mod page_teacher;
 mod pictures;
+mod progress;
 #[cfg(feature = "simulation")]
 pub mod rehearsal;
 #[cfg(feature = "simulation")]
 mod run_page;
 #[cfg(feature = "simulation")]
 pub mod shipped;
+mod statistics;
 mod teaching_page;
 mod teaching_progress;
 #[cfg(feature = "simulation")]

@@ -14,7 +14,7 @@ use sdg_simulation::{
     AttemptConfig, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig, SimulationError,
     Workcell, WorkcellConfig,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::against_truth::{grasp_error, grasp_pose};
 
@@ -76,10 +76,29 @@ impl Rehearsed {
     }
 }
 
+/// How often the camera looked in an attempt, until the part was found or there was no further place to look from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Looks {
+    /// From the look-out pose and beside it.
+    pub from_afar: usize,
+    /// From above what was found.
+    pub from_above: usize,
+}
+
+impl Looks {
+    /// Of targets look by look: the first that was found ends those from afar.
+    fn of(targets: &[Option<GraspTarget>]) -> Self {
+        let from_afar = targets.iter().position(Option::is_some).map_or(targets.len(), |found| found + 1);
+        Self { from_afar, from_above: targets.len() - from_afar }
+    }
+}
+
 /// One attempt, and what there is to see of it.
 pub struct Attempted {
     /// How it went.
     pub attempt: Attempt,
+    /// How often the camera looked.
+    pub looks: Looks,
     /// Pictures from outside, if they were asked for.
     pub frames: Vec<RgbImage>,
     /// What the wrist camera saw last, with the detection drawn.
@@ -92,7 +111,7 @@ impl Rehearsal<'_> {
         let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
-            let Attempted { attempt, frames, view } =
+            let Attempted { attempt, frames, view, .. } =
                 self.attempt(number, (!filmed_success).then(RecordConfig::default))?;
             if !frames.is_empty() {
                 rehearsed.film = frames;
@@ -122,16 +141,18 @@ impl Rehearsal<'_> {
         let mut perception = ModelPerception { rehearsal: self, last: None };
         let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
         let started = Instant::now();
-        let (attempt, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
-            Ok(mut report) => (self.record(number, &report), std::mem::take(&mut report.frames)),
+        let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
+            Ok(mut report) => {
+                (self.record(number, &report), Looks::of(&report.targets), std::mem::take(&mut report.frames))
+            }
             Err(SimulationError::Perception(why)) => {
                 let duration_secs = started.elapsed().as_secs_f64();
                 let failed = Attempt { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
-                (failed, Vec::new())
+                (failed, Looks::default(), Vec::new())
             }
             Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
         };
-        Ok(Attempted { attempt, frames, view: perception.last })
+        Ok(Attempted { attempt, looks, frames, view: perception.last })
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> Attempt {

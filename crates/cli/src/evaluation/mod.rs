@@ -15,26 +15,27 @@
 //! What is in the store is not done again, so an evaluation that was interrupted goes on where it stopped. A teaching
 //! that led to nothing is a result, too: all attempts of its cell count as failed.
 
+mod attempting;
+pub mod axes;
 mod cell;
 mod looking;
 mod page;
 mod paper;
-mod progress;
 mod records;
 mod schedule;
 mod settings;
-mod statistics;
 mod store;
 mod summary;
 mod tables;
+mod teaching;
 mod units;
 
-pub use cell::Cell;
+pub use crate::progress::EvaluationProgress;
+pub use crate::statistics::{Share, percentile, wilson_interval};
+pub use cell::{Cell, Marks};
 pub use page::page;
-pub use progress::EvaluationProgress;
 pub use records::{AttemptRecord, AttemptsRecord, LookRecord, Pictured, Said, SpeedRecord, TeachingRecord};
-pub use settings::Settings;
-pub use statistics::{Share, percentile, wilson_interval};
+pub use settings::{Settings, TeachingSettings};
 pub use store::Store;
 pub use summary::{CellSummary, ModelSummary, Summary};
 pub use tables::{Titled, markdown, tables};

@@ -1,9 +1,10 @@
 //! What a unit of work leaves behind.
 
 use sdg_grasp::TeachingFacts;
-use sdg_report::{Attempt, DetectionError};
+use sdg_report::DetectionError;
 use serde::{Deserialize, Serialize};
 
+use crate::rehearsal::{Attempted, Looks};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// Steps that one value of a teaching's loss stands for.
@@ -47,6 +48,8 @@ pub struct AttemptRecord {
     pub error_mm: Option<f64>,
     /// Turn of the last detection beside the truth, in degrees.
     pub error_deg: Option<f64>,
+    /// How often the camera looked.
+    pub looks: Looks,
     /// Wall-clock time.
     pub seconds: f64,
 }
@@ -58,7 +61,7 @@ impl AttemptRecord {
     pub const TEACH: &str = "teach";
 
     /// As the rehearsal tells it.
-    pub fn new(attempt: &Attempt) -> Self {
+    pub fn new(Attempted { attempt, looks, .. }: &Attempted) -> Self {
         Self {
             attempt: attempt.number,
             success: attempt.success,
@@ -66,21 +69,48 @@ impl AttemptRecord {
             why: attempt.why.clone(),
             error_mm: attempt.detection_error.map(|e| e.distance_mm),
             error_deg: attempt.detection_error.map(|e| e.angle_deg),
+            looks: *looks,
             seconds: attempt.duration_secs,
         }
     }
 
     /// An attempt that failed without the robot's doing.
     pub fn failed(attempt: usize, step: &str, why: String) -> Self {
-        Self { attempt, success: false, step: step.to_owned(), why, error_mm: None, error_deg: None, seconds: 0.0 }
+        Self {
+            attempt,
+            success: false,
+            step: step.to_owned(),
+            why,
+            error_mm: None,
+            error_deg: None,
+            looks: Looks::default(),
+            seconds: 0.0,
+        }
+    }
+
+    /// Whether the part was held and both its detections came of a first look: from the look-out pose and from above.
+    pub fn is_held_at_first_look(&self) -> bool {
+        self.success && self.looks == Looks { from_afar: 1, from_above: 1 }
     }
 }
 
 /// The attempts of a cell so far, in their order.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AttemptsRecord {
+    /// How attempts are recorded: [`Self::VERSION`]. Those of another version are made again.
+    pub version: u32,
     /// One each.
     pub attempts: Vec<AttemptRecord>,
+}
+
+impl AttemptsRecord {
+    /// The version of what an attempt leaves behind: raised when a field of it comes or goes.
+    pub const VERSION: u32 = 2;
+
+    /// Those of this version.
+    pub fn new(attempts: Vec<AttemptRecord>) -> Self {
+        Self { version: Self::VERSION, attempts }
+    }
 }
 
 /// What a model said of a picture.

@@ -1,9 +1,11 @@
 //! What decides an evaluation's results.
 
+use anyhow::Result;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-/// Everything that results depend on, apart from which models and parts they are of. Kept in every file of a
-/// [`Store`](super::Store), so that results of different settings never meet in one table.
+/// Everything that results of the paper's protocol depend on, apart from which models and parts they are of. Kept in every
+/// file of a [`Store`](super::Store), so that results of different settings never meet in one table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
@@ -27,42 +29,73 @@ impl Settings {
     /// The protocol of this version.
     pub const PROTOCOL: u32 = 2;
 
-    /// What differs from `found`, in words; `None` when nothing does.
-    pub fn difference(&self, found: &Self) -> Option<String> {
-        let steps = |steps: Option<u32>| steps.map_or("the preset's".to_owned(), |steps| steps.to_string());
-        let differing: Vec<String> = [
-            ("protocol", self.protocol.to_string(), found.protocol.to_string()),
-            ("preset", self.preset.clone(), found.preset.clone()),
-            ("steps", steps(self.steps), steps(found.steps)),
-            ("seed", self.seed.to_string(), found.seed.to_string()),
-            ("attempts", self.attempts.to_string(), found.attempts.to_string()),
-            ("views", self.views.to_string(), found.views.to_string()),
-            ("scenes", self.scenes.to_string(), found.scenes.to_string()),
-        ]
-        .into_iter()
-        .filter(|(_, expected, found)| expected != found)
-        .map(|(name, expected, found)| format!("{name}: expected {expected}, found {found}"))
-        .collect();
-        (!differing.is_empty()).then(|| differing.join("; "))
+    /// Those of them that decide a teaching.
+    pub fn teaching(&self) -> TeachingSettings {
+        TeachingSettings { preset: self.preset.clone(), steps: self.steps, seed: self.seed }
     }
+}
+
+/// What a teaching depends on, apart from model, part and marks: the protocol and the axes share teachings.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TeachingSettings {
+    /// Network, training and augmentation.
+    pub preset: String,
+    /// Optimiser steps other than the preset's.
+    pub steps: Option<u32>,
+    /// Decides every random choice.
+    pub seed: u64,
+}
+
+/// How the settings that a reader asks for differ from those that a file was made with, in words; `None` when each that is
+/// asked for is as in the file. What the file says beyond them does not concern the reader.
+///
+/// # Errors
+/// Settings that cannot be written as JSON.
+pub(super) fn difference(expected: &impl Serialize, found: &Value) -> Result<Option<String>> {
+    let expected = serde_json::to_value(expected)?;
+    let told = |value: &Value| match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    };
+    let mut differing: Vec<String> = expected
+        .as_object()
+        .into_iter()
+        .flatten()
+        .filter(|(name, expected)| found[name.as_str()] != **expected)
+        .map(|(name, expected)| format!("{name}: expected {}, found {}", told(expected), told(&found[name.as_str()])))
+        .collect();
+    differing.sort();
+    Ok((!differing.is_empty()).then(|| differing.join("; ")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn settings() -> Settings {
+        Settings { protocol: 1, preset: "edge".into(), steps: None, seed: 1, attempts: 10, views: 25, scenes: 25 }
+    }
+
+    fn told(expected: &impl Serialize, found: &Settings) -> Option<String> {
+        difference(expected, &serde_json::to_value(found).unwrap()).unwrap()
+    }
+
     #[test]
     fn every_difference_is_named() {
-        let settings =
-            Settings { protocol: 1, preset: "edge".into(), steps: None, seed: 1, attempts: 10, views: 25, scenes: 25 };
-        assert_eq!(settings.difference(&settings.clone()), None);
-        let other = Settings { seed: 2, steps: Some(40), ..settings.clone() };
-        assert_eq!(
-            settings.difference(&other).unwrap(),
-            "steps: expected the preset's, found 40; seed: expected 1, found 2"
-        );
+        assert_eq!(told(&settings(), &settings()), None);
+        let other = Settings { seed: 2, steps: Some(40), ..settings() };
+        assert_eq!(told(&settings(), &other).unwrap(), "seed: expected 1, found 2; steps: expected none, found 40");
         let each =
             Settings { protocol: 0, preset: String::new(), steps: Some(1), seed: 0, attempts: 0, views: 0, scenes: 0 };
-        assert_eq!(settings.difference(&each).unwrap().matches("expected").count(), 7);
+        assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 7);
+    }
+
+    #[test]
+    fn a_teaching_depends_on_its_own_settings_alone() {
+        let other = Settings { protocol: 9, attempts: 1, views: 1, scenes: 1, ..settings() };
+        assert_eq!(told(&settings().teaching(), &other), None);
+        let other = Settings { preset: "tiny".into(), ..settings() };
+        assert_eq!(told(&settings().teaching(), &other).unwrap(), "preset: expected edge, found tiny");
     }
 }

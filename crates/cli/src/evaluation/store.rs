@@ -7,9 +7,12 @@
 //! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
 //! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten as each ends
 //! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
+//! DIR/axes/C-pendulum.tilt.json               pictures of an axis
+//! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
 //! ```
 //!
-//! Each JSON file carries the settings that it was made with and is there whole or not at all.
+//! Each JSON file carries the settings that it was made with and is there whole or not at all. A teaching carries those of
+//! teachings alone, so that the protocol and the axes share it, with whatever number of attempts or pictures.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -18,8 +21,9 @@ use anyhow::{Context, Result, bail};
 use sdg_report::write_atomically;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::settings::Settings;
+use super::settings::{Settings, difference};
 use crate::files;
 
 /// Larger than any record.
@@ -45,10 +49,10 @@ impl Store {
     /// Opens the folder of an evaluation or begins one.
     ///
     /// # Errors
-    /// A folder that cannot be written, that another process works in, or whose results were made with other settings.
+    /// A folder that cannot be written, that another process works in, or whose models were taught with other settings.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
         files::prepare_folder(folder)?;
-        for inner in ["models", "cells", "pictures"] {
+        for inner in ["models", "cells", "pictures", "axes"] {
             files::prepare_folder(&folder.join(inner))?;
         }
         let lock_file = folder.join(".lock");
@@ -61,9 +65,10 @@ impl Store {
             }
         }
         let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
-        match store.read::<()>("settings.json")? {
+        let teaching = settings.teaching();
+        match store.read_made_with::<()>("settings.json", &teaching)? {
             Some(()) => {}
-            None => store.write("settings.json", &())?,
+            None => store.write_made_with("settings.json", &teaching, &())?,
         }
         Ok(store)
     }
@@ -73,37 +78,43 @@ impl Store {
         &self.folder
     }
 
-    /// What its results are made with.
+    /// What results of the paper's protocol are made with.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// A record, if there is one yet. `name` is that of its file.
+    /// A record of the paper's protocol, if there is one yet. `name` is that of its file.
     ///
     /// # Errors
     /// A file that cannot be read, is damaged, or was made with other settings.
     pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
+        self.read_made_with(name, &self.settings)
+    }
+
+    /// A record, if there is one yet, that depends on `settings`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_made_with<T: DeserializeOwned>(&self, name: &str, settings: &impl Serialize) -> Result<Option<T>> {
         let path = self.folder.join(name);
-        if !path.exists() {
-            return Ok(None);
-        }
-        let bytes = files::read(&path, MOST_RECORD_BYTES)?;
-        let named = || format!("{}: expected a record of an evaluation", path.display());
-        let stored: Stored<serde_json::Value, serde_json::Value> =
-            serde_json::from_slice(&bytes).with_context(named)?;
-        let made_with: Settings = serde_json::from_value(stored.settings).with_context(named)?;
-        if let Some(difference) = self.settings.difference(&made_with) {
+        let Some((made_with, record)) = read_stored(&path)? else { return Ok(None) };
+        if let Some(difference) = difference(settings, &made_with)? {
             bail!(
                 "{}: made with other settings ({difference}); give these settings, or another folder with --out",
                 path.display()
             );
         }
-        Ok(Some(serde_json::from_value(stored.record).with_context(named)?))
+        Ok(Some(serde_json::from_value(record).with_context(|| not_a_record(&path))?))
     }
 
-    /// Writes a record, whole or not at all.
+    /// Writes a record of the paper's protocol, whole or not at all.
     pub fn write<T: Serialize>(&self, name: &str, record: &T) -> Result<()> {
-        let stored = Stored { settings: &self.settings, record };
+        self.write_made_with(name, &self.settings, record)
+    }
+
+    /// Writes a record that depends on `settings`, whole or not at all.
+    pub fn write_made_with(&self, name: &str, settings: &impl Serialize, record: &impl Serialize) -> Result<()> {
+        let stored = Stored { settings, record };
         let mut bytes = serde_json::to_vec_pretty(&stored)?;
         bytes.push(b'\n');
         self.write_bytes(name, &bytes)
@@ -129,6 +140,23 @@ impl Store {
             _ => Ok(()),
         }
     }
+}
+
+/// The settings and the record of any store's file; `None` where there is no such file.
+///
+/// # Errors
+/// A file that cannot be read or is damaged.
+pub(super) fn read_stored(path: &Path) -> Result<Option<(Value, Value)>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let bytes = files::read(path, MOST_RECORD_BYTES)?;
+    let stored: Stored<Value, Value> = serde_json::from_slice(&bytes).with_context(|| not_a_record(path))?;
+    Ok(Some((stored.settings, stored.record)))
+}
+
+fn not_a_record(path: &Path) -> String {
+    format!("{}: expected a record of an evaluation", path.display())
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use serde::Serialize;
 use super::cell::Cell;
 use super::records::{AttemptRecord, Said, TeachingRecord};
 use super::settings::Settings;
-use super::statistics::{Share, percentile, wilson_interval};
 use super::store::Store;
 use super::units::Evaluation;
+use crate::statistics::{Share, percentile, wilson_interval};
 
 /// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -249,6 +249,7 @@ fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store
 mod tests {
     use super::*;
     use crate::evaluation::records::{AttemptsRecord, LookRecord, Pictured};
+    use sdg_geometry::RotationalSymmetry;
     use sdg_grasp::{Preset, TeachingFacts};
     use sdg_simulation::objects::ObjectSpec;
 
@@ -285,6 +286,7 @@ mod tests {
         let store = Store::open(folder.path(), &settings).unwrap();
         let facts = TeachingFacts {
             seed: 1,
+            symmetry: RotationalSymmetry::None,
             samples: 100,
             steps: 10,
             seconds: 60.0,
@@ -297,7 +299,7 @@ mod tests {
         let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
         store.write("cells/C-rod_end.teaching.json", &failed).unwrap();
         let attempts = vec![attempt(1, true, "hold"), attempt(2, false, "lift"), attempt(3, true, "hold")];
-        store.write("cells/B-pendulum.attempts-verified.json", &AttemptsRecord { attempts }).unwrap();
+        store.write("cells/B-pendulum.attempts-verified.json", &AttemptsRecord::new(attempts)).unwrap();
         let look = LookRecord {
             present: vec![
                 pictured(said(0.9, Some((1.0, 0.5))), said(0.4, Some((1.0, 0.5)))),

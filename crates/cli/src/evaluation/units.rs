@@ -5,20 +5,19 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
-use sdg_grasp::{Event, History, ModelKind, Preset, StepRecord, TeachOptions, Verification, teach};
-use sdg_simulation::SimulationError;
+use sdg_grasp::{ModelKind, Preset, Verification};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
-use super::cell::{Cell, attempts_of};
+use super::attempting::go_on;
+use super::cell::{Cell, Marks, attempts_of};
 use super::looking::{part_seed, picture_seed, scene_without, show};
-use super::progress::EvaluationProgress;
-use super::records::{AttemptRecord, AttemptsRecord, LOSS_STEPS, LookRecord, SpeedRecord, TeachingRecord};
+use super::records::{LookRecord, SpeedRecord};
 use super::schedule::{Task, run_all};
 use super::store::Store;
-use crate::exit::one_line;
+use super::teaching::Teaching;
+use crate::progress::EvaluationProgress;
 use crate::rehearsal::Rehearsal;
-use crate::shipped;
 use crate::trial::try_view;
 
 /// Pictures on which speed is measured, for each part.
@@ -144,7 +143,7 @@ impl Evaluation<'_> {
 
     /// Not so once its teaching has failed: then there is nothing left to do for it.
     fn is_usable(&self, cell: Cell) -> Result<bool> {
-        Ok(!matches!(cell.teaching(self.store)?, Some(TeachingRecord::Failed { .. })))
+        Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }
 
     fn without_speed(&self) -> Result<Vec<&ObjectSpec>> {
@@ -168,7 +167,10 @@ impl Evaluation<'_> {
     ) -> Result<ControlFlow<()>> {
         let started = Instant::now();
         let said = match unit {
-            Unit::Teach(cell) => self.teach(cell, is_interrupted)?,
+            Unit::Teach(cell) => {
+                let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
+                teaching.teach(cell, Marks::Shipped, is_interrupted)?
+            }
             Unit::Look(object) => self.look(object, is_interrupted)?,
             Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted)?,
         };
@@ -177,57 +179,13 @@ impl Evaluation<'_> {
         Ok(ControlFlow::Continue(()))
     }
 
-    /// Teaches a network and keeps it; in words what came of it, `None` when it was interrupted.
-    fn teach(&self, cell: Cell, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
-        let demonstration = shipped::demonstration(cell.object)?;
-        let settings = self.store.settings();
-        let options = TeachOptions {
-            kind: cell.model,
-            preset: self.preset,
-            symmetry: ObjectSpec::by_name(cell.object)?.symmetry,
-            steps: settings.steps.map(|steps| steps as usize),
-            ..TeachOptions::new(settings.seed)
-        };
-        // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
-        let mut interrupted = false;
-        let mut observe = |_: &Event| {
-            interrupted |= is_interrupted();
-            if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let taught = caught(|| Ok(teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
-        if interrupted {
-            return Ok(None);
-        }
-        let (record, said) = match taught {
-            Ok(taught) => {
-                let bytes = taught.model.to_bytes()?;
-                // The record last: it says that the model is whole.
-                self.store.write_bytes(&cell.model_file(), &bytes)?;
-                let facts = taught.model.facts().clone();
-                let said = facts.validation.map_or("nothing to train".to_owned(), |validation| {
-                    format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
-                });
-                let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
-                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs, losses }, said)
-            }
-            Err(error) => {
-                self.store.remove(&cell.model_file())?;
-                let why = one_line(&error);
-                let said = format!("failed, all its attempts count as failures: {why}");
-                (TeachingRecord::Failed { why }, said)
-            }
-        };
-        self.store.write(&cell.file("teaching"), &record)?;
-        Ok(Some(said))
-    }
-
     /// Shows every model of a part that has not seen them the same pictures.
     fn look(&self, object: &ObjectSpec, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
         let settings = self.store.settings();
         let mut looks = Vec::new();
         for cell in self.cells(object) {
             if cell.look(self.store)?.is_none()
-                && let Some(model) = cell.read_model(self.store)?
+                && let Some(model) = cell.read_model(Marks::Shipped, self.store)?
             {
                 looks.push((cell, model, LookRecord::default(), None));
             }
@@ -278,25 +236,14 @@ impl Evaluation<'_> {
         is_interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<String>> {
         let settings = self.store.settings();
-        let Some(model) = cell.read_model(self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
+        let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
         let seed = part_seed(settings.seed, object);
         let rehearsal = Rehearsal { model: &model, object, attempts: settings.attempts, seed, verification };
-        let mut record = AttemptsRecord { attempts: cell.attempts(verification, self.store)? };
-        for number in record.attempts.len() + 1..=settings.attempts as usize {
-            if is_interrupted() {
-                return Ok(None);
-            }
-            record.attempts.push(match rehearsal.attempt(number, None) {
-                Ok(attempted) => AttemptRecord::new(&attempted.attempt),
-                Err(error) if is_of_physics(&error) => {
-                    AttemptRecord::failed(number, AttemptRecord::SIMULATION, one_line(&error))
-                }
-                Err(error) => return Err(error),
-            });
-            self.store.write(&cell.file(&attempts_of(verification)), &record)?;
-        }
-        let held = record.attempts.iter().filter(|attempt| attempt.success).count();
-        Ok(Some(format!("held in {held} of {}", record.attempts.len())))
+        let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
+        Ok(attempts.map(|attempts| {
+            let held = attempts.iter().filter(|attempt| attempt.success).count();
+            format!("held in {held} of {}", attempts.len())
+        }))
     }
 
     /// Times detections with nothing of ours beside them, on all cores.
@@ -307,7 +254,7 @@ impl Evaluation<'_> {
             if cell.speed(self.store)?.is_some() {
                 continue;
             }
-            let Some(model) = cell.read_model(self.store)? else { continue };
+            let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { continue };
             let timed = |verification: Verification| -> Result<Vec<f64>> {
                 // The first one packs weights and fills caches.
                 model.detect(&pictures[0].view.image, verification)?;
@@ -335,16 +282,8 @@ impl std::fmt::Display for Unit<'_> {
     }
 }
 
-/// Whether the physics gave up, as against files, OpenGL or settings: that is one attempt's misfortune.
-fn is_of_physics(error: &anyhow::Error) -> bool {
-    matches!(
-        error.downcast_ref::<SimulationError>(),
-        Some(SimulationError::Unstable { .. } | SimulationError::MuJoCo { .. })
-    )
-}
-
 /// Turns a panic into an error, so that the units beside it are kept.
-fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
     // Unwind safety: whatever the closure was changing is given up with its unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
         let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
@@ -353,16 +292,10 @@ fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
     })
 }
 
-/// The curve of a teaching, coarse enough to keep.
-fn mean_losses(history: &History) -> Vec<f64> {
-    let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
-    history.steps.chunks(LOSS_STEPS).map(mean).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::Settings;
+    use crate::evaluation::{AttemptRecord, AttemptsRecord, Settings, TeachingRecord};
 
     fn settings() -> Settings {
         Settings {
@@ -411,7 +344,7 @@ mod tests {
         let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
         store.write("cells/C-pendulum.teaching.json", &failed).unwrap();
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
-        let done = AttemptsRecord { attempts: vec![attempt(1), attempt(2)] };
+        let done = AttemptsRecord::new(vec![attempt(1), attempt(2)]);
         store.write("cells/C-rod_end.attempts-verified.json", &done).unwrap();
         store.write("cells/B-rod_end.look.json", &LookRecord::default()).unwrap();
         assert_eq!(

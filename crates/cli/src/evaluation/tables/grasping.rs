@@ -5,8 +5,8 @@ use sdg_report::{Cell, Column, Step, Table, Tone};
 use super::{Titled, number, share, ways};
 use crate::evaluation::paper;
 use crate::evaluation::records::AttemptRecord;
-use crate::evaluation::statistics::Share;
 use crate::evaluation::summary::{Figures, Summary};
+use crate::statistics::Share;
 
 /// The paper's Table II: success.
 pub(super) fn success(summary: &Summary) -> Titled {

@@ -7,8 +7,8 @@ mod models;
 use sdg_report::{Cell, Column, Table, Tone};
 
 use super::records::TeachingRecord;
-use super::statistics::Share;
 use super::summary::{Figures, ModelSummary, Summary};
+use crate::statistics::Share;
 
 /// A table under its heading.
 pub struct Titled {

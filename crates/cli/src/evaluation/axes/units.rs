@@ -1,0 +1,359 @@
+//! What there is to do for the axes, and the doing of it.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use nalgebra::Isometry3;
+use sdg_grasp::{GraspModel, ModelKind, Preset, Verification};
+use sdg_simulation::SimulationError;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
+
+use super::matching::place;
+use super::records::{AxisPicture, AxisRecord, LookAlike};
+use super::selection::{GraspCondition, Selection};
+use super::settings::{AxisSettings, GraspSettings};
+use crate::evaluation::EvaluationProgress;
+use crate::evaluation::attempting::go_on;
+use crate::evaluation::cell::{Cell, Marks, attempts_of, read_attempts};
+use crate::evaluation::looking::part_seed;
+use crate::evaluation::records::AttemptRecord;
+use crate::evaluation::schedule::{Task, run_all};
+use crate::evaluation::store::Store;
+use crate::evaluation::teaching::Teaching;
+use crate::evaluation::units::{NO_MODEL, caught};
+use crate::rehearsal::{Rehearsal, RehearsalErrors};
+
+/// The models that grasp under errors: the paper's best, and the one without a network.
+pub const GRASPING_MODELS: [ModelKind; 2] = [ModelKind::S, ModelKind::C];
+
+/// Pictures of a stratum that are tried until one can be drawn.
+const MAX_DRAWINGS: u64 = 8;
+
+/// What is kept or lost as a whole.
+#[derive(Debug, Clone, Copy)]
+enum Unit<'a> {
+    /// A network is taught on a part.
+    Teach(Cell<'a>, Marks),
+    /// All models look at a part's pictures of an axis: each picture is drawn once.
+    Pictures(&'a ObjectSpec, Axis),
+    /// A model grasps a part under an error; kept attempt by attempt.
+    Grasps(Cell<'a>, &'a ObjectSpec, GraspCondition),
+}
+
+/// Models, parts, axes and errors, and the folder for what becomes of them.
+pub struct AxesEvaluation<'a> {
+    /// The models.
+    pub models: &'a [ModelKind],
+    /// The parts.
+    pub objects: &'a [ObjectSpec],
+    /// Axes of pictures, and errors in grasps.
+    pub selection: &'a Selection,
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    /// Teachings and results.
+    pub store: &'a Store,
+    /// Pictures of each part and axis.
+    pub axis_views: u32,
+    /// Edge points that model S compares at each pose of its search, if not as taught.
+    pub search_points: Option<u32>,
+    /// Units side by side.
+    pub jobs: usize,
+}
+
+impl AxesEvaluation<'_> {
+    /// Does what is not in the store yet; breaks when `is_interrupted` says so, with everything kept that has ended.
+    ///
+    /// # Errors
+    /// Files that cannot be read or written, and errors of the simulator itself. A teaching that fails is a result.
+    pub fn run(
+        &self,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+        progress: &EvaluationProgress,
+    ) -> Result<ControlFlow<()>> {
+        let tasks = self.tasks()?;
+        progress.expect(tasks.len());
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let work = |unit: &Unit| {
+            if is_interrupted() {
+                return Ok(ControlFlow::Break(()));
+            }
+            caught(|| self.work(*unit, is_interrupted, progress)).with_context(|| unit.to_string())
+        };
+        run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)?;
+        Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+    }
+
+    /// How many units are not in the store yet.
+    pub fn remaining(&self) -> Result<usize> {
+        Ok(self.tasks()?.len())
+    }
+
+    /// What the pictures' results depend on.
+    pub fn axis_settings(&self) -> AxisSettings {
+        AxisSettings {
+            axes: AxisSettings::AXES,
+            teaching: self.store.settings().teaching(),
+            axis_views: self.axis_views,
+            search_points: self.search_points,
+        }
+    }
+
+    /// What attempts under errors depend on.
+    pub fn grasp_settings(&self) -> GraspSettings {
+        GraspSettings {
+            errors: GraspSettings::ERRORS,
+            teaching: self.store.settings().teaching(),
+            attempts: self.store.settings().attempts,
+            search_points: self.search_points,
+        }
+    }
+
+    /// What a model said of a part's pictures of an axis, if it was shown them.
+    pub fn axis_record(&self, cell: Cell, axis: Axis) -> Result<Option<AxisRecord>> {
+        self.store.read_made_with(&axis_file(cell, axis), &self.axis_settings())
+    }
+
+    /// The attempts of a model on a part under an error so far.
+    pub fn grasps(&self, cell: Cell, condition: GraspCondition) -> Result<Vec<AttemptRecord>> {
+        match self.is_the_protocol_s(condition) {
+            true => cell.attempts(Verification::ByShape, self.store),
+            false => read_attempts(self.store, &grasps_file(cell, condition), &self.grasp_settings()),
+        }
+    }
+
+    /// Whether attempts are the same as the paper's protocol makes: then they are shared.
+    fn is_the_protocol_s(&self, condition: GraspCondition) -> bool {
+        condition == GraspCondition::NoError && self.search_points.is_none()
+    }
+
+    /// The models that grasp under errors, of those that were asked for.
+    pub fn grasping_models(&self) -> impl Iterator<Item = ModelKind> {
+        GRASPING_MODELS.into_iter().filter(|model| self.models.contains(model))
+    }
+
+    /// What is not in the store yet, part by part, so that an interrupted run has whole parts to show.
+    fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
+        let mut tasks = Vec::<Task<Unit>>::new();
+        for object in self.objects {
+            let cell = |model| Cell { model, object: &object.name };
+            let mut teachings: Vec<(ModelKind, Marks, usize)> = Vec::new();
+            let mut teaching_of = |cell: Cell<'_>, marks, tasks: &mut Vec<Task<Unit>>| -> Result<Option<usize>> {
+                if cell.teaching_from(marks, self.store)?.is_some() {
+                    return Ok(None);
+                }
+                let network = cell.network().model;
+                let known = teachings.iter().find(|(model, from, _)| (*model, *from) == (network, marks));
+                Ok(Some(known.map_or(tasks.len(), |(.., task)| *task)).inspect(|&task| {
+                    if task == tasks.len() {
+                        teachings.push((network, marks, task));
+                        let cell = Cell { model: network, object: &object.name };
+                        tasks.push(Task { unit: Unit::Teach(cell, marks), after: Vec::new() });
+                    }
+                }))
+            };
+            for &axis in &self.selection.axes {
+                let mut after = Vec::new();
+                let mut is_missing = false;
+                for cell in self.models.iter().copied().map(cell) {
+                    if !cell.is_without_model(Marks::Shipped, self.store)? && self.axis_record(cell, axis)?.is_none() {
+                        is_missing = true;
+                        after.extend(teaching_of(cell, Marks::Shipped, &mut tasks)?);
+                    }
+                }
+                if is_missing {
+                    after.dedup();
+                    tasks.push(Task { unit: Unit::Pictures(object, axis), after });
+                }
+            }
+            for &condition in &self.selection.conditions {
+                for cell in self.grasping_models().map(cell) {
+                    let marks = marks_of(condition);
+                    let done = self.grasps(cell, condition)?.len();
+                    if !cell.is_without_model(marks, self.store)? && done < self.store.settings().attempts as usize {
+                        let after = teaching_of(cell, marks, &mut tasks)?.into_iter().collect();
+                        tasks.push(Task { unit: Unit::Grasps(cell, object, condition), after });
+                    }
+                }
+            }
+        }
+        Ok(tasks)
+    }
+
+    fn work(
+        &self,
+        unit: Unit,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+        progress: &EvaluationProgress,
+    ) -> Result<ControlFlow<()>> {
+        let started = Instant::now();
+        let said = match unit {
+            Unit::Teach(cell, marks) => {
+                let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
+                teaching.teach(cell, marks, is_interrupted)?
+            }
+            Unit::Pictures(object, axis) => self.show(object, axis, is_interrupted)?,
+            Unit::Grasps(cell, object, condition) => self.grasp(cell, object, condition, is_interrupted)?,
+        };
+        let Some(said) = said else { return Ok(ControlFlow::Break(())) };
+        progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+        Ok(ControlFlow::Continue(()))
+    }
+
+    /// A cell's model as it is measured.
+    fn model(&self, cell: Cell, marks: Marks) -> Result<Option<GraspModel>> {
+        let model = cell.read_model(marks, self.store)?;
+        Ok(match (model, self.search_points) {
+            (Some(model), Some(points)) if !cell.model.has_network() => Some(model.with_search_points(points as usize)?),
+            (model, _) => model,
+        })
+    }
+
+    /// Shows every model that has not seen them a part's pictures of an axis.
+    fn show(
+        &self,
+        object: &ObjectSpec,
+        axis: Axis,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let mut shown = Vec::new();
+        for &model in self.models {
+            let cell = Cell { model, object: &object.name };
+            if self.axis_record(cell, axis)?.is_none()
+                && let Some(model) = self.model(cell, Marks::Shipped)?
+            {
+                shown.push((cell, model, AxisRecord { pictures: Vec::new(), seconds: 0.0 }));
+            }
+        }
+        if shown.is_empty() {
+            return Ok(Some(NO_MODEL.to_owned()));
+        }
+        let num_shown = shown.len() as f64;
+        for number in 0..u64::from(self.axis_views) {
+            if is_interrupted() {
+                return Ok(None);
+            }
+            let started = Instant::now();
+            let view = draw(object, axis, number, self.store.settings().seed)?;
+            let drawing_secs = started.elapsed().as_secs_f64();
+            for (_, model, record) in &mut shown {
+                let started = Instant::now();
+                record.pictures.push(ask(model, object, &view)?);
+                record.seconds += started.elapsed().as_secs_f64() + drawing_secs / num_shown;
+            }
+        }
+        let mut said = Vec::new();
+        for (cell, _, record) in shown {
+            self.store.write_made_with(&axis_file(cell, axis), &self.axis_settings(), &record)?;
+            let found: usize = record
+                .pictures
+                .iter()
+                .map(|picture| (0..picture.visible.len()).filter(|&i| picture.verified.has_found(i)).count())
+                .sum();
+            let wrong: usize = record.pictures.iter().map(|picture| picture.verified.num_wrong()).sum();
+            said.push(format!("{} found {found}, {wrong} wrong", cell.model));
+        }
+        Ok(Some(said.join("; ")))
+    }
+
+    /// Goes on with a cell's attempts under an error.
+    fn grasp(
+        &self,
+        cell: Cell,
+        object: &ObjectSpec,
+        condition: GraspCondition,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let Some(model) = self.model(cell, marks_of(condition))? else { return Ok(Some(NO_MODEL.to_owned())) };
+        let settings = self.store.settings();
+        let rehearsal = Rehearsal {
+            model: &model,
+            object,
+            attempts: settings.attempts,
+            // The scenes of the paper's protocol: what differs is the error alone.
+            seed: part_seed(settings.seed, object),
+            verification: Verification::ByShape,
+            errors: errors_of(condition),
+        };
+        let attempts = if self.is_the_protocol_s(condition) {
+            let file = cell.file(&attempts_of(Verification::ByShape));
+            go_on(&rehearsal, self.store, &file, settings, is_interrupted)?
+        } else {
+            go_on(&rehearsal, self.store, &grasps_file(cell, condition), &self.grasp_settings(), is_interrupted)?
+        };
+        Ok(attempts.map(|attempts| {
+            let held = attempts.iter().filter(|attempt| attempt.success).count();
+            format!("held in {held} of {}", attempts.len())
+        }))
+    }
+}
+
+impl std::fmt::Display for Unit<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Teach(cell, Marks::Shipped) => write!(f, "teach {} {}", cell.model, cell.object),
+            Self::Teach(cell, Marks::Jittered) => write!(f, "teach {} {} from jittered marks", cell.model, cell.object),
+            Self::Pictures(object, axis) => write!(f, "{axis} {}", object.name),
+            Self::Grasps(cell, _, condition) => write!(f, "grasp {} {}, {}", cell.model, cell.object, condition.name()),
+        }
+    }
+}
+
+/// Where it stands what a model said of an axis' pictures.
+pub(super) fn axis_file(cell: Cell, axis: Axis) -> String {
+    format!("axes/{cell}.{}.json", axis.name())
+}
+
+fn grasps_file(cell: Cell, condition: GraspCondition) -> String {
+    format!("axes/{cell}.attempts-{}.json", condition.name())
+}
+
+/// The marks that a model is taught from for attempts under an error.
+pub(super) fn marks_of(condition: GraspCondition) -> Marks {
+    if condition == GraspCondition::Marks { Marks::Jittered } else { Marks::Shipped }
+}
+
+/// What is wrong in attempts.
+fn errors_of(condition: GraspCondition) -> RehearsalErrors {
+    match condition {
+        // Jittered marks are the teaching's error.
+        GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::none(),
+        GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::none() },
+        GraspCondition::HandEye => RehearsalErrors::hand_eye(),
+        GraspCondition::Friction => RehearsalErrors::friction(),
+        GraspCondition::Shake => RehearsalErrors::shake(),
+    }
+}
+
+/// Draws a picture of an axis. Where a scene leaves no place for camera, cover or instances, the next picture of the same
+/// stratum is drawn.
+fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
+    let mut impossible = None;
+    for round in 0..MAX_DRAWINGS {
+        match axis_view(object, axis, number + round * PICTURES_PER_AXIS.max(1) * 1000, seed) {
+            Err(error @ SimulationError::Configuration { .. }) => impossible = Some(error),
+            drawn => return drawn.with_context(|| format!("picture {number}")),
+        }
+    }
+    Err(impossible.map_or_else(|| anyhow::anyhow!("no picture"), Into::into))
+        .with_context(|| format!("picture {number}, drawn {MAX_DRAWINGS} times"))
+}
+
+/// What a model says of a picture, both ways.
+fn ask(model: &GraspModel, object: &ObjectSpec, view: &AxisView) -> Result<AxisPicture> {
+    let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
+    let answer = |verification| -> Result<_> {
+        let detections = model.detect(&view.view.image, verification)?;
+        Ok(place(object, &view.view.camera, &detections, &instances))
+    };
+    Ok(AxisPicture {
+        number: view.number,
+        parameter: view.parameter.value,
+        unit: view.parameter.unit.to_owned(),
+        visible: view.truths.iter().map(|truth| truth.visible_share).collect(),
+        look_alike: view.look_alike.map(look_alike),
+        verified: answer(Verification::ByShape)?,
+        alone: if model.kind().has_network() { Some(answer(Verification::Off)?) } else { None },
+    })
+}

@@ -1,0 +1,91 @@
+//! A network is taught on a part and kept.
+
+use std::ops::ControlFlow;
+
+use anyhow::Result;
+use sdg_grasp::{Event, History, Preset, StepRecord, TeachOptions, teach};
+use sdg_simulation::objects::ObjectSpec;
+
+use super::axes::{MARKS_JITTER_PX, with_jittered_marks};
+use super::cell::{Cell, Marks};
+use super::looking::part_seed;
+use super::records::{LOSS_STEPS, TeachingRecord};
+use super::store::Store;
+use super::units::caught;
+use crate::exit::one_line;
+use crate::shipped;
+
+/// Where and how networks are taught.
+pub(super) struct Teaching<'a> {
+    /// What is taught is kept here.
+    pub store: &'a Store,
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    /// How many units run side by side.
+    pub jobs: usize,
+}
+
+impl Teaching<'_> {
+    /// Teaches a cell's network and keeps it; in words what came of it, `None` when it was interrupted.
+    ///
+    /// # Errors
+    /// Files that cannot be written. A teaching that leads to no model is a result.
+    pub(super) fn teach(
+        &self,
+        cell: Cell,
+        marks: Marks,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let settings = self.store.settings();
+        let object = ObjectSpec::by_name(cell.object)?;
+        let shipped = shipped::demonstration(cell.object)?;
+        let demonstration = match marks {
+            Marks::Shipped => shipped,
+            Marks::Jittered => with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object)),
+        };
+        let options = TeachOptions {
+            kind: cell.network().model,
+            preset: self.preset,
+            symmetry: object.symmetry,
+            steps: settings.steps.map(|steps| steps as usize),
+            ..TeachOptions::new(settings.seed)
+        };
+        // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
+        let mut interrupted = false;
+        let mut observe = |_: &Event| {
+            interrupted |= is_interrupted();
+            if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let taught = caught(|| Ok(teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
+        if interrupted {
+            return Ok(None);
+        }
+        let (record, said) = match taught {
+            Ok(taught) => {
+                let bytes = taught.model.to_bytes()?;
+                // The record last: it says that the model is whole.
+                self.store.write_bytes(&cell.model_file(marks), &bytes)?;
+                let facts = taught.model.facts().clone();
+                let said = facts.validation.map_or("nothing to train".to_owned(), |validation| {
+                    format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
+                });
+                let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
+                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs, losses }, said)
+            }
+            Err(error) => {
+                self.store.remove(&cell.model_file(marks))?;
+                let why = one_line(&error);
+                let said = format!("failed, all its attempts count as failures: {why}");
+                (TeachingRecord::Failed { why }, said)
+            }
+        };
+        self.store.write_made_with(&cell.teaching_file(marks), &settings.teaching(), &record)?;
+        Ok(Some(said))
+    }
+}
+
+/// The curve of a teaching, coarse enough to keep.
+fn mean_losses(history: &History) -> Vec<f64> {
+    let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
+    history.steps.chunks(LOSS_STEPS).map(mean).collect()
+}
