@@ -221,6 +221,12 @@ impl Workcell {
     /// # Errors
     /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
     pub fn view_from(&mut self, base_from_camera: &Isometry3<f64>) -> Result<CameraView> {
+        self.reach_camera_pose(base_from_camera)?;
+        self.wrist_view()
+    }
+
+    /// As [`Workcell::view_from`], without the picture.
+    pub(crate) fn reach_camera_pose(&mut self, base_from_camera: &Isometry3<f64>) -> Result<()> {
         let base_from_tcp = self.base_from_tcp_for_camera(base_from_camera);
         let solution = self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map_err(|error| {
             SimulationError::Configuration {
@@ -231,8 +237,7 @@ impl Workcell {
         })?;
         self.panda_ids.set_position(&mut self.data, &solution.q);
         self.reference = ArmReference::at_rest(solution.q);
-        self.data.forward()?;
-        self.wrist_view()
+        self.data.forward()
     }
 
     /// A picture of the whole workcell from outside.

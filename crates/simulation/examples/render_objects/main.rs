@@ -6,14 +6,21 @@
 //! of the grasp marks, x along the marks from `grasp_start` to `grasp_end`. All lengths are in metres.
 
 mod ball_bearing;
+mod board_print;
+mod circuit_board;
 mod common_line;
 mod cranfield_face;
 mod fuel_line;
 mod housing;
+mod key;
 mod part;
 mod pendulum;
+mod pliers;
 mod pneumatic_cylinder;
+mod print;
 mod rod_end;
+mod shapes;
+mod spring_clip;
 
 use std::path::PathBuf;
 
@@ -29,6 +36,10 @@ fn main() -> std::io::Result<()> {
         ball_bearing::ball_bearing(),
         common_line::common_line(),
         cranfield_face::cranfield_face(),
+        key::key(),
+        pliers::pliers(),
+        circuit_board::circuit_board(),
+        spring_clip::spring_clip(),
     ] {
         part::write_part(&folder.join(part.name), &part)?;
     }

@@ -64,4 +64,19 @@ pub(super) const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
         "cranfield_face_plate.obj", "cranfield_face_collars.obj",
         "cranfield_face_printed.png",
     ],
+    "key": [
+        "object.json", "object.xml",
+        "key_bow.obj", "key_ribs.obj", "key_emblem.obj", "key_blade.obj",
+        "key_moulded.png", "key_emblem.png", "key_nickel.png",
+    ],
+    "pliers": [
+        "object.json", "object.xml",
+        "pliers_steel.obj", "pliers_lap.obj", "pliers_rivet.obj", "pliers_sleeves.obj", "pliers_inlays.obj",
+        "pliers_ground.png", "pliers_oiled.png", "pliers_turned.png", "pliers_dipped.png", "pliers_inlay.png",
+    ],
+    "spring_clip": [
+        "object.json", "object.xml",
+        "spring_clip_leaf.obj", "spring_clip_lower.obj", "spring_clip_bead.obj", "spring_clip_rivet.obj", "spring_clip_cover.obj",
+        "spring_clip_leaf.png", "spring_clip_steel.png", "spring_clip_brass.png", "spring_clip_vinyl.png",
+    ],
 };

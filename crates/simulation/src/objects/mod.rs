@@ -9,7 +9,12 @@
 //! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
+mod height_map;
+mod look_alike;
 mod metadata;
+mod mjcf_tags;
+mod obj_mesh;
+mod shape;
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -25,6 +30,8 @@ use crate::scene::pose_attributes;
 use embedded::EMBEDDED;
 use metadata::Metadata;
 
+pub(crate) use height_map::HeightMap;
+pub use look_alike::{LookAlike, LookAlikeKind};
 pub use sdg_geometry::RotationalSymmetry;
 
 /// Version of `object.json` that this reader understands.
@@ -196,6 +203,23 @@ impl ObjectSpec {
     pub fn fragment(&self, base_from_object: &Isometry3<f64>) -> MjcfFragment {
         let placed = format!("<body name=\"object\" {}>", pose_attributes(base_from_object));
         MjcfFragment { sections: self.mjcf.replace(BODY_TAG, &placed), files: self.files.clone() }
+    }
+
+    /// One more body of the part, `instance_{index}`, in a scene that has [`ObjectSpec::fragment`] already: it shares that
+    /// one's meshes and materials.
+    pub(crate) fn instance_fragment(&self, index: usize, base_from_object: &Isometry3<f64>) -> MjcfFragment {
+        const OPEN: &str = "<worldbody>";
+        const CLOSE: &str = "</worldbody>";
+        let mut sections = String::new();
+        let mut rest = self.mjcf.as_str();
+        while let Some((from, to)) = rest.find(OPEN).and_then(|from| Some((from, from + rest[from..].find(CLOSE)?))) {
+            sections.push_str(&rest[from..to + CLOSE.len()]);
+            rest = &rest[to + CLOSE.len()..];
+        }
+        let placed = format!("<body name=\"object\" {}>", pose_attributes(base_from_object));
+        let sections =
+            sections.replace(BODY_TAG, &placed).replace(" name=\"object", &format!(" name=\"instance_{index}"));
+        MjcfFragment { sections, files: Vec::new() }
     }
 }
 

@@ -123,6 +123,18 @@ impl Distractor {
         }
     }
 
+    /// The same distractor at another place on the table.
+    pub fn moved_to(&self, table_from_distractor: &Isometry2<f64>) -> Self {
+        Self::new(self.kind, table_from_distractor, self.seed)
+    }
+
+    /// Its triangles in its own frame.
+    pub(crate) fn triangles(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
+        pieces(self.kind, self.seed)
+            .into_iter()
+            .flat_map(|piece| piece.mesh.faces.iter().map(|&face| piece.mesh.corners(face)).collect::<Vec<_>>())
+    }
+
     /// The MJCF of the distractor under the name `distractor_{index}`.
     pub(super) fn fragment(&self, index: usize) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();

@@ -8,6 +8,7 @@
 //! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene draws from a stream of its
 //! own: another number of distractors leaves the lamps as they were. The same seed gives the same scene to the bit.
 
+mod axis;
 mod distractor;
 pub mod footprint;
 mod fragment;
@@ -26,6 +27,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::objects::ObjectSpec;
 
+pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_view};
 pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
@@ -76,6 +78,8 @@ pub struct PlacedObject {
 pub struct SceneVariation {
     /// The part to grasp; `None` for a table without it.
     pub object: Option<PlacedObject>,
+    /// More instances of the same part.
+    pub instances: Vec<PlacedObject>,
     /// The light.
     pub lighting: Lighting,
     /// The table.
@@ -108,6 +112,7 @@ impl SceneVariation {
     pub fn nominal(object: Option<(&ObjectSpec, Isometry3<f64>)>) -> Self {
         Self {
             object: object.map(|(spec, base_from_object)| PlacedObject { spec: spec.clone(), base_from_object }),
+            instances: Vec::new(),
             lighting: Lighting::nominal(),
             table: Table::nominal(),
             distractors: Vec::new(),
@@ -127,8 +132,10 @@ impl SceneVariation {
         } else {
             (Lighting::nominal(), Table::nominal())
         };
-        let distractors = sample_distractors(object.as_ref(), config, &mut Stream::Distractors.rng(seed));
-        Self { object, lighting, table, distractors }
+        let taken =
+            object.iter().flat_map(|object| [object.footprint(), object.gripper_footprint()]).collect::<Vec<_>>();
+        let distractors = sample_distractors(taken, config, &mut Stream::Distractors.rng(seed));
+        Self { object, instances: Vec::new(), lighting, table, distractors }
     }
 
     /// The scene as MJCF sections and the files that they name.
@@ -137,6 +144,9 @@ impl SceneVariation {
         fragment.append(self.table.fragment());
         if let Some(object) = &self.object {
             fragment.append(object.spec.fragment(&object.base_from_object));
+        }
+        for (index, instance) in self.instances.iter().enumerate() {
+            fragment.append(instance.spec.instance_fragment(index, &instance.base_from_object));
         }
         for (index, distractor) in self.distractors.iter().enumerate() {
             fragment.append(distractor.fragment(index));
@@ -158,7 +168,8 @@ impl PlacedObject {
         footprint::placed(&GRIPPER_FOOTPRINT.map(Point2::from), &table_from_gripper)
     }
 
-    fn table_from_object(&self) -> Isometry2<f64> {
+    /// Its place and turn on the table.
+    pub(crate) fn table_from_object(&self) -> Isometry2<f64> {
         let x_axis = self.base_from_object.rotation * nalgebra::Vector3::x();
         Isometry2::new(self.base_from_object.translation.vector.xy(), x_axis.y.atan2(x_axis.x))
     }
@@ -173,9 +184,12 @@ const PLACEMENT_TRIES: usize = 40;
 /// How far distractors spread beyond where the object may lie, in metres.
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
 
-fn sample_distractors(object: Option<&PlacedObject>, config: &VariationConfig, rng: &mut Pcg64Mcg) -> Vec<Distractor> {
-    let mut taken: Vec<Vec<Point2<f64>>> =
-        object.map(|object| vec![object.footprint(), object.gripper_footprint()]).unwrap_or_default();
+/// Distractors at random places that keep apart from each other and from what is `taken`.
+fn sample_distractors(
+    mut taken: Vec<Vec<Point2<f64>>>,
+    config: &VariationConfig,
+    rng: &mut Pcg64Mcg,
+) -> Vec<Distractor> {
     let spread = |range: &Range<f64>| range.start - DISTRACTOR_MARGIN_M..range.end + DISTRACTOR_MARGIN_M;
     let (x_range, y_range) = (spread(&config.object_x_m), spread(&config.object_y_m));
     let wanted = rng.random_range(config.distractors.clone());

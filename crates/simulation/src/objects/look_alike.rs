@@ -1,0 +1,208 @@
+//! Parts that resemble a part: mirrored, with one feature moved, of another size.
+//!
+//! ```text
+//! ObjectSpec ─> meshes, marks, collision shapes, inertia changed together ─> ObjectSpec of its own name
+//! ```
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use nalgebra::{Isometry2, Point2, Point3, Vector2};
+
+use super::ObjectSpec;
+use super::mjcf_tags::{Tag, map_tags};
+use super::obj_mesh::ObjMesh;
+use crate::error::Result;
+
+/// In what a look-alike differs from the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum LookAlikeKind {
+    /// The mirror image in a vertical plane.
+    Mirrored,
+    /// One feature stands elsewhere.
+    FeatureMoved,
+    /// The whole part in another size.
+    Scaled {
+        /// The size in percent of the part's.
+        percent: u32,
+    },
+}
+
+impl LookAlikeKind {
+    /// All kinds.
+    pub const ALL: [Self; 6] = [
+        Self::Mirrored,
+        Self::FeatureMoved,
+        Self::Scaled { percent: 80 },
+        Self::Scaled { percent: 90 },
+        Self::Scaled { percent: 110 },
+        Self::Scaled { percent: 125 },
+    ];
+}
+
+impl fmt::Display for LookAlikeKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Mirrored => f.write_str("mirrored"),
+            Self::FeatureMoved => f.write_str("feature moved"),
+            Self::Scaled { percent } => write!(f, "size {:.2}", f64::from(*percent) / 100.0),
+        }
+    }
+}
+
+/// A part that resembles another one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LookAlike {
+    /// In what it differs.
+    pub kind: LookAlikeKind,
+    /// The part itself, to be placed like any other.
+    pub spec: ObjectSpec,
+    /// What was done, in words.
+    pub description: String,
+}
+
+/// Side of a cell of the views from above, in metres.
+const CELL_M: f64 = 0.001;
+/// Heights that differ by less look the same from above, in metres.
+const SAME_HEIGHT_M: f64 = 0.001;
+/// Least difference of a part to its mirror image at the turn where they are most alike.
+const MIN_MIRROR_DIFFERENCE: f64 = 0.04;
+
+impl ObjectSpec {
+    /// The kinds of look-alikes that this part has: all, but for the mirror image where it equals the part.
+    ///
+    /// # Errors
+    /// As [`ObjectSpec::look_alike`].
+    pub fn look_alike_kinds(&self) -> Result<Vec<LookAlikeKind>> {
+        let is_chiral = self.mirror_difference()? >= MIN_MIRROR_DIFFERENCE;
+        Ok(LookAlikeKind::ALL
+            .into_iter()
+            .filter(|kind| *kind != LookAlikeKind::FeatureMoved && (*kind != LookAlikeKind::Mirrored || is_chiral))
+            .collect())
+    }
+
+    /// A look-alike of this part; `seed` picks the feature that is moved, and how far.
+    ///
+    /// # Errors
+    /// [`crate::SimulationError::File`] for a part whose shapes are not given as OBJ meshes.
+    pub fn look_alike(&self, kind: LookAlikeKind, seed: u64) -> Result<LookAlike> {
+        let _ = seed;
+        let (spec, description) = match kind {
+            LookAlikeKind::Mirrored => (self.mirrored()?, "the mirror image".to_owned()),
+            LookAlikeKind::FeatureMoved => (self.clone(), String::new()),
+            LookAlikeKind::Scaled { percent } => {
+                (self.scaled(f64::from(percent) / 100.0)?, format!("{percent} % of the size"))
+            }
+        };
+        Ok(LookAlike { kind, spec, description })
+    }
+
+    /// Share of what is seen from above that differs between the part and its mirror image, at the turn where they are
+    /// most alike.
+    fn mirror_difference(&self) -> Result<f64> {
+        let (own, mirror) = (self.height_map(CELL_M)?, self.mirrored()?.height_map(CELL_M)?);
+        let difference = |turn: f64, shift: Vector2<f64>| {
+            let onto = Isometry2::new(own.centre().coords + shift, turn) * Isometry2::new(-mirror.centre().coords, 0.0);
+            mirror.difference(&own, &onto, SAME_HEIGHT_M)
+        };
+        let best_of = |turns: &mut dyn Iterator<Item = f64>| {
+            turns.map(|turn| (difference(turn, Vector2::zeros()), turn)).min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let Some((_, coarse)) = best_of(&mut (0..120).map(|step| TAU * f64::from(step) / 120.0)) else {
+            return Ok(0.0);
+        };
+        let Some((least, turn)) = best_of(&mut (-6..=6).map(|step| coarse + f64::from(step) * 0.005)) else {
+            return Ok(0.0);
+        };
+        let shifts = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(f64::from(x), f64::from(y)) * CELL_M));
+        Ok(shifts.map(|shift| difference(turn, shift)).fold(least, f64::min))
+    }
+
+    fn mirrored(&self) -> Result<Self> {
+        let mut spec = self.renamed("mirrored", "mirrored");
+        spec.map_meshes(|_, mesh| mesh.mirrored())?;
+        let flip = |p: Point3<f64>| Point3::new(p.x, -p.y, p.z);
+        spec.grasp_start = flip(spec.grasp_start);
+        spec.grasp_end = flip(spec.grasp_end);
+        spec.footprint = spec.footprint.iter().rev().map(|p| Point2::new(p.x, -p.y)).collect();
+        spec.mjcf = map_tags(&spec.mjcf, |tag| {
+            if !has_shape(tag) {
+                return false;
+            }
+            let negate = |indices: &'static [usize]| {
+                move |values: &mut Vec<f64>| {
+                    for &idx in indices {
+                        if let Some(value) = values.get_mut(idx) {
+                            *value = -*value;
+                        }
+                    }
+                }
+            };
+            tag.map_numbers("pos", negate(&[1]));
+            tag.map_numbers("fromto", negate(&[1, 4]));
+            // A turn is mirrored by turning the other way about x and z.
+            tag.map_numbers("quat", negate(&[1, 3]));
+            tag.map_numbers("euler", negate(&[0, 2]));
+            tag.map_numbers("axisangle", negate(&[0, 2]));
+            // Ixx Iyy Izz Ixy Ixz Iyz
+            tag.map_numbers("fullinertia", negate(&[3, 5]));
+            true
+        });
+        Ok(spec)
+    }
+
+    fn scaled(&self, factor: f64) -> Result<Self> {
+        let percent = (factor * 100.0).round();
+        let mut spec = self.renamed(&format!("size_{percent}"), &format!("{percent} % of the size"));
+        spec.map_meshes(|_, mesh| mesh.mapped(|_, p| p * factor))?;
+        spec.mass_kg *= factor.powi(3);
+        spec.grasp_start *= factor;
+        spec.grasp_end *= factor;
+        for length in
+            [&mut spec.jaw_width_m, &mut spec.grasp_height_m, &mut spec.mark_height_m, &mut spec.rest_height_m]
+        {
+            *length *= factor;
+        }
+        for corner in &mut spec.footprint {
+            *corner *= factor;
+        }
+        spec.mjcf = map_tags(&spec.mjcf, |tag| {
+            if !has_shape(tag) {
+                return false;
+            }
+            for (key, power) in
+                [("pos", 1), ("fromto", 1), ("size", 1), ("mass", 3), ("fullinertia", 5), ("diaginertia", 5)]
+            {
+                tag.map_numbers(key, |values| values.iter_mut().for_each(|value| *value *= factor.powi(power)));
+            }
+            true
+        });
+        Ok(spec)
+    }
+
+    fn renamed(&self, suffix: &str, words: &str) -> Self {
+        Self {
+            name: format!("{}_{suffix}", self.name),
+            title: format!("{}, {words}", self.title),
+            description: format!("Look-alike of the {}: {words}", self.title.to_lowercase()),
+            ..self.clone()
+        }
+    }
+
+    /// Replaces the meshes that are seen; the map is given the number of the geom.
+    fn map_meshes(&mut self, map: impl Fn(usize, ObjMesh) -> ObjMesh) -> Result<()> {
+        let meshes = self.visual_meshes()?;
+        for (idx, visual) in meshes.into_iter().enumerate() {
+            let bytes = map(idx, visual.mesh).to_obj().into_bytes();
+            if let Some(asset) = self.files.iter_mut().find(|asset| asset.name == visual.file) {
+                asset.bytes = bytes;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a tag says where or how heavy something of the part is.
+fn has_shape(tag: &Tag) -> bool {
+    matches!(tag.name.as_str(), "geom" | "inertial" | "site")
+}
