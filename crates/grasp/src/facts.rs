@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
 use crate::GraspError;
@@ -107,6 +108,9 @@ impl TurnSource {
 pub struct TeachingFacts {
     /// Decides every random choice.
     pub seed: u64,
+    /// Which turns of the part cannot be told from none, as whoever taught it said; files of older versions do not tell.
+    #[serde(default, skip_serializing_if = "is_without_symmetry")]
+    pub symmetry: RotationalSymmetry,
     /// Samples that the network saw.
     pub samples: usize,
     /// Optimiser steps.
@@ -121,6 +125,10 @@ pub struct TeachingFacts {
     pub orientation: Option<OrientationFacts>,
     /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.
     pub base_weights_sha256: Option<String>,
+}
+
+fn is_without_symmetry(symmetry: &RotationalSymmetry) -> bool {
+    *symmetry == RotationalSymmetry::None
 }
 
 /// How good a model was found to be on held-back samples.
@@ -169,7 +177,8 @@ mod tests {
         assert_eq!(facts.validation, Some(ValidationFacts { hit_rate: 0.9, error_px: 0.8, error_degrees: 0.7 }));
         let written = serde_json::to_value(&facts).unwrap();
         assert_eq!(written, serde_json::from_str::<serde_json::Value>(file).unwrap());
-        let instant = TeachingFacts { validation: None, ..facts };
+        assert_eq!(facts.symmetry, RotationalSymmetry::None);
+        let instant = TeachingFacts { validation: None, symmetry: RotationalSymmetry::Fold(2), ..facts };
         let written = serde_json::to_string(&instant).unwrap();
         assert_eq!(serde_json::from_str::<TeachingFacts>(&written).unwrap(), instant);
     }

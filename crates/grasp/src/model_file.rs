@@ -306,7 +306,7 @@ mod tests {
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;
-    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon, RotationalSymmetry};
 
     /// A model of an untaught network: everything that a file holds, in no time.
     fn untaught(kind: ModelKind) -> GraspModel {
@@ -342,6 +342,7 @@ mod tests {
             calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: Calibration::NEUTRAL },
             facts: TeachingFacts {
                 seed: 3,
+                symmetry: RotationalSymmetry::None,
                 samples: 0,
                 steps: 0,
                 seconds: 0.5,

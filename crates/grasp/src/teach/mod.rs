@@ -173,6 +173,7 @@ fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Inst
         calibrations: Calibrations { network: Calibration::NEUTRAL, agreement },
         facts: TeachingFacts {
             seed: options.seed,
+            symmetry: options.symmetry,
             samples: 0,
             steps: 0,
             seconds: decimal(start.elapsed().as_secs_f64()),
@@ -246,6 +247,7 @@ pub(crate) fn teach_network(
     let agreement = strangers.calibrate(Some(&network), &taught)?;
     let facts = TeachingFacts {
         seed: options.seed,
+        symmetry: options.symmetry,
         samples: history.steps.iter().map(|step| step.samples).sum(),
         steps: history.steps.len(),
         seconds: decimal(start.elapsed().as_secs_f64()),
