@@ -100,7 +100,7 @@ impl TaughtDemonstration {
     pub fn from_parts(cutout: RgbImage, marks: TaughtMarks) -> Result<Self, GraspError> {
         let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
         let template = ShapeTemplate::new(&cutout, &outline, &ShapeConfig::default())?;
-        let surface = Surface::new(&cutout, &outline);
+        let surface = Surface::new(&cutout, &outline, &ShapeConfig::DEFAULT.surface);
         let search = InstantSearch::new(&cutout, &outline, &SECOND_OPINION)?;
         Ok(Self { cutout, marks, template, surface, search })
     }

@@ -19,22 +19,17 @@ use image::RgbImage;
 use nalgebra::Vector2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
+use crate::config::{AgreementConfig, SettlingConfig};
 use crate::gradient_field::GradientField;
-use crate::surface::{SURFACE_SHARE, Surface};
+use crate::surface::Surface;
 use crate::template::ShapeTemplate;
 
-/// Nothing is gained above it: edges that agree so well lie right.
-pub(crate) const SURE: f64 = 0.65;
 /// Steps of the climb, in pixels by which the part's rim moves: first and last.
 const STEPS_PX: (f64, f64) = (3.0, 0.3);
 /// Least gain of a step.
 const LEAST_GAIN: f64 = 1e-4;
 /// A bound for climbs that creep.
 const MOST_LOOKS: usize = 120;
-/// Where climbs begin again, so many pixels around a pose that is still poor, unless it is too poor to be the part at all:
-/// what agrees by less was never it.
-const RESTART_PX: f64 = 10.0;
-const LEAST_RESTARTED: f64 = 0.33;
 /// What the edges may cost in agreement when they have the last word: they are more exact than what is climbed.
 const LAST_WORD: f64 = 0.005;
 
@@ -58,12 +53,17 @@ pub struct Agreement {
     pub edges: f64,
     /// [`Surface::agreement`], in `[0, 1]`.
     pub surface: f64,
+    surface_share: f64,
 }
 
 impl Agreement {
-    /// Both together, in `[0, 1]`: [`SURFACE_SHARE`] of the surface.
+    pub(crate) fn new(edges: f64, surface: f64, config: &AgreementConfig) -> Self {
+        Self { edges, surface, surface_share: config.surface_share }
+    }
+
+    /// Both together, in `[0, 1]`: [`AgreementConfig::surface_share`] of the surface.
     pub fn both(&self) -> f64 {
-        (1.0 - SURFACE_SHARE) * self.edges + SURFACE_SHARE * self.surface
+        (1.0 - self.surface_share) * self.edges + self.surface_share * self.surface
     }
 }
 
@@ -73,10 +73,11 @@ impl Comparison<'_> {
     /// # Units and frames
     /// Poses map demonstration pixels to pixels of the image.
     pub fn agreement(&self, image_from_demonstration: &PlanarSimilarity) -> Agreement {
-        Agreement {
-            edges: self.template.agreement(self.field, image_from_demonstration),
-            surface: self.surface.agreement(self.image, image_from_demonstration),
-        }
+        Agreement::new(
+            self.template.agreement(self.field, image_from_demonstration),
+            self.surface.agreement(self.image, image_from_demonstration),
+            &self.template.config.agreement,
+        )
     }
 
     /// Refined by the edges alone: quick, and exact where it is right.
@@ -91,14 +92,15 @@ impl Comparison<'_> {
         refined: PlanarSimilarity,
         scales: &RangeInclusive<f64>,
     ) -> PlanarSimilarity {
+        let SettlingConfig { sure_agreement, min_restart_agreement, .. } = self.template.config.settling;
         let both = |pose: &PlanarSimilarity| self.agreement(pose).both();
-        if both(&refined) >= SURE {
+        if both(&refined) >= sure_agreement {
             return refined;
         }
         let climbed = [refined, *start].map(|from| self.climbed(from, scales));
         let [(from_refined, one), (from_start, other)] = climbed;
         let (mut best, mut agreement) = if other > one { (from_start, other) } else { (from_refined, one) };
-        if (LEAST_RESTARTED..SURE).contains(&agreement) {
+        if (min_restart_agreement..sure_agreement).contains(&agreement) {
             for around in self.all_around(&best) {
                 let (pose, seen) = self.climbed(around, scales);
                 if seen > agreement {
@@ -115,7 +117,7 @@ impl Comparison<'_> {
         let center = pose.apply(&self.template.center);
         std::array::from_fn(|i| {
             let (sin, cos) = (i as f64 * std::f64::consts::TAU / 6.0).sin_cos();
-            let to = center + RESTART_PX * Vector2::new(cos, sin);
+            let to = center + self.template.config.settling.restart_px * Vector2::new(cos, sin);
             PlanarSimilarity::about(center, to, Angle::ZERO, 1.0).compose(pose)
         })
     }

@@ -13,11 +13,8 @@
 
 use image::RgbImage;
 
-/// Gradient below which a direction is not trusted even in a noiseless image, in grey levels per
-/// level pixel. A step of 5 grey levels has about this gradient after smoothing.
-const SMALLEST_GRADIENT: f32 = 1.5;
-/// The quiet quarter of the pixels tells the noise; an edge must exceed it this many times.
-const NOISE_FACTOR: f32 = 3.0;
+use crate::config::GradientConfig;
+
 /// Levels are added while both sides keep this many pixels.
 const SMALLEST_LEVEL_SIDE: usize = 24;
 /// Level 6 makes one pixel of 64: no part needs more.
@@ -36,11 +33,16 @@ pub struct GradientField {
 impl GradientField {
     /// Computes the field of `image`. Images of any size are accepted; an empty one has no gradients.
     pub fn new(image: &RgbImage) -> Self {
+        Self::with_config(image, &GradientConfig::DEFAULT)
+    }
+
+    /// As [`new`](Self::new), with another sense of what is noise.
+    pub fn with_config(image: &RgbImage, config: &GradientConfig) -> Self {
         let mut planes = Planes::from_image(image);
-        let mut levels = vec![GradientLevel::new(&planes)];
+        let mut levels = vec![GradientLevel::new(&planes, config)];
         while levels.len() < MAX_LEVELS && planes.width.min(planes.height) / 2 >= SMALLEST_LEVEL_SIDE {
             planes = planes.halved();
-            levels.push(GradientLevel::new(&planes));
+            levels.push(GradientLevel::new(&planes, config));
         }
         Self { levels }
     }
@@ -84,10 +86,10 @@ pub(crate) struct GradientLevel {
 }
 
 impl GradientLevel {
-    fn new(planes: &Planes) -> Self {
+    fn new(planes: &Planes, config: &GradientConfig) -> Self {
         let (width, height) = (planes.width, planes.height);
         let mut samples = structure_tensors(planes);
-        let floor = SMALLEST_GRADIENT.powi(2) + NOISE_FACTOR * quiet_energy(&samples);
+        let floor = config.min_gradient.powi(2) + config.noise_factor * quiet_energy(&samples);
         for sample in &mut samples {
             let [tr, vx, vy] = *sample;
             let scale = 1.0 / (tr + floor);

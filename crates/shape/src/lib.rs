@@ -12,8 +12,9 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] is a second witness: the colours inside the outline; a [`Comparison`] hears both. [`InstantSearch`] needs no detector: it tries every
-//! place, turn and scale of a whole image coarsely and refines the best.
+//! [`Surface`] compares the colours inside the outline; a [`Comparison`] scores edges and surface together.
+//! [`InstantSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
+//! best. [`ShapeConfig`] holds what was fitted, with its origin.
 //!
 //! What this crate leaves out: it knows no grasp and no camera, and a part lies flat: poses are turns, shifts and scales
 //! in the image plane. Threads only with the feature `parallel`, and results do not depend on them.
@@ -53,6 +54,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod comparison;
+mod config;
 mod consensus;
 mod edge_points;
 mod error;
@@ -65,9 +67,10 @@ mod surface;
 mod template;
 
 pub use comparison::{Agreement, Comparison};
+pub use config::{AgreementConfig, GradientConfig, ScaleRange, SettlingConfig, ShapeConfig, SurfaceConfig};
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
 pub use refinement::Refinement;
 pub use search::{InstantSearch, Match, SearchConfig};
-pub use surface::{SURFACE_SHARE, Surface};
-pub use template::{ScaleRange, ShapeConfig, ShapeTemplate};
+pub use surface::Surface;
+pub use template::ShapeTemplate;

@@ -21,23 +21,14 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-/// The weight of the surface where it is averaged with the edges' agreement; the edges have the rest.
-pub const SURFACE_SHARE: f64 = 0.3;
+use crate::config::SurfaceConfig;
 
 /// Points looked at; a few hundred are enough for correlations, and cost microseconds.
 const POINTS: f64 = 900.0;
-/// Cells of equal size that the outline's area would fill.
-const CELLS: f64 = 6.0;
 /// A cell of fewer points tells nothing.
 const LEAST_IN_CELL: usize = 4;
-/// The weight of the cells where both correlations are averaged; the whole one has the rest.
-const CELLS_SHARE: f64 = 2.0 / 3.0;
 /// Points this near to the outline show the background when the pose is a pixel off.
 const EDGE_MARGIN_PX: f64 = 2.0;
-/// Contrast below this, in grey values, is noise: a surface without any agrees with nothing.
-const NOISE: f64 = 8.0;
-/// The same within a cell, where there is less contrast.
-const NOISE_IN_CELL: f64 = 6.0;
 /// Least share of the points that must lie inside the image.
 const LEAST_INSIDE: f64 = 0.5;
 
@@ -46,14 +37,15 @@ const LEAST_INSIDE: f64 = 0.5;
 pub struct Surface {
     /// Cell by cell.
     cells: Vec<Vec<(Point2<f64>, [f64; 3])>>,
+    config: SurfaceConfig,
 }
 
 impl Surface {
     /// Reads the colours of the demonstration, `cutout`; `outline` in its pixels.
-    pub fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
+    pub fn new(cutout: &RgbImage, outline: &Polygon, config: &SurfaceConfig) -> Self {
         let bounds = outline.bounds();
         let step = (outline.area() / POINTS).sqrt().max(1.0);
-        let cell_side = (outline.area() / CELLS).sqrt().max(1.0);
+        let cell_side = (outline.area() / config.num_cells).sqrt().max(1.0);
         let (columns, rows) = ((bounds.width() / step) as usize, (bounds.height() / step) as usize);
         let mut cells: BTreeMap<[usize; 2], Vec<_>> = BTreeMap::new();
         for i in 0..rows * columns {
@@ -67,7 +59,7 @@ impl Surface {
                 cells.entry([right, down].map(|d| (d / cell_side) as usize)).or_default().push((point, color));
             }
         }
-        Self { cells: cells.into_values().collect() }
+        Self { cells: cells.into_values().collect(), config: *config }
     }
 
     fn points(&self) -> impl Iterator<Item = &Point2<f64>> {
@@ -83,6 +75,7 @@ impl Surface {
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
     /// none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
+        let SurfaceConfig { cells_share, noise, noise_in_cell, .. } = self.config;
         let mut whole = Correlation::default();
         let (mut cells, mut weights) = (0.0, 0.0);
         for cell in &self.cells {
@@ -93,8 +86,8 @@ impl Surface {
                 }
             }
             if local.count >= LEAST_IN_CELL {
-                let weight = local.count as f64 * local.contrast_taught(NOISE_IN_CELL);
-                cells += weight * local.value(NOISE_IN_CELL);
+                let weight = local.count as f64 * local.contrast_taught(noise_in_cell);
+                cells += weight * local.value(noise_in_cell);
                 weights += weight;
             }
             whole.merge(&local);
@@ -103,7 +96,7 @@ impl Surface {
             return 0.0;
         }
         let cells = if weights > 0.0 { cells / weights } else { 0.0 };
-        CELLS_SHARE * cells + (1.0 - CELLS_SHARE) * whole.value(NOISE)
+        cells_share * cells + (1.0 - cells_share) * whole.value(noise)
     }
 }
 
@@ -214,7 +207,8 @@ mod tests {
     }
 
     fn surface() -> Surface {
-        Surface::new(&plate(1.0, false), &Polygon::from_box(&BoundingBox { x1: 10.0, y1: 15.0, x2: 110.0, y2: 65.0 }))
+        let outline = Polygon::from_box(&BoundingBox { x1: 10.0, y1: 15.0, x2: 110.0, y2: 65.0 });
+        Surface::new(&plate(1.0, false), &outline, &SurfaceConfig::default())
     }
 
     #[test]

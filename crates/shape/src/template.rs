@@ -4,72 +4,17 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::config::{MIN_POINTS, ShapeConfig, check_config};
 use crate::edge_points::{EdgePoint, EdgeSelection, rms_radius, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::{GradientField, GradientLevel};
 use crate::pose::Pose;
 
-/// How a template is made and how far it is moved.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ShapeConfig {
-    /// Most edge points kept at each pyramid level.
-    pub max_points: usize,
-    /// Weight of an edge on the outline relative to one inside, where shading moves with the light.
-    pub outline_weight: f64,
-    /// How far an initial pose may be off in x and in y, as a share of the image's width.
-    pub capture_shift: f64,
-    /// How far an initial pose may be turned, in radians.
-    pub capture_angle_rad: f64,
-    /// How far an initial pose's scale may be off.
-    pub scale: ScaleRange,
-}
-
-impl ShapeConfig {
-    /// What [`Default`] gives.
-    pub const DEFAULT: Self = Self {
-        max_points: 300,
-        outline_weight: 2.0,
-        capture_shift: 0.02,
-        capture_angle_rad: 14.0 * std::f64::consts::PI / 180.0,
-        scale: ScaleRange::Within(0.12),
-    };
-}
-
-impl Default for ShapeConfig {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
-
-/// What a refinement may do to the scale.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ScaleRange {
-    /// Keep the initial pose's scale: the camera's height over the table is known.
-    Fixed,
-    /// Stay within this share of the initial pose's scale, up and down: 0.1 is 1/1.1 to 1.1.
-    Within(f64),
-}
-
-impl ScaleRange {
-    /// Largest change of ln scale.
-    pub(crate) fn max_log(self) -> f64 {
-        match self {
-            Self::Fixed => 0.0,
-            Self::Within(share) => share.ln_1p(),
-        }
-    }
-}
-
-/// Fewer edge points than this recognise nothing.
-const MIN_POINTS: usize = 20;
 /// Smallest extent of an outline, in demonstration pixels.
 const MIN_EXTENT_PX: f64 = 12.0;
 /// The finest level shows the part no larger than this, the coarsest no smaller, in level pixels.
 const FINEST_EXTENT: f64 = 400.0;
 const COARSEST_EXTENT: f64 = 32.0;
-/// Extent at which the agreement is measured, in level pixels. Coarser than the finest, so that a
-/// pixel of parallax or of lens distortion does not count as another shape.
-const AGREEMENT_EXTENT: f64 = 64.0;
 /// Less than this share of the template inside the image is judged as if it were this much.
 const MIN_VISIBLE: f64 = 0.6;
 
@@ -110,7 +55,7 @@ impl ShapeTemplate {
         let bounds = outline.bounds();
         let extent = bounds.width().max(bounds.height());
         let center = bounds.center();
-        let field = GradientField::new(image);
+        let field = GradientField::with_config(image, &config.gradient);
         let levels_to = |extent_in_level: f64| (extent / extent_in_level).log2().floor().max(0.0) as usize;
         let last = field.num_levels() - 1;
         let finest = levels_to(FINEST_EXTENT).min(last);
@@ -139,7 +84,7 @@ impl ShapeTemplate {
             }
             levels.push(TemplateLevel { pixel_size, radius_px: rms_radius(&points), points });
         }
-        let agreement_level_idx = levels_to(AGREEMENT_EXTENT).saturating_sub(finest).min(levels.len() - 1);
+        let agreement_level_idx = levels_to(config.agreement.extent).saturating_sub(finest).min(levels.len() - 1);
         Ok(Self { config: config.clone(), center, levels, agreement_level_idx })
     }
 
@@ -207,31 +152,6 @@ impl Overlay<'_> {
         }
         f64::from(sum) / f64::from(visible).max(MIN_VISIBLE)
     }
-}
-
-fn check_config(config: &ShapeConfig) -> Result<(), ShapeError> {
-    let scale = match config.scale {
-        ScaleRange::Fixed => 0.0,
-        ScaleRange::Within(share) => share,
-    };
-    let checks = [
-        ("max_points", "at least 20", config.max_points as f64, config.max_points >= MIN_POINTS),
-        (
-            "outline_weight",
-            "in (0, 100]",
-            config.outline_weight,
-            config.outline_weight > 0.0 && config.outline_weight <= 100.0,
-        ),
-        ("capture_shift", "in [0, 0.2]", config.capture_shift, (0.0..=0.2).contains(&config.capture_shift)),
-        ("capture_angle_rad", "in [0, 0.8]", config.capture_angle_rad, (0.0..=0.8).contains(&config.capture_angle_rad)),
-        ("scale", "within [0, 0.5]", scale, (0.0..=0.5).contains(&scale)),
-    ];
-    for (name, expected, found, ok) in checks {
-        if !ok {
-            return Err(ShapeError::InvalidConfig { name, expected, found });
-        }
-    }
-    Ok(())
 }
 
 /// The outline, or why it cannot be used.

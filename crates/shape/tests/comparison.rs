@@ -8,7 +8,7 @@ use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{Angle, PlanarSimilarity};
-use sdg_shape::{Comparison, GradientField, ShapeConfig, ShapeTemplate, Surface};
+use sdg_shape::{Comparison, GradientField, ShapeConfig, ShapeTemplate, Surface, SurfaceConfig};
 
 /// Farther than this beside the part, in pixels, nothing is grasped.
 const BESIDE_PX: f64 = 3.0;
@@ -29,7 +29,7 @@ fn settled(part_idx: usize, seed: u64) -> Settled {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let (image, outline, demonstration_from_part) = scenes::demonstration(part, 1, 0.05);
     let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let surface = Surface::new(&image, &outline);
+    let surface = Surface::new(&image, &outline, &SurfaceConfig::default());
     let image_from_part = scenes::pose(
         rng.random_range(150.0..490.0),
         rng.random_range(130.0..350.0),
@@ -81,7 +81,7 @@ fn what_is_sure_is_left_where_the_edges_put_it() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
     let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let (surface, field) = (Surface::new(&image, &outline), GradientField::new(&image));
+    let (surface, field) = (Surface::new(&image, &outline, &SurfaceConfig::default()), GradientField::new(&image));
     let comparison = Comparison { template: &template, surface: &surface, image: &image, field: &field };
     let start = PlanarSimilarity { tx: 3.0, ..PlanarSimilarity::IDENTITY };
     let refined = comparison.refined_by_edges(&start);
@@ -93,7 +93,7 @@ fn scales_stay_in_range() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
     let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let surface = Surface::new(&image, &outline);
+    let surface = Surface::new(&image, &outline, &SurfaceConfig::default());
     // Seen from twice as far, the part is half as large, and that is not allowed.
     let pivot = outline.bounds().center();
     let shrunk = image::imageops::resize(&image, 320, 240, image::imageops::FilterType::Triangle);

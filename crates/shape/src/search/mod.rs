@@ -21,7 +21,8 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use crate::comparison::{Agreement, Comparison, SURE};
+use crate::comparison::{Agreement, Comparison};
+use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::GradientField;
@@ -32,7 +33,7 @@ use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::sweep;
 use crate::surface::Surface;
-use crate::template::{ShapeConfig, ShapeTemplate};
+use crate::template::ShapeTemplate;
 
 /// What is looked for, and what is reported.
 #[derive(Debug, Clone, PartialEq)]
@@ -134,12 +135,12 @@ impl InstantSearch {
     pub fn new(image: &RgbImage, outline: &Polygon, config: &SearchConfig) -> Result<Self, ShapeError> {
         check_config(config)?;
         let template = ShapeTemplate::new(image, outline, &config.shape)?;
-        let field = GradientField::new(image);
+        let field = GradientField::with_config(image, &config.shape.gradient);
         let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
         let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
         Ok(Self {
             config: config.clone(),
-            surface: Surface::new(image, outline),
+            surface: Surface::new(image, outline, &config.shape.surface),
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
@@ -151,7 +152,7 @@ impl InstantSearch {
     ///
     /// Several may lie there, turned in any way; deterministic.
     pub fn search(&self, image: &RgbImage) -> Vec<Match> {
-        self.search_field(image, &GradientField::new(image))
+        self.search_field(image, &GradientField::with_config(image, &self.config.shape.gradient))
     }
 
     /// As [`search`](Self::search), with the field of `image` at hand because others read it too.
@@ -186,7 +187,7 @@ impl InstantSearch {
 
     fn matched(&self, image: &RgbImage, field: &GradientField, image_from_demonstration: PlanarSimilarity) -> Match {
         let seen = self.comparison(image, field).agreement(&image_from_demonstration);
-        let Agreement { edges, surface } = seen;
+        let Agreement { edges, surface, .. } = seen;
         Match { image_from_demonstration, agreement: seen.both(), edges, surface }
     }
 
@@ -196,7 +197,7 @@ impl InstantSearch {
 
     /// Refined from all around, where the match is poor: its start may have been on the wrong side of a shadow.
     fn polished(&self, image: &RgbImage, field: &GradientField, found: &Match) -> Match {
-        if found.agreement >= SURE || found.agreement < LEAST_POLISHED {
+        if found.agreement >= self.config.shape.settling.sure_agreement || found.agreement < LEAST_POLISHED {
             return *found;
         }
         let (comparison, start) = (self.comparison(image, field), &found.image_from_demonstration);
@@ -233,7 +234,7 @@ impl InstantSearch {
         let mut climbed = parallel::map(poses, |&pose| {
             let (pose, edges) = self.template.climb_coarsest(field, &self.range_about(pose), pose);
             let surface = self.surface.agreement(image, &pose.to_similarity(self.template.center));
-            (pose, Agreement { edges, surface }.both())
+            (pose, Agreement::new(edges, surface, &self.config.shape.agreement).both())
         });
         climbed.sort_by(|a, b| b.1.total_cmp(&a.1));
         let pitch = self.place_pitch();
