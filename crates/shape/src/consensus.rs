@@ -16,18 +16,20 @@ use crate::pose::Pose;
 use crate::refinement::{CaptureRange, step_units};
 use crate::template::{Overlay, TemplateLevel};
 
-/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds.
+/// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
+/// not measured.
 const FIRST_REACH: usize = 6;
 const LATER_REACH: usize = 3;
-/// Most crests kept for a point.
+/// Most crests kept for a point. Chosen by hand, not measured.
 const MAX_CRESTS: usize = 3;
-/// Least alignment of a crest's direction, noise floor included.
+/// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
 const LEAST_TRUST: f32 = 0.2;
-/// Width of "on the edge" in level pixels, from the first look to the last.
+/// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
 const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
-/// Starts of the first round, in level pixels of edge movement by shift and by scale.
+/// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
 const START_STEP: f64 = 3.0;
-/// Rounds of gathering crests anew, and the movement (level pixels) below which they stop.
+/// Rounds of gathering crests anew, and the movement (level pixels) below which they stop. Both bound the
+/// time; chosen by hand, not measured.
 const MAX_ROUNDS: usize = 5;
 const STILL: f64 = 0.01;
 
@@ -185,7 +187,7 @@ fn settle(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, width
                     right += weighted * (distance - sighting.row.dot(&step));
                 }
             }
-            // Directions that no edge holds (the angle of a ring) stay where they are.
+            // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.
             normal_matrix += Matrix4::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
             for k in 0..4 {
                 if !is_free[k] {

@@ -10,12 +10,14 @@ use crate::error::ShapeError;
 use crate::gradient_field::{GradientField, GradientLevel};
 use crate::pose::Pose;
 
-/// Smallest extent of an outline, in demonstration pixels.
+/// Smallest extent of an outline, in demonstration pixels. Chosen by hand, not measured.
 const MIN_EXTENT_PX: f64 = 12.0;
-/// The finest level shows the part no larger than this, the coarsest no smaller, in level pixels.
+/// The finest level shows the part no larger than this, the coarsest no smaller, in level pixels. Chosen by
+/// hand, not measured.
 const FINEST_EXTENT: f64 = 400.0;
 const COARSEST_EXTENT: f64 = 32.0;
-/// Less than this share of the template inside the image is judged as if it were this much.
+/// Less than this share of the template inside the image is judged as if it were this much. Chosen by
+/// hand, not measured.
 const MIN_VISIBLE: f64 = 0.6;
 
 /// The edges of one demonstrated part, ready to be compared with images.

@@ -6,7 +6,7 @@ use crate::edge_points::EdgePoint;
 use crate::search::responses::{NUM_DIRECTIONS, PITCH, SPREAD, direction_idx, table_idx};
 
 /// How far the outer points may move from one pose to the next, in level pixels: half of it to either side is what
-/// directions are spread.
+/// directions are spread. Derived from the spread.
 const POSE_STEP: f64 = 2.0 * SPREAD as f64;
 
 /// One turn and scale.
@@ -118,7 +118,8 @@ fn sample_by_weight(points: &[EdgePoint], count: usize) -> Vec<EdgePoint> {
     sampled
 }
 
-/// Distance from the centre within which nine points of ten lie, in demonstration pixels.
+/// Distance from the centre within which nine points of ten lie, in demonstration pixels. The share was chosen by hand, so
+/// that a single far point does not make all steps small.
 fn outer_radius(points: &[EdgePoint]) -> f64 {
     let mut radii: Vec<f64> = points.iter().map(|p| f64::from(p.offset[0]).hypot(f64::from(p.offset[1]))).collect();
     radii.sort_by(f64::total_cmp);
