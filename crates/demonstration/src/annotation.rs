@@ -112,7 +112,38 @@ pub(crate) struct Draft {
     pub outline: Option<(Vec<Point2<f64>>, String)>,
 }
 
+/// Whether the picture's border may cut a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Border {
+    /// A demonstration shows the whole part: marks outside the picture are mistakes.
+    MustNotCut,
+    /// On a test picture the part may lie across the border: its box is cut, its outline left out.
+    MayCut,
+}
+
 impl Draft {
+    /// Cuts, if need be, what reaches beyond the picture, then [`Self::finish`]. A grasp is never cut: it must lie inside.
+    pub fn finish_at(mut self, image: &ImageFacts, border: Border) -> Result<Annotation> {
+        if border == Border::MustNotCut {
+            return self.finish(image);
+        }
+        let (width, height) = (f64::from(image.width), f64::from(image.height));
+        let is_inside = |p: &Point2<f64>| (0.0..=width).contains(&p.x) && (0.0..=height).contains(&p.y);
+        if let Some((points, place)) = self.outline.take_if(|(points, _)| !points.iter().all(is_inside)) {
+            self.corners.get_or_insert((points, place));
+        }
+        if let Some((corners, _)) = &mut self.corners
+            && let Some(bbox) = BoundingBox::around(corners.iter().copied())
+        {
+            let cut = bbox.clip(width, height);
+            // A box beside the picture stays as it is, to be refused with its place.
+            if cut.width() >= LEAST_EXTENT_PX && cut.height() >= LEAST_EXTENT_PX {
+                *corners = cut.corners().to_vec();
+            }
+        }
+        self.finish(image)
+    }
+
     /// Checks everything and makes the annotation.
     pub fn finish(self, image: &ImageFacts) -> Result<Annotation> {
         let outline = self.outline.map(|(points, place)| check_outline(&points, &place, image)).transpose()?;

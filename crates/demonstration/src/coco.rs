@@ -6,14 +6,14 @@
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
-use crate::annotation::{Annotation, Draft, ImageFacts};
+use crate::annotation::{Annotation, Border, Draft, ImageFacts};
 use crate::json::{Node, describe, shorten};
 use crate::labelled::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads the objects of one image of a COCO file, which must have one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
-    let instances = read_instances(root, image)?;
+    let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
         let id = choose_image(&root.field("images", "the list of images")?.items()?, image)?;
         return Err(Error::NoObject {
@@ -25,7 +25,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
 }
 
 /// Reads the objects of one image of a COCO file, if any.
-pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
+pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) -> Result<Vec<LabelledInstance>> {
     let images = root.field("images", "the list of images")?.items()?;
     let chosen = choose_image(&images, image)?;
     if let (Some(width), Some(height)) = (chosen.optional("width")?, chosen.optional("height")?) {
@@ -42,7 +42,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<Labe
         if annotation.field("image_id", "the number of its image")?.value == image_id.value {
             objects.push(LabelledInstance {
                 optional: is_optional(annotation.optional("attributes")?.as_ref())?,
-                annotation: read_object(&annotation, &categories, image)?,
+                annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
                 place: annotation.place,
             });
         }
@@ -80,7 +80,7 @@ fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>>
     })
 }
 
-fn read_object(node: &Node, categories: &[Node], image: &ImageFacts) -> Result<Annotation> {
+fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
     let mut draft = Draft { place: node.place.clone(), ..Draft::default() };
     let category_id = node.optional("category_id")?;
     let category = categories
@@ -125,7 +125,7 @@ fn read_object(node: &Node, categories: &[Node], image: &ImageFacts) -> Result<A
         let points = numbers.chunks_exact(2).map(|xy| Point2::new(xy[0], xy[1])).collect();
         draft.outline = Some((points, polygon.place.clone()));
     }
-    draft.finish(image)
+    Ok(draft)
 }
 
 /// Exporters write `[]` for what is not there.

@@ -5,6 +5,7 @@
 
 use serde_json::Value;
 
+use crate::annotation::Border;
 use crate::format::json_format;
 use crate::json::{self, Node, shorten};
 use crate::{Annotation, AnnotationFormat, Error, ImageFacts, Result, coco, labelme};
@@ -12,7 +13,7 @@ use crate::{Annotation, AnnotationFormat, Error, ImageFacts, Result, coco, label
 /// One part on a picture, as it was labelled.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledInstance {
-    /// The marks, in pixels of the picture.
+    /// The marks, in pixels of the picture. Where the picture's border cuts the part, the box is cut and the outline left out.
     pub annotation: Annotation,
     /// Neither missed when it is not found nor wrong when it is: mostly covered, or seen from another side. LabelMe: the
     /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
@@ -85,12 +86,13 @@ impl LabelFile {
     /// What is marked on one picture, in the file's order; nothing where the part is not there.
     ///
     /// # Errors
-    /// Those of [`Annotation::read`], but for [`Error::NoObject`] of a picture without any mark.
+    /// Those of [`Annotation::read`], but for [`Error::NoObject`] of a picture without any mark, and but for boxes and
+    /// outlines that lie across the picture's border. A grasp must lie inside.
     pub fn instances(&self, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
         let root = Node::root(&self.value);
         match self.format {
-            AnnotationFormat::LabelMe => labelme::read_instances(&root, image),
-            _ => coco::read_instances(&root, image),
+            AnnotationFormat::LabelMe => labelme::read_instances(&root, image, Border::MayCut),
+            _ => coco::read_instances(&root, image, Border::MayCut),
         }
     }
 }
@@ -179,6 +181,29 @@ mod tests {
         // As a demonstration the same file is refused.
         let text = serde_json::to_vec(&labelme(Vec::new())).unwrap();
         assert!(matches!(Annotation::read(&text, &IMAGE), Err(Error::NoObject { .. })));
+    }
+
+    #[test]
+    fn the_border_may_cut_a_part_but_not_its_grasp() {
+        let mut shapes = group(1, 10.0, false);
+        shapes[0]["points"] = json!([[10, -30], [700, 30]]);
+        shapes.push(json!({"label": "rod", "shape_type": "polygon", "points": [[10, 10], [700, -30], [60, 30]],
+                           "group_id": 1}));
+        let value = labelme(shapes);
+        let cut = parse(&value).instances(&IMAGE).unwrap().remove(0).annotation;
+        assert_eq!((cut.bbox.to_xywh(), cut.outline), ([10.0, 0.0, 630.0, 30.0], None));
+        // Of a demonstration the whole part is wanted.
+        let text = serde_json::to_vec(&value).unwrap();
+        assert!(matches!(Annotation::read(&text, &IMAGE), Err(Error::OutsideImage { .. })));
+
+        let mut shapes = group(1, 10.0, false);
+        shapes[1]["points"] = json!([[15, -20]]);
+        let found = parse(&labelme(shapes)).instances(&IMAGE).unwrap_err().to_string();
+        assert!(found.contains("shapes[1]: expected a place inside the image of 640×480 pixels"), "{found}");
+        let mut shapes = group(1, 10.0, false);
+        shapes[0]["points"] = json!([[650, 10], [700, 30]]);
+        let found = parse(&labelme(shapes)).instances(&IMAGE).unwrap_err().to_string();
+        assert!(found.contains("shapes[0]: expected a place inside"), "{found}");
     }
 
     #[test]

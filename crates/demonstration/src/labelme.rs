@@ -5,14 +5,14 @@ use std::collections::{BTreeSet, HashMap};
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
-use crate::annotation::{Annotation, Draft, ImageFacts};
+use crate::annotation::{Annotation, Border, Draft, ImageFacts};
 use crate::json::{Node, shorten};
 use crate::labelled::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads every object of a LabelMe file, which must have one.
 pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
-    let instances = read_instances(root, image)?;
+    let instances = read_instances(root, image, Border::MustNotCut)?;
     if instances.is_empty() {
         return Err(Error::NoObject {
             expected: "at least a `rectangle` or a `polygon`".into(),
@@ -23,7 +23,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
 }
 
 /// Reads every object of a LabelMe file, if there is one, in the order in which their first shapes stand.
-pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<LabelledInstance>> {
+pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) -> Result<Vec<LabelledInstance>> {
     if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
         image.check_declared(width.pixels()?, height.pixels()?)?;
     }
@@ -37,7 +37,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<Labe
     let ids: BTreeSet<&str> = shapes.iter().filter_map(|shape| shape.group.as_deref()).collect();
     let ungrouped = shapes.iter().filter(|shape| shape.group.is_none()).count();
     if ids.len() <= 1 {
-        return Ok(vec![instance(shapes, image)?]);
+        return Ok(vec![instance(shapes, image, border)?]);
     }
     if ungrouped > 0 {
         return Err(Error::Ungrouped { found: format!("{} groups and {ungrouped} shapes without one", ids.len()) });
@@ -51,13 +51,13 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts) -> Result<Vec<Labe
         }
         groups[at].push(shape);
     }
-    groups.into_iter().map(|shapes| instance(shapes, image)).collect()
+    groups.into_iter().map(|shapes| instance(shapes, image, border)).collect()
 }
 
-fn instance(shapes: Vec<Shape>, image: &ImageFacts) -> Result<LabelledInstance> {
+fn instance(shapes: Vec<Shape>, image: &ImageFacts, border: Border) -> Result<LabelledInstance> {
     let optional = shapes.iter().any(|shape| shape.optional);
     let place = shapes.first().map(|shape| shape.place.clone()).unwrap_or_default();
-    Ok(LabelledInstance { annotation: object(shapes, image)?, optional, place })
+    Ok(LabelledInstance { annotation: object(shapes)?.finish_at(image, border)?, optional, place })
 }
 
 enum Kind {
@@ -124,7 +124,8 @@ impl Shape {
     }
 }
 
-fn object(shapes: Vec<Shape>, image: &ImageFacts) -> Result<Annotation> {
+/// What the shapes of one group mark.
+fn object(shapes: Vec<Shape>) -> Result<Draft> {
     let mut draft =
         Draft { place: shapes.first().map(|shape| shape.place.clone()).unwrap_or_default(), ..Draft::default() };
     let (mut box_label, mut outline_label) = (None, None);
@@ -155,7 +156,7 @@ fn object(shapes: Vec<Shape>, image: &ImageFacts) -> Result<Annotation> {
         }
     }
     draft.label = box_label.or(outline_label);
-    draft.finish(image)
+    Ok(draft)
 }
 
 /// The version of LabelMe whose files ours are like; LabelMe compares it with its own and warns of newer ones.
