@@ -14,7 +14,7 @@ macro_rules! shipped {
 }
 
 /// Name, photo, annotation.
-const SHIPPED: [(&str, &[u8], &[u8]); 8] = shipped![
+const SHIPPED: [(&str, &[u8], &[u8]); 12] = shipped![
     "pendulum",
     "fuel_line",
     "rod_end",
@@ -22,7 +22,11 @@ const SHIPPED: [(&str, &[u8], &[u8]); 8] = shipped![
     "pneumatic_cylinder",
     "ball_bearing",
     "common_line",
-    "cranfield_face"
+    "cranfield_face",
+    "key",
+    "pliers",
+    "circuit_board",
+    "spring_clip"
 ];
 
 /// The demonstration of a shipped object.
@@ -56,7 +60,7 @@ mod tests {
         assert_eq!(
             error,
             "expected an object out of pendulum, fuel_line, rod_end, housing, pneumatic_cylinder, ball_bearing, \
-             common_line, cranfield_face, found \"teapot\""
+             common_line, cranfield_face, key, pliers, circuit_board, spring_clip, found \"teapot\""
         );
     }
 }

@@ -16,8 +16,11 @@ use crate::machine::machine;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
+    if let Some(names) = &args.axes {
+        return super::evaluate_axes::run(args, names);
+    }
     let models = models(&args.models)?;
-    let objects = objects(&args.objects)?;
+    let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
     let settings = Settings {
         protocol: Settings::PROTOCOL,
@@ -89,7 +92,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn models(letters: &[String]) -> Result<Vec<ModelKind>> {
+pub(super) fn models(letters: &[String]) -> Result<Vec<ModelKind>> {
     if letters.is_empty() {
         return Ok(ModelKind::ALL.to_vec());
     }
@@ -104,9 +107,9 @@ fn models(letters: &[String]) -> Result<Vec<ModelKind>> {
     Ok(models)
 }
 
-fn objects(names: &[String]) -> Result<Vec<ObjectSpec>> {
-    let all = || ObjectSpec::names().map(str::to_owned).collect();
-    let names: Vec<String> = if names.is_empty() { all() } else { names.to_vec() };
+/// The parts of these names; without a name, `all`.
+pub(super) fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Result<Vec<ObjectSpec>> {
+    let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
     let mut objects: Vec<ObjectSpec> = Vec::new();
     for name in names {
         let object = ObjectSpec::by_name(name.trim()).map_err(|error| Usage(format!("--objects: {error}")))?;

@@ -26,12 +26,12 @@ pub(super) fn show(
 }
 
 /// A picture without the part: one to six unseen things, some made to resemble parts. Every second one also has another
-/// shipped part, each in its turn: real parts in real finishes are the look-alikes that a workshop has.
+/// shipped part of the paper's eight, each in its turn: real parts in real finishes are the look-alikes that a workshop has.
 pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Result<(TestView, Option<&'static str>)> {
     if number.is_multiple_of(2) {
         return Ok((test_views(object, false, 1, seed).next().context("a picture")??, None));
     }
-    let others: Vec<&'static str> = ObjectSpec::names().filter(|name| *name != object.name).collect();
+    let others: Vec<&'static str> = ObjectSpec::paper_names().filter(|name| *name != object.name).collect();
     let other = others[(number / 2) as usize % others.len()];
     let mut config = VariationConfig::default();
     config.distractors = 1..=*config.distractors.end();
@@ -66,6 +66,14 @@ mod tests {
         assert_eq!(other, Some("rod_end"));
         assert_eq!(seen.scene.object.unwrap().spec.name, "rod_end");
         assert!(seen.truth.is_none());
+        // A held-out part lies in no picture, and all eight lie in its own.
+        for (name, expected) in [("pendulum", "fuel_line"), ("key", "pendulum")] {
+            let object = ObjectSpec::by_name(name).unwrap();
+            let others: Vec<_> =
+                (0..8).map(|turn| scene_without(&object, 2 * turn + 1, 5).unwrap().1.unwrap()).collect();
+            assert_eq!(others[0], expected);
+            assert!(others.iter().all(|other| ObjectSpec::paper_names().any(|name| name == *other)), "{others:?}");
+        }
     }
 
     #[test]
@@ -77,7 +85,7 @@ mod tests {
             .collect();
         seeds.sort_unstable();
         seeds.dedup();
-        assert_eq!(seeds.len(), 2 * 8 * 50);
+        assert_eq!(seeds.len(), 2 * 12 * 50);
         assert_eq!(part_seed(1, &objects[2]), 1002);
     }
 }

@@ -21,8 +21,8 @@ const BLACK: Colour = [0.09, 0.09, 0.10];
 
 /// White print on the board.
 const LETTERING: [Lettering; 14] = [
-    Lettering::level("SDG IO-4", -8.0, -11.5, 2.2),
-    Lettering::level("V1.2", 4.0, -15.0, 1.8),
+    Lettering::level("SDG IO-4", -9.6, -11.2, 1.8),
+    Lettering::level("V1.2", 4.0, -15.2, 1.6),
     Lettering::level("U1", -4.5, 9.3, 1.3),
     Lettering::level("U2", 20.3, 10.0, 1.3),
     Lettering::level("U3", -16.0, 3.9, 1.3),
@@ -81,9 +81,9 @@ pub fn board_texture() -> Texture {
         let margins = [0.0018, 0.0022, 0.0022, 0.0007, 0.0007, 0.0007, 0.0007, 0.0006, 0.0006];
         LETTERING.iter().any(|text| text.covers(place))
             || blocks.iter().zip(margins).any(|(block, margin)| outlined(place, block, margin))
-            || CANS.iter().any(|&(x, y, radius, _)| {
-                (0.0006..0.0009).contains(&((place - Point2::new(x, y)).norm() - radius))
-            })
+            || CANS
+                .iter()
+                .any(|&(x, y, radius, _)| (0.0006..0.0009).contains(&((place - Point2::new(x, y)).norm() - radius)))
             || CHIPS.iter().any(|&(x, y, along_y)| {
                 let size = if along_y { (0.0022, 0.0034) } else { (0.0034, 0.0022) };
                 outlined(place, &Block { at: (x, y), size, height: 0.0 }, 0.0001)
@@ -121,7 +121,8 @@ pub fn board_texture() -> Texture {
             track.corners.windows(2).any(|pair| distance_to_segment(place, pair[0], pair[1]) < track.half_width)
         });
         // A copper plane fills the lower left and the surroundings of the relay.
-        let plane = in_rectangle(place, (-0.0260, -0.0080), (0.0280, 0.0240)) || in_rectangle(place, (0.0270, -0.0080), (0.0230, 0.0210));
+        let plane = in_rectangle(place, (-0.0260, -0.0080), (0.0280, 0.0240))
+            || in_rectangle(place, (0.0270, -0.0080), (0.0230, 0.0210));
         let base = if on_track != plane { MASK_OVER_COPPER } else { MASK };
         let shade = 1.0 + 0.06 * blotches.fractal(place.x / SPAN, place.y / SPAN, 3);
         base.map(|channel| channel * shade)

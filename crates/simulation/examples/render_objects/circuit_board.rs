@@ -40,7 +40,8 @@ pub const CONTROLLER: Block = block(0.0040, 0.0020, 0.0120, 0.0120, 0.0014);
 pub const DRIVER: Block = block(0.0275, 0.0100, 0.0100, 0.0040, 0.0016);
 pub const MEMORY: Block = block(-0.0160, -0.0005, 0.0050, 0.0040, 0.0016);
 pub const RELAY: Block = block(0.0275, -0.0080, 0.0190, 0.0152, 0.0155);
-pub const TERMINALS: [Block; 2] = [block(0.0455, -0.0085, 0.0082, 0.0203, 0.0102), block(0.0455, 0.0110, 0.0082, 0.0102, 0.0102)];
+pub const TERMINALS: [Block; 2] =
+    [block(0.0455, -0.0085, 0.0082, 0.0203, 0.0102), block(0.0455, 0.0110, 0.0082, 0.0102, 0.0102)];
 pub const JACK: Block = block(-0.0365, -0.0130, 0.0140, 0.0092, 0.0108);
 pub const HEADER: Block = block(0.0080, 0.0208, 0.0254, 0.0050, 0.0025);
 const USB: Block = block(-0.0355, 0.0100, 0.0165, 0.0120, 0.0108);
@@ -98,7 +99,8 @@ pub fn circuit_board() -> Part {
     }
     for terminal in &TERMINALS {
         plastics.append(&solid(&Block { height: 0.0070, ..*terminal }, 0.0));
-        let upper = block(terminal.at.0 - 0.0010, terminal.at.1, terminal.size.0 - 0.0030, terminal.size.1, terminal.height);
+        let upper =
+            block(terminal.at.0 - 0.0010, terminal.at.1, terminal.size.0 - 0.0030, terminal.size.1, terminal.height);
         plastics.append(&solid(&upper, 0.0005));
     }
     for (x, y, along_y) in CHIPS {
@@ -173,7 +175,12 @@ pub fn circuit_board() -> Part {
                       with 44 pins, relay, USB socket, power jack, screw terminals, pin header, capacitors, crystal",
         pieces: vec![
             Piece { name: "board", mesh: centred_texture(board, SPAN), density: 1850.0, material: "mask" },
-            Piece { name: "plastics", mesh: centred_texture(plastics, SPAN), density: 1.4 * PLASTIC, material: "plastics" },
+            Piece {
+                name: "plastics",
+                mesh: centred_texture(plastics, SPAN),
+                density: 1.4 * PLASTIC,
+                material: "plastics",
+            },
             // Sockets and screws are mostly hollow or thin.
             Piece { name: "tin", mesh: tin.textured_from_above(0.02), density: 0.35 * STEEL, material: "tin" },
             Piece { name: "brass", mesh: brass.textured_from_above(0.02), density: BRASS, material: "gold" },
@@ -238,7 +245,15 @@ fn pins() -> TriangleMesh {
 /// A pan head with a slot.
 fn screw_head() -> TriangleMesh {
     let mut mesh = lathe(
-        &[(0.0, 0.0), (0.0028, 0.0), (0.0028, 0.0010), (0.0024, 0.0015), (0.0014, 0.0019), (0.0012, 0.0012), (0.0, 0.0012)],
+        &[
+            (0.0, 0.0),
+            (0.0028, 0.0),
+            (0.0028, 0.0010),
+            (0.0024, 0.0015),
+            (0.0014, 0.0019),
+            (0.0012, 0.0012),
+            (0.0, 0.0012),
+        ],
         28,
     );
     // The socket is filled by a bar but for a cross.

@@ -20,7 +20,7 @@ const RIVET_RADIUS: f64 = 0.0042;
 const JAW_TIP: f64 = 0.0520;
 /// Half the gap between the closed jaws.
 const GAP: f64 = 0.00025;
-const HANDLE_MIDDLE: f64 = 0.0052;
+const HANDLE_MIDDLE: f64 = 0.0054;
 const HANDLE: [(f64, f64); 4] = [(-0.0240, 0.0108), (-0.0500, 0.0205), (-0.0800, 0.0225), (-0.1085, 0.0160)];
 /// Plan that the steel's texture covers.
 const SPAN: f64 = 0.10;
@@ -163,8 +163,8 @@ fn tang(cut_radius: f64) -> Vec<Point2<f64>> {
         (-0.0003, JOINT_HALF_WIDTH),
         (-0.0090, JOINT_HALF_WIDTH),
         (-0.0180, 0.0128),
-        (-0.0320, 0.0172),
-        (-0.0300, 0.0098),
+        (-0.0285, 0.0160),
+        (-0.0275, 0.0096),
         (-0.0220, 0.0062),
         (-0.0160, 0.0026),
         (-0.0125, 0.0004),
@@ -179,16 +179,16 @@ fn tang(cut_radius: f64) -> Vec<Point2<f64>> {
 fn sleeve_half_size(part: f64) -> (f64, f64) {
     let guard = 0.0011 * (-((part - 0.10) / 0.035).powi(2)).exp();
     let belly = 0.0008 * (-((part - 0.50) / 0.28).powi(2)).exp();
-    // A quarter of an ellipse at either end.
+    // A blunt start and a quarter of an ellipse at the end.
     let end = |distance: f64, length: f64| (1.0 - (1.0 - (distance / length).min(1.0)).powi(2)).max(0.0).sqrt();
-    let fade = (0.35 + 0.65 * end(part, 0.05)) * (0.12 + 0.88 * end(1.0 - part, 0.06));
-    ((0.0044 + guard + belly) * fade, (0.0047 + 0.4 * guard + 0.4 * belly).min(HANDLE_MIDDLE) * fade)
+    let fade = (0.88 + 0.12 * end(part, 0.03)) * (0.12 + 0.88 * end(1.0 - part, 0.06));
+    ((0.0044 + guard + belly) * fade, (0.0052 + 0.2 * belly) * fade)
 }
 
 /// Half width and half height of the inlay on a sleeve: it stands out on top.
 fn inlay_half_size(part: f64) -> (f64, f64) {
     let fade = (1.0 - (2.0 * part - 1.0).abs().powi(4)).max(0.02).sqrt();
-    (0.0031 * fade, 0.0047 + 0.0008 * fade)
+    (0.0031 * fade, 0.0050 + 0.0008 * fade)
 }
 
 /// Brushed steel with darker marks stamped into jaws and tangs, drawn to scale.
@@ -202,10 +202,9 @@ fn ground_steel() -> Texture {
     ];
     plan_texture(384, SPAN, |place| {
         let (u, v) = (place.x / SPAN, place.y / SPAN);
-        // The jaws' insides are ground brighter than the forged tangs.
-        let base = if place.x > 0.0 { 0.66 } else { 0.60 };
-        let cutter = in_rectangle(place, (0.0155, 0.0), (0.0090, 0.0030));
-        let shade = base * (1.0 + 0.10 * lines.at(u, v) + 0.05 * broad.fractal(u, v, 2));
+        // The cutter's edges are ground brighter.
+        let cutter = in_rectangle(place, (0.0145, 0.0), (0.0085, 0.0030));
+        let shade = 0.64 * (1.0 + 0.10 * lines.at(u, v) + 0.05 * broad.fractal(u, v, 2));
         let shade = if cutter { shade * 1.15 } else { shade };
         let shade = if stamps.iter().any(|stamp| stamp.covers(place)) { 0.45 * shade } else { shade };
         [shade, shade * 1.005, shade * 1.02]

@@ -12,7 +12,10 @@ macro_rules! embedded {
 /// A file's name and bytes, compiled in.
 pub(super) type EmbeddedFile = (&'static str, &'static [u8]);
 
-/// Name and files of every part that is compiled in.
+/// How many of [`EMBEDDED`] are the paper's parts: they come first.
+pub(super) const NUM_PAPER_PARTS: usize = 8;
+
+/// Name and files of every part that is compiled in: the paper's eight, then the held-out four.
 pub(super) const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
     "pendulum": [
         "object.json", "object.xml",
@@ -74,9 +77,17 @@ pub(super) const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
         "pliers_steel.obj", "pliers_lap.obj", "pliers_rivet.obj", "pliers_sleeves.obj", "pliers_inlays.obj",
         "pliers_ground.png", "pliers_oiled.png", "pliers_turned.png", "pliers_dipped.png", "pliers_inlay.png",
     ],
+    "circuit_board": [
+        "object.json", "object.xml",
+        "circuit_board_board.obj", "circuit_board_plastics.obj", "circuit_board_tin.obj", "circuit_board_brass.obj",
+        "circuit_board_lids.obj",
+        "circuit_board_mask.png", "circuit_board_plastics.png", "circuit_board_tin.png", "circuit_board_gold.png",
+        "circuit_board_lid.png",
+    ],
     "spring_clip": [
         "object.json", "object.xml",
-        "spring_clip_leaf.obj", "spring_clip_lower.obj", "spring_clip_bead.obj", "spring_clip_rivet.obj", "spring_clip_cover.obj",
+        "spring_clip_leaf.obj", "spring_clip_lower.obj", "spring_clip_bead.obj", "spring_clip_rivet.obj",
+        "spring_clip_cover.obj",
         "spring_clip_leaf.png", "spring_clip_steel.png", "spring_clip_brass.png", "spring_clip_vinyl.png",
     ],
 };

@@ -27,7 +27,7 @@ use crate::model::Asset;
 use crate::scene::MjcfFragment;
 use crate::scene::pose_attributes;
 
-use embedded::EMBEDDED;
+use embedded::{EMBEDDED, NUM_PAPER_PARTS};
 use metadata::Metadata;
 
 pub(crate) use height_map::HeightMap;
@@ -89,9 +89,20 @@ pub struct GraspError {
 }
 
 impl ObjectSpec {
-    /// The names of the parts that are compiled in.
+    /// The names of the parts that are compiled in: the paper's, then the held-out ones.
     pub fn names() -> impl Iterator<Item = &'static str> {
         EMBEDDED.iter().map(|(name, _)| *name)
+    }
+
+    /// The names of the paper's eight parts.
+    pub fn paper_names() -> impl Iterator<Item = &'static str> {
+        Self::names().take(NUM_PAPER_PARTS)
+    }
+
+    /// The names of four parts of another kind: no constant may be fitted on them, and results on them are reported
+    /// apart from those on the paper's parts.
+    pub fn held_out_names() -> impl Iterator<Item = &'static str> {
+        Self::names().skip(NUM_PAPER_PARTS)
     }
 
     /// One of the parts that are compiled in.
@@ -264,13 +275,20 @@ mod tests {
 
     #[test]
     fn every_part_compiled_in_reads_and_equals_its_folder() {
-        assert_eq!(ObjectSpec::names().count(), 8);
+        assert_eq!(ObjectSpec::names().count(), 12);
         for name in ObjectSpec::names() {
             let spec = ObjectSpec::by_name(name).unwrap();
             assert_eq!(spec.name, name);
             assert!(spec.mass_kg < 1.0 && spec.jaw_width_m < 0.055, "{name}");
             assert_eq!(spec, ObjectSpec::from_folder(&source_folder().join(name)).unwrap());
         }
+    }
+
+    #[test]
+    fn held_out_parts_follow_the_papers() {
+        let paper: Vec<_> = ObjectSpec::paper_names().collect();
+        assert_eq!((paper.len(), paper[0], paper[7]), (8, "pendulum", "cranfield_face"));
+        assert!(ObjectSpec::held_out_names().eq(["key", "pliers", "circuit_board", "spring_clip"]));
     }
 
     #[test]
