@@ -1,6 +1,6 @@
 //! An OpenGL context that needs no display: EGL on Mesa's surfaceless platform.
 
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use khronos_egl as egl;
 
@@ -48,6 +48,16 @@ fn open() -> std::result::Result<Surfaceless, String> {
     Ok(Surfaceless { egl, display, config })
 }
 
+/// A context that is current on no thread.
+struct Unused(egl::Context);
+
+// SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section 3.7.3).
+unsafe impl Send for Unused {}
+
+/// Contexts that nobody uses now. The driver compiles its shaders anew for each new context, which takes longer than a
+/// picture; one that was used before has them.
+static UNUSED: Mutex<Vec<Unused>> = Mutex::new(Vec::new());
+
 /// An OpenGL context of its own, current on no thread except while a [`Current`] lives.
 pub(crate) struct OffscreenContext {
     egl: &'static Surfaceless,
@@ -57,6 +67,9 @@ pub(crate) struct OffscreenContext {
 impl OffscreenContext {
     pub(crate) fn new() -> Result<Self> {
         let surfaceless = surfaceless()?;
+        if let Some(Unused(context)) = UNUSED.lock().unwrap_or_else(PoisonError::into_inner).pop() {
+            return Ok(Self { egl: surfaceless, context });
+        }
         let failed = |error| SimulationError::Rendering { reason: format!("no OpenGL context ({error})") };
         // The bound API is a thread's own state.
         surfaceless.egl.bind_api(egl::OPENGL_API).map_err(failed)?;
@@ -79,8 +92,7 @@ impl OffscreenContext {
 
 impl Drop for OffscreenContext {
     fn drop(&mut self) {
-        // A context that cannot be destroyed is leaked; nothing better can be done while dropping.
-        let _ = self.egl.egl.destroy_context(self.egl.display, self.context);
+        UNUSED.lock().unwrap_or_else(PoisonError::into_inner).push(Unused(self.context));
     }
 }
 

@@ -102,12 +102,18 @@ pub struct Distractor {
     /// Its convex outline from above, in the base frame, counter-clockwise.
     pub footprint: Vec<Point2<f64>>,
     seed: u64,
+    scale: f64,
 }
 
 impl Distractor {
     /// Makes a distractor; `seed` fixes its size and finish.
     pub fn new(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64) -> Self {
-        let pieces = pieces(kind, seed);
+        Self::scaled(kind, table_from_distractor, seed, 1.0)
+    }
+
+    /// As [`Distractor::new`], all lengths times `scale`.
+    pub fn scaled(kind: DistractorKind, table_from_distractor: &Isometry2<f64>, seed: u64, scale: f64) -> Self {
+        let pieces = scaled_pieces(kind, seed, scale);
         let lowest = pieces.iter().map(|piece| piece.mesh.bounds().0.z).fold(f64::INFINITY, f64::min);
         let outline =
             convex_hull(pieces.iter().flat_map(|piece| piece.mesh.vertices.iter().map(|vertex| vertex.position.xy())));
@@ -120,17 +126,18 @@ impl Distractor {
             ),
             footprint: placed(&outline, table_from_distractor),
             seed,
+            scale,
         }
     }
 
     /// The same distractor at another place on the table.
     pub fn moved_to(&self, table_from_distractor: &Isometry2<f64>) -> Self {
-        Self::new(self.kind, table_from_distractor, self.seed)
+        Self::scaled(self.kind, table_from_distractor, self.seed, self.scale)
     }
 
     /// Its triangles in its own frame.
     pub(crate) fn triangles(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
-        pieces(self.kind, self.seed)
+        scaled_pieces(self.kind, self.seed, self.scale)
             .into_iter()
             .flat_map(|piece| piece.mesh.faces.iter().map(|&face| piece.mesh.corners(face)).collect::<Vec<_>>())
     }
@@ -139,7 +146,7 @@ impl Distractor {
     pub(super) fn fragment(&self, index: usize) -> MjcfFragment {
         let mut fragment = MjcfFragment::default();
         let mut geoms = String::new();
-        for (piece_idx, piece) in pieces(self.kind, self.seed).into_iter().enumerate() {
+        for (piece_idx, piece) in scaled_pieces(self.kind, self.seed, self.scale).into_iter().enumerate() {
             let name = format!("distractor_{index}_{piece_idx}");
             let metal = !matches!(piece.stuff.look, Look::Plastic | Look::Printed);
             fragment.add_mesh(&name, &piece.mesh);
@@ -228,6 +235,16 @@ fn laid(mesh: TriangleMesh, x: f64, height: f64) -> TriangleMesh {
 
 fn raised(mesh: TriangleMesh, z: f64) -> TriangleMesh {
     mesh.transformed(&Isometry3::translation(0.0, 0.0, z))
+}
+
+fn scaled_pieces(kind: DistractorKind, seed: u64, scale: f64) -> Vec<Piece> {
+    let mut pieces = pieces(kind, seed);
+    if scale != 1.0 {
+        for vertex in pieces.iter_mut().flat_map(|piece| &mut piece.mesh.vertices) {
+            vertex.position *= scale;
+        }
+    }
+    pieces
 }
 
 /// The pieces in the distractor's frame: z up as it rests, about the origin in x and y.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
+use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2, Vector3};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
@@ -33,7 +33,9 @@ const KINDS: [DistractorKind; 10] = [
 ];
 
 /// Covers that are tried until one covers enough.
-const MAX_COVERS: usize = 40;
+const MAX_COVERS: u32 = 60;
+/// First step from the estimated place, in metres.
+const FIRST_STEP_M: f64 = 0.003;
 /// Pictures that are measured to find a cover's place.
 const MAX_MEASUREMENTS: usize = 8;
 /// Side of a cell of the views from above, in metres.
@@ -51,20 +53,26 @@ struct Slide {
     cover_map: HeightMap,
     /// Where the cover's middle is at the end of its way, in the base frame, and where it comes from.
     end: Point2<f64>,
+    camera: Vector3<f64>,
+    cover_middle_m: f64,
     direction: Vector2<f64>,
     yaw_rad: f64,
 }
 
 impl Slide {
-    fn new(part: &PlacedObject, part_map: &HeightMap, rng: &mut Pcg64Mcg) -> Self {
+    fn new(part: &PlacedObject, part_map: &HeightMap, scale: f64, rng: &mut Pcg64Mcg) -> Self {
         let kind = KINDS[rng.random_range(0..KINDS.len())];
-        let cover = Distractor::new(kind, &Isometry2::identity(), rng.random());
+        let cover = Distractor::scaled(kind, &Isometry2::identity(), rng.random(), scale);
         let triangles: Vec<([Point3<f64>; 3], u32)> = cover.triangles().map(|corners| (corners, 0)).collect();
         let (yaw_rad, from_rad): (f64, f64) = (rng.random_range(-PI..PI), rng.random_range(-PI..PI));
         // Any place of the part may be covered, its ends as well as its middle.
         let filled: Vec<Point2<f64>> = part_map.filled().map(|(at, ..)| at).collect();
         let end = part.table_from_object() * filled[rng.random_range(0..filled.len())];
+        let heights = triangles.iter().flat_map(|(corners, _)| corners.map(|corner| corner.z));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
         Self {
+            camera: base_from_look_camera().translation.vector,
+            cover_middle_m: 0.5 * (high - low),
             cover_map: HeightMap::new(&triangles, CELL_M),
             cover,
             part: part.clone(),
@@ -79,34 +87,52 @@ impl Slide {
         Isometry2::new(self.end.coords + self.direction * distance_m, self.yaw_rad)
     }
 
-    /// Share of the part that the cover hides from straight above, and the height of the part's top under it.
-    fn from_above(&self, distance_m: f64) -> (f64, f64) {
-        let cover_from_part = self.table_from_cover(distance_m).inverse() * self.part.table_from_object();
-        let (mut covered, mut total, mut top) = (0, 0, f64::NEG_INFINITY);
+    /// Height of the part's top under the cover; `None` beside the part.
+    fn top_m(&self, table_from_cover: &Isometry2<f64>) -> Option<f64> {
+        let cover_from_part = table_from_cover.inverse() * self.part.table_from_object();
+        self.part_map
+            .filled()
+            .filter(|(at, ..)| self.cover_map.at(&(cover_from_part * at)).is_some())
+            .map(|(_, z, _)| z + self.part.spec.rest_height_m)
+            .reduce(f64::max)
+    }
+
+    /// Share of the part that the cover hides from the camera, the cover taken for a flat thing at half of its height.
+    fn estimated_share(&self, distance_m: f64) -> f64 {
+        let table_from_cover = self.table_from_cover(distance_m);
+        let bottom_m = self.top_m(&table_from_cover).unwrap_or(0.0) + AIR_M;
+        let (cover_from_table, table_from_part) = (table_from_cover.inverse(), self.part.table_from_object());
+        let (mut covered, mut total) = (0, 0);
         for (at, z, _) in self.part_map.filled() {
             total += 1;
-            if self.cover_map.at(&(cover_from_part * at)).is_some() {
-                covered += 1;
-                top = top.max(z);
-            }
+            let at = (table_from_part * at).coords.push(z + self.part.spec.rest_height_m);
+            // Where the ray from the part to the camera passes the cover's height.
+            let rise = (bottom_m + self.cover_middle_m - at.z).max(0.0) / (self.camera.z - at.z);
+            let passed = at + (self.camera - at) * rise;
+            covered += i32::from(self.cover_map.at(&(cover_from_table * Point2::from(passed.xy()))).is_some());
         }
-        (f64::from(covered) / f64::from(total.max(1)), top + self.part.spec.rest_height_m)
+        f64::from(covered) / f64::from(total.max(1))
     }
 
     /// Where the cover lies at a distance from the end of its way.
     fn pose(&self, distance_m: f64) -> Isometry3<f64> {
-        let (share, top) = self.from_above(distance_m);
-        let mut placed = self.cover.moved_to(&self.table_from_cover(distance_m));
-        if share > 0.0 {
-            placed.base_from_distractor.translation.z += top + AIR_M;
+        let table_from_cover = self.table_from_cover(distance_m);
+        let mut placed = self.cover.moved_to(&table_from_cover);
+        if let Some(top_m) = self.top_m(&table_from_cover) {
+            placed.base_from_distractor.translation.z += top_m + AIR_M;
         }
         placed.base_from_distractor
     }
 
-    /// The distance at which the cover hides the wanted share as seen from above; `None` where it never does.
+    /// The distance at which the cover first hides the wanted share on its way; `None` where it never does.
     fn distance_for(&self, wanted: f64) -> Option<f64> {
-        let step_m = 0.002;
-        (0..150).rev().map(|step| f64::from(step) * step_m).find(|&distance| self.from_above(distance).0 >= wanted)
+        let on_the_way = |step: f64, from: f64, num_steps: u32| {
+            (0..=num_steps)
+                .map(move |number| from - step * f64::from(number))
+                .find(|&distance| self.estimated_share(distance) >= wanted)
+        };
+        let coarse = on_the_way(0.008, 0.20, 25)?;
+        on_the_way(0.001, coarse + 0.008, 8)
     }
 }
 
@@ -121,8 +147,10 @@ pub(super) fn draw_covered(request: &mut Request<'_>) -> Result<Drawn> {
         found: format!("none of {MAX_COVERS} for {}", request.spec.name),
     };
     let part = ordinary.object.clone().ok_or_else(none)?;
-    for _ in 0..MAX_COVERS {
-        let slide = Slide::new(&part, &part_map, &mut request.rng);
+    for number in 0..MAX_COVERS {
+        // Where usual things are too small for the part, larger ones are tried.
+        let scale = 1.0 + f64::from(number) / f64::from(MAX_COVERS);
+        let slide = Slide::new(&part, &part_map, scale, &mut request.rng);
         let Some(estimate) = slide.distance_for(wanted) else { continue };
         let mut scene = ordinary.clone();
         let mut cover = slide.cover.moved_to(&slide.table_from_cover(estimate));
@@ -170,10 +198,10 @@ fn lay_over(
         if share > wanted {
             near_m = distance_m;
             // The first steps keep near the estimate, which is seldom far off.
-            distance_m = (distance_m + 0.008).min(0.5 * (distance_m + far_m));
+            distance_m = (distance_m + FIRST_STEP_M).min(0.5 * (distance_m + far_m));
         } else {
             far_m = distance_m;
-            distance_m = (distance_m - 0.008).max(0.5 * (near_m + distance_m));
+            distance_m = (distance_m - FIRST_STEP_M).max(0.5 * (near_m + distance_m));
         }
     }
     Ok(None)
