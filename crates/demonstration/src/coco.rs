@@ -195,9 +195,15 @@ impl CocoFile {
 
     /// Adds an image and what is marked on it; ids count up from 1.
     pub fn push_image(&mut self, file_name: &str, width: u32, height: u32, objects: &[Annotation]) {
+        let instances: Vec<_> = objects.iter().map(|object| LabelledInstance::new(object.clone(), false)).collect();
+        self.push_labelled(file_name, width, height, &instances);
+    }
+
+    /// Adds a test picture and the instances on it, each optional or not; ids count up from 1.
+    pub fn push_labelled(&mut self, file_name: &str, width: u32, height: u32, instances: &[LabelledInstance]) {
         let image_id = self.images.len() + 1;
         self.images.push(json!({"id": image_id, "file_name": file_name, "width": width, "height": height}));
-        for object in objects {
+        for LabelledInstance { annotation: object, optional, .. } in instances {
             let category = self.labels.iter().position(|label| *label == object.label).unwrap_or_else(|| {
                 self.labels.push(object.label.clone());
                 self.labels.len() - 1
@@ -232,6 +238,9 @@ impl CocoFile {
                 // For people and other programs: it follows from box and keypoints, and is not read.
                 let offset = line.center() - object.bbox.center();
                 attributes.insert("grasp_offset".into(), json!([offset.x, offset.y]));
+            }
+            if *optional {
+                attributes.insert("optional".into(), json!(true));
             }
             if !attributes.is_empty() {
                 annotation["attributes"] = attributes.into();

@@ -18,8 +18,15 @@ pub struct LabelledInstance {
     /// Neither missed when it is not found nor wrong when it is: mostly covered, or seen from another side. LabelMe: the
     /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
     pub optional: bool,
-    /// Where in the file it stands, such as `shapes[3]` or `annotations[0]`.
+    /// Where in the file it stands, such as `shapes[3]` or `annotations[0]`; empty for one that is not from a file.
     pub place: String,
+}
+
+impl LabelledInstance {
+    /// An instance that does not come from a file.
+    pub fn new(annotation: Annotation, optional: bool) -> Self {
+        Self { annotation, optional, place: String::new() }
+    }
 }
 
 /// A label file, LabelMe or COCO JSON, parsed once for however many pictures it labels.
@@ -158,11 +165,11 @@ mod tests {
         let objects: Vec<Annotation> =
             marked.instances(&IMAGE).unwrap().into_iter().map(|instance| instance.annotation).collect();
         let mut file = CocoFile::new();
-        file.push_image("a.png", 640, 480, &objects);
+        let flagged = [(&objects[0], false), (&objects[1], true)]
+            .map(|(annotation, optional)| LabelledInstance::new(annotation.clone(), optional));
+        file.push_labelled("a.png", 640, 480, &flagged);
         file.push_image("b.png", 320, 240, &[]);
-        let mut value: Value = serde_json::from_str(&file.to_json()).unwrap();
-        value["annotations"][1]["attributes"]["optional"] = json!(true);
-        let labels = parse(&value);
+        let labels = LabelFile::parse(file.to_json().as_bytes()).unwrap();
         assert_eq!(labels.picture_names().unwrap(), ["a.png", "b.png"]);
         let instances = labels.instances(&IMAGE).unwrap();
         assert_eq!(instances.iter().map(|instance| instance.optional).collect::<Vec<_>>(), [false, true]);
