@@ -1,0 +1,144 @@
+//! Whether two parts look alike under a turn: the measure behind symmetry and look-alikes.
+
+use sdg_geometry::RotationalSymmetry;
+
+use crate::recipe::Material;
+use crate::relief::{Level, Relief};
+
+/// Share of the cells that may differ between two parts that look the same: what rounding to cells leaves.
+const MAX_SAME_SHARE: f32 = 0.0015;
+
+/// The most turns of a whole that are looked for.
+const MAX_FOLD: u32 = 40;
+
+/// Heights differ visibly beyond this, in millimetres, plus a share of the part's height.
+const HEIGHT_TOLERANCE_MM: f32 = 0.3;
+const HEIGHT_TOLERANCE_SHARE: f32 = 0.03;
+
+/// Colours differ visibly beyond this (sum over channels of square roots of linear values).
+const COLOR_TOLERANCE: f32 = 0.12;
+
+/// The middle of the area that a part covers, in its own frame.
+pub(crate) fn centroid(relief: &Relief) -> [f32; 2] {
+    let level = &relief.levels[1];
+    let (mut sum, mut count) = ([0.0f64; 2], 0usize);
+    for y in 0..level.height {
+        for x in 0..level.width {
+            if level.texels[y * level.width + x].top > 0 {
+                let place = relief.place(level, x, y);
+                sum = [sum[0] + f64::from(place[0]), sum[1] + f64::from(place[1])];
+                count += 1;
+            }
+        }
+    }
+    sum.map(|s| (s / count.max(1) as f64) as f32)
+}
+
+/// Two parts, each with the place that the turn keeps.
+pub(crate) struct Comparison<'a> {
+    a: (&'a Relief, [f32; 2]),
+    b: (&'a Relief, [f32; 2]),
+    height_tolerance_mm: f32,
+    same_material: Vec<bool>,
+}
+
+impl<'a> Comparison<'a> {
+    /// Compares `a` with `b`, whose centres lie on each other.
+    pub fn new(a: &'a Relief, center_a: [f32; 2], b: &'a Relief, center_b: [f32; 2]) -> Self {
+        let same_material = a
+            .materials
+            .iter()
+            .flat_map(|one| b.materials.iter().map(move |other| look_distance(one, other) < COLOR_TOLERANCE))
+            .collect();
+        let height_tolerance_mm = HEIGHT_TOLERANCE_MM + HEIGHT_TOLERANCE_SHARE * a.top_mm.max(b.top_mm);
+        Self { a: (a, center_a), b: (b, center_b), height_tolerance_mm, same_material }
+    }
+
+    /// Share of the cells that have no counterpart within a cell when `a` is turned by `turn` radians; counting stops
+    /// once it is above `enough`.
+    pub fn difference(&self, turn: f32, enough: f32) -> f32 {
+        let covered = self.a.0.levels[1].texels.iter().filter(|texel| texel.top > 0).count().max(1);
+        let limit = (enough * covered as f32).ceil() as usize + 4;
+        let there = self.unmatched(false, turn, limit);
+        if there > limit {
+            return there as f32 / covered as f32;
+        }
+        (there + self.unmatched(true, -turn, limit)) as f32 / covered as f32
+    }
+
+    /// Whether the two look the same when `a` is turned.
+    pub fn is_same(&self, turn: f32) -> bool {
+        self.difference(turn, MAX_SAME_SHARE) <= MAX_SAME_SHARE
+    }
+
+    /// Whether some turn makes the two look the same.
+    pub fn is_same_at_some_turn(&self) -> bool {
+        (0..360).any(|degree| self.is_same((degree as f32).to_radians()))
+    }
+
+    fn unmatched(&self, backwards: bool, turn: f32, limit: usize) -> usize {
+        let ((from, from_center), (to, to_center)) = if backwards { (self.b, self.a) } else { (self.a, self.b) };
+        let (level, target) = (&from.levels[1], &to.levels[1]);
+        let (sin, cos) = turn.sin_cos();
+        let mut count = 0;
+        // Every third row first: a difference shows early.
+        for first in [1, 0, 2] {
+            for y in (first..level.height).step_by(3) {
+                for x in 0..level.width {
+                    let texel = level.texels[y * level.width + x];
+                    if texel.top == 0 {
+                        continue;
+                    }
+                    let [px, py] = from.place(level, x, y);
+                    let (px, py) = (px - from_center[0], py - from_center[1]);
+                    let q = [cos * px - sin * py + to_center[0], sin * px + cos * py + to_center[1]];
+                    let top = texel.top as f32 * from.step;
+                    if !self.has_match(to, target, q, top, texel.material, backwards) {
+                        count += 1;
+                        if count > limit {
+                            return count;
+                        }
+                    }
+                }
+            }
+        }
+        count
+    }
+
+    fn has_match(&self, to: &Relief, level: &Level, at: [f32; 2], top: f32, material: u8, backwards: bool) -> bool {
+        let gx = ((at[0] - to.min[0]) / level.cell).floor() as i32;
+        let gy = ((at[1] - to.min[1]) / level.cell).floor() as i32;
+        (-1..=1).any(|dy| {
+            (-1..=1).any(|dx| {
+                let other = level.get(gx + dx, gy + dy);
+                let (a, b) = if backwards { (other.material, material) } else { (material, other.material) };
+                other.top > 0
+                    && (other.top as f32 * to.step - top).abs() < self.height_tolerance_mm
+                    && self.same_material[a as usize * self.b.0.materials.len() + b as usize]
+            })
+        })
+    }
+}
+
+/// How differently two materials look under even light.
+fn look_distance(one: &Material, other: &Material) -> f32 {
+    (0..3)
+        .map(|k| {
+            let look = |m: &Material| (m.albedo[k] + 0.7 * m.reflectance[k]).sqrt();
+            (look(one) - look(other)).abs()
+        })
+        .sum()
+}
+
+/// Which turns about its middle leave a part looking as it was.
+pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry {
+    let comparison = Comparison::new(relief, center, relief, center);
+    // Turns that no fold up to 40 has in common.
+    if [7.0f32, 17.0, 31.0, 53.0, 101.0, 149.0].iter().all(|degrees| comparison.is_same(degrees.to_radians())) {
+        return RotationalSymmetry::Full;
+    }
+    (2..=MAX_FOLD)
+        .rev()
+        .find(|&fold| comparison.is_same(std::f32::consts::TAU / fold as f32))
+        .map_or(RotationalSymmetry::None, RotationalSymmetry::Fold)
+}

@@ -1,0 +1,55 @@
+//! Random rigid parts, their look-alikes, and pictures of scenes with the truth: to measure and to pretrain with.
+//!
+//! ```text
+//! seed ─ Part (recipe ─ relief ─ grasp, symmetry, outline) ─┬─ look_alike ─┐
+//!                                                           ├─ demonstration ─ Demonstration {photo, marks}
+//!                                                           └─ Scenes ─ sample(i) ─ Sample {image, instances, others}
+//! ```
+//!
+//! A part is a height field with materials, built from a recipe of flat shapes that raise, cut and paint it: flat
+//! stampings, turned, bent, cast and moulded parts. Scenes are drawn by following lines of sight through a pinhole
+//! camera onto those height fields, with soft shadows, mirrored surroundings, and what lens and sensor do. Sample *i* of
+//! a seed is the same to the bit whoever asks, in whatever order and on however many threads.
+//!
+//! **Frames.** A part's: millimetres, x right, y down as seen from above, z up from the table. A picture's: pixels, the
+//! centre of the first pixel at (0.5, 0.5). Angles are radians from x to y, so clockwise as seen.
+//!
+//! What is deliberately absent: files, clocks, tensors (no burn), a simulator, and every part that the project ships:
+//! nothing here is modelled on one.
+//!
+//! ```
+//! use sdg_part_generator::{Condition, LookAlike, Part, PhotoConfig, SceneConfig, Scenes, demonstration};
+//!
+//! let part = Part::generate(7);
+//! let taught = demonstration(&part, &PhotoConfig::default(), 1);
+//! assert_eq!(taught.check(), Ok(()));
+//!
+//! let scenes = Scenes::new(&[part], SceneConfig { num_other_parts: 2, ..SceneConfig::only(Condition::Tilt) }, 3)?;
+//! let sample = scenes.sample(12);
+//! assert_eq!(sample, scenes.sample(12));
+//! let truth = &sample.instances[0];
+//! assert!(truth.visible_share > 0.5 && truth.scale > 0.5);
+//! # Ok::<(), sdg_part_generator::GeneratorError>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod comparison;
+mod error;
+mod grasp;
+mod look_alike;
+mod part;
+mod random;
+mod recipe;
+mod relief;
+mod scene;
+mod tiles;
+
+pub use error::{GeneratorError, Result};
+pub use grasp::PartGrasp;
+pub use look_alike::LookAlike;
+pub use part::{Part, PartKind};
+pub use scene::{
+    Condition, Conditions, DemonstrationPhoto, Instance, OtherKind, OtherObject, PhotoConfig, Sample, SceneConfig,
+    Scenes, demonstration,
+};

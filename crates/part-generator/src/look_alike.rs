@@ -1,0 +1,150 @@
+//! Parts that resemble a part: its mirror image, one feature elsewhere, another size.
+
+use std::sync::Arc;
+
+use nalgebra::Point2;
+use sdg_geometry::Polygon;
+
+use crate::Part;
+use crate::comparison::Comparison;
+use crate::grasp::MAX_JAW_WIDTH_MM;
+use crate::random::{Draw, Stream, generator};
+use crate::recipe::{Operation, Recipe, Shape};
+
+/// How far a feature is moved, as shares of the part's diagonal.
+const MOVE_SHARES: [f32; 2] = [0.05, 0.10];
+
+/// Share of the cells that a moved feature must change.
+const MIN_CHANGED_SHARE: f32 = 0.006;
+
+/// Moves that are tried before a part counts as one without a feature to move.
+const MAX_MOVES: usize = 24;
+
+/// How a look-alike differs from its part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum LookAlike {
+    /// The mirror image.
+    Mirrored,
+    /// One feature moved by 5 to 10 % of the part's diagonal.
+    FeatureMoved,
+    /// Another size: the factor, 0.8 to 1.25 by custom.
+    Scaled(f64),
+}
+
+impl Part {
+    /// A part that resembles this one and is another.
+    ///
+    /// None where there is no such part: the mirror image looks like the part under some turn, no feature can be
+    /// moved visibly, the factor is not positive and finite or is 1, or the look-alike could not be grasped.
+    pub fn look_alike(&self, kind: LookAlike, seed: u64) -> Option<Part> {
+        match kind {
+            LookAlike::Mirrored => self.mirrored(),
+            LookAlike::FeatureMoved => self.with_feature_moved(seed),
+            LookAlike::Scaled(factor) => self.scaled(factor),
+        }
+    }
+
+    fn mirrored(&self) -> Option<Part> {
+        let made = Part::from_recipe(self.kind, self.recipe.mirrored())?;
+        let comparison = Comparison::new(&self.relief, self.center, &made.relief, made.center);
+        (!comparison.is_same_at_some_turn()).then_some(made)
+    }
+
+    fn with_feature_moved(&self, seed: u64) -> Option<Part> {
+        let mut rng = generator(seed, Stream::LookAlike, 0);
+        let diagonal = self.diagonal_mm() as f32;
+        (0..MAX_MOVES).find_map(|_| {
+            let shift = diagonal * rng.uniform(MOVE_SHARES[0], MOVE_SHARES[1]);
+            let recipe = moved(&self.recipe, shift, rng.angle(), rng.random_group(&self.recipe))?;
+            let made = Part::from_recipe(self.kind, recipe)?;
+            // Held in place, a visible share must differ; under any other turn it must not look the same.
+            let in_place = Comparison::new(&self.relief, self.center, &made.relief, self.center);
+            let turned = Comparison::new(&self.relief, self.center, &made.relief, made.center);
+            let differs = in_place.difference(0.0, MIN_CHANGED_SHARE) > MIN_CHANGED_SHARE;
+            (differs && !turned.is_same_at_some_turn()).then_some(made)
+        })
+    }
+
+    fn scaled(&self, factor: f64) -> Option<Part> {
+        if !(factor.is_finite() && factor > 0.0) || factor == 1.0 {
+            return None;
+        }
+        let f = factor as f32;
+        let mut made = self.clone();
+        made.relief = Arc::new(self.relief.scaled(f));
+        made.center = self.center.map(|v| v * f);
+        made.grasp.start = self.grasp.start.map(|v| v * f);
+        made.grasp.end = self.grasp.end.map(|v| v * f);
+        made.grasp.jaw_width_mm *= f;
+        made.grasp.height_mm *= f;
+        made.outline = Polygon {
+            vertices: self.outline.vertices.iter().map(|v| Point2::new(v.x * factor, v.y * factor)).collect(),
+        };
+        (made.grasp.jaw_width_mm <= 1.25 * MAX_JAW_WIDTH_MM).then_some(made)
+    }
+}
+
+/// Draws a group that may move.
+trait DrawGroup {
+    fn random_group(&mut self, recipe: &Recipe) -> u16;
+}
+
+impl<R: Draw> DrawGroup for R {
+    fn random_group(&mut self, recipe: &Recipe) -> u16 {
+        let last = recipe.features.iter().map(|feature| feature.group).max().unwrap_or(0);
+        // 0 stands for the body, of which one corner or bend is moved.
+        self.whole(usize::from(last > 0), last as usize) as u16
+    }
+}
+
+/// The recipe with one group moved by `shift` in a direction; of the body, one corner, bend or shoulder.
+fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Recipe> {
+    let mut made = recipe.clone();
+    let (sin, cos) = direction.sin_cos();
+    if group > 0 {
+        let mut any = false;
+        for feature in made.features.iter_mut().filter(|feature| feature.group == group) {
+            any = true;
+            if let Operation::Turned { profile, ripples, .. } = &mut feature.operation {
+                // Along the axis only.
+                let along = shift * cos.signum();
+                profile.iter_mut().for_each(|point| point[0] += along);
+                ripples.iter_mut().for_each(|ripple| {
+                    ripple.from += along;
+                    ripple.to += along;
+                });
+            } else {
+                feature.center[0] += shift * cos;
+                feature.center[1] += shift * sin;
+            }
+        }
+        return any.then_some(made);
+    }
+    // The direction also chooses which point moves.
+    let choose = |count: usize| (direction * 1000.0) as usize % count;
+    let body = made.features.iter_mut().find(|feature| feature.group == 0)?;
+    match (&mut body.shape, &mut body.operation) {
+        (_, Operation::Turned { profile, .. }) => {
+            let last = profile.len() - 1;
+            let along = shift * cos.signum();
+            let point = if cos > 0.0 { &mut profile[last] } else { &mut profile[0] };
+            point[0] += along;
+        }
+        (Shape::Polygon { vertices, .. }, _) => {
+            let k = choose(vertices.len());
+            vertices[k] = [vertices[k][0] + shift * cos, vertices[k][1] + shift * sin];
+        }
+        (Shape::Path { points, .. }, _) => {
+            // Everything behind a bend moves.
+            let k = 1 + choose(points.len() - 1);
+            for point in &mut points[k..] {
+                point[0] += shift * cos;
+                point[1] += shift * sin;
+            }
+        }
+        (Shape::Rectangle { half, .. }, _) => half[0] += 0.5 * shift,
+        _ => return None,
+    }
+    Some(made)
+}

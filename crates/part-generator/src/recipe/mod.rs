@@ -1,0 +1,78 @@
+//! The construction of a part: features, applied in order, that raise, cut and paint a surface above the table.
+
+mod bent;
+mod builder;
+mod cast;
+mod cover;
+mod feature;
+mod material;
+mod shape;
+mod stamping;
+mod turned;
+
+use rand_pcg::Pcg64Mcg;
+
+pub(crate) use cover::cover;
+pub(crate) use feature::{Feature, Operation, State};
+pub(crate) use material::{Brushing, Material, paint_color};
+pub(crate) use shape::Shape;
+
+use crate::PartKind;
+
+/// The construction tree of a part: what it is made of and how, in millimetres.
+///
+/// The part's frame has x right, y down as seen from above, z up from the table.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Recipe {
+    /// The materials; features name them by index.
+    pub materials: Vec<Material>,
+    /// The features in the order in which they are applied.
+    pub features: Vec<Feature>,
+    /// Seed of the surface's grain.
+    pub grain_seed: u64,
+}
+
+impl Recipe {
+    /// Draws a part of a kind.
+    pub fn draw(kind: PartKind, rng: &mut Pcg64Mcg) -> Self {
+        match kind {
+            PartKind::Stamping => stamping::draw(rng),
+            PartKind::TurnedLying => turned::draw_lying(rng),
+            PartKind::TurnedStanding => turned::draw_standing(rng),
+            PartKind::BentWire => bent::draw_wire(rng),
+            PartKind::BentSheet => bent::draw_sheet(rng),
+            PartKind::Cast => cast::draw_cast(rng),
+            PartKind::Moulded => cast::draw_moulded(rng),
+        }
+    }
+
+    /// The surface above a point.
+    pub fn state_at(&self, x: f32, y: f32) -> State {
+        let mut state = State::EMPTY;
+        for feature in &self.features {
+            feature.apply(x, y, &mut state);
+        }
+        state
+    }
+
+    /// Smallest box around everything that features add: [min x, min y, max x, max y].
+    pub fn bounds(&self) -> [f32; 4] {
+        self.features.iter().filter(|feature| feature.operation.adds()).fold(
+            [f32::MAX, f32::MAX, f32::MIN, f32::MIN],
+            |b, feature| {
+                let f = feature.bounds();
+                [b[0].min(f[0]), b[1].min(f[1]), b[2].max(f[2]), b[3].max(f[3])]
+            },
+        )
+    }
+
+    /// The mirror image across the y axis.
+    pub fn mirrored(&self) -> Self {
+        let mut made = self.clone();
+        made.features.iter_mut().for_each(Feature::mirror);
+        for material in &mut made.materials {
+            material.mirror();
+        }
+        made
+    }
+}

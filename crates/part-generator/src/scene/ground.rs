@@ -1,0 +1,193 @@
+//! Heights of everything on the table as one grid; shadows and contact darkening from it.
+
+use super::placement::Placement;
+
+/// Heights above the table, seen from straight above.
+pub(crate) struct Ground {
+    min: [f32; 2],
+    cell: f32,
+    width: usize,
+    height: usize,
+    tops: Vec<f32>,
+    /// Heights blurred over some millimetres: how much stands around a place.
+    blurred: Vec<f32>,
+}
+
+/// Height below which a place is in the shadow of a direction of light, for several directions of one lamp.
+pub(crate) struct Shadow {
+    sweeps: Vec<Vec<f32>>,
+    /// Share of the light that reaches the table itself.
+    on_table: Vec<f32>,
+    softness: f32,
+}
+
+impl Ground {
+    /// A grid over a box of the table, without anything on it.
+    pub fn new(bounds: [f32; 4], cell: f32) -> Self {
+        let min = [bounds[0] - 8.0 * cell, bounds[1] - 8.0 * cell];
+        let count = |low: f32, high: f32| ((high - low) / cell).ceil().clamp(1.0, 1024.0) as usize + 16;
+        let (width, height) = (count(bounds[0], bounds[2]), count(bounds[1], bounds[3]));
+        Self { min, cell, width, height, tops: vec![0.0; width * height], blurred: Vec::new() }
+    }
+
+    #[inline(always)]
+    fn index(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let (gx, gy) = ((x - self.min[0]) / self.cell, (y - self.min[1]) / self.cell);
+        let inside = gx >= 0.0 && gy >= 0.0 && gx < self.width as f32 && gy < self.height as f32;
+        inside.then(|| gy as usize * self.width + gx as usize)
+    }
+
+    /// Calls `visit` with (index of the cell, top of the body there) for the cells that a body covers.
+    fn cells(&self, body: &Placement, cell: f32, mut visit: impl FnMut(usize, f32)) {
+        let relief = &body.part.relief;
+        let level = relief.level_for(cell);
+        for y in 0..level.height {
+            for x in 0..level.width {
+                let texel = level.texels[y * level.width + x];
+                if texel.top > 0
+                    && let Some(idx) = self.index(body.to_table(relief.place(level, x, y)))
+                {
+                    visit(idx, texel.top as f32 * relief.step);
+                }
+            }
+        }
+    }
+
+    /// Puts a body on the grid.
+    pub fn put(&mut self, body: &Placement) {
+        let mut tops = std::mem::take(&mut self.tops);
+        let base = body.base;
+        self.cells(body, 0.75 * self.cell, |idx, top| tops[idx] = tops[idx].max(base + top));
+        self.tops = tops;
+    }
+
+    /// The highest point under a body, and the share of its cells under which something stands.
+    pub fn under(&self, body: &Placement) -> (f32, f32) {
+        let (mut highest, mut shared, mut count) = (0.0f32, 0usize, 0usize);
+        self.cells(body, 2.0 * self.cell, |idx, _| {
+            count += 1;
+            shared += usize::from(self.tops[idx] > 0.0);
+            highest = highest.max(self.tops[idx]);
+        });
+        (highest, shared as f32 / count.max(1) as f32)
+    }
+
+    /// Prepares contact darkening: means of heights over `radius` millimetres.
+    pub fn blur(&mut self, radius: f32) {
+        let reach = ((radius / self.cell).round() as usize).clamp(1, 24);
+        let (width, height) = (self.width, self.height);
+        let norm = 1.0 / (2 * reach + 1) as f32;
+        let mut rows = vec![0.0f32; width * height];
+        for (source, target) in self.tops.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
+            let mut sum: f32 = source[..reach.min(width)].iter().sum();
+            for x in 0..width {
+                sum += if x + reach < width { source[x + reach] } else { 0.0 };
+                sum -= if x > reach { source[x - reach - 1] } else { 0.0 };
+                target[x] = sum * norm;
+            }
+        }
+        let mut blurred = vec![0.0f32; width * height];
+        let mut sums = vec![0.0f32; width];
+        for y in 0..reach.min(height) {
+            sums.iter_mut().zip(&rows[y * width..]).for_each(|(sum, v)| *sum += v);
+        }
+        for y in 0..height {
+            if y + reach < height {
+                sums.iter_mut().zip(&rows[(y + reach) * width..]).for_each(|(sum, v)| *sum += v);
+            }
+            if y > reach {
+                sums.iter_mut().zip(&rows[(y - reach - 1) * width..]).for_each(|(sum, v)| *sum -= v);
+            }
+            blurred[y * width..(y + 1) * width].iter_mut().zip(&sums).for_each(|(b, sum)| *b = sum * norm);
+        }
+        self.blurred = blurred;
+    }
+
+    /// Share of the light from all around that reaches a place: less beside and between bodies.
+    #[inline]
+    pub fn openness(&self, place: [f32; 2], z: f32, radius: f32) -> f32 {
+        let around = self.index(place).map_or(0.0, |idx| self.blurred[idx]);
+        1.0 - 0.65 * ((around - z) / (0.6 * radius)).clamp(0.0, 1.0)
+    }
+
+    /// The shadows of a lamp in a direction (x, y, z up, a unit vector) that appears `radius` radians wide.
+    pub fn shadow(&self, direction: [f32; 3], radius: f32) -> Shadow {
+        let level = direction[0].hypot(direction[1]);
+        let azimuth = direction[1].atan2(direction[0]);
+        let elevation = direction[2].atan2(level);
+        let sweeps: Vec<Vec<f32>> = [(0.7, 0.5), (-0.7, 0.5), (0.0, -0.9), (0.0, 0.0)]
+            .iter()
+            .map(|&(aside, up)| {
+                let raised = (elevation + up * radius).clamp(0.15, 1.55);
+                self.sweep(azimuth + aside * radius / elevation.cos().max(0.2), raised.tan())
+            })
+            .collect();
+        let softness = self.cell * elevation.tan().min(4.0);
+        let mut shadow = Shadow { sweeps, on_table: Vec::new(), softness };
+        shadow.on_table = (0..self.tops.len()).map(|idx| shadow.light_at(idx, 0.0)).collect();
+        shadow
+    }
+
+    /// Carries heights away from the light, falling by `slope` for each millimetre.
+    fn sweep(&self, azimuth: f32, slope: f32) -> Vec<f32> {
+        let (sin, cos) = azimuth.sin_cos();
+        let (width, height) = (self.width as i32, self.height as i32);
+        let mut shade = vec![0.0f32; self.tops.len()];
+        let along_x = cos.abs() >= sin.abs();
+        let (major, minor) = if along_x { (cos, sin) } else { (sin, cos) };
+        let (count, across) = if along_x { (width, height) } else { (height, width) };
+        let (stride, stride_across) = if along_x { (1, width) } else { (width, 1) };
+        let lean = minor / major.abs();
+        let fall = self.cell / major.abs() * slope;
+        let towards = if major > 0.0 { 1 } else { -1 };
+        // From the side of the light to the other.
+        for k in 1..count {
+            let at = if towards > 0 { count - 1 - k } else { k };
+            let from = (at + towards) * stride;
+            let shift = lean.floor() as i32;
+            let share = lean - lean.floor();
+            let first = (-shift).clamp(0, across);
+            let end = (across - shift - 1).clamp(first, across);
+            for j in first..end {
+                let a = (from + (j + shift) * stride_across) as usize;
+                let b = (from + (j + shift + 1) * stride_across) as usize;
+                let (high_a, high_b) = (self.tops[a].max(shade[a]), self.tops[b].max(shade[b]));
+                let carried = high_a + (high_b - high_a) * share - fall;
+                shade[(at * stride + j * stride_across) as usize] = carried.max(0.0);
+            }
+        }
+        shade
+    }
+
+    /// Share of a lamp's light that reaches a point.
+    #[inline]
+    pub fn light(&self, shadow: &Shadow, place: [f32; 2], z: f32) -> f32 {
+        self.index(place).map_or(1.0, |idx| shadow.light_at(idx, z))
+    }
+
+    /// Share of a lamp's light that reaches the table.
+    #[inline]
+    pub fn light_on_table(&self, shadow: &Shadow, [x, y]: [f32; 2]) -> f32 {
+        let (gx, gy) = ((x - self.min[0]) / self.cell - 0.5, (y - self.min[1]) / self.cell - 0.5);
+        let (column, row) = (gx.floor(), gy.floor());
+        if column < 0.0 || row < 0.0 || column >= (self.width - 1) as f32 || row >= (self.height - 1) as f32 {
+            return 1.0;
+        }
+        let (fx, fy) = (gx - column, gy - row);
+        let idx = row as usize * self.width + column as usize;
+        let light = &shadow.on_table;
+        let upper = light[idx] + (light[idx + 1] - light[idx]) * fx;
+        let below = idx + self.width;
+        let lower = light[below] + (light[below + 1] - light[below]) * fx;
+        upper + (lower - upper) * fy
+    }
+}
+
+impl Shadow {
+    #[inline(always)]
+    fn light_at(&self, idx: usize, z: f32) -> f32 {
+        let lit: f32 =
+            self.sweeps.iter().map(|sweep| (1.0 - (sweep[idx] - z - 0.15) / self.softness).clamp(0.0, 1.0)).sum();
+        lit / self.sweeps.len() as f32
+    }
+}

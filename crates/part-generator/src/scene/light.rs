@@ -1,0 +1,222 @@
+//! Lamps, light from all around, and what shiny parts reflect.
+
+use rand_pcg::Pcg64Mcg;
+
+use crate::random::Draw;
+use crate::recipe::Material;
+
+/// Side of the map of reflections.
+const SIDE: usize = 48;
+
+/// Blur of the maps, in texels: a mirror first, a matt surface last.
+const BLURS: [f32; 4] = [0.0, 1.5, 4.0, 9.0];
+
+/// A lamp far away.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Lamp {
+    /// Towards the lamp, a unit vector, z up.
+    pub direction: [f32; 3],
+    /// What a white surface that faces it scatters.
+    pub color: [f32; 3],
+    /// How wide it appears, in radians.
+    pub radius: f32,
+    /// Strength of what glossy surfaces reflect of it.
+    pub glare: f32,
+}
+
+/// All light of a scene.
+pub(crate) struct Lighting {
+    pub lamps: Vec<Lamp>,
+    /// Light from all around.
+    pub ambient: [f32; 3],
+    /// Change of the light across the picture, a share for a picture's width: x, y.
+    pub gradient: [f32; 2],
+    /// What is reflected in a direction, by roughness.
+    maps: Vec<Vec<[f32; 3]>>,
+}
+
+/// What kind of light is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LightStyle {
+    /// Even light, as for a photo that teaches.
+    pub even: bool,
+    /// Strong narrow lamps with highlights.
+    pub glare: bool,
+    /// Hard shadows.
+    pub hard: bool,
+}
+
+impl Lighting {
+    /// Draws lamps and surroundings.
+    pub fn draw(style: LightStyle, rng: &mut Pcg64Mcg) -> Self {
+        let hall = tint(rng, 0.05);
+        let share_ambient = if style.even {
+            rng.uniform(0.6, 0.8)
+        } else if style.hard {
+            rng.uniform(0.2, 0.4)
+        } else {
+            rng.uniform(0.35, 0.75)
+        };
+        let num_lamps = if style.even { rng.whole(1, 2) } else { rng.whole(1, 3) };
+        let shares: Vec<f32> = (0..num_lamps).map(|_| rng.uniform(0.3, 1.0)).collect();
+        let total: f32 = shares.iter().sum();
+        let lamps: Vec<Lamp> = shares
+            .iter()
+            .map(|share| {
+                let azimuth = rng.angle();
+                let elevation: f32 = if style.even { rng.uniform(1.0, 1.4) } else { rng.uniform(0.55, 1.4) };
+                let strength = (1.0 - share_ambient) * share / total / elevation.sin();
+                let (sin, cos) = azimuth.sin_cos();
+                Lamp {
+                    direction: [cos * elevation.cos(), sin * elevation.cos(), elevation.sin()],
+                    color: tint(rng, 0.08).map(|c| c * strength),
+                    radius: if style.even {
+                        rng.uniform(0.15, 0.3)
+                    } else if style.hard {
+                        rng.uniform(0.01, 0.05)
+                    } else {
+                        rng.log_uniform(0.02, 0.3)
+                    },
+                    glare: if style.glare { rng.uniform(1.0, 2.2) } else { rng.uniform(0.2, 0.8) },
+                }
+            })
+            .collect();
+        let slope = if style.even { 0.1 } else { 0.5 };
+        let gradient = [rng.uniform(-slope, slope), rng.uniform(-slope, slope)];
+        let ambient = hall.map(|c| c * share_ambient);
+        let maps = reflections(&lamps, ambient, style, rng);
+        Self { lamps, ambient, gradient, maps }
+    }
+
+    /// What a surface of a roughness reflects from a direction, the mean over its lobe.
+    #[inline]
+    pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 3] {
+        let half = 0.5 * SIDE as f32;
+        let x = (direction[0] + 1.0) * half - 0.5;
+        let y = (direction[1] + 1.0) * half - 0.5;
+        let (column, row) = (x.clamp(0.0, SIDE as f32 - 1.01), y.clamp(0.0, SIDE as f32 - 1.01));
+        let (fx, fy) = (column.fract(), row.fract());
+        let map = &self.maps[level];
+        let idx = row as usize * SIDE + column as usize;
+        let (a, b, c, d) = (&map[idx], &map[idx + 1], &map[idx + SIDE], &map[idx + SIDE + 1]);
+        let mut sum = [0.0; 3];
+        for k in 0..3 {
+            let upper = a[k] + (b[k] - a[k]) * fx;
+            let lower = c[k] + (d[k] - c[k]) * fx;
+            sum[k] = upper + (lower - upper) * fy;
+        }
+        sum
+    }
+
+    /// The map for a material.
+    pub fn level_of(material: &Material) -> usize {
+        match material.roughness {
+            r if r < 0.13 => 0,
+            r if r < 0.3 => 1,
+            r if r < 0.55 => 2,
+            _ => 3,
+        }
+    }
+}
+
+/// White, warmer or colder by up to a share.
+fn tint(rng: &mut Pcg64Mcg, share: f32) -> [f32; 3] {
+    let warmth = rng.uniform(-1.0, 1.0) * share;
+    [1.0 + warmth, 1.0, 1.0 - 1.2 * warmth]
+}
+
+/// The upper half of the surroundings seen in a level mirror: walls, ceiling, windows, the dark camera above.
+fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut Pcg64Mcg) -> Vec<Vec<[f32; 3]>> {
+    let (ceiling, wall) = (rng.uniform(0.7, 1.5), rng.uniform(0.25, 1.0));
+    let lean = [rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6)];
+    // Windows and soft boxes: centre, half size, turn, brightness.
+    let panels: Vec<([f32; 2], [f32; 2], f32, f32)> = (0..rng.whole(1, 4))
+        .map(|_| {
+            let (angle, reach) = (rng.angle(), rng.uniform(0.1, 0.85));
+            let brightness = if style.even { rng.uniform(1.2, 2.0) } else { rng.log_uniform(1.2, 5.0) };
+            let half = [rng.uniform(0.08, 0.4), rng.uniform(0.05, 0.25)];
+            ([reach * angle.cos(), reach * angle.sin()], half, rng.angle(), brightness)
+        })
+        .collect();
+    let camera = rng.uniform(0.08, 0.22);
+    let dark = rng.uniform(0.25, 0.9);
+    let mut map = vec![[0.0f32; 3]; SIDE * SIDE];
+    for (idx, texel) in map.iter_mut().enumerate() {
+        let x = (idx % SIDE) as f32 / SIDE as f32 * 2.0 - 1.0 + 1.0 / SIDE as f32;
+        let y = (idx / SIDE) as f32 / SIDE as f32 * 2.0 - 1.0 + 1.0 / SIDE as f32;
+        let r = x.hypot(y);
+        let up = (1.0 - r * r).max(0.0).sqrt();
+        let mut light = wall + (ceiling - wall) * up;
+        light *= 1.0 + lean[0] * x + lean[1] * y;
+        for (center, half, turn, brightness) in &panels {
+            let (sin, cos) = turn.sin_cos();
+            let (dx, dy) = (x - center[0], y - center[1]);
+            let (a, b) = ((cos * dx + sin * dy).abs() - half[0], (cos * dy - sin * dx).abs() - half[1]);
+            if a < 0.0 && b < 0.0 {
+                light = *brightness;
+            }
+        }
+        if r < camera {
+            light *= dark;
+        }
+        *texel = ambient.map(|c| c * light.max(0.02) * 1.25);
+    }
+    BLURS
+        .iter()
+        .map(|&blur| {
+            let mut blurred = blurred(&map, blur);
+            for lamp in lamps {
+                add_lamp(&mut blurred, lamp, blur);
+            }
+            blurred
+        })
+        .collect()
+}
+
+/// A highlight: as wide as the lamp and the blur together, as bright as its energy allows.
+fn add_lamp(map: &mut [[f32; 3]], lamp: &Lamp, blur: f32) {
+    // A perfect half-vector lobe: the reflected direction spreads twice as far as the normal.
+    let texels = 0.5 * SIDE as f32;
+    let width = (lamp.radius * texels).hypot(1.1 * blur).max(0.7);
+    let energy = 14.0 * lamp.glare * (1.0 + (lamp.radius * texels).powi(2) * 0.3);
+    let peak = (energy / (width * width)).min(30.0);
+    let (cx, cy) = ((lamp.direction[0] + 1.0) * texels - 0.5, (lamp.direction[1] + 1.0) * texels - 0.5);
+    for (idx, texel) in map.iter_mut().enumerate() {
+        let (dx, dy) = ((idx % SIDE) as f32 - cx, (idx / SIDE) as f32 - cy);
+        let exponent = 0.5 * (dx * dx + dy * dy) / (width * width);
+        if exponent < 8.0 {
+            let strength = peak * (-exponent).exp();
+            for k in 0..3 {
+                texel[k] += lamp.color[k] * strength;
+            }
+        }
+    }
+}
+
+/// A normal blur.
+fn blurred(map: &[[f32; 3]], sigma: f32) -> Vec<[f32; 3]> {
+    if sigma <= 0.0 {
+        return map.to_vec();
+    }
+    let reach = (2.0 * sigma).ceil() as i32;
+    let weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
+    let total: f32 = weights.iter().sum();
+    let pass = |source: &[[f32; 3]], along_x: bool| -> Vec<[f32; 3]> {
+        (0..SIDE * SIDE)
+            .map(|idx| {
+                let (x, y) = ((idx % SIDE) as i32, (idx / SIDE) as i32);
+                let mut sum = [0.0f32; 3];
+                for (weight, d) in weights.iter().zip(-reach..) {
+                    let (u, v) = if along_x { (x + d, y) } else { (x, y + d) };
+                    let (u, v) = (u.clamp(0, SIDE as i32 - 1) as usize, v.clamp(0, SIDE as i32 - 1) as usize);
+                    let texel = &source[v * SIDE + u];
+                    for k in 0..3 {
+                        sum[k] += weight * texel[k];
+                    }
+                }
+                sum.map(|s| s / total)
+            })
+            .collect()
+    };
+    pass(&pass(map, true), false)
+}

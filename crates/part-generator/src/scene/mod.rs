@@ -1,0 +1,19 @@
+//! Pictures of parts on tables, with the truth.
+
+mod config;
+mod ground;
+mod layout;
+mod light;
+mod photo;
+mod placement;
+mod render;
+mod sample;
+mod scenes;
+mod sensor;
+mod table;
+mod view;
+
+pub use config::{Condition, SceneConfig};
+pub use photo::{DemonstrationPhoto, PhotoConfig, demonstration};
+pub use sample::{Conditions, Instance, OtherKind, OtherObject, Sample};
+pub use scenes::Scenes;

@@ -1,0 +1,336 @@
+//! Draws a scene: what each pixel meets, how it is lit, edges with more samples.
+
+use crate::recipe::{Brushing, Material};
+
+use super::ground::{Ground, Shadow};
+use super::light::Lighting;
+use super::placement::{Contact, Placement};
+use super::table::Table;
+use super::view::{Sight, View};
+
+/// Marks pixels that meet no body.
+pub(crate) const TABLE: u8 = u8::MAX;
+
+/// Samples of a pixel on an edge.
+const EDGE_SAMPLES: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
+
+/// Neighbouring pixels whose heights differ by more than this many pixels' width lie on an edge.
+const EDGE_STEP_PX: f32 = 0.9;
+
+/// Everything that is drawn.
+pub(crate) struct Scene {
+    pub view: View,
+    pub lighting: Lighting,
+    pub table: Table,
+    pub bodies: Vec<Placement>,
+    /// A shadow of something outside the picture: normal of its edge, distance, width of the edge, strength.
+    pub far_shadow: Option<([f32; 2], f32, f32, f32)>,
+}
+
+/// What each pixel meets first.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    body: u8,
+    z: f32,
+    contact: Option<Contact>,
+}
+
+/// A picture in linear light, and which body each pixel's centre shows.
+pub(crate) struct Rendered {
+    pub light: Vec<[f32; 3]>,
+    pub ids: Vec<u8>,
+}
+
+impl Scene {
+    /// Draws the picture.
+    pub fn render(&self) -> Rendered {
+        let (width, height) = (self.view.width, self.view.height);
+        let mm_per_px = self.view.mm_per_px();
+        let mut ground = Ground::new(self.view.ground(), 1.35 * mm_per_px);
+        self.bodies.iter().for_each(|body| ground.put(body));
+        let contact_mm = 6.0f32.max(3.0 * mm_per_px);
+        ground.blur(contact_mm);
+        let shadows: Vec<Shadow> =
+            self.lighting.lamps.iter().map(|lamp| ground.shadow(lamp.direction, lamp.radius)).collect();
+        let shading = Shading { scene: self, ground: &ground, shadows: &shadows, contact_mm, mm_per_px };
+
+        let mut seen = vec![Seen { body: TABLE, z: 0.0, contact: None }; width * height];
+        let boxes: Vec<[usize; 4]> =
+            self.bodies.iter().map(|body| clipped(body.picture_box(&self.view), width, height)).collect();
+        for (idx, (body, &[x0, y0, x1, y1])) in self.bodies.iter().zip(&boxes).enumerate() {
+            for y in y0..y1 {
+                for x in x0..x1 {
+                    let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
+                    let pixel = &mut seen[y * width + x];
+                    if let Some(contact) = body.meet(&sight)
+                        && contact.z > pixel.z
+                    {
+                        *pixel = Seen { body: idx as u8, z: contact.z, contact: Some(contact) };
+                    }
+                }
+            }
+        }
+        let mut light = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
+                light.push(match &seen[y * width + x] {
+                    Seen { body, contact: Some(contact), .. } => shading.body(*body, contact, &sight),
+                    _ => shading.table(&sight),
+                });
+            }
+        }
+        self.smooth_edges(&seen, &boxes, &shading, &mut light);
+        Rendered { light, ids: seen.iter().map(|pixel| pixel.body).collect() }
+    }
+
+    /// Draws pixels on edges anew, from several samples.
+    fn smooth_edges(&self, seen: &[Seen], boxes: &[[usize; 4]], shading: &Shading, light: &mut [[f32; 3]]) {
+        let (width, height) = (self.view.width, self.view.height);
+        let step = EDGE_STEP_PX * shading.mm_per_px;
+        let differ = |a: &Seen, b: &Seen| {
+            a.body != b.body
+                || match (&a.contact, &b.contact) {
+                    (Some(one), Some(other)) => {
+                        (one.z - other.z).abs() > step
+                            || one.texel.material != other.texel.material
+                            || one.wall.is_some() != other.wall.is_some()
+                    }
+                    _ => false,
+                }
+        };
+        for y in 0..height {
+            for x in 0..width {
+                let idx = y * width + x;
+                let here = &seen[idx];
+                let neighbours = [
+                    (x > 0).then(|| idx - 1),
+                    (x + 1 < width).then(|| idx + 1),
+                    (y > 0).then(|| idx - width),
+                    (y + 1 < height).then(|| idx + width),
+                ];
+                // Bodies that the pixel may show a piece of: its own and its neighbours'.
+                let mut bodies = [here.body, TABLE, TABLE, TABLE, TABLE];
+                let mut on_edge = false;
+                for (slot, other) in bodies[1..].iter_mut().zip(neighbours.into_iter().flatten()) {
+                    on_edge |= differ(here, &seen[other]);
+                    *slot = seen[other].body;
+                }
+                if !on_edge {
+                    continue;
+                }
+                bodies.sort_unstable();
+                let mut sum = [0.0f32; 3];
+                for [dx, dy] in EDGE_SAMPLES {
+                    let sight = self.view.sight(x as f32 + dx, y as f32 + dy);
+                    let mut nearest: Option<(u8, Contact)> = None;
+                    for (k, &body) in bodies.iter().enumerate() {
+                        if body == TABLE || (k > 0 && bodies[k - 1] == body) {
+                            continue;
+                        }
+                        let [x0, y0, x1, y1] = boxes[body as usize];
+                        if x < x0 || x >= x1 || y < y0 || y >= y1 {
+                            continue;
+                        }
+                        if let Some(contact) = self.bodies[body as usize].meet(&sight)
+                            && nearest.as_ref().is_none_or(|(_, other)| contact.z > other.z)
+                        {
+                            nearest = Some((body, contact));
+                        }
+                    }
+                    let sample = match &nearest {
+                        Some((body, contact)) => shading.body(*body, contact, &sight),
+                        None => shading.table(&sight),
+                    };
+                    for k in 0..3 {
+                        sum[k] += sample[k];
+                    }
+                }
+                light[idx] = sum.map(|s| s / EDGE_SAMPLES.len() as f32);
+            }
+        }
+    }
+
+    /// The pixels of a body alone, as if nothing covered it: the box and whether each pixel's centre shows it.
+    pub fn silhouette(&self, body: usize) -> ([i32; 4], Vec<bool>) {
+        let b = self.bodies[body].picture_box(&self.view);
+        // A body far outside has no use for pixels without end.
+        let (w, h) = (self.view.width as i32, self.view.height as i32);
+        let b = [b[0].max(-w), b[1].max(-h), b[2].min(2 * w), b[3].min(2 * h)];
+        let mut shown = Vec::with_capacity(((b[2] - b[0]).max(0) * (b[3] - b[1]).max(0)) as usize);
+        for y in b[1]..b[3] {
+            for x in b[0]..b[2] {
+                let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
+                shown.push(self.bodies[body].meet(&sight).is_some());
+            }
+        }
+        (b, shown)
+    }
+}
+
+fn clipped(b: [i32; 4], width: usize, height: usize) -> [usize; 4] {
+    let x = |v: i32| v.clamp(0, width as i32) as usize;
+    let y = |v: i32| v.clamp(0, height as i32) as usize;
+    [x(b[0]), y(b[1]), x(b[2]), y(b[3])]
+}
+
+/// What shading reads.
+struct Shading<'a> {
+    scene: &'a Scene,
+    ground: &'a Ground,
+    shadows: &'a [Shadow],
+    contact_mm: f32,
+    mm_per_px: f32,
+}
+
+impl Shading<'_> {
+    /// Change of the light across the picture, and shadows from outside.
+    #[inline]
+    fn exposure(&self, place: [f32; 2]) -> f32 {
+        let across = self.mm_per_px * self.scene.view.width as f32;
+        let g = self.scene.lighting.gradient;
+        let mut factor = 1.0 + (g[0] * place[0] + g[1] * place[1]) / across;
+        if let Some((normal, distance, soft, strength)) = self.scene.far_shadow {
+            let d = normal[0] * place[0] + normal[1] * place[1] - distance;
+            factor *= 1.0 - strength * (d / soft + 0.5).clamp(0.0, 1.0);
+        }
+        factor.max(0.1)
+    }
+
+    #[inline]
+    fn table(&self, sight: &Sight) -> [f32; 3] {
+        let Scene { lighting, table, .. } = self.scene;
+        let place = sight.foot;
+        let albedo = table.color(place, self.mm_per_px);
+        let open = self.ground.openness(place, 0.0, self.contact_mm);
+        let mut light = lighting.ambient.map(|c| c * open);
+        let mut lit = open;
+        for (lamp, shadow) in lighting.lamps.iter().zip(self.shadows) {
+            let reached = self.ground.light_on_table(shadow, place);
+            lit *= 0.4 + 0.6 * reached;
+            let strength = lamp.direction[2] * reached;
+            for k in 0..3 {
+                light[k] += lamp.color[k] * strength;
+            }
+        }
+        let exposure = self.exposure(place);
+        let mut color = [0, 1, 2].map(|k| albedo[k] * light[k] * exposure);
+        if table.gloss > 0.0 {
+            let slopes = table.slopes(place);
+            let view = towards_viewer(sight);
+            let reflection = mirrored(view, normalized([-slopes[0], -slopes[1], 1.0]));
+            let seen = lighting.reflected(reflection, table.gloss_level);
+            for k in 0..3 {
+                color[k] += (table.gloss * (0.3 + 0.7 * albedo[k])).min(0.6) * seen[k] * lit * exposure;
+            }
+        }
+        color
+    }
+
+    #[inline]
+    fn body(&self, body: u8, contact: &Contact, sight: &Sight) -> [f32; 3] {
+        let Scene { lighting, table, bodies, .. } = self.scene;
+        let body = &bodies[body as usize];
+        let texel = &contact.texel;
+        let material = &body.part.relief.materials[texel.material as usize];
+        let place = sight.at(contact.z);
+        let normal = match contact.wall {
+            Some(wall) => normalized([wall[0], wall[1], 0.25]),
+            None => {
+                let [x, y] = texel.normal.map(|n| f32::from(n) * (1.0 / 127.0));
+                let [x, y] = body.direction_to_table([x, y]);
+                [x, y, (1.0 - x * x - y * y).max(0.01).sqrt()]
+            }
+        };
+        let open = self.ground.openness(place, contact.z, self.contact_mm);
+        // What faces sideways gets its light from walls and from the table.
+        let up = 0.5 + 0.5 * normal[2];
+        let below = table.mean();
+        let mut light = [0, 1, 2].map(|k| lighting.ambient[k] * open * (up + (1.0 - up) * 0.8 * below[k]));
+        let mut lit = open;
+        for (lamp, shadow) in lighting.lamps.iter().zip(self.shadows) {
+            let facing = dot(normal, lamp.direction);
+            let reached = self.ground.light(shadow, place, contact.z);
+            lit *= 0.4 + 0.6 * reached;
+            if facing > 0.0 {
+                for k in 0..3 {
+                    light[k] += lamp.color[k] * facing * reached;
+                }
+            }
+        }
+        let view = towards_viewer(sight);
+        let seen = self.reflection(material, body, place, normal, view, below);
+        let facing = dot(normal, view).clamp(0.0, 1.0);
+        let grazing = (1.0 - facing).powi(5) * (1.0 - material.roughness);
+        let tone = f32::from(texel.tone) * (1.0 / 128.0);
+        let exposure = self.exposure(place);
+        [0, 1, 2].map(|k| {
+            let reflectance = material.reflectance[k] + (1.0 - material.reflectance[k]) * grazing;
+            exposure * tone * (material.albedo[k] * light[k] + reflectance * seen[k] * lit)
+        })
+    }
+
+    /// What a surface mirrors.
+    #[inline]
+    fn reflection(
+        &self,
+        material: &Material,
+        body: &Placement,
+        place: [f32; 2],
+        normal: [f32; 3],
+        view: [f32; 3],
+        below: [f32; 3],
+    ) -> [f32; 3] {
+        let lighting = &self.scene.lighting;
+        let level = Lighting::level_of(material);
+        let look = |normal: [f32; 3]| {
+            let direction = mirrored(view, normal);
+            let up = lighting.reflected(direction, level);
+            // Directions below the horizon meet the table.
+            let sky = (direction[2] * 4.0 + 0.5).clamp(0.0, 1.0);
+            [0, 1, 2].map(|k| up[k] * sky + (1.0 - sky) * below[k] * 0.7)
+        };
+        let Some(brushing) = material.brushing else { return look(normal) };
+        let across = match brushing {
+            Brushing::Along(angle) => body.direction_to_table([-angle.sin(), angle.cos()]),
+            Brushing::Around => {
+                let (x, y) = (place[0] - body.at[0], place[1] - body.at[1]);
+                let radius = x.hypot(y).max(0.1);
+                [x / radius, y / radius]
+            }
+        };
+        let mut sum = [0.0f32; 3];
+        for spread in [-0.22f32, 0.0, 0.22] {
+            let bent = normalized([normal[0] + spread * across[0], normal[1] + spread * across[1], normal[2]]);
+            let seen = look(bent);
+            for k in 0..3 {
+                sum[k] += seen[k];
+            }
+        }
+        sum.map(|s| s / 3.0)
+    }
+}
+
+#[inline(always)]
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn normalized(v: [f32; 3]) -> [f32; 3] {
+    let norm = 1.0 / dot(v, v).sqrt();
+    v.map(|c| c * norm)
+}
+
+/// From a point on the line of sight to the camera.
+#[inline(always)]
+fn towards_viewer(sight: &Sight) -> [f32; 3] {
+    normalized([sight.drift[0], sight.drift[1], 1.0])
+}
+
+/// The direction from which light comes that is mirrored towards the viewer.
+#[inline(always)]
+fn mirrored(view: [f32; 3], normal: [f32; 3]) -> [f32; 3] {
+    let twice = 2.0 * dot(view, normal);
+    [twice * normal[0] - view[0], twice * normal[1] - view[1], twice * normal[2] - view[2]]
+}

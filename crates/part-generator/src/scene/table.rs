@@ -1,0 +1,353 @@
+//! What parts lie on: colours, grain, lines and print of table tops.
+
+use rand_pcg::Pcg64Mcg;
+
+use crate::random::Draw;
+use crate::recipe::paint_color;
+use crate::tiles::{Tile, Tiles};
+
+/// A layer of noise over the base colour.
+struct Layer {
+    tile: &'static Tile,
+    /// Texels for a millimetre along and across.
+    scale: [f32; 2],
+    shift: [f32; 2],
+    /// What a value of 1 adds.
+    color: [f32; 3],
+}
+
+/// Lines, squares or dots at even distances.
+enum Pattern {
+    None,
+    /// Lines of a width every so many millimetres, every fifth one stronger.
+    Grid {
+        pitch: f32,
+        width: f32,
+        color: [f32; 3],
+    },
+    /// Squares of two colours.
+    Checks {
+        pitch: f32,
+        color: [f32; 3],
+    },
+    /// Boards or tiles with joints, each of a shade of its own.
+    Boards {
+        width: f32,
+        length: f32,
+        joint: f32,
+        vary: f32,
+    },
+    /// Round holes or bumps.
+    Dots {
+        pitch: f32,
+        radius: f32,
+        color: [f32; 3],
+    },
+    /// Waves: corrugated board, conveyor belts.
+    Waves {
+        pitch: f32,
+        strength: f32,
+    },
+    /// Woven threads.
+    Weave {
+        pitch: f32,
+        strength: f32,
+    },
+    /// Lines of letters, as on paper.
+    Text {
+        pitch: f32,
+        color: [f32; 3],
+    },
+    /// Sheets of other colours, each in a half-plane.
+    Sheets(Vec<([f32; 2], f32, [f32; 3])>),
+}
+
+/// A table top.
+pub(crate) struct Table {
+    base: [f32; 3],
+    layers: Vec<Layer>,
+    pattern: Pattern,
+    sin_cos: [f32; 2],
+    shift: [f32; 2],
+    /// Share of mirrored light: 0 for matt tops.
+    pub gloss: f32,
+    /// Which map of reflections a glossy top reads.
+    pub gloss_level: usize,
+    /// Slope of the top's grain, which breaks reflections up.
+    pub ripple: f32,
+    tiles: &'static Tiles,
+}
+
+/// Which tables are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TableStyle {
+    /// Any.
+    Any,
+    /// Plain and light to middle grey, as a careful person chooses for a photo that teaches.
+    Plain,
+}
+
+impl Table {
+    /// Draws a table top.
+    pub fn draw(style: TableStyle, rng: &mut Pcg64Mcg) -> Self {
+        let tiles = Tiles::get();
+        let (sin, cos) = rng.angle().sin_cos();
+        let shift = [rng.uniform(0.0, 500.0), rng.uniform(0.0, 500.0)];
+        let mut made = Self {
+            base: grey(rng, 0.12, 0.75),
+            layers: Vec::new(),
+            pattern: Pattern::None,
+            sin_cos: [sin, cos],
+            shift,
+            gloss: 0.0,
+            gloss_level: 3,
+            ripple: 0.0,
+            tiles,
+        };
+        if style == TableStyle::Plain {
+            made.base = grey(rng, 0.2, 0.75);
+            made.add(&tiles.cloud, [0.8, 0.8], 0.03, rng);
+            made.add(&tiles.grain, [1.1, 1.1], 0.02, rng);
+            return made;
+        }
+        made.draw_kind(rng);
+        // Dirt, wear and grain on everything.
+        let stains = rng.uniform(0.0, 0.09);
+        let scale = rng.log_uniform(0.25, 1.2);
+        made.add(&tiles.cloud, [scale, scale], stains, rng);
+        let fine = rng.uniform(0.005, 0.05);
+        made.add(&tiles.grain, [1.4, 1.4], fine, rng);
+        if rng.chance(0.2) {
+            let strength = rng.uniform(-0.5, 0.3);
+            let scale = rng.log_uniform(0.5, 2.0);
+            made.add(&tiles.spots, [scale, scale], strength, rng);
+        }
+        made
+    }
+
+    fn draw_kind(&mut self, rng: &mut Pcg64Mcg) {
+        let tiles = self.tiles;
+        match rng.whole(0, 13) {
+            0 => {
+                // Painted or laminated board.
+                self.base = paint_color(rng).map(|c| 0.8 * c + 0.03);
+                self.shine(rng.uniform(0.0, 0.12), rng);
+            }
+            1 => {
+                // Speckled laminate or stone.
+                self.base = grey(rng, 0.12, 0.6);
+                for _ in 0..2 {
+                    let (scale, strength) = (rng.log_uniform(0.6, 2.0), rng.uniform(-0.7, 0.5));
+                    self.add(&tiles.spots, [scale, scale], strength, rng);
+                }
+                self.shine(rng.uniform(0.0, 0.08), rng);
+            }
+            2 | 3 => {
+                // Wood, in boards at times.
+                let level = rng.log_uniform(0.1, 0.5);
+                let warmth = rng.uniform(0.4, 1.0);
+                self.base = [level * (1.0 + 0.35 * warmth), level, level * (1.0 - 0.45 * warmth)];
+                let scale = rng.log_uniform(0.5, 1.4);
+                let strength = rng.uniform(0.08, 0.3);
+                self.add(&tiles.wood, [0.22 * scale, scale], strength, rng);
+                if rng.chance(0.5) {
+                    let (width, length) = (rng.uniform(40.0, 120.0), rng.uniform(200.0, 600.0));
+                    self.pattern = Pattern::Boards { width, length, joint: 0.8, vary: 0.2 };
+                }
+                self.shine(rng.uniform(0.0, 0.06), rng);
+            }
+            4 | 5 => {
+                // Sheet metal: brushed, rolled, scratched.
+                self.base = grey(rng, 0.12, 0.4);
+                let strength = rng.uniform(0.05, 0.2);
+                self.add(&tiles.streak, [rng.uniform(0.05, 0.4), rng.uniform(0.6, 1.8)], strength, rng);
+                self.shine(rng.uniform(0.1, 0.45), rng);
+                self.ripple = rng.uniform(0.01, 0.06);
+            }
+            6 => {
+                // A cutting mat or squared paper.
+                let paper = rng.chance(0.4);
+                self.base = if paper { grey(rng, 0.6, 0.8) } else { paint_color(rng).map(|c| 0.35 * c + 0.01) };
+                let pitch = if paper { 5.0 } else { 10.0 };
+                let ink = if paper { paint_color(rng).map(|c| 0.5 * c) } else { grey(rng, 0.3, 0.7) };
+                self.pattern = Pattern::Grid { pitch, width: rng.uniform(0.3, 0.8), color: ink };
+            }
+            7 => {
+                let color = grey(rng, 0.05, 0.7);
+                self.pattern = if rng.chance(0.5) {
+                    Pattern::Checks { pitch: rng.log_uniform(6.0, 60.0), color }
+                } else {
+                    let pitch = rng.log_uniform(5.0, 40.0);
+                    Pattern::Dots { pitch, radius: pitch * rng.uniform(0.15, 0.4), color }
+                };
+            }
+            8 => {
+                // Corrugated board or a ribbed belt.
+                let level = rng.log_uniform(0.05, 0.45);
+                let warmth = if rng.chance(0.6) { rng.uniform(0.4, 1.0) } else { 0.0 };
+                self.base = [level * (1.0 + 0.25 * warmth), level, level * (1.0 - 0.4 * warmth)];
+                self.pattern = Pattern::Waves { pitch: rng.uniform(3.0, 10.0), strength: rng.uniform(0.03, 0.2) };
+            }
+            9 => {
+                // Cloth.
+                self.base = paint_color(rng);
+                self.pattern = Pattern::Weave { pitch: rng.uniform(1.2, 4.0), strength: rng.uniform(0.08, 0.35) };
+            }
+            10 => {
+                // Printed paper.
+                self.base = grey(rng, 0.55, 0.82);
+                self.pattern = Pattern::Text { pitch: rng.uniform(3.5, 12.0), color: grey(rng, 0.02, 0.2) };
+            }
+            11 => {
+                // Sheets and edges: a table with papers, tape and shadows of things outside.
+                let sheets = (0..rng.whole(1, 3))
+                    .map(|_| {
+                        let angle = rng.angle();
+                        let color = if rng.chance(0.6) { grey(rng, 0.05, 0.8) } else { paint_color(rng) };
+                        ([angle.cos(), angle.sin()], rng.uniform(20.0, 160.0), color)
+                    })
+                    .collect();
+                self.pattern = Pattern::Sheets(sheets);
+            }
+            12 => {
+                // Black: foam, rubber, painted steel.
+                self.base = grey(rng, 0.01, 0.05);
+                self.shine(rng.uniform(0.0, 0.05), rng);
+            }
+            _ => {
+                // Stained workshop steel, concrete.
+                self.base = grey(rng, 0.08, 0.35);
+                for _ in 0..3 {
+                    let (scale, strength) = (rng.log_uniform(0.3, 3.0), rng.uniform(0.05, 0.22));
+                    self.add(&tiles.cloud, [scale, scale], strength, rng);
+                }
+            }
+        }
+    }
+
+    /// A layer that lightens and darkens by a share.
+    fn add(&mut self, tile: &'static Tile, scale: [f32; 2], strength: f32, rng: &mut Pcg64Mcg) {
+        let tint = [rng.uniform(0.9, 1.1), 1.0, rng.uniform(0.9, 1.1)];
+        let color = [0, 1, 2].map(|k| strength * tint[k] * (0.8 * self.base[k] + 0.02));
+        let shift = [rng.uniform(0.0, 256.0), rng.uniform(0.0, 256.0)];
+        self.layers.push(Layer { tile, scale, shift, color });
+    }
+
+    fn shine(&mut self, gloss: f32, rng: &mut Pcg64Mcg) {
+        self.gloss = if gloss < 0.02 { 0.0 } else { gloss };
+        self.gloss_level = rng.whole(1, 3);
+    }
+
+    /// The colour at a place, in linear light, and two slopes of its grain; `mm_per_px` smooths lines.
+    #[inline]
+    pub fn color(&self, place: [f32; 2], mm_per_px: f32) -> [f32; 3] {
+        let [sin, cos] = self.sin_cos;
+        let x = cos * place[0] + sin * place[1] + self.shift[0];
+        let y = cos * place[1] - sin * place[0] + self.shift[1];
+        let mut color = self.base;
+        self.print(x, y, mm_per_px, &mut color);
+        for layer in &self.layers {
+            let value = layer.tile.at(x * layer.scale[0] + layer.shift[0], y * layer.scale[1] + layer.shift[1]);
+            for k in 0..3 {
+                color[k] += value * layer.color[k];
+            }
+        }
+        color.map(|c| c.max(0.004))
+    }
+
+    #[inline]
+    fn print(&self, x: f32, y: f32, mm_per_px: f32, color: &mut [f32; 3]) {
+        let mix = |color: &mut [f32; 3], other: &[f32; 3], share: f32| {
+            for k in 0..3 {
+                color[k] += (other[k] - color[k]) * share;
+            }
+        };
+        // How much of a pixel lies within `half` of a line at distance `d`.
+        let inside =
+            |d: f32, half: f32| ((half - d) / mm_per_px + 0.5).clamp(0.0, 1.0) * (2.0 * half / mm_per_px).min(1.0);
+        let to_line = |v: f32, pitch: f32| (v - pitch * (v / pitch).round()).abs();
+        match &self.pattern {
+            Pattern::None => {}
+            Pattern::Grid { pitch, width, color: ink } => {
+                let fine = inside(to_line(x, *pitch).min(to_line(y, *pitch)), 0.5 * width);
+                let strong = inside(to_line(x, 5.0 * pitch).min(to_line(y, 5.0 * pitch)), 0.9 * width);
+                mix(color, ink, (0.5 * fine).max(strong));
+            }
+            Pattern::Checks { pitch, color: other } => {
+                let (u, v) = (x / pitch, y / pitch);
+                // Distance to the next edge, signed by the square's colour.
+                let odd = (u.floor() as i32 + v.floor() as i32) & 1 == 1;
+                let d = to_line(x, *pitch).min(to_line(y, *pitch));
+                let share = (d / mm_per_px + 0.5).clamp(0.0, 1.0);
+                mix(color, other, if odd { share } else { 1.0 - share });
+            }
+            Pattern::Boards { width, length, joint, vary } => {
+                let board = (y / width).floor();
+                let offset = self.tiles.grain.nearest(board * 7.0, board * 3.0) * length;
+                let piece = ((x + offset) / length).floor();
+                let shade = 1.0 + vary * self.tiles.grain.nearest(board * 5.0 + 11.0, piece * 13.0 + board);
+                let d = to_line(y, *width).min(to_line(x + offset, *length));
+                let dark = 1.0 - 0.7 * inside(d, 0.5 * joint);
+                color.iter_mut().for_each(|c| *c *= shade * dark);
+            }
+            Pattern::Dots { pitch, radius, color: other } => {
+                let (dx, dy) = (to_line(x, *pitch), to_line(y, *pitch));
+                mix(color, other, ((radius - dx.hypot(dy)) / mm_per_px + 0.5).clamp(0.0, 1.0));
+            }
+            Pattern::Waves { pitch, strength } => {
+                let fade = (pitch / (2.5 * mm_per_px)).min(1.0);
+                let shade = 1.0 + fade * strength * (std::f32::consts::TAU * y / pitch).sin();
+                color.iter_mut().for_each(|c| *c *= shade);
+            }
+            Pattern::Weave { pitch, strength } => {
+                let fade = (pitch / (2.5 * mm_per_px)).min(1.0);
+                let k = std::f32::consts::TAU / pitch;
+                let shade = 1.0 + fade * strength * (k * x).sin() * (k * y).sin();
+                color.iter_mut().for_each(|c| *c *= shade);
+            }
+            Pattern::Text { pitch, color: ink } => {
+                let line = (y / pitch).floor();
+                let within = y / pitch - line;
+                let letter = (x / (0.55 * pitch)).floor();
+                let written = self.tiles.cloud.nearest(letter * 0.31, line * 17.0) > -0.5
+                    && self.tiles.grain.nearest(letter, line * 3.0) > -0.55;
+                if written && within > 0.25 && within < 0.75 {
+                    let stroke = self.tiles.grain.at(x / pitch * 7.0, y / pitch * 7.0);
+                    let legible = (0.55 * pitch / (3.0 * mm_per_px)).min(1.0);
+                    let share = (0.5 + 2.5 * stroke).clamp(0.0, 1.0) * legible + 0.4 * (1.0 - legible);
+                    mix(color, ink, share);
+                }
+            }
+            Pattern::Sheets(sheets) => {
+                for (normal, distance, other) in sheets {
+                    let (dx, dy) = (x - self.shift[0], y - self.shift[1]);
+                    let d = normal[0] * dx + normal[1] * dy - distance;
+                    mix(color, other, (d / mm_per_px + 0.5).clamp(0.0, 1.0));
+                }
+            }
+        }
+    }
+
+    /// Slopes of the top's grain at a place.
+    #[inline]
+    pub fn slopes(&self, place: [f32; 2]) -> [f32; 2] {
+        if self.ripple <= 0.0 {
+            return [0.0; 2];
+        }
+        let [sin, cos] = self.sin_cos;
+        let (x, y) = (cos * place[0] + sin * place[1], cos * place[1] - sin * place[0]);
+        let across = self.ripple * self.tiles.streak.at(0.3 * x, 1.3 * y);
+        [-sin * across, cos * across]
+    }
+
+    /// The mean colour, roughly: what walls and shiny parts reflect from below.
+    pub fn mean(&self) -> [f32; 3] {
+        self.base
+    }
+}
+
+/// A grey, slightly coloured.
+fn grey(rng: &mut Pcg64Mcg, low: f32, high: f32) -> [f32; 3] {
+    let level = rng.log_uniform(low, high);
+    [level * rng.uniform(0.94, 1.06), level, level * rng.uniform(0.92, 1.08)]
+}

@@ -1,0 +1,115 @@
+//! The camera over the table.
+
+/// A pinhole camera that looks down at the table.
+///
+/// The table's frame, in millimetres: x right and y down as in a picture from straight above, z up. (It is left-handed,
+/// as every frame with y down and z towards the viewer.)
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View {
+    pub width: usize,
+    pub height: usize,
+    /// Focal length in pixels.
+    pub focal: f32,
+    /// Where the camera is.
+    pub position: [f32; 3],
+    /// The picture's right, down and the viewing direction.
+    axes: [[f32; 3]; 3],
+}
+
+/// A line of sight: where it meets the table, and how far it moves sideways for a millimetre of height.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    pub foot: [f32; 2],
+    pub drift: [f32; 2],
+}
+
+impl Sight {
+    /// The place at a height.
+    #[inline(always)]
+    pub fn at(&self, z: f32) -> [f32; 2] {
+        [self.foot[0] + self.drift[0] * z, self.foot[1] + self.drift[1] * z]
+    }
+}
+
+impl View {
+    /// A camera that looks at the table's origin from `distance` millimetres, tilted by `tilt` radians from straight
+    /// down towards the direction `azimuth`.
+    pub fn new(width: u32, height: u32, focal: f32, distance: f32, tilt: f32, azimuth: f32) -> Self {
+        // Turned about a level axis (Rodrigues).
+        let (axis_y, axis_x) = azimuth.sin_cos();
+        let (sin, cos) = tilt.sin_cos();
+        let turned = |v: [f32; 3]| {
+            let dot = (axis_x * v[0] + axis_y * v[1]) * (1.0 - cos);
+            let cross = [axis_y * v[2], -axis_x * v[2], axis_x * v[1] - axis_y * v[0]];
+            [
+                v[0] * cos + cross[0] * sin + axis_x * dot,
+                v[1] * cos + cross[1] * sin + axis_y * dot,
+                v[2] * cos + cross[2] * sin,
+            ]
+        };
+        let axes = [turned([1.0, 0.0, 0.0]), turned([0.0, 1.0, 0.0]), turned([0.0, 0.0, -1.0])];
+        let position = axes[2].map(|v| -v * distance);
+        Self { width: width as usize, height: height as usize, focal, position, axes }
+    }
+
+    /// The line of sight through a place in the picture.
+    #[inline(always)]
+    pub fn sight(&self, px: f32, py: f32) -> Sight {
+        let (x, y) = ((px - 0.5 * self.width as f32) / self.focal, (py - 0.5 * self.height as f32) / self.focal);
+        let [u, v, w] = &self.axes;
+        let ray = [w[0] + u[0] * x + v[0] * y, w[1] + u[1] * x + v[1] * y, w[2] + u[2] * x + v[2] * y];
+        // Down at least a little, so that the sight meets the table.
+        let drift = [ray[0] / ray[2].min(-0.05), ray[1] / ray[2].min(-0.05)];
+        let z = self.position[2];
+        Sight { foot: [self.position[0] - drift[0] * z, self.position[1] - drift[1] * z], drift }
+    }
+
+    /// Where a point appears; none behind the camera.
+    pub fn project(&self, p: [f32; 3]) -> Option<[f32; 2]> {
+        let d = [p[0] - self.position[0], p[1] - self.position[1], p[2] - self.position[2]];
+        let along = |axis: &[f32; 3]| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2];
+        let depth = along(&self.axes[2]);
+        (depth > 1.0).then(|| {
+            [
+                self.focal * along(&self.axes[0]) / depth + 0.5 * self.width as f32,
+                self.focal * along(&self.axes[1]) / depth + 0.5 * self.height as f32,
+            ]
+        })
+    }
+
+    /// Millimetres of the table for one pixel in the middle of the picture.
+    pub fn mm_per_px(&self) -> f32 {
+        let [x, y, z] = self.position;
+        (x * x + y * y + z * z).sqrt() / self.focal
+    }
+
+    /// The box on the table that the picture shows: [min x, min y, max x, max y].
+    pub fn ground(&self) -> [f32; 4] {
+        let (w, h) = (self.width as f32, self.height as f32);
+        [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]].iter().fold(
+            [f32::MAX, f32::MAX, f32::MIN, f32::MIN],
+            |b, &[px, py]| {
+                let p = self.sight(px, py).foot;
+                [b[0].min(p[0]), b[1].min(p[1]), b[2].max(p[0]), b[3].max(p[1])]
+            },
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sights_and_projections_agree() {
+        let view = View::new(320, 240, 275.0, 400.0, 0.3, 1.1);
+        for (px, py, z) in [(10.0, 20.0, 0.0), (160.0, 120.0, 30.0), (300.0, 200.0, 15.0)] {
+            let [x, y] = view.sight(px, py).at(z);
+            let seen = view.project([x, y, z]).unwrap();
+            assert!((seen[0] - px).abs() < 0.01 && (seen[1] - py).abs() < 0.01, "{seen:?}");
+        }
+        let straight = View::new(320, 240, 275.0, 400.0, 0.0, 0.0);
+        // 40 mm to the right at 400 mm are 27.5 pixels.
+        assert!((straight.project([40.0, 0.0, 0.0]).unwrap()[0] - 187.5).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,143 @@
+//! Tiles of noise that all pictures share, drawn once from a fixed seed and read at any place, turn and scale.
+
+use std::sync::OnceLock;
+
+use rand_pcg::Pcg64Mcg;
+
+use crate::random::{Draw, Stream, generator};
+
+/// Side of a tile; a power of two, so that wrapping is a mask.
+const SIDE: usize = 256;
+
+/// Length of the table of normal numbers.
+const NORMALS: usize = 1 << 15;
+
+/// Values around 0, mostly in [-1, 1], that repeat every 256 texels without a seam.
+pub(crate) struct Tile {
+    values: Box<[f32]>,
+}
+
+/// Everything that is drawn once.
+pub(crate) struct Tiles {
+    /// Smooth clouds of several sizes.
+    pub cloud: Tile,
+    /// A new value every texel, little smoothed.
+    pub grain: Tile,
+    /// Streaks along x.
+    pub streak: Tile,
+    /// Rings of wood, cut along the trunk: lines along x.
+    pub wood: Tile,
+    /// Sparse spots: 0, or up to 1 within a spot.
+    pub spots: Tile,
+    /// Normally distributed numbers.
+    normals: Box<[f32]>,
+}
+
+impl Tile {
+    fn from_fn(mut value: impl FnMut(usize, usize) -> f32) -> Self {
+        Self { values: (0..SIDE * SIDE).map(|k| value(k % SIDE, k / SIDE)).collect() }
+    }
+
+    /// Sums octaves of smooth noise of so many cells a side, then brings the standard deviation to 0.5.
+    fn fractal(cells: [usize; 2], octaves: u32, fall: f32, rng: &mut Pcg64Mcg) -> Self {
+        let mut values = vec![0.0f32; SIDE * SIDE];
+        let mut strength = 1.0;
+        for octave in 0..octaves {
+            let [nx, ny] = cells.map(|count| (count << octave).min(SIDE));
+            let lattice: Vec<f32> = (0..nx * ny).map(|_| rng.uniform(-1.0, 1.0)).collect();
+            for y in 0..SIDE {
+                let (v, fy) = split(y, ny);
+                for x in 0..SIDE {
+                    let (u, fx) = split(x, nx);
+                    let at = |u: usize, v: usize| lattice[(v % ny) * nx + u % nx];
+                    let upper = at(u, v) + (at(u + 1, v) - at(u, v)) * fx;
+                    let lower = at(u, v + 1) + (at(u + 1, v + 1) - at(u, v + 1)) * fx;
+                    values[y * SIDE + x] += strength * (upper + (lower - upper) * fy);
+                }
+            }
+            strength *= fall;
+        }
+        let n = values.len() as f32;
+        let mean = values.iter().sum::<f32>() / n;
+        let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n).sqrt();
+        values.iter_mut().for_each(|v| *v = 0.5 * (*v - mean) / deviation);
+        Self { values: values.into() }
+    }
+
+    /// The nearest value.
+    #[inline(always)]
+    pub fn nearest(&self, x: f32, y: f32) -> f32 {
+        self.texel(x.floor() as i32, y.floor() as i32)
+    }
+
+    /// Bilinear.
+    #[inline(always)]
+    pub fn at(&self, x: f32, y: f32) -> f32 {
+        let (column, row) = (x.floor(), y.floor());
+        let (fx, fy) = (x - column, y - row);
+        let (u, v) = (column as i32, row as i32);
+        let upper = self.texel(u, v) + (self.texel(u + 1, v) - self.texel(u, v)) * fx;
+        let lower = self.texel(u, v + 1) + (self.texel(u + 1, v + 1) - self.texel(u, v + 1)) * fx;
+        upper + (lower - upper) * fy
+    }
+
+    #[inline(always)]
+    fn texel(&self, u: i32, v: i32) -> f32 {
+        let mask = SIDE as i32 - 1;
+        self.values[((v & mask) as usize) * SIDE + (u & mask) as usize]
+    }
+}
+
+/// The cell of a lattice of `count` that texel `k` lies in, and how far along, eased.
+fn split(k: usize, count: usize) -> (usize, f32) {
+    let place = (k as f32 + 0.5) * count as f32 / SIDE as f32;
+    let t = place.fract();
+    (place as usize, t * t * (3.0 - 2.0 * t))
+}
+
+impl Tiles {
+    /// The tiles, drawn at the first call.
+    pub fn get() -> &'static Self {
+        static TILES: OnceLock<Tiles> = OnceLock::new();
+        TILES.get_or_init(Self::draw)
+    }
+
+    fn draw() -> Self {
+        let mut rng = generator(0x7469_6c65, Stream::Tiles, 0);
+        let cloud = Tile::fractal([4, 4], 6, 0.55, &mut rng);
+        let grain = Tile::fractal([128, 128], 2, 0.8, &mut rng);
+        let streak = Tile::fractal([4, 128], 2, 0.8, &mut rng);
+        let warp = Tile::fractal([2, 4], 4, 0.5, &mut rng);
+        let fibre = Tile::fractal([8, 128], 2, 0.7, &mut rng);
+        let wood = Tile::from_fn(|x, y| {
+            let rings = (y as f32 / SIDE as f32) * 16.0 + 2.2 * warp.texel(x as i32, y as i32);
+            0.55 * (std::f32::consts::TAU * rings).sin() + 0.45 * fibre.texel(x as i32, y as i32)
+        });
+        let mut dots = vec![0.0f32; SIDE * SIDE];
+        for _ in 0..420 {
+            let (cx, cy) = (rng.uniform(0.0, SIDE as f32), rng.uniform(0.0, SIDE as f32));
+            let (radius, strength) = (rng.log_uniform(0.6, 3.5), rng.uniform(0.3, 1.0));
+            let reach = radius.ceil() as i32 + 1;
+            for dy in -reach..=reach {
+                for dx in -reach..=reach {
+                    let distance = (dx as f32 - cx.fract()).hypot(dy as f32 - cy.fract());
+                    let inside = (radius + 0.5 - distance).clamp(0.0, 1.0) * strength;
+                    let mask = SIDE as i32 - 1;
+                    let (u, v) = ((cx as i32 + dx) & mask, (cy as i32 + dy) & mask);
+                    let dot = &mut dots[v as usize * SIDE + u as usize];
+                    *dot = dot.max(inside);
+                }
+            }
+        }
+        // Box and Muller's transform.
+        let normals = (0..NORMALS).map(|_| (-2.0 * rng.uniform(1e-7, 1.0).ln()).sqrt() * rng.angle().cos()).collect();
+        Self { cloud, grain, streak, wood, spots: Tile { values: dots.into() }, normals }
+    }
+
+    /// `len` normal numbers from a place of the table that `address` chooses; `len` is at most half of the table.
+    pub fn normals(&self, address: u64, len: usize) -> &[f32] {
+        assert!(len <= NORMALS / 2, "rows of at most {} numbers", NORMALS / 2);
+        let first = (address % (NORMALS - len) as u64) as usize;
+        &self.normals[first..first + len]
+    }
+}
