@@ -111,6 +111,16 @@ pub enum GraspError {
     /// A demonstration in which there is no shape to compare.
     #[error("the demonstration cannot be laid over images: {0}")]
     Shape(#[from] sdg_shape::ShapeError),
+    /// A value of a configuration out of its range.
+    #[error("expected {name} {expected}, found {found}")]
+    InvalidConfig {
+        /// Field of [`crate::CheckConfig`].
+        name: &'static str,
+        /// The accepted range, in words.
+        expected: &'static str,
+        /// The value given.
+        found: f64,
+    },
     /// The network refused its input.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),

@@ -36,6 +36,7 @@
 #[cfg(feature = "teach")]
 mod base_weights;
 mod calibration;
+mod check_config;
 mod decimal;
 mod device;
 mod error;
@@ -55,6 +56,7 @@ mod verification;
 pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
+pub use check_config::{CheckConfig, SizePenalty, ThresholdConfig};
 pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
 pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};

@@ -18,7 +18,7 @@ use crate::models::{Candidate, Network, instant};
 use crate::taught::TaughtDemonstration;
 use crate::verification::{Overlay, Scene, verify};
 
-/// No part can be told in an image with a shorter side.
+/// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
 const LEAST_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.
@@ -148,7 +148,7 @@ impl GraspModel {
                 .map(|c| self.unverified(c))
                 .collect(),
             (Some(network), Verification::ByShape) => {
-                let scene = Scene::new(image);
+                let scene = Scene::new(image, &self.demonstrations);
                 let candidates = network.candidates_async(image, &self.demonstrations).await?;
                 let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, &scene)).collect();
                 if !found.iter().any(GraspDetection::is_accepted) {
@@ -157,7 +157,7 @@ impl GraspModel {
                 }
                 found
             }
-            (None, _) => self.searched(&Scene::new(image)),
+            (None, _) => self.searched(&Scene::new(image, &self.demonstrations)),
         };
         let (width, height) = (f64::from(width), f64::from(height));
         found.iter_mut().for_each(|detection| detection.bbox = detection.bbox.clip(width, height));
@@ -221,7 +221,9 @@ impl GraspModel {
 /// Detections that verification moved onto the same part, by the overlap of their boxes: the best one stays. Of those that
 /// ended in the same pose it is the one that the network was surest of, and not a matter of the last bit.
 fn drop_repeated(found: &mut Vec<GraspDetection>) {
+    // Chosen by hand, not measured.
     const SAME_PART_IOU: f64 = 0.5;
+    // Chosen by hand: above the rounding of single precision, below any difference that tells poses apart.
     const SAME_SCORE: f64 = 1e-4;
     let mut kept: Vec<GraspDetection> = Vec::with_capacity(found.len());
     for detection in found.drain(..) {

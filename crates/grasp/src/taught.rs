@@ -4,23 +4,15 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{Comparison, GradientField, InstantSearch, Match, SearchConfig, ShapeConfig, ShapeTemplate, Surface};
+use sdg_shape::{Comparison, GradientField, InstantSearch, Match, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
 
+use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
 use crate::{GraspError, NUM_KEYPOINTS};
 
-/// Pixels kept around the part, so that gradients at the outline have both their sides.
+/// Pixels kept around the part, so that gradients at the outline have both their sides. Chosen by hand, not measured.
 const MARGIN_PX: f64 = 16.0;
-
-/// What the second opinion looks for: about the size that was taught, as the camera hovers about as high.
-const SECOND_OPINION: SearchConfig = SearchConfig {
-    scales: 0.88..=1.14,
-    least_agreement: 0.2,
-    max_matches: 3,
-    num_points: SearchConfig::DEFAULT_NUM_POINTS,
-    shape: ShapeConfig::DEFAULT,
-};
 
 /// The marks, in pixels of the kept cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,6 +42,7 @@ pub struct TaughtDemonstration {
     template: ShapeTemplate,
     surface: Surface,
     search: InstantSearch,
+    check: CheckConfig,
 }
 
 impl TaughtDemonstration {
@@ -98,11 +91,30 @@ impl TaughtDemonstration {
     /// # Errors
     /// Nothing in the outline to compare.
     pub fn from_parts(cutout: RgbImage, marks: TaughtMarks) -> Result<Self, GraspError> {
+        Self::with_config(cutout, marks, CheckConfig::DEFAULT)
+    }
+
+    fn with_config(cutout: RgbImage, marks: TaughtMarks, check: CheckConfig) -> Result<Self, GraspError> {
+        check.check()?;
         let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
-        let template = ShapeTemplate::new(&cutout, &outline, &ShapeConfig::default())?;
-        let surface = Surface::new(&cutout, &outline, &ShapeConfig::DEFAULT.surface);
-        let search = InstantSearch::new(&cutout, &outline, &SECOND_OPINION)?;
-        Ok(Self { cutout, marks, template, surface, search })
+        let template = ShapeTemplate::new(&cutout, &outline, &check.search.shape)?;
+        let surface = Surface::new(&cutout, &outline, &check.search.shape.surface);
+        let search = InstantSearch::new(&cutout, &outline, &check.search)?;
+        Ok(Self { cutout, marks, template, surface, search, check })
+    }
+
+    /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration
+    /// has the default.
+    ///
+    /// # Errors
+    /// A value out of range.
+    pub fn with_check(self, check: CheckConfig) -> Result<Self, GraspError> {
+        Self::with_config(self.cutout, self.marks, check)
+    }
+
+    /// How it is compared and searched for.
+    pub fn check(&self) -> &CheckConfig {
+        &self.check
     }
 
     /// The same demonstration, searched for with `num_points` edge points a pose.
@@ -110,10 +122,9 @@ impl TaughtDemonstration {
     /// # Errors
     /// A number of points that [`InstantSearch::new`] refuses.
     pub(crate) fn with_search_points(self, num_points: usize) -> Result<Self, GraspError> {
-        let outline = self.marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.marks.bbox));
-        let config = SearchConfig { num_points, ..SECOND_OPINION };
-        let search = InstantSearch::new(&self.cutout, &outline, &config)?;
-        Ok(Self { search, ..self })
+        let mut check = self.check.clone();
+        check.search.num_points = num_points;
+        self.with_check(check)
     }
 
     /// The scale at which the part lies in an image of that size that is taken as the photo was, with as many pixels or

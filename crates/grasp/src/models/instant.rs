@@ -4,7 +4,7 @@
 use sdg_shape::Match;
 
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Overlay, Scene, less_for_another_size, usual_scale};
+use crate::verification::{Overlay, Scene, usual_scale};
 
 /// Every place in the image where a demonstration agrees well enough to be mentioned.
 pub(crate) fn search<'a>(demonstrations: &'a [TaughtDemonstration], scene: &Scene<'_>) -> Vec<Overlay<'a>> {
@@ -16,7 +16,7 @@ pub(crate) fn search<'a>(demonstrations: &'a [TaughtDemonstration], scene: &Scen
             demonstration,
             image_from_cutout: image_from_demonstration,
             agreement_at_any_size: agreement,
-            agreement: less_for_another_size(agreement, image_from_demonstration.scale / usual),
+            agreement: demonstration.check().size.apply(agreement, image_from_demonstration.scale / usual),
         }));
     }
     found

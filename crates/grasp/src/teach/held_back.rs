@@ -52,13 +52,13 @@ impl HeldBack<'_> {
     /// # Errors
     /// An image that the network refuses.
     pub(super) fn calibrate(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Calibrated> {
-        /// Highest raw score of a wrong detection where the held-back samples gave none.
+        /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
         let (mut right_scores, mut wrong_scores) = (Vec::new(), Vec::new());
         let mut positives = 0;
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
         for sample in self.samples {
-            let scene = Scene::new(&sample.image);
+            let scene = Scene::new(&sample.image, demonstrations);
             // The highest score of a candidate that ended beside the part, and of one on it.
             let (mut beside, mut on_part) = (0.0f64, 0.0f64);
             let mut is_on_part = |overlay: &Overlay| {

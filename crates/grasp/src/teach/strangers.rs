@@ -10,26 +10,13 @@
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
 
 use crate::calibration::Calibration;
-use crate::decimal::decimal;
 use crate::error::Result;
 use crate::models::{Network, instant};
 use crate::taught::TaughtDemonstration;
 use crate::verification::{Scene, better_way_round, verify};
 
-/// How far above the mean of strangers the threshold stands: beyond the highest of any shipped part.
-const ABOVE_STRANGERS: f64 = 0.2;
-/// Where the threshold may lie. The lower bound is for look-alikes that composed scenes know nothing of, the upper one for
-/// the part itself in bad light.
-const THRESHOLDS: (f64, f64) = (0.44, 0.6);
-/// Without strangers that agree at all there is no mean.
-const LEAST_SCENES: usize = 3;
-/// The threshold then.
-const THRESHOLD_UNSEEN: f64 = 0.5;
-/// The logistic's slope: 0.08 above the threshold is a score of 0.88.
-const SLOPE: f64 = 25.0;
-
 /// Scenes without the part.
-pub(super) struct Strangers {
+pub(crate) struct Strangers {
     scenes: Vec<Sample>,
 }
 
@@ -38,7 +25,7 @@ impl Strangers {
     ///
     /// # Errors
     /// As [`Augmenter::new`].
-    pub(super) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
+    pub(crate) fn new(demonstrations: &[Demonstration], seed: u64, count: u64) -> Result<Self> {
         // Pieces of the part itself agree with it, and lie on no table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
@@ -55,9 +42,22 @@ impl Strangers {
         network: Option<&Network>,
         demonstrations: &[TaughtDemonstration],
     ) -> Result<Calibration> {
+        let config = demonstrations.first().map(|first| first.check().threshold).unwrap_or_default();
+        Ok(config.calibration(&self.agreements(network, demonstrations)?))
+    }
+
+    /// The highest agreement in each scene in which anything agrees at all.
+    ///
+    /// # Errors
+    /// An image that the network refuses.
+    pub(crate) fn agreements(
+        &self,
+        network: Option<&Network>,
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Vec<f64>> {
         let mut highest = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
-            let scene = Scene::new(&sample.image);
+            let scene = Scene::new(&sample.image, demonstrations);
             // At any size: what another size costs is there to part strangers further from the part, not to lower the bar.
             let mut agreements = Vec::new();
             for overlay in instant::search(demonstrations, &scene) {
@@ -74,13 +74,7 @@ impl Strangers {
             }
             highest.extend(agreements.into_iter().reduce(f64::max));
         }
-        let threshold = if highest.len() < LEAST_SCENES {
-            THRESHOLD_UNSEEN
-        } else {
-            let mean = highest.iter().sum::<f64>() / highest.len() as f64;
-            (mean + ABOVE_STRANGERS).clamp(THRESHOLDS.0, THRESHOLDS.1)
-        };
-        Ok(Calibration { threshold: decimal(threshold), slope: SLOPE })
+        Ok(highest)
     }
 }
 
@@ -96,7 +90,7 @@ mod tests {
         let strangers = Strangers::new(&demonstrations, 3, 12).unwrap();
         let calibration = strangers.calibrate(None, &taught).unwrap();
         let best = |image| {
-            let found = instant::search(&taught, &Scene::new(image));
+            let found = instant::search(&taught, &Scene::new(image, &taught));
             found.iter().map(|overlay| calibration.apply(overlay.agreement)).fold(0.0, f64::max)
         };
         let scores: Vec<f64> = strangers.scenes.iter().map(|sample| best(&sample.image)).collect();
