@@ -23,17 +23,20 @@ pub struct Calibration {
 }
 
 /// How far from the wrong scores to the right ones the threshold stands when the two are apart. Below a half,
-/// because pictures of the real workcell agree less than augmentations do, and wrong ones do not agree more.
+/// because pictures of the real workcell agree less than augmentations do, and wrong ones do not agree more. Chosen by that
+/// reasoning, not measured.
 const SHARE_OF_GAP: f64 = 0.4;
-/// The logistic at the nearer end of the gap, which sets the slope.
+/// The logistic at the nearer end of the gap, which sets the slope. Chosen by hand, not measured.
 const SCORE_AT_GAP_END: f64 = 0.88;
-/// Bounds of the slope, so that a handful of scores makes neither a step nor a flat line.
+/// Bounds of the slope, so that a handful of scores makes neither a step nor a flat line. Chosen by that reasoning, not
+/// measured; the upper one was 60 at first.
 const SLOPE_BOUNDS: (f64, f64) = (4.0, 25.0);
-/// Share of right scores that may lie below the lower end of the gap: one odd picture does not move the threshold.
+/// Share of right scores that may lie below the lower end of the gap: one odd picture does not move the threshold. Chosen
+/// by that reasoning, not measured.
 const TRIMMED: f64 = 0.02;
 
 impl Calibration {
-    /// Leaves a score where it is, nearly: 0.5 stays 0.5.
+    /// Leaves a score where it is, nearly: 0.5 stays 0.5. Derived: a logistic of slope 4 has slope 1 there.
     pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 4.0 };
 
     /// Finds the threshold between the raw scores of right and wrong detections.

@@ -35,8 +35,9 @@ use crate::facts::{ModelKind, TurnSource};
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
+/// Chosen by hand; how often there are more is not recorded.
 const MOST_CANDIDATES: usize = 4;
-/// Below this the network itself does not believe it.
+/// Below this the network itself does not believe it. Detectron2's own threshold at test time.
 const LEAST_NETWORK_SCORE: f64 = 0.05;
 
 /// A model's detector, and how it is read. Model S has none.
