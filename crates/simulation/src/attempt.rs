@@ -7,10 +7,10 @@
 //! A look that does not find the part is repeated from beside, as a person would: another place shows a tall part from
 //! another side, and shadows of the arm elsewhere.
 
-use std::fmt;
+mod report;
+
 use std::time::Instant;
 
-use image::RgbImage;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -25,6 +25,8 @@ use crate::panda::FINGERTIP_BEYOND_TCP_M;
 use crate::perception::{GraspTarget, Perception};
 use crate::record::RecordConfig;
 use crate::workcell::{MotionEnd, Workcell, camera_looking_down};
+
+pub use report::{AttemptOutcome, AttemptReport, AttemptStep};
 
 /// Where the sequence goes and how it is judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,82 +69,6 @@ impl Default for AttemptConfig {
             record: None,
         }
     }
-}
-
-/// A step of an attempt.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum AttemptStep {
-    /// Perception finds the part.
-    Detect,
-    /// The arm goes over the part and turns to it.
-    Hover,
-    /// The hand comes down to the part.
-    Approach,
-    /// The fingers close on it.
-    Close,
-    /// The arm lifts it.
-    Lift,
-    /// The part stays between the fingers.
-    Hold,
-}
-
-impl fmt::Display for AttemptStep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Detect => "detect",
-            Self::Hover => "hover",
-            Self::Approach => "approach",
-            Self::Close => "close",
-            Self::Lift => "lift",
-            Self::Hold => "hold",
-        })
-    }
-}
-
-/// How an attempt ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AttemptOutcome {
-    /// One second after lifting, the part hung high enough between both fingers.
-    Success,
-    /// It did not come so far.
-    Failure {
-        /// The step that failed.
-        step: AttemptStep,
-        /// Why, in one sentence.
-        why: String,
-    },
-}
-
-impl AttemptOutcome {
-    /// Whether the part was grasped.
-    pub fn is_success(&self) -> bool {
-        *self == Self::Success
-    }
-}
-
-/// All that happened in an attempt.
-#[derive(Debug, Clone)]
-pub struct AttemptReport {
-    /// How it ended.
-    pub outcome: AttemptOutcome,
-    /// The seed of the start configuration.
-    pub seed: u64,
-    /// Where the part lay at the start, in the base frame.
-    pub base_from_object: Option<Isometry3<f64>>,
-    /// What the wrist camera saw, look by look: from afar until the part was found, then from above it.
-    pub views: Vec<CameraView>,
-    /// What perception said to each of the views, where it was sure enough.
-    pub targets: Vec<Option<GraspTarget>>,
-    /// Height of the part's lowest point above the table at the end, in metres.
-    pub object_height_m: Option<f64>,
-    /// Simulated time in seconds.
-    pub simulated_secs: f64,
-    /// Time that it took, in seconds, perception included.
-    pub wall_secs: f64,
-    /// Of that, time in perception, in seconds.
-    pub perception_secs: f64,
-    /// Pictures from outside, if recorded.
-    pub frames: Vec<RgbImage>,
 }
 
 /// Why the sequence ended early.
@@ -212,10 +138,18 @@ impl Workcell {
             self.start_recording(record)?;
         }
         let base_from_object = self.base_from_object();
-        let mut attempt =
-            Attempt { cell: self, perceive, config, views: Vec::new(), targets: Vec::new(), perception_secs: 0.0 };
+        let mut attempt = Attempt {
+            cell: self,
+            perceive,
+            config,
+            views: Vec::new(),
+            targets: Vec::new(),
+            looks: [0; 2],
+            shake_amplitude_m: None,
+            perception_secs: 0.0,
+        };
         let ended = attempt.sequence();
-        let Attempt { views, targets, perception_secs, .. } = attempt;
+        let Attempt { views, targets, looks, shake_amplitude_m, perception_secs, .. } = attempt;
         let frames = self.stop_recording();
         let outcome = match ended {
             Ok(()) => AttemptOutcome::Success,
@@ -228,6 +162,8 @@ impl Workcell {
             base_from_object,
             views,
             targets,
+            looks,
+            shake_amplitude_m,
             object_height_m: self.object_height_m(),
             simulated_secs: self.data.time_secs(),
             wall_secs: started.elapsed().as_secs_f64(),
@@ -285,6 +221,8 @@ struct Attempt<'a, 'p> {
     config: &'a AttemptConfig,
     views: Vec<CameraView>,
     targets: Vec<Option<GraspTarget>>,
+    looks: [usize; 2],
+    shake_amplitude_m: Option<f64>,
     perception_secs: f64,
 }
 
@@ -296,6 +234,7 @@ impl Attempt<'_, '_> {
         self.come_down(approach)?;
         self.close()?;
         self.lift()?;
+        self.shake()?;
         self.hold()
     }
 
@@ -313,6 +252,7 @@ impl Attempt<'_, '_> {
                 Ok(()) => self.cell.wait(SETTLE_SECS)?,
             }
             looks += 1;
+            self.looks[0] = looks;
             if let Some(target) = self.perceive(|target| target.score >= SURE)? {
                 return Ok(target);
             }
@@ -329,6 +269,7 @@ impl Attempt<'_, '_> {
                 Err(_) => continue,
                 Ok(()) => looks += 1,
             }
+            self.looks[1] = looks;
             if let Some(target) = self.perceive(|target| target.score >= SURE || confirms(first, target))? {
                 return Ok(target);
             }
@@ -338,7 +279,10 @@ impl Attempt<'_, '_> {
 
     /// Takes a picture and asks perception; a target that no hand can take is a failure.
     fn perceive(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Sequence<Option<GraspTarget>> {
-        let view = self.cell.wrist_view()?;
+        let mut view = self.cell.wrist_view()?;
+        if let Some(camera_from_told) = self.cell.config().errors.camera_from_told {
+            view.camera.world_from_camera *= camera_from_told;
+        }
         let started = Instant::now();
         let best = (self.perceive)(self.cell, &view).map_err(|error| SimulationError::Perception(error.to_string()))?;
         let target = best.filter(is_accepted);
@@ -471,6 +415,14 @@ impl Attempt<'_, '_> {
         };
         self.move_along(path, [0.25, 0.10, 0.05], AttemptStep::Lift)?;
         self.judge(AttemptStep::Lift)
+    }
+
+    /// Shakes the part where the workcell's errors ask for it.
+    fn shake(&mut self) -> Sequence<()> {
+        if let Some(shake) = self.cell.config().errors.shake {
+            self.shake_amplitude_m = Some(self.cell.shake(&shake)?);
+        }
+        Ok(())
     }
 
     fn hold(&mut self) -> Sequence<()> {

@@ -28,6 +28,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod attempt;
+mod attempt_errors;
 mod camera;
 mod controller;
 mod data;
@@ -44,9 +45,11 @@ mod perception;
 mod record;
 mod render;
 pub mod scene;
+mod shake;
 mod workcell;
 
 pub use attempt::{AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep};
+pub use attempt_errors::{AttemptErrors, Shake};
 pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
 pub use controller::{ArmController, ArmReference};
 pub use data::{Contact, Data};

@@ -27,6 +27,19 @@ pub fn panda_asset() -> Asset {
     Asset { name: PANDA_FILE.to_owned(), bytes: include_bytes!("../assets/panda.xml").to_vec() }
 }
 
+/// The pads' priority and friction as the MJCF has them.
+const PAD_PRIORITY: &str = " priority=\"1\"";
+const PAD_FRICTION: &str = "friction=\"1.0 ";
+
+/// As [`panda_asset`] with pads of another sliding friction and without priority, so that MuJoCo combines it with the
+/// part's by its usual rule: the larger of the two.
+pub(crate) fn panda_asset_with_pads(friction: f64) -> Asset {
+    let text = include_str!("../assets/panda.xml")
+        .replace(PAD_PRIORITY, "")
+        .replace(PAD_FRICTION, &format!("friction=\"{friction} "));
+    Asset { name: PANDA_FILE.to_owned(), bytes: text.into_bytes() }
+}
+
 /// The arm's parts in a compiled model.
 #[derive(Debug, Clone)]
 pub struct PandaIds {
@@ -189,6 +202,23 @@ mod tests {
             assert_eq!(range, [kinematics::POSITION_MIN_RAD[joint], kinematics::POSITION_MAX_RAD[joint]]);
             assert_eq!(torque, [-kinematics::TORQUE_MAX_NM[joint], kinematics::TORQUE_MAX_NM[joint]]);
         }
+    }
+
+    #[test]
+    fn worn_pads_have_their_friction_and_no_priority() {
+        let pads = |asset: Asset| {
+            let xml = "<mujoco><compiler angle='radian'/><include file='panda.xml'/></mujoco>";
+            let model = Model::from_xml(xml, &[asset]).unwrap();
+            let raw = model.raw();
+            let mut found = Vec::new();
+            for geom in model.ids::<Geom>().filter(|&geom| model.name(geom).is_some_and(|name| name.contains("pad"))) {
+                // SAFETY: one priority and three coefficients a geom.
+                found.push(unsafe { (*raw.geom_priority.add(geom.index()), *raw.geom_friction.add(3 * geom.index())) });
+            }
+            found
+        };
+        assert_eq!(pads(panda_asset()), [(1, 1.0); 8]);
+        assert_eq!(pads(panda_asset_with_pads(0.7)), [(0, 0.7); 8]);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_kinematics::{IkOptions, Panda, Trajectory, ready_pose};
 
+use crate::attempt_errors::AttemptErrors;
 use crate::camera::{CameraView, posed_camera};
 use crate::controller::{ArmController, ArmReference};
 use crate::data::Data;
@@ -13,7 +14,7 @@ use crate::error::{Result, SimulationError};
 use crate::extent::lowest_point_m;
 use crate::gripper::Gripper;
 use crate::model::{Body, Camera, Id, Joint, Model};
-use crate::panda::{PANDA_FILE, PandaIds, panda_asset};
+use crate::panda::{PANDA_FILE, PandaIds, panda_asset, panda_asset_with_pads};
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
 use crate::scene::SceneVariation;
@@ -31,12 +32,14 @@ pub struct WorkcellConfig {
     pub scene: SceneVariation,
     /// How the wrist camera's pictures are drawn.
     pub wrist_render: RenderConfig,
+    /// What is wrong in attempts.
+    pub errors: AttemptErrors,
 }
 
 impl WorkcellConfig {
-    /// A scene with the wrist camera's usual pictures.
+    /// A scene with the wrist camera's usual pictures, without errors.
     pub fn new(scene: SceneVariation) -> Self {
-        Self { scene, wrist_render: RenderConfig::default() }
+        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default() }
     }
 }
 
@@ -84,7 +87,10 @@ impl Workcell {
             .replace("PANDA_FILE", PANDA_FILE)
             .replace("<!-- SCENE -->", &fragment.sections);
         let mut assets = fragment.files;
-        assets.push(panda_asset());
+        assets.push(match config.errors.pad_friction {
+            Some(friction) => panda_asset_with_pads(friction),
+            None => panda_asset(),
+        });
         let model = Arc::new(Model::from_xml(&xml, &assets)?);
 
         let panda_ids = PandaIds::find(&model)?;
@@ -263,7 +269,7 @@ impl Workcell {
     }
 
     /// Lets one control period pass, the arm following the reference.
-    fn tick(&mut self) -> Result<()> {
+    pub(crate) fn tick(&mut self) -> Result<()> {
         self.data.step1()?;
         self.controller.apply(&mut self.data, &self.panda_ids, &self.reference);
         self.gripper.apply(&mut self.data, &self.panda_ids, PERIOD_SECS);
@@ -304,6 +310,11 @@ impl Workcell {
             }
         }
         Ok(MotionEnd::Arrived)
+    }
+
+    /// Sets where the controller wants the arm in the next period.
+    pub(crate) fn set_reference(&mut self, reference: ArmReference) {
+        self.reference = reference;
     }
 
     /// Where the controller wants the arm.

@@ -1,0 +1,100 @@
+//! What can be wrong in a workcell while it grasps: where the camera is believed to be, what the pads hold, a shaken hand.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+/// How far beside its true place the camera is believed to be, in metres, and how far it is turned, in degrees.
+const HAND_EYE_SHIFT_M: f64 = 0.002;
+const HAND_EYE_TURN_DEG: f64 = 0.5;
+
+/// Sliding friction of worn or dusty pads.
+const PAD_FRICTIONS: std::ops::Range<f64> = 0.6..0.8;
+
+/// How far the hand swings to either side, in metres, how often in a second, and for how long, in seconds.
+const SHAKE_AMPLITUDES_M: std::ops::Range<f64> = 0.020..0.030;
+const SHAKE_FREQUENCIES_HZ: std::ops::Range<f64> = 2.0..3.0;
+const SHAKE_SECS: f64 = 1.0;
+
+/// A hand that swings to and fro along a horizontal line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shake {
+    /// The farthest from the middle, in metres; less where the arm's limits ask for it.
+    pub amplitude_m: f64,
+    /// Swings in a second.
+    pub frequency_hz: f64,
+    /// How long, in seconds.
+    pub duration_secs: f64,
+    /// Direction of the line in the base frame, in radians about z from x.
+    pub direction_rad: f64,
+}
+
+/// Errors of a workcell; by default there is none, and nothing changes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AttemptErrors {
+    /// The pose that perception is told of the camera, in the camera's own frame.
+    pub camera_from_told: Option<Isometry3<f64>>,
+    /// Sliding friction of the pads. They then lose their priority: MuJoCo takes the larger of the pad's and the part's.
+    pub pad_friction: Option<f64>,
+    /// What the arm does between lifting and holding.
+    pub shake: Option<Shake>,
+}
+
+impl AttemptErrors {
+    /// A hand-eye calibration that is wrong by 2 mm and 0.5 degrees, in directions of the seed.
+    pub fn hand_eye(seed: u64) -> Self {
+        let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4841_4e44_5f45_5945);
+        let shift = direction(rng).into_inner() * HAND_EYE_SHIFT_M;
+        let turn = UnitQuaternion::from_axis_angle(&direction(rng), HAND_EYE_TURN_DEG.to_radians());
+        Self { camera_from_told: Some(Isometry3::from_parts(Translation3::from(shift), turn)), ..Self::default() }
+    }
+
+    /// Pads with a friction of 0.6 to 0.8 by the seed, without priority.
+    pub fn friction(seed: u64) -> Self {
+        let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4652_4943_5449_4f4e);
+        Self { pad_friction: Some(rng.random_range(PAD_FRICTIONS)), ..Self::default() }
+    }
+
+    /// A hand that is shaken for a second after lifting: 20 to 30 mm to either side, two to three times a second.
+    pub fn shake(seed: u64) -> Self {
+        let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x5348_414b_4531_3233);
+        let shake = Shake {
+            amplitude_m: rng.random_range(SHAKE_AMPLITUDES_M),
+            frequency_hz: rng.random_range(SHAKE_FREQUENCIES_HZ),
+            duration_secs: SHAKE_SECS,
+            direction_rad: rng.random_range(0.0..TAU),
+        };
+        Self { shake: Some(shake), ..Self::default() }
+    }
+}
+
+/// A direction, all equally likely.
+fn direction(rng: &mut Pcg64Mcg) -> Unit<Vector3<f64>> {
+    let (z, around) = (rng.random_range(-1.0..1.0f64), rng.random_range(0.0..TAU));
+    let across = (1.0 - z * z).sqrt();
+    Unit::new_normalize(Vector3::new(across * around.cos(), across * around.sin(), z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_have_their_size_in_every_direction() {
+        let mut sum = Vector3::zeros();
+        for seed in 0..200 {
+            let error = AttemptErrors::hand_eye(seed).camera_from_told.unwrap();
+            assert!((error.translation.vector.norm() - 0.002).abs() < 1e-12);
+            assert!((error.rotation.angle().to_degrees() - 0.5).abs() < 1e-9);
+            sum += error.translation.vector;
+            let friction = AttemptErrors::friction(seed).pad_friction.unwrap();
+            assert!((0.6..0.8).contains(&friction), "{friction}");
+        }
+        // The mean of 200 random directions has a length of about 2 mm / sqrt(200).
+        assert!((sum / 200.0).norm() < 3.0 * 0.002 / 200f64.sqrt(), "{sum}");
+        assert_eq!(AttemptErrors::shake(3), AttemptErrors::shake(3));
+        assert_ne!(AttemptErrors::shake(3), AttemptErrors::shake(4));
+    }
+}

@@ -1,0 +1,98 @@
+//! The arm shaken on purpose, about where it stands.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use nalgebra::{Vector3, Vector6};
+use sdg_kinematics::{ACCELERATION_MAX_RAD_S2, JointVector, VELOCITY_MAX_RAD_S};
+
+use crate::attempt_errors::Shake;
+use crate::controller::ArmReference;
+use crate::error::Result;
+use crate::workcell::{PERIOD_SECS, Workcell};
+
+/// How long the swinging takes to build up and to end, in seconds.
+const RAMP_SECS: f64 = 0.2;
+
+/// Share of the arm's velocity and acceleration limits that a shake may take.
+const SHARE_OF_LIMITS: f64 = 0.9;
+
+/// Keeps the inverse of the Jacobian finite near singular postures, in square metres.
+const DAMPING: f64 = 1e-6;
+
+impl Shake {
+    /// How far along its line the hand is at a time, how fast, and with what acceleration, for an amplitude of one.
+    fn at(&self, time_secs: f64) -> [f64; 3] {
+        let omega = TAU * self.frequency_hz;
+        let (sin, cos) = (omega * time_secs).sin_cos();
+        // A sine's square from rest to full swing, and back at the end.
+        let (since, sign) = match time_secs < 0.5 * self.duration_secs {
+            true => (time_secs, 1.0),
+            false => (self.duration_secs - time_secs, -1.0),
+        };
+        let u = (since / RAMP_SECS).clamp(0.0, 1.0);
+        let is_ramp = f64::from(u8::from(u > 0.0 && u < 1.0));
+        let w = (FRAC_PI_2 * u).sin().powi(2);
+        let dw = is_ramp * sign * FRAC_PI_2 / RAMP_SECS * (PI * u).sin();
+        let ddw = is_ramp * 0.5 * (PI / RAMP_SECS).powi(2) * (PI * u).cos();
+        [w * sin, dw * sin + w * omega * cos, ddw * sin + 2.0 * dw * omega * cos - w * omega * omega * sin]
+    }
+}
+
+impl Workcell {
+    /// Swings the hand to and fro without turning it, and ends where it began; the amplitude that the arm's limits
+    /// allowed, in metres.
+    ///
+    /// # Errors
+    /// [`crate::SimulationError::Unstable`] or a renderer's error while recording.
+    pub(crate) fn shake(&mut self, shake: &Shake) -> Result<f64> {
+        let start = self.commanded();
+        let along = Vector3::new(shake.direction_rad.cos(), shake.direction_rad.sin(), 0.0);
+        // Joint motion for a metre along the line, the hand's turn kept. Over some centimetres the arm's posture, and
+        // with it the Jacobian, hardly changes.
+        let jacobian = self.panda.jacobian(&start);
+        let damped = jacobian * jacobian.transpose() + nalgebra::Matrix6::identity() * DAMPING;
+        let twist = Vector6::new(along.x, along.y, along.z, 0.0, 0.0, 0.0);
+        let solved = damped.cholesky().map_or_else(Vector6::zeros, |factors| factors.solve(&twist));
+        let q_per_m: JointVector = jacobian.transpose() * solved;
+
+        let num_periods = (shake.duration_secs / PERIOD_SECS).round() as usize;
+        let times = (1..=num_periods).map(|period| period as f64 * PERIOD_SECS);
+        let amplitude_m = times.clone().fold(shake.amplitude_m, |amplitude_m, time_secs| {
+            let [_, velocity, acceleration] = shake.at(time_secs);
+            let most = |limits: [f64; 7], rate: f64| {
+                let needed = (0..7).map(|joint| (q_per_m[joint] * rate / limits[joint]).abs()).fold(1e-9, f64::max);
+                SHARE_OF_LIMITS / needed
+            };
+            amplitude_m.min(most(VELOCITY_MAX_RAD_S, velocity)).min(most(ACCELERATION_MAX_RAD_S2, acceleration))
+        });
+        for time_secs in times {
+            let [position, velocity, acceleration] = shake.at(time_secs).map(|value| q_per_m * (amplitude_m * value));
+            self.set_reference(ArmReference { position: start + position, velocity, acceleration });
+            self.tick()?;
+        }
+        self.set_reference(ArmReference::at_rest(start));
+        Ok(amplitude_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SHAKE: Shake = Shake { amplitude_m: 0.025, frequency_hz: 2.5, duration_secs: 1.0, direction_rad: 0.0 };
+
+    #[test]
+    fn rates_are_the_derivatives_of_the_position() {
+        const STEP: f64 = 1e-5;
+        for time in [0.05, 0.1, 0.31, 0.55, 0.85, 0.95] {
+            let [before, here, after] = [time - STEP, time, time + STEP].map(|time| SHAKE.at(time));
+            // The third derivative is below (2 pi 2.5)^3 and the ramp's own: central differences err by 1e-6.
+            assert!(((after[0] - before[0]) / (2.0 * STEP) - here[1]).abs() < 1e-4, "{time}");
+            assert!(((after[1] - before[1]) / (2.0 * STEP) - here[2]).abs() < 1e-2, "{time}");
+        }
+        for end in [0.0, 1.0] {
+            let [position, velocity, _] = SHAKE.at(end);
+            assert!(position.abs() < 1e-9 && velocity.abs() < 1e-9);
+        }
+    }
+}
