@@ -28,7 +28,7 @@ pub enum Command {
     Detect(DetectArgs),
     /// Grasp attempts in MuJoCo
     Rehearse(RehearseArgs),
-    /// The paper's protocol: every model on every part, and the paper's tables
+    /// The paper's protocol: every model on every part, and the paper's tables; or a model on your own labelled pictures
     Evaluate(EvaluateArgs),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
@@ -203,13 +203,78 @@ pub struct RehearseArgs {
     pub json: bool,
 }
 
+/// What `sdg evaluate --pictures` reads and writes.
+const PICTURES_HELP: &str = "\
+Labelled pictures (--pictures DIR):
+  DIR holds PNG or JPEG pictures and their labels: LabelMe (a JSON file of the same name beside each picture) or COCO (one
+  JSON file with `images` and `annotations`). Each instance of the part has a box or an outline and the two points of the
+  grasp, grasp_start and grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in
+  `flags`; COCO: in `attributes`) is neither missed nor wrong, and may lack the grasp. A picture whose labels mark nothing is one without the part.
+  A picture that the model was taught from is left out. Folders are not searched for folders: call once for each.
+
+  A hit lies within 4 % of the instance's diagonal and 10 degrees of the marks, but for turns that `sdg teach --symmetry`
+  said look alike; one detection to one instance, the best score first. The diagonal is that of the demonstration's box, as
+  much larger as the instance's marks are longer than the demonstration's. A picture is clean when something on it is right
+  and nothing wrong.
+
+  --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
+  pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
+  pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
+  seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
+  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_min_score [{min_score, found,
+  wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report.
+  The exit code is 3 where parts are marked and nothing at all was detected.";
+
 /// `sdg evaluate`
 #[derive(Debug, ClapArgs)]
+#[command(after_long_help = PICTURES_HELP)]
 pub struct EvaluateArgs {
+    /// Test a taught model on your own labelled pictures instead: a folder of pictures with LabelMe or COCO labels. The
+    /// end of --help says how they are labelled and what is counted
+    #[arg(
+        long,
+        value_name = "DIR",
+        requires = "grasp_model",
+        conflicts_with_all = [
+            "models", "objects", "attempts", "views", "scenes", "unverified", "preset", "steps", "seed", "jobs", "out",
+            "axes",
+        ],
+        help_heading = PICTURES
+    )]
+    pub pictures: Option<PathBuf>,
+    /// The grasp model to test, as `sdg teach` wrote it
+    #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
+    pub grasp_model: Option<PathBuf>,
+    /// Leave out the check against the demonstration: the network alone decides and places
+    #[arg(long, requires = "pictures", help_heading = PICTURES)]
+    pub no_verify: bool,
+    /// The least score that counts
+    #[arg(
+        long,
+        default_value_t = 0.5,
+        value_name = "X",
+        value_parser = share,
+        requires = "pictures",
+        help_heading = PICTURES
+    )]
+    pub min_score: f64,
+    /// The label of the part, where others are labelled too; without it, the model's object
+    #[arg(long, value_name = "NAME", requires = "pictures", help_heading = PICTURES)]
+    pub label: Option<String>,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(
+        long,
+        default_value = "flex",
+        value_name = "NAME",
+        value_parser = backend,
+        requires = "pictures",
+        help_heading = PICTURES
+    )]
+    pub device: ComputeBackend,
     /// The grasp models, by their letters; without it, all
     #[arg(long, value_name = "LETTERS", value_delimiter = ',')]
     pub models: Vec<String>,
-    /// The parts, out of those shipped under datasets/; without it, all
+    /// The parts, out of those shipped under datasets/; without it, the paper's eight
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub objects: Vec<String>,
     /// Grasp attempts of each model on each part
@@ -224,6 +289,40 @@ pub struct EvaluateArgs {
     /// Also try every grasp without the check against the demonstration: twice the attempts
     #[arg(long)]
     pub unverified: bool,
+    /// Instead of the paper's protocol: pictures made harder one axis at a time (height, tilt, covered, dark, blur, tint,
+    /// clutter, instances, look-alikes; all: pictures) and grasps under errors (no-error, marks, mark-height, hand-eye,
+    /// friction, shake; all: grasps). Without names, everything, on all parts
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        num_args = 0..=1,
+        conflicts_with_all = ["unverified"],
+        help_heading = AXES
+    )]
+    pub axes: Option<Vec<String>>,
+    /// Pictures of each part and axis
+    #[arg(
+        long,
+        default_value_t = 20,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=10_000),
+        requires = "axes",
+        help_heading = AXES
+    )]
+    pub axis_views: u32,
+    /// Edge points that model S compares at each pose of its search, instead of as taught
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(8..=1024),
+        requires = "axes",
+        help_heading = AXES
+    )]
+    pub search_points: Option<u32>,
+    /// The folder (--out) of another run with --axes, to compare with on the same pictures
+    #[arg(long, value_name = "DIR", requires = "axes", help_heading = AXES)]
+    pub against: Option<PathBuf>,
     /// Network, training and augmentation
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
@@ -239,13 +338,19 @@ pub struct EvaluateArgs {
     /// Folder for models and results; what is in it already is not done again
     #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
     pub out: PathBuf,
-    /// Folder for the page; without it, the folder of the results
+    /// Folder for the page; without it, the folder of the results, or target/pictures-report for --pictures
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,
 }
+
+/// The heading of the options of `--axes` in the help.
+const AXES: &str = "Axes and errors";
+
+/// The heading of the options of `--pictures` in the help.
+const PICTURES: &str = "Labelled pictures";
 
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
@@ -425,6 +530,14 @@ fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     }
 }
 
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 to 1".to_owned()),
+    }
+}
+
 /// A positive, finite number of seconds.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -457,6 +570,10 @@ mod tests {
             "sdg rehearse --grasp-model m.sdg --object pendulum --attempts 20 --seed 2",
             "sdg evaluate",
             "sdg evaluate --models B,C --objects pendulum,rod_end --attempts 2 --seed 3 --out d --report r --json",
+            "sdg evaluate --axes",
+            "sdg evaluate --axes tilt,covered --axis-views 3 --models S --search-points 32 --against other --json",
+            "sdg evaluate --pictures d --grasp-model m.sdg",
+            "sdg evaluate --pictures d --grasp-model m.sdg --no-verify --min-score 0.4 --label rod --device flex --report r --json",
             "sdg augment --demo a.png:a.json --count 5 --out samples",
             "sdg annotation convert photo.json photo.txt --image photo.png --format yolo-pose --json",
             "sdg completions bash",
@@ -469,5 +586,17 @@ mod tests {
         }
         assert!(Args::try_parse_from(["sdg", "teach", "--demo", "a:b", "--out", "m", "--time-budget", "-1"]).is_err());
         assert!(Args::try_parse_from(["sdg", "teach", "--demo", "a:b", "--out", "m", "--symmetry", "0"]).is_err());
+        for line in [
+            "sdg evaluate --axis-views 3",
+            "sdg evaluate --pictures d",
+            "sdg evaluate --grasp-model m.sdg",
+            "sdg evaluate --no-verify",
+            "sdg evaluate --device flex",
+            "sdg evaluate --pictures d --grasp-model m.sdg --models S",
+            "sdg evaluate --pictures d --grasp-model m.sdg --views 10",
+            "sdg evaluate --pictures d --grasp-model m.sdg --min-score 1.1",
+        ] {
+            assert!(Args::try_parse_from(line.split(' ')).is_err(), "{line}");
+        }
     }
 }

@@ -32,6 +32,7 @@ pub mod evaluation;
 mod exit;
 mod files;
 mod interrupt;
+pub mod labelled_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
 mod page_teacher;
@@ -71,12 +72,13 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Detect(detect) => commands::detect::run(detect),
         #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
+        Command::Evaluate(evaluate) if evaluate.pictures.is_some() => commands::evaluate_pictures::run(evaluate),
         #[cfg(feature = "simulation")]
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         #[cfg(not(feature = "simulation"))]
         Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) => Err(exit::Usage(
-            "this sdg was built without the simulator, which demo, rehearse and evaluate need: expected a build with \
-             cargo's feature \"simulation\""
+            "this sdg was built without the simulator, which demo, rehearse and evaluate (but for --pictures) need: \
+             expected a build with cargo's feature \"simulation\""
                 .to_owned(),
         )
         .into()),

@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use anyhow::Result;
 use image::ImageFormat;
-use sdg_demonstration::{Annotation, AugmentationConfig, Augmenter, CocoFile};
+use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile, LabelledInstance};
 use sdg_report::write_atomically;
 use serde_json::json;
 
@@ -39,10 +39,15 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         sample.image.write_to(&mut png, ImageFormat::Png)?;
         write_atomically(&args.out.join(&name), &png.into_inner())?;
 
-        let objects: Vec<Annotation> =
-            sample.objects.iter().map(|object| object.annotation(&label, &sample.image)).collect();
-        with_part += usize::from(!objects.is_empty());
-        coco.push_image(&name, sample.image.width(), sample.image.height(), &objects);
+        // A part whose grasp the border cuts off need not be found by whoever is tested on the samples.
+        let instances: Vec<LabelledInstance> = sample
+            .objects
+            .iter()
+            .map(|object| object.annotation(&label, &sample.image))
+            .map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none()))
+            .collect();
+        with_part += usize::from(!instances.is_empty());
+        coco.push_labelled(&name, sample.image.width(), sample.image.height(), &instances);
     }
     write_atomically(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
 

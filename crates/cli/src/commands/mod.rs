@@ -11,6 +11,9 @@ pub mod detect;
 pub mod devices;
 #[cfg(feature = "simulation")]
 pub mod evaluate;
+#[cfg(feature = "simulation")]
+pub mod evaluate_axes;
+pub mod evaluate_pictures;
 pub mod man;
 #[cfg(feature = "simulation")]
 pub mod rehearse;

@@ -1,0 +1,288 @@
+//! A folder of labelled pictures: which label file speaks of which picture, and what each says.
+//!
+//! LabelMe keeps a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes COCO
+//! beside the picture. A label file of a picture's name belongs to that picture, whatever name it gives (people rename
+//! files); any other one belongs to the pictures that it names.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sdg_demonstration::{AnnotationFormat, Error, ImageFacts, LabelFile, LabelledInstance};
+use sdg_geometry::{BoundingBox, GraspLine};
+use sdg_grasp::GraspModel;
+use serde::Serialize;
+
+use super::taught::taught_grasps;
+use crate::files;
+
+/// Pictures by the ends of their names.
+const PICTURE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
+const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
+
+/// An instance of the part on a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// The box around it.
+    pub bbox: BoundingBox,
+    /// The marked grasp; an optional instance may lack it.
+    pub grasp: Option<GraspLine>,
+    /// Neither missed nor wrong: flagged so, or what the model was taught from.
+    pub optional: bool,
+}
+
+/// A picture and what is labelled on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledPicture {
+    /// The picture.
+    pub path: PathBuf,
+    /// The file that labels it.
+    pub labels: PathBuf,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The part's instances; none where it is not on the picture.
+    pub instances: Vec<Instance>,
+}
+
+impl LabelledPicture {
+    /// The file's name.
+    pub fn name(&self) -> String {
+        file_name(&self.path)
+    }
+}
+
+/// A file of the folder that does not count, and the reason.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// The file's name.
+    pub file: String,
+    /// Why.
+    pub why: String,
+}
+
+/// The pictures to test a model on.
+#[derive(Debug, Clone)]
+pub struct LabelledFolder {
+    /// By name.
+    pub pictures: Vec<LabelledPicture>,
+    /// What else is there.
+    pub left_out: Vec<LeftOut>,
+    /// Instances of other labels, which are not of the part.
+    pub others: usize,
+}
+
+impl LabelledFolder {
+    /// Reads every label and checks it against its picture, before any minute is spent on detection.
+    ///
+    /// Where the labels are of several names, those of `label` count; without it, those of the model's object.
+    ///
+    /// # Errors
+    /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
+    /// marks of a picture of another size or outside the picture, two files that label one picture, an instance
+    /// without a grasp that is not optional, and several labels out of which none is chosen.
+    pub fn read(folder: &Path, model: &GraspModel, label: Option<&str>) -> Result<Self> {
+        let mut left_out = Vec::new();
+        let assigned = assign(folder, &mut left_out)?;
+        let read = assigned.pictures.iter().map(|(picture, labels)| {
+            let (path, file) = &assigned.label_files[*labels];
+            read_picture(picture, path, file, model)
+        });
+        let read = read.collect::<Result<Vec<_>>>()?;
+        let label = chosen_label(folder, &read, model, label)?;
+        let mut pictures = Vec::new();
+        let mut others = 0;
+        for picture in read {
+            others += picture.instances.iter().filter(|instance| !is_counted(instance, label.as_deref())).count();
+            let is_taught = !picture.taught.is_empty();
+            let picture = picture.counted(label.as_deref())?;
+            if is_taught && picture.instances.iter().all(|instance| instance.optional) {
+                left_out.push(LeftOut { file: picture.name(), why: "the model was taught from it".to_owned() });
+            } else {
+                pictures.push(picture);
+            }
+        }
+        if pictures.is_empty() {
+            bail!(
+                "{}: expected labelled pictures that the model was not taught from, found only {}",
+                folder.display(),
+                left_out.iter().map(|left_out| left_out.file.as_str()).collect::<Vec<_>>().join(", ")
+            );
+        }
+        left_out.sort_by(|a, b| a.file.cmp(&b.file));
+        Ok(Self { pictures, left_out, others })
+    }
+}
+
+/// Which label file, by its place in the list, labels which picture.
+struct Assigned {
+    pictures: BTreeMap<PathBuf, usize>,
+    label_files: Vec<(PathBuf, LabelFile)>,
+}
+
+fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
+    let named = || format!("{}: cannot read this folder", folder.display());
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).with_context(named)? {
+        let path = entry.with_context(named)?.path();
+        if path.is_file() {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    let pictures: Vec<&PathBuf> = paths.iter().filter(|path| has_extension(path, &PICTURE_EXTENSIONS)).collect();
+    if pictures.is_empty() {
+        bail!("{}: expected PNG or JPEG pictures, found none among {} files", folder.display(), paths.len());
+    }
+    let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
+    for path in paths.iter().filter(|path| has_extension(path, &["json"])) {
+        let same_name: Vec<&PathBuf> =
+            pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
+        let bytes = files::read(path, files::MOST_ANNOTATION_BYTES)?;
+        let file = match LabelFile::parse(&bytes) {
+            // Other programs keep JSON beside pictures, too.
+            Err(Error::WrongFile { .. }) if same_name.is_empty() => {
+                let why = "neither LabelMe nor COCO JSON, and no picture has its name".to_owned();
+                left_out.push(LeftOut { file: file_name(path), why });
+                continue;
+            }
+            file => file.with_context(|| path.display().to_string())?,
+        };
+        let labelled = labelled_by(path, &file, &same_name, folder)?;
+        let label_file_idx = assigned.label_files.len();
+        assigned.label_files.push((path.clone(), file));
+        for picture in labelled {
+            if let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) {
+                bail!(
+                    "{}: expected one label file, found two: {} and {}",
+                    picture.display(),
+                    file_name(&assigned.label_files[first].0),
+                    file_name(path)
+                );
+            }
+        }
+    }
+    if assigned.pictures.is_empty() {
+        bail!(
+            "{}: expected labels (LabelMe: a JSON file of the same name beside each picture; COCO: one JSON file with \
+             `images` and `annotations`), found {} pictures and none",
+            folder.display(),
+            pictures.len()
+        );
+    }
+    for picture in pictures.iter().filter(|picture| !assigned.pictures.contains_key(picture.as_path())) {
+        left_out.push(LeftOut { file: file_name(picture), why: "no label file speaks of it".to_owned() });
+    }
+    Ok(assigned)
+}
+
+/// The pictures that a label file is about.
+fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &Path) -> Result<Vec<PathBuf>> {
+    let names = file.picture_names().with_context(|| path.display().to_string())?;
+    let is_of_one_picture = file.format() == AnnotationFormat::LabelMe || names.len() == 1;
+    if let (true, [only]) = (is_of_one_picture, same_name) {
+        return Ok(vec![(*only).clone()]);
+    }
+    if names.is_empty() && file.format() == AnnotationFormat::LabelMe {
+        bail!(
+            "{}: expected a picture of the same name beside it, or its name as `imagePath`, found neither",
+            path.display()
+        );
+    }
+    let picture = |name: &String| {
+        let picture = folder.join(name);
+        if !picture.is_file() {
+            bail!("{}: expected the picture {name} that it labels beside it, found no such file", path.display());
+        }
+        if !has_extension(&picture, &PICTURE_EXTENSIONS) {
+            bail!("{}: expected the name of a PNG or JPEG picture, found {name}", path.display());
+        }
+        Ok(picture)
+    };
+    names.iter().map(picture).collect()
+}
+
+/// A picture with every instance that is labelled on it, of whatever label.
+struct ReadPicture {
+    path: PathBuf,
+    labels: PathBuf,
+    size: [u32; 2],
+    instances: Vec<LabelledInstance>,
+    /// Where the model's own demonstrations were cut from it.
+    taught: Vec<nalgebra::Point2<f64>>,
+}
+
+fn read_picture(path: &Path, labels: &Path, file: &LabelFile, model: &GraspModel) -> Result<ReadPicture> {
+    let image = files::read_image(path)?;
+    let (width, height) = image.dimensions();
+    let name = file_name(path);
+    let facts = ImageFacts { width, height, file_name: Some(&name) };
+    let instances = file.instances(&facts).with_context(|| format!("{}, labels of {name}", labels.display()))?;
+    Ok(ReadPicture {
+        path: path.to_owned(),
+        labels: labels.to_owned(),
+        size: [width, height],
+        instances,
+        taught: taught_grasps(&image, model.demonstrations()),
+    })
+}
+
+impl ReadPicture {
+    /// The instances that count; what the model was taught from is no test, so it is optional.
+    fn counted(self, label: Option<&str>) -> Result<LabelledPicture> {
+        let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
+        let instances = counted.map(|instance| {
+            let annotation = &instance.annotation;
+            if !instance.optional {
+                annotation.require_grasp().with_context(|| format!("{}, {}", self.labels.display(), instance.place))?;
+            }
+            let is_taught = annotation.grasp.is_some_and(|grasp| {
+                let reach = MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length();
+                self.taught.iter().any(|taught| (taught - grasp.center()).norm() <= reach)
+            });
+            Ok(Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional: instance.optional || is_taught })
+        });
+        let instances = instances.collect::<Result<Vec<_>>>()?;
+        Ok(LabelledPicture { path: self.path, labels: self.labels, size: self.size, instances })
+    }
+}
+
+fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
+    label.is_none_or(|label| instance.annotation.label == label)
+}
+
+/// The label that counts; `None` where all instances are of one label, whatever the model calls its object.
+fn chosen_label(
+    folder: &Path,
+    pictures: &[ReadPicture],
+    model: &GraspModel,
+    label: Option<&str>,
+) -> Result<Option<String>> {
+    let instances = pictures.iter().flat_map(|picture| &picture.instances);
+    let labels: BTreeSet<&str> = instances.map(|instance| instance.annotation.label.as_str()).collect();
+    let listed = || labels.iter().copied().collect::<Vec<_>>().join(", ");
+    match label {
+        Some(label) if labels.contains(label) || labels.is_empty() => Ok(Some(label.to_owned())),
+        Some(label) => bail!("{}: expected instances labelled {label} (--label), found {}", folder.display(), listed()),
+        None if labels.len() <= 1 => Ok(None),
+        None if labels.contains(model.object()) => Ok(Some(model.object().to_owned())),
+        None => bail!(
+            "{}: expected instances of one label, or some labelled {} as the model's object is, found {}: choose one \
+             with --label",
+            folder.display(),
+            model.object(),
+            listed()
+        ),
+    }
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension()
+        .and_then(|extension| extension.to_str())
+        .is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

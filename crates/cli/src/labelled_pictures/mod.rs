@@ -1,0 +1,23 @@
+//! A taught model on the user's own labelled pictures: found, missed, wrong, false alarms and errors.
+//!
+//! ```text
+//! DIR ─ LabelledFolder: pictures, their instances, what is left out ─┐
+//! GraspModel ─ detect, picture by picture ───────────────────────────┴─ Tested ─ judge(min_score) ─ Judged ─ Totals
+//!                                                                        │                             │
+//!                                                                        └──────────── page, JSON ─────┘
+//! ```
+//!
+//! A **part** is an instance that must be found; an **optional** instance (mostly covered, or seen from another side) is
+//! neither missed nor, when hit, wrong. A **hit** lies within 4 % of the instance's diagonal and 10° of its marks, one
+//! detection to one instance. A picture that the model was taught from is no test and is left out.
+
+mod folder;
+mod page;
+mod records;
+mod score;
+mod taught;
+
+pub use folder::{LabelledFolder, LabelledPicture, LeftOut};
+pub use page::{in_words, page};
+pub use records::{Evaluated, to_json};
+pub use score::{DEFAULT_MIN_SCORE, Judged, Outcome, Tested, Totals, Truth, judge, sweep};

@@ -1,0 +1,133 @@
+//! The evaluation as other programs read it: the one object of `sdg evaluate --pictures --json`.
+
+use std::path::Path;
+
+use sdg_geometry::{BoundingBox, RotationalSymmetry};
+use sdg_grasp::{DetectionRecord, GraspModel, Verification};
+use serde_json::{Value, json};
+
+use super::folder::LeftOut;
+use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, judge, sweep};
+
+/// A model tested on a folder.
+pub struct Evaluated<'a> {
+    /// The folder.
+    pub folder: &'a Path,
+    /// The model's file.
+    pub model_file: &'a Path,
+    /// The model.
+    pub model: &'a GraspModel,
+    /// Whether detections were laid over the demonstration.
+    pub verification: Verification,
+    /// The least score that counts.
+    pub min_score: f64,
+    /// The pictures and what was found on them.
+    pub tested: Vec<Tested>,
+    /// Files of the folder that do not count.
+    pub left_out: Vec<LeftOut>,
+    /// Instances of other labels, which are not of the part.
+    pub others: usize,
+}
+
+impl Evaluated<'_> {
+    /// The turns that the model cannot tell apart.
+    pub fn symmetry(&self) -> RotationalSymmetry {
+        self.model.facts().symmetry
+    }
+
+    /// Every picture judged with the least score that counts.
+    pub fn judged(&self) -> Vec<Judged> {
+        self.tested.iter().map(|tested| judge(tested, self.symmetry(), self.min_score)).collect()
+    }
+}
+
+/// Everything as one object; pixels, percent of the diagonal, degrees.
+pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
+    let judged = evaluated.judged();
+    let totals = Totals::of(&judged);
+    let pictures: Vec<Value> =
+        evaluated.tested.iter().zip(&judged).map(|(tested, judged)| picture(tested, judged)).collect();
+    let swept: Vec<Value> = sweep(&evaluated.tested, evaluated.symmetry())
+        .into_iter()
+        .map(|(min_score, totals)| {
+            json!({
+                "min_score": min_score,
+                "found": totals.found.count,
+                "wrong": totals.wrong,
+                "clean": totals.clean.count,
+                "false_alarms": totals.false_alarms.count,
+            })
+        })
+        .collect();
+    json!({
+        "folder": evaluated.folder.display().to_string(),
+        "grasp_model": evaluated.model_file.display().to_string(),
+        "model": evaluated.model.kind().letter(),
+        "object": evaluated.model.object(),
+        "symmetry": evaluated.symmetry(),
+        "verified": evaluated.verification == Verification::ByShape,
+        "min_score": evaluated.min_score,
+        "found": totals.found.count,
+        "parts": totals.found.of,
+        "missed": totals.missed,
+        "wrong": totals.wrong,
+        "optional_found": totals.optional.count,
+        "optional": totals.optional.of,
+        "clean": totals.clean.count,
+        "pictures_with_part": totals.clean.of,
+        "false_alarms": totals.false_alarms.count,
+        "pictures_without_part": totals.false_alarms.of,
+        "errors": totals.errors,
+        "pictures": pictures,
+        "by_min_score": swept,
+        "left_out": evaluated.left_out,
+        "other_labels": evaluated.others,
+        "report": report.display().to_string(),
+    })
+}
+
+fn picture(tested: &Tested, judged: &Judged) -> Value {
+    let instances: Vec<Value> = tested
+        .truths
+        .iter()
+        .enumerate()
+        .map(|(instance_idx, truth)| {
+            let grasp = truth.grasp.map(|TrueGrasp { center, angle, diagonal_px }| {
+                json!({"x": center.x, "y": center.y, "angle_deg": angle.degrees(), "diagonal_px": diagonal_px})
+            });
+            let BoundingBox { x1, y1, x2, y2 } = truth.bbox;
+            json!({
+                "grasp": grasp,
+                "box": [x1, y1, x2, y2],
+                "optional": truth.optional,
+                "found": judged.is_found(instance_idx),
+            })
+        })
+        .collect();
+    let detections: Vec<Value> = tested
+        .detections
+        .iter()
+        .zip(&judged.hits)
+        .map(|(detection, hit)| {
+            let hit = hit.map(|Hit { instance_idx, error }| json!({"instance": instance_idx, "error": error}));
+            json!({"hit": hit, "detection": DetectionRecord::from(detection)})
+        })
+        .collect();
+    let parts = judged.parts();
+    json!({
+        "image": tested.picture.path.display().to_string(),
+        "labels": tested.picture.labels.display().to_string(),
+        "width": tested.picture.size[0],
+        "height": tested.picture.size[1],
+        "outcome": judged.outcome(),
+        "found": parts.count,
+        "parts": parts.of,
+        "missed": judged.missed(),
+        "wrong": judged.wrong(),
+        "clean": judged.is_clean(),
+        "false_alarm": judged.is_false_alarm(),
+        "seconds": tested.seconds,
+        "instances": instances,
+        "detections": detections,
+    })
+}

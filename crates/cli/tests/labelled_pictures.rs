@@ -1,0 +1,305 @@
+//! `sdg evaluate --pictures`: what is counted, against a naive reference and in both formats; wrong folders.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::{Value, json};
+
+/// Samples: enough that some lack the part and some show it cut by the border.
+const NUM_SAMPLES: usize = 20;
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+fn stdout(arguments: &[&str]) -> String {
+    let output = sdg(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Model S of the shipped pendulum.
+fn teach(folder: &Path) -> PathBuf {
+    let model = folder.join("model.sdg");
+    let demonstration = format!("{}:{}", text(&shipped("image.png")), text(&shipped("annotation.json")));
+    stdout(&["teach", "--model", "S", "--demo", &demonstration, "--out", text(&model)]);
+    model
+}
+
+fn read_json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn evaluate(pictures: &Path, model: &Path, report: &Path, more: &[&str]) -> Value {
+    let mut arguments = vec!["evaluate", "--pictures", text(pictures), "--grasp-model", text(model)];
+    arguments.extend(["--report", text(report), "--json"]);
+    arguments.extend(more);
+    serde_json::from_str(&stdout(&arguments)).unwrap()
+}
+
+/// An instance of the pendulum: middle and direction of its marks in pixels and degrees, their length, and whether it may be
+/// missed.
+struct Marked {
+    x: f64,
+    y: f64,
+    angle_deg: f64,
+    length: f64,
+    optional: bool,
+}
+
+fn marked(annotation: &Value) -> Marked {
+    let k: Vec<f64> = annotation["keypoints"].as_array().unwrap().iter().map(|k| k.as_f64().unwrap()).collect();
+    let (dx, dy) = (k[3] - k[0], k[4] - k[1]);
+    Marked {
+        x: (k[0] + k[3]) / 2.0,
+        y: (k[1] + k[4]) / 2.0,
+        angle_deg: dy.atan2(dx).to_degrees(),
+        length: dx.hypot(dy),
+        optional: annotation["attributes"]["optional"] == json!(true),
+    }
+}
+
+/// Found, wrong and false alarms as the definition says, written down once more: from what `sdg detect` prints, and the
+/// marks as they stand in the file. Samples show one part at most, so that a first hit settles it.
+fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
+    let file = read_json(&samples.join("annotations.json"));
+    let demonstration = read_json(&shipped("annotation.json"));
+    let demonstration = &demonstration["annotations"][0];
+    let bbox: Vec<f64> = demonstration["bbox"].as_array().unwrap().iter().map(|b| b.as_f64().unwrap()).collect();
+    let diagonal_per_length = bbox[2].hypot(bbox[3]) / marked(demonstration).length;
+    let [mut parts, mut found, mut wrong, mut negatives, mut false_alarms] = [0; 5];
+    for image in file["images"].as_array().unwrap() {
+        let picture = samples.join(image["file_name"].as_str().unwrap());
+        // Exit code 3, nothing to grasp, is an answer, too.
+        let printed = sdg(&["detect", "--grasp-model", text(model), "--json", text(&picture)]).stdout;
+        let printed: Value = serde_json::from_slice(&printed).unwrap();
+        let detections = printed["detections"].as_array().unwrap();
+        let here = file["annotations"].as_array().unwrap().iter().find(|a| a["image_id"] == image["id"]);
+        let Some(truth) = here.map(marked) else {
+            negatives += 1;
+            false_alarms += usize::from(!detections.is_empty());
+            continue;
+        };
+        parts += usize::from(!truth.optional);
+        let mut is_free = true;
+        for detection in detections {
+            let grasp = |name: &str| detection["grasp"][name].as_f64().unwrap();
+            let distance = (grasp("x") - truth.x).hypot(grasp("y") - truth.y);
+            let turn = ((grasp("angle_deg") - truth.angle_deg + 180.0).rem_euclid(360.0) - 180.0).abs();
+            let is_hit = is_free && distance <= 0.04 * diagonal_per_length * truth.length && turn <= 10.0;
+            match (is_hit, truth.optional) {
+                (true, _) => {
+                    found += usize::from(!truth.optional);
+                    is_free = false;
+                }
+                // Without marks to compare with, the reference has nothing to say of it.
+                (false, true) => {}
+                (false, false) => wrong += 1,
+            }
+        }
+    }
+    [parts, found, wrong, negatives, false_alarms]
+}
+
+fn counts(evaluated: &Value) -> [usize; 5] {
+    ["parts", "found", "wrong", "pictures_without_part", "false_alarms"]
+        .map(|name| evaluated[name].as_u64().unwrap() as usize)
+}
+
+/// The samples' marks once more, as LabelMe keeps them: a file beside each picture.
+fn write_labelme(samples: &Path, folder: &Path) {
+    fs::create_dir(folder).unwrap();
+    let file = read_json(&samples.join("annotations.json"));
+    for image in file["images"].as_array().unwrap() {
+        let name = image["file_name"].as_str().unwrap();
+        fs::copy(samples.join(name), folder.join(name)).unwrap();
+        let here = file["annotations"].as_array().unwrap().iter().filter(|a| a["image_id"] == image["id"]);
+        let shapes: Vec<Value> = here
+            .flat_map(|annotation| {
+                let [x, y, width, height] = [0, 1, 2, 3].map(|i| annotation["bbox"][i].as_f64().unwrap());
+                let flags = json!({"optional": annotation["attributes"]["optional"] == json!(true)});
+                let point = |label: &str, at: usize| {
+                    let points = [[&annotation["keypoints"][at], &annotation["keypoints"][at + 1]]];
+                    json!({"label": label, "shape_type": "point", "points": points, "group_id": 1})
+                };
+                let corners = [[x, y], [x + width, y + height]];
+                let rectangle = json!({"label": "pendulum", "shape_type": "rectangle", "points": corners,
+                                       "group_id": 1, "flags": flags});
+                let is_marked = annotation["keypoints"][2] != json!(0);
+                let points = is_marked.then(|| [point("grasp_start", 0), point("grasp_end", 3)]);
+                std::iter::once(rectangle).chain(points.into_iter().flatten())
+            })
+            .collect();
+        let labels = json!({"imagePath": name, "imageWidth": image["width"], "imageHeight": image["height"],
+                            "shapes": shapes});
+        fs::write(folder.join(name).with_extension("json"), labels.to_string()).unwrap();
+    }
+}
+
+#[test]
+fn what_augment_writes_is_counted_as_a_naive_reference_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (samples, report) = (folder.path().join("samples"), folder.path().join("report"));
+    let model = teach(folder.path());
+    let demonstration = format!("{}:{}", text(&shipped("image.png")), text(&shipped("annotation.json")));
+    let num_samples = NUM_SAMPLES.to_string();
+    stdout(&["augment", "--demo", &demonstration, "--count", &num_samples, "--out", text(&samples)]);
+
+    let evaluated = evaluate(&samples, &model, &report, &[]);
+    let expected = counted_naively(&samples, &model);
+    assert_eq!(counts(&evaluated), expected);
+    let [parts, found, _, negatives, _] = expected;
+    // Otherwise nothing was compared.
+    assert!(found > 0 && negatives > 0 && parts > found / 2, "{expected:?}");
+    assert_eq!(evaluated["pictures"].as_array().unwrap().len(), NUM_SAMPLES);
+    assert_eq!(evaluated["missed"], json!(parts - found));
+    let html = fs::read_to_string(report.join("index.html")).unwrap();
+    assert!(html.contains("000019.png") && html.contains("<svg"), "every picture and a chart are on the page");
+
+    // At 0.5 the sweep says what the totals say, and a limit of 1 finds nothing.
+    let at = |min_score: f64| {
+        let swept = evaluated["by_min_score"].as_array().unwrap();
+        swept.iter().find(|at| at["min_score"] == json!(min_score)).unwrap()
+    };
+    assert_eq!(at(0.5)["found"], evaluated["found"]);
+    assert_eq!(at(0.5)["false_alarms"], evaluated["false_alarms"]);
+    assert!(at(0.0)["found"].as_u64() >= at(0.5)["found"].as_u64());
+
+    // The same marks in the other format, beside the photo that the model was taught from and another program's JSON.
+    let labelme = folder.path().join("labelme");
+    write_labelme(&samples, &labelme);
+    fs::copy(shipped("image.png"), labelme.join("photo.png")).unwrap();
+    fs::copy(shipped("annotation.json"), labelme.join("photo.json")).unwrap();
+    fs::write(labelme.join("poses.json"), "[1, 2]").unwrap();
+    fs::copy(samples.join("000000.png"), labelme.join("unlabelled.png")).unwrap();
+    let again = evaluate(&labelme, &model, &report, &["--min-score", "0.5"]);
+    assert_eq!(counts(&again), expected);
+    assert_eq!(again["optional"], evaluated["optional"]);
+    let left_out: Vec<&str> =
+        again["left_out"].as_array().unwrap().iter().map(|left_out| left_out["file"].as_str().unwrap()).collect();
+    assert_eq!(left_out, ["photo.png", "poses.json", "unlabelled.png"]);
+    assert_eq!(again["left_out"][0]["why"], "the model was taught from it");
+}
+
+/// A folder with one picture of 640×480 and a label file.
+struct Case {
+    folder: tempfile::TempDir,
+}
+
+impl Case {
+    fn new(name: &str, labels: &str) -> Self {
+        let case = Self { folder: tempfile::tempdir().unwrap() };
+        // The shipped photo, but for one pixel: the model was not taught from it.
+        let mut picture = image::open(shipped("image.png")).unwrap().into_rgb8();
+        let [width, height] = [picture.width(), picture.height()];
+        for x in 0..width {
+            picture.put_pixel(x, height / 2, image::Rgb([0, 0, 0]));
+        }
+        picture.save(case.folder.path().join("a.png")).unwrap();
+        case.with(name, labels)
+    }
+
+    fn with(self, name: &str, content: &str) -> Self {
+        fs::write(self.folder.path().join(name), content).unwrap();
+        self
+    }
+
+    fn without(self, name: &str) -> Self {
+        fs::remove_file(self.folder.path().join(name)).unwrap();
+        self
+    }
+
+    /// Asserts exit code 1, one line with every part, and no page.
+    fn assert_refused(&self, model: &Path, more: &[&str], parts: &[&str]) {
+        let report = self.folder.path().join("report");
+        let mut arguments = vec!["evaluate", "--pictures", text(self.folder.path()), "--grasp-model", text(model)];
+        arguments.extend(["--report", text(&report)]);
+        arguments.extend(more);
+        let output = sdg(&arguments);
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{parts:?}: {stderr}");
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+        for part in parts {
+            assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+        }
+        assert!(!report.exists());
+    }
+}
+
+fn labelme(shapes: &[Value]) -> String {
+    json!({"imagePath": "a.png", "imageWidth": 640, "imageHeight": 480, "shapes": shapes}).to_string()
+}
+
+fn instance(label: &str, group: u32, x: f64) -> Vec<Value> {
+    vec![
+        json!({"label": label, "shape_type": "rectangle", "points": [[x, 10], [x + 60.0, 40]], "group_id": group}),
+        json!({"label": "grasp_start", "shape_type": "point", "points": [[x + 5.0, 20]], "group_id": group}),
+        json!({"label": "grasp_end", "shape_type": "point", "points": [[x + 50.0, 20]], "group_id": group}),
+    ]
+}
+
+#[test]
+fn wrong_folders_are_refused_with_what_was_expected() {
+    let teaching = tempfile::tempdir().unwrap();
+    let model = teach(teaching.path());
+    let empty = labelme(&[]);
+    let coco = |images: Value| json!({"images": images, "annotations": []}).to_string();
+    let refused = |case: Case, parts: &[&str]| case.assert_refused(&model, &[], parts);
+
+    refused(Case::new("notes.txt", ""), &["expected labels", "found 1 pictures and none"]);
+    refused(Case::new("a.json", &empty).without("a.png"), &["expected PNG or JPEG pictures", "found none"]);
+    refused(Case::new("a.json", "{\"shapes\": ["), &["a.json", "not JSON", "line 1"]);
+    refused(Case::new("labels.json", "{\"images\": [}"), &["labels.json", "not JSON"]);
+    refused(Case::new("a.json", "[1, 2]"), &["a.json", "expected COCO JSON"]);
+    let other = json!({"imagePath": "a.png", "imageWidth": 320, "imageHeight": 240, "shapes": []}).to_string();
+    refused(Case::new("a.json", &other), &["a.json", "320×240", "640×480"]);
+    let other = coco(json!([{"id": 1, "file_name": "a.png", "width": 640, "height": 360}]));
+    refused(Case::new("annotations.json", &other), &["annotations.json", "a.png", "640×360", "640×480"]);
+    refused(Case::new("b.json", &empty.replace("a.png", "b.png")), &["b.json", "the picture b.png", "no such file"]);
+    let two = coco(json!([{"id": 1, "file_name": "a.png"}, {"id": 2, "file_name": "x/gone.png"}]));
+    refused(Case::new("annotations.json", &two), &["annotations.json", "the picture gone.png", "no such file"]);
+    let one = coco(json!([{"id": 1, "file_name": "a.png"}]));
+    refused(Case::new("annotations.json", &one).with("a.json", &empty), &["a.png", "found two", "a.json"]);
+
+    let mut outside = instance("pendulum", 1, 100.0);
+    outside[2]["points"] = json!([[700, 20]]);
+    refused(Case::new("a.json", &labelme(&outside)), &["a.json", "shapes[2]", "inside the image", "(700, 20)"]);
+    let rectangle = &instance("pendulum", 1, 100.0)[..1];
+    refused(Case::new("a.json", &labelme(rectangle)), &["a.json, shapes[0]", "lacks the grasp", "grasp_start"]);
+    let both = [instance("bolt", 1, 100.0), instance("nut", 2, 300.0)].concat();
+    refused(Case::new("a.json", &labelme(&both)), &["labelled pendulum", "found bolt, nut", "--label"]);
+    Case::new("a.json", &labelme(&both)).assert_refused(
+        &model,
+        &["--label", "screw"],
+        &["labelled screw", "bolt, nut"],
+    );
+    let photo = Case::new("photo.json", &fs::read_to_string(shipped("annotation.json")).unwrap()).without("a.png");
+    fs::copy(shipped("image.png"), photo.folder.path().join("photo.png")).unwrap();
+    refused(photo, &["not taught from", "found only photo.png"]);
+
+    let picture = Case::new("a.json", &empty);
+    picture.assert_refused(&shipped("image.png"), &[], &["expected a grasp model", "a PNG image"]);
+    picture.assert_refused(Path::new("/nowhere/model.sdg"), &[], &["/nowhere/model.sdg", "cannot read"]);
+}
+
+#[test]
+fn a_folder_or_a_model_alone_and_options_of_the_protocol_are_wrong_usage() {
+    for arguments in [
+        &["evaluate", "--pictures", "d"][..],
+        &["evaluate", "--grasp-model", "m.sdg"],
+        &["evaluate", "--pictures", "d", "--grasp-model", "m.sdg", "--models", "S"],
+        &["evaluate", "--pictures", "d", "--grasp-model", "m.sdg", "--min-score", "2"],
+    ] {
+        assert_eq!(sdg(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+}
