@@ -121,6 +121,15 @@ pub enum GraspError {
         /// The value given.
         found: f64,
     },
+    /// A name that no constant has which can be fitted.
+    #[cfg(feature = "teach")]
+    #[error("expected a constant out of {}, found \"{found}\"", .known.join(", "))]
+    UnknownConstant {
+        /// The constants that there are.
+        known: Vec<&'static str>,
+        /// What was asked for.
+        found: String,
+    },
     /// The network refused its input.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),

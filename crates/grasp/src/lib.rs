@@ -41,6 +41,8 @@ mod decimal;
 mod device;
 mod error;
 mod facts;
+#[cfg(feature = "teach")]
+pub mod fitting;
 mod model;
 mod model_file;
 mod models;

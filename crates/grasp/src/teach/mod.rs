@@ -18,9 +18,9 @@ mod paper;
 mod plan;
 mod r50;
 pub(crate) mod strangers;
-mod symmetry;
+pub(crate) mod symmetry;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};

@@ -9,14 +9,14 @@ use sdg_demonstration::{Demonstration, Sample};
 use sdg_geometry::{Angle, Keypoint, PlanarGrasp, PlanarSimilarity, RotationalSymmetry, Visibility};
 
 /// The symmetry of the part in some demonstrations.
-pub(super) struct HiddenTurns {
+pub(crate) struct HiddenTurns {
     symmetry: RotationalSymmetry,
     /// What each demonstration's part turns about, in pixels of its photo.
     centers: Vec<Point2<f64>>,
 }
 
 impl HiddenTurns {
-    pub(super) fn new(demonstrations: &[Demonstration], symmetry: RotationalSymmetry) -> Self {
+    pub(crate) fn new(demonstrations: &[Demonstration], symmetry: RotationalSymmetry) -> Self {
         Self { symmetry, centers: demonstrations.iter().map(|d| d.annotation.region().centroid()).collect() }
     }
 
@@ -46,7 +46,7 @@ impl HiddenTurns {
 
     /// The grasp that looks like `grasp` and is turned least against the true one. `image_from_demonstration` says where
     /// the demonstration `demonstration_idx` lies.
-    pub(super) fn nearest(
+    pub(crate) fn nearest(
         &self,
         grasp: &PlanarGrasp,
         true_angle: Angle,

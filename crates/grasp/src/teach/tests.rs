@@ -18,7 +18,7 @@ use crate::model::Verification;
 const PHOTO: [u32; 2] = [192, 144];
 
 /// An L with a bright foot, on a dim ramp.
-pub(super) fn demonstration() -> Demonstration {
+pub(crate) fn demonstration() -> Demonstration {
     let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
     let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() };
     let mask = outline.rasterize(PHOTO[0], PHOTO[1]);

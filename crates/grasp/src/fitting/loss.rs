@@ -1,0 +1,155 @@
+//! How wrong the decisions of a configuration are.
+
+use super::observation::{PartObservations, PictureObservations};
+use crate::calibration::Calibration;
+use crate::check_config::{CheckConfig, SizePenalty};
+
+/// Scores are kept this far from 0 and 1: one decision can cost −ln 0.01 = 4.6 at most.
+const MIN_SCORE: f64 = 0.01;
+
+/// How wrong decisions were; see [`crate::fitting`] for the definition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loss {
+    /// The sum of the two parts.
+    pub total: f64,
+    /// Of right poses: mean of −ln p.
+    pub right: f64,
+    /// Of wrong poses: mean of −ln (1 − q).
+    pub wrong: f64,
+    /// Instances of which a right pose was accepted, and all instances.
+    pub accepted: [usize; 2],
+    /// Pictures in which a wrong pose was accepted, and all pictures.
+    pub false_alarms: [usize; 2],
+}
+
+/// The loss of each part.
+pub(super) fn losses(parts: &[PartObservations], config: &CheckConfig) -> Vec<Loss> {
+    parts.iter().map(|part| part_loss(part, config)).collect()
+}
+
+fn part_loss(part: &PartObservations, config: &CheckConfig) -> Loss {
+    let calibration = config.threshold.calibration(&part.negatives);
+    let (mut right, mut wrong) = (Vec::new(), Vec::new());
+    for picture in &part.pictures {
+        let (rights, worst) = scores(picture, &calibration, &config.size);
+        right.extend(rights);
+        wrong.push(worst);
+    }
+    let clipped = |score: f64| score.clamp(MIN_SCORE, 1.0 - MIN_SCORE);
+    let right_loss = mean(right.iter().map(|&p| -clipped(p).ln()));
+    let wrong_loss = mean(wrong.iter().map(|&q| -(1.0 - clipped(q)).ln()));
+    let accepted = |scores: &[f64]| [scores.iter().filter(|&&score| score >= 0.5).count(), scores.len()];
+    Loss {
+        total: right_loss + wrong_loss,
+        right: right_loss,
+        wrong: wrong_loss,
+        accepted: accepted(&right),
+        false_alarms: accepted(&wrong),
+    }
+}
+
+/// The best score of a right pose of each instance, and the best of a wrong pose.
+fn scores(picture: &PictureObservations, calibration: &Calibration, size: &SizePenalty) -> (Vec<f64>, f64) {
+    let mut rights = vec![0.0f64; picture.num_instances];
+    let mut worst = 0.0f64;
+    for pose in &picture.poses {
+        let score = calibration.apply(size.apply(pose.agreement_at_any_size, pose.scale));
+        let best = pose.instance_idx.map_or(&mut worst, |idx| &mut rights[idx]);
+        *best = best.max(score);
+    }
+    (rights, worst)
+}
+
+/// The mean over parts; counts are summed.
+pub(super) fn mean_loss(parts: &[Loss]) -> Loss {
+    let sum = |counts: fn(&Loss) -> [usize; 2]| parts.iter().map(counts).fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
+    Loss {
+        total: mean(parts.iter().map(|loss| loss.total)),
+        right: mean(parts.iter().map(|loss| loss.right)),
+        wrong: mean(parts.iter().map(|loss| loss.wrong)),
+        accepted: sum(|loss| loss.accepted),
+        false_alarms: sum(|loss| loss.false_alarms),
+    }
+}
+
+/// What a change of the configuration does to the loss: negative is better.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Difference {
+    /// Mean over parts.
+    pub mean: f64,
+    /// Half of the 95 % interval: 1.96 standard errors of the parts' differences.
+    pub half_interval: f64,
+}
+
+impl Difference {
+    pub(super) fn between(before: &[Loss], after: &[Loss]) -> Self {
+        let differences: Vec<f64> = before.iter().zip(after).map(|(b, a)| a.total - b.total).collect();
+        let (n, center) = (differences.len() as f64, mean(differences.iter().copied()));
+        let squares: f64 = differences.iter().map(|d| (d - center).powi(2)).sum();
+        Self { mean: center, half_interval: 1.96 * (squares / (n - 1.0) / n).sqrt() }
+    }
+
+    /// Whether the loss falls beyond the interval.
+    pub fn is_improvement(&self) -> bool {
+        self.mean + self.half_interval < 0.0
+    }
+}
+
+/// 0 of nothing.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (count, sum) = values.fold((0usize, 0.0), |(count, sum), value| (count + 1, sum + value));
+    if count > 0 { sum / count as f64 } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::observation::PoseObservation;
+    use super::*;
+
+    fn pose(agreement: f64, scale: f64, instance_idx: Option<usize>) -> PoseObservation {
+        PoseObservation { agreement_at_any_size: agreement, scale, instance_idx }
+    }
+
+    /// The negatives' mean is 0.3: the threshold stands at 0.5, the slope is 25.
+    fn part() -> PartObservations {
+        let pictures = vec![
+            PictureObservations {
+                num_instances: 2,
+                poses: vec![pose(0.5, 1.0, Some(0)), pose(0.45, 1.0, Some(0)), pose(0.5, 1.0, None)],
+            },
+            PictureObservations { num_instances: 0, poses: vec![pose(0.6, 0.1f64.exp(), None)] },
+        ];
+        PartObservations { negatives: vec![0.2, 0.3, 0.4], pictures }
+    }
+
+    #[test]
+    fn the_loss_is_what_a_hand_computes() {
+        let loss = part_loss(&part(), &CheckConfig::DEFAULT);
+        // p: one instance at the threshold, 0.5, and one never found, 0.01. q: 0.5 at the threshold; the other picture's wrong
+        // pose is 0.1 of ln scale too large: 0.6 − 2 · 0.07 = 0.46, a score of 1 / (1 + e^1) = 0.268941.
+        let right = -(0.5f64.ln() + 0.01f64.ln()) / 2.0;
+        let wrong = -(0.5f64.ln() + (1.0 - 0.268_941_421f64).ln()) / 2.0;
+        assert!((loss.right - right).abs() < 1e-6 && (loss.wrong - wrong).abs() < 1e-6, "{loss:?}");
+        assert!((loss.total - right - wrong).abs() < 1e-6);
+        assert_eq!((loss.accepted, loss.false_alarms), ([1, 2], [1, 2]));
+    }
+
+    #[test]
+    fn a_perfect_check_loses_as_little_as_can_be() {
+        let pictures = vec![PictureObservations { num_instances: 1, poses: vec![pose(1.0, 1.0, Some(0))] }];
+        let loss = part_loss(&PartObservations { negatives: vec![0.3; 3], pictures }, &CheckConfig::DEFAULT);
+        assert!((loss.total - 2.0 * -(0.99f64.ln())).abs() < 1e-9, "{loss:?}");
+        assert_eq!((loss.accepted, loss.false_alarms), ([1, 1], [0, 1]));
+    }
+
+    #[test]
+    fn differences_are_taken_part_by_part() {
+        let loss = |total: f64| Loss { total, right: total, wrong: 0.0, accepted: [0, 0], false_alarms: [0, 0] };
+        let difference = Difference::between(&[loss(1.0), loss(2.0)], &[loss(0.9), loss(1.7)]);
+        // Differences −0.1 and −0.3: their mean is −0.2, their standard deviation √0.02, its error √0.02 / √2 = 0.1.
+        assert!((difference.mean + 0.2).abs() < 1e-12);
+        assert!((difference.half_interval - 0.196).abs() < 1e-12);
+        assert!(difference.is_improvement());
+        assert!(!Difference { mean: -0.1, half_interval: 0.196 }.is_improvement());
+    }
+}

@@ -1,0 +1,157 @@
+//! What a fit found, and how it is printed.
+
+use std::fmt;
+
+use super::loss::{Difference, Loss};
+
+/// A value that was tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trial {
+    /// The value.
+    pub value: f64,
+    /// The loss on the training half.
+    pub loss: f64,
+}
+
+/// What was found about one constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConstantReport {
+    /// Its field of [`crate::CheckConfig`].
+    pub name: &'static str,
+    /// Where its value stands.
+    pub file: &'static str,
+    /// Whether the threshold's margin was fitted again for each value, today's included.
+    pub is_margin_fitted: bool,
+    /// Today's value.
+    pub today: f64,
+    /// The value with the least loss on the training half.
+    pub fitted: f64,
+    /// All values that were tried.
+    pub trials: Vec<Trial>,
+    /// On the held-out half, with today's value.
+    pub before: Loss,
+    /// On the held-out half, with the fitted value.
+    pub after: Loss,
+    /// From before to after.
+    pub difference: Difference,
+}
+
+/// What was found about size and threshold, fitted together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointReport {
+    /// Name, today's and fitted value of each.
+    pub values: Vec<(&'static str, f64, f64)>,
+    /// On the held-out half, with today's values.
+    pub before: Loss,
+    /// On the held-out half, with the fitted values.
+    pub after: Loss,
+    /// From before to after.
+    pub difference: Difference,
+}
+
+/// What a fit found. Printed, it is Markdown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitReport {
+    /// Parts that constants were fitted on.
+    pub num_training: usize,
+    /// Parts that fitted values were measured on.
+    pub num_held_out: usize,
+    /// Today's values on the held-out half.
+    pub today: Loss,
+    /// Today's values on the training half.
+    pub today_training: Loss,
+    /// Each constant alone.
+    pub constants: Vec<ConstantReport>,
+    /// Size and threshold together.
+    pub joint: JointReport,
+}
+
+impl fmt::Display for FitReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Parts: {} to fit on, {} held out.\n", self.num_training, self.num_held_out)?;
+        writeln!(
+            f,
+            "| today's values | loss | of right poses | of wrong poses | right accepted | pictures with a false alarm |"
+        )?;
+        writeln!(f, "|---|--:|--:|--:|---|---|")?;
+        for (name, loss) in [("training half", &self.today_training), ("held-out half", &self.today)] {
+            let Loss { total, right, wrong, accepted, false_alarms } = loss;
+            writeln!(
+                f,
+                "| {name} | {total:.3} | {right:.3} | {wrong:.3} | {} of {} | {} of {} |",
+                accepted[0], accepted[1], false_alarms[0], false_alarms[1]
+            )?;
+        }
+        writeln!(
+            f,
+            "\nEach constant alone, the others as today. Loss, right accepted and false alarms on the held-out half; (m): the"
+        )?;
+        writeln!(f, "threshold's margin fitted again for every value, today's included.\n")?;
+        writeln!(
+            f,
+            "| constant | today | fitted | loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |"
+        )?;
+        writeln!(f, "|---|--:|--:|---|---|---|---|---|")?;
+        for constant in &self.constants {
+            let margin = if constant.is_margin_fitted { " (m)" } else { "" };
+            write!(f, "| `{}`{margin} | {} | {} |", constant.name, Short(constant.today), Short(constant.fitted))?;
+            change(f, &constant.before, &constant.after, &constant.difference)?;
+            writeln!(f, " {} |", verdict(constant.today != constant.fitted, &constant.difference))?;
+        }
+        writeln!(f, "\nSize and threshold together:\n")?;
+        for (name, today, fitted) in &self.joint.values {
+            writeln!(f, "- `{name}`: {} → {}", Short(*today), Short(*fitted))?;
+        }
+        let JointReport { values, before, after, difference } = &self.joint;
+        write!(
+            f,
+            "\n| loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |\n|---|---|---|---|---|\n|"
+        )?;
+        change(f, before, after, difference)?;
+        let is_other = values.iter().any(|(_, today, fitted)| today != fitted);
+        writeln!(f, " {} |", verdict(is_other, difference))?;
+        writeln!(f, "\nLoss on the training half of every value that was tried:\n")?;
+        for constant in &self.constants {
+            let mut trials = constant.trials.clone();
+            trials.sort_by(|a, b| a.value.total_cmp(&b.value));
+            let tried: Vec<String> = trials.iter().map(|t| format!("{}: {:.3}", Short(t.value), t.loss)).collect();
+            writeln!(f, "- `{}`: {}", constant.name, tried.join(", "))?;
+        }
+        Ok(())
+    }
+}
+
+fn change(f: &mut fmt::Formatter<'_>, before: &Loss, after: &Loss, difference: &Difference) -> fmt::Result {
+    write!(
+        f,
+        " {:.3} → {:.3} | {:+.3} ± {:.3} | {} → {} of {} | {} → {} of {} |",
+        before.total,
+        after.total,
+        difference.mean,
+        difference.half_interval,
+        before.accepted[0],
+        after.accepted[0],
+        after.accepted[1],
+        before.false_alarms[0],
+        after.false_alarms[0],
+        after.false_alarms[1]
+    )
+}
+
+/// What the fit says of a constant.
+fn verdict(is_other: bool, difference: &Difference) -> &'static str {
+    match (is_other, difference.is_improvement()) {
+        (false, _) => "no",
+        (true, true) => "yes",
+        (true, false) => "not beyond the interval",
+    }
+}
+
+/// Three decimals at most.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", (self.0 * 1e3).round() / 1e3)
+    }
+}
