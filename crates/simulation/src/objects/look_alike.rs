@@ -75,10 +75,7 @@ impl ObjectSpec {
     /// As [`ObjectSpec::look_alike`].
     pub fn look_alike_kinds(&self) -> Result<Vec<LookAlikeKind>> {
         let is_chiral = self.mirror_difference()? >= MIN_MIRROR_DIFFERENCE;
-        Ok(LookAlikeKind::ALL
-            .into_iter()
-            .filter(|kind| *kind != LookAlikeKind::FeatureMoved && (*kind != LookAlikeKind::Mirrored || is_chiral))
-            .collect())
+        Ok(LookAlikeKind::ALL.into_iter().filter(|kind| *kind != LookAlikeKind::Mirrored || is_chiral).collect())
     }
 
     /// A look-alike of this part; `seed` picks the feature that is moved, and how far.
@@ -86,10 +83,9 @@ impl ObjectSpec {
     /// # Errors
     /// [`crate::SimulationError::File`] for a part whose shapes are not given as OBJ meshes.
     pub fn look_alike(&self, kind: LookAlikeKind, seed: u64) -> Result<LookAlike> {
-        let _ = seed;
         let (spec, description) = match kind {
             LookAlikeKind::Mirrored => (self.mirrored()?, "the mirror image".to_owned()),
-            LookAlikeKind::FeatureMoved => (self.clone(), String::new()),
+            LookAlikeKind::FeatureMoved => self.with_feature_moved(seed)?,
             LookAlikeKind::Scaled { percent } => {
                 (self.scaled(f64::from(percent) / 100.0)?, format!("{percent} % of the size"))
             }
@@ -99,7 +95,10 @@ impl ObjectSpec {
 
     /// Share of what is seen from above that differs between the part and its mirror image, at the turn where they are
     /// most alike.
-    fn mirror_difference(&self) -> Result<f64> {
+    ///
+    /// # Errors
+    /// As [`ObjectSpec::look_alike`].
+    pub fn mirror_difference(&self) -> Result<f64> {
         let (own, mirror) = (self.height_map(CELL_M)?, self.mirrored()?.height_map(CELL_M)?);
         let difference = |turn: f64, shift: Vector2<f64>| {
             let onto = Isometry2::new(own.centre().coords + shift, turn) * Isometry2::new(-mirror.centre().coords, 0.0);
@@ -155,16 +154,17 @@ impl ObjectSpec {
         let percent = (factor * 100.0).round();
         let mut spec = self.renamed(&format!("size_{percent}"), &format!("{percent} % of the size"));
         spec.map_meshes(|_, mesh| mesh.mapped(|_, p| p * factor))?;
-        spec.mass_kg *= factor.powi(3);
-        spec.grasp_start *= factor;
-        spec.grasp_end *= factor;
+        let scaled = |value: f64| rounded(value * factor);
+        spec.mass_kg = rounded(spec.mass_kg * factor.powi(3));
+        spec.grasp_start = spec.grasp_start.map(scaled);
+        spec.grasp_end = spec.grasp_end.map(scaled);
         for length in
             [&mut spec.jaw_width_m, &mut spec.grasp_height_m, &mut spec.mark_height_m, &mut spec.rest_height_m]
         {
-            *length *= factor;
+            *length = scaled(*length);
         }
         for corner in &mut spec.footprint {
-            *corner *= factor;
+            *corner = corner.map(scaled);
         }
         spec.mjcf = map_tags(&spec.mjcf, |tag| {
             if !has_shape(tag) {
@@ -180,7 +180,7 @@ impl ObjectSpec {
         Ok(spec)
     }
 
-    fn renamed(&self, suffix: &str, words: &str) -> Self {
+    pub(super) fn renamed(&self, suffix: &str, words: &str) -> Self {
         Self {
             name: format!("{}_{suffix}", self.name),
             title: format!("{}, {words}", self.title),
@@ -190,7 +190,7 @@ impl ObjectSpec {
     }
 
     /// Replaces the meshes that are seen; the map is given the number of the geom.
-    fn map_meshes(&mut self, map: impl Fn(usize, ObjMesh) -> ObjMesh) -> Result<()> {
+    pub(super) fn map_meshes(&mut self, map: impl Fn(usize, ObjMesh) -> ObjMesh) -> Result<()> {
         let meshes = self.visual_meshes()?;
         for (idx, visual) in meshes.into_iter().enumerate() {
             let bytes = map(idx, visual.mesh).to_obj().into_bytes();
@@ -200,6 +200,11 @@ impl ObjectSpec {
         }
         Ok(())
     }
+}
+
+/// A nanometre or a microgram: numbers then have few digits, and are read as they were written.
+pub(super) fn rounded(value: f64) -> f64 {
+    (value * 1e9).round() / 1e9
 }
 
 /// Whether a tag says where or how heavy something of the part is.

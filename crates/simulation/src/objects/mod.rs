@@ -9,6 +9,9 @@
 //! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
+mod feature_moved;
+mod features;
+mod folder;
 mod height_map;
 mod look_alike;
 mod metadata;
