@@ -11,8 +11,8 @@ use sdg_report::{Attempt, Step};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptConfig, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig, SimulationError,
-    Workcell, WorkcellConfig,
+    AttemptConfig, AttemptErrors, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig,
+    SimulationError, Workcell, WorkcellConfig,
 };
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,18 @@ pub struct Rehearsal<'a> {
     pub seed: u64,
     /// Whether detections are checked against the demonstration.
     pub verification: Verification,
+    /// What the robot is told wrong, or has wrong.
+    pub errors: RehearsalErrors,
+}
+
+/// Errors of a rehearsal; by default there is none.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RehearsalErrors {
+    /// How far the height of the marks that the robot is told lies beside the true one, in metres: above it in attempts of
+    /// an odd number, below it in the others.
+    pub mark_height_m: f64,
+    /// What is wrong in the workcell, by the attempt's seed.
+    pub of_workcell: Option<fn(u64) -> AttemptErrors>,
 }
 
 /// What became of a rehearsal.
@@ -85,14 +97,6 @@ pub struct Looks {
     pub from_above: usize,
 }
 
-impl Looks {
-    /// Of targets look by look: the first that was found ends those from afar.
-    fn of(targets: &[Option<GraspTarget>]) -> Self {
-        let from_afar = targets.iter().position(Option::is_some).map_or(targets.len(), |found| found + 1);
-        Self { from_afar, from_above: targets.len() - from_afar }
-    }
-}
-
 /// One attempt, and what there is to see of it.
 pub struct Attempted {
     /// How it went.
@@ -137,14 +141,13 @@ impl Rehearsal<'_> {
         let seed = attempt_seed(self.seed, number);
         let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
-        let mut workcell = Workcell::new(&WorkcellConfig::new(scene))?;
-        let mut perception = ModelPerception { rehearsal: self, last: None };
+        let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
+        let mut workcell = Workcell::new(&WorkcellConfig { errors, ..WorkcellConfig::new(scene) })?;
+        let mut perception = ModelPerception { rehearsal: self, told: self.told(number), last: None };
         let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
-            Ok(mut report) => {
-                (self.record(number, &report), Looks::of(&report.targets), std::mem::take(&mut report.frames))
-            }
+            Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
             Err(SimulationError::Perception(why)) => {
                 let duration_secs = started.elapsed().as_secs_f64();
                 let failed = Attempt { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
@@ -153,6 +156,14 @@ impl Rehearsal<'_> {
             Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
         };
         Ok(Attempted { attempt, looks, frames, view: perception.last })
+    }
+
+    /// The part as the robot is told of it in an attempt.
+    fn told(&self, number: usize) -> ObjectSpec {
+        let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let mut told = self.object.clone();
+        told.mark_height_m += sign * self.errors.mark_height_m;
+        told
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> Attempt {
@@ -198,6 +209,11 @@ impl Rehearsal<'_> {
     }
 }
 
+fn looks_of(report: &AttemptReport) -> Looks {
+    let [from_afar, from_above] = report.looks;
+    Looks { from_afar, from_above }
+}
+
 /// A seed of its own for every attempt of every rehearsal.
 fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
@@ -206,6 +222,7 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
 /// The model as the workcell's eyes.
 struct ModelPerception<'a> {
     rehearsal: &'a Rehearsal<'a>,
+    told: ObjectSpec,
     last: Option<RgbImage>,
 }
 
@@ -214,7 +231,7 @@ impl Perception for ModelPerception<'_> {
         &mut self,
         view: &CameraView,
     ) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>> {
-        let Rehearsal { model, object, verification, .. } = self.rehearsal;
+        let Rehearsal { model, verification, .. } = self.rehearsal;
         let detections = model.detect(&view.image, *verification)?;
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
         let Some(best) = detections.into_iter().next() else { return Ok(None) };
@@ -223,7 +240,7 @@ impl Perception for ModelPerception<'_> {
             jaw_width_m: pose.jaw_width_m,
             score: best.score,
         };
-        match grasp_pose(object, &view.camera, &best.grasp) {
+        match grasp_pose(&self.told, &view.camera, &best.grasp) {
             Ok(pose) => Ok(Some(target(pose))),
             // What is nothing in all likelihood needs no pose.
             Err(_) if !best.is_accepted() => Ok(None),

@@ -164,6 +164,17 @@ fn results_of_other_settings_are_not_mixed() {
 }
 
 #[test]
+fn an_unknown_axis_names_the_known_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let parts = ["--axes", "found \"fog\"", "tilt", "look-alikes", "mark-height", "pictures"];
+    assert_refused(&["evaluate", "--axes", "tilt,fog", "--out", out], 2, &parts);
+    let parts = ["--against", "expected the folder of another run"];
+    assert_refused(&["evaluate", "--axes", "tilt", "--out", out, "--against", "/nowhere"], 1, &parts);
+}
+
+#[test]
 fn wrong_usage_is_exit_code_2() {
     let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
     for arguments in [
@@ -183,6 +194,9 @@ fn wrong_usage_is_exit_code_2() {
         vec!["evaluate", "--objects", "teapot"],
         vec!["evaluate", "--preset", "huge"],
         vec!["evaluate", "--scenes", "0"],
+        vec!["evaluate", "--axis-views", "3"],
+        vec!["evaluate", "--axes", "tilt", "--axis-views", "0"],
+        vec!["evaluate", "--axes", "tilt", "--search-points", "2"],
         vec!["demo", "--time-budget", "-3"],
     ] {
         assert_eq!(sdg(&arguments).status.code(), Some(2), "{arguments:?}");

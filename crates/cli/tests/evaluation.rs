@@ -1,9 +1,13 @@
-//! An evaluation in small, in the simulator: model S, which is taught at once, on one part.
+//! An evaluation in small, and some axes of pictures and errors in small, in the simulator: model S, which is taught at once,
+//! on one part.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;
 
+use sdg_cli::evaluation::axes::{
+    Against, AxesEvaluation, AxesSummary, GraspCondition, GroupSummary, Selection, Way, comparison_tables,
+};
 use sdg_cli::evaluation::{Evaluation, EvaluationProgress, Settings, Store, Summary, TeachingRecord, markdown, page};
 use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
@@ -11,9 +15,8 @@ use sdg_simulation::objects::ObjectSpec;
 const ATTEMPTS: &str = "cells/S-rod_end.attempts-verified.json";
 const MODEL: &str = "models/S-rod_end.sdg";
 
-/// Opens the folder as a process of its own would, goes on until it is interrupted, and adds up what there is.
-fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
-    let settings = Settings {
+fn settings() -> Settings {
+    Settings {
         protocol: Settings::PROTOCOL,
         preset: Preset::Edge.name().to_owned(),
         steps: None,
@@ -21,8 +24,12 @@ fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
         attempts: 2,
         views: 2,
         scenes: 2,
-    };
-    let store = Store::open(folder, &settings).unwrap();
+    }
+}
+
+/// Opens the folder as a process of its own would, goes on until it is interrupted, and adds up what there is.
+fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
+    let store = Store::open(folder, &settings()).unwrap();
     let evaluation = Evaluation {
         models: &[ModelKind::S],
         objects: &[ObjectSpec::by_name("rod_end").unwrap()],
@@ -32,9 +39,11 @@ fn go_on(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Summary {
         jobs: 2,
     };
     let ended = evaluation.run(is_interrupted, &EvaluationProgress::new()).unwrap();
-    let summary = Summary::collect(&evaluation).unwrap();
+    let mut summaries = Summary::collect(&evaluation).unwrap();
+    assert!(page(&summaries, &store, &[], "sdg evaluate").unwrap().to_html().is_ok());
+    let summary = summaries.remove(0);
+    assert!(summaries.is_empty(), "a group without parts");
     assert_eq!(ended.is_break(), summary.remaining > 0);
-    assert!(page(&summary, &store, &[], "sdg evaluate").unwrap().to_html().is_ok());
     summary
 }
 
@@ -69,7 +78,9 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
 
     let attempts_file = broken.path().join(ATTEMPTS);
     let interrupted = go_on(broken.path(), &|| attempts_file.exists());
-    assert!(interrupted.remaining > 0 && markdown(&interrupted, &[], "").contains("Not complete"));
+    assert!(
+        interrupted.remaining > 0 && markdown(std::slice::from_ref(&interrupted), &[], "").contains("Not complete")
+    );
     let read = |name: &str| fs::read(broken.path().join(name)).unwrap();
     let record: serde_json::Value = serde_json::from_slice(&read(ATTEMPTS)).unwrap();
     let first_attempt = &record["record"]["attempts"][0];
@@ -83,4 +94,58 @@ fn an_interrupted_evaluation_goes_on_to_the_same_tables() {
     assert_eq!(read(MODEL), model_file);
     // Once more there is nothing to do, and every number stands.
     assert_eq!(go_on(broken.path(), &|| panic!("asked of work that there is none of")), resumed);
+}
+
+/// Goes on with some axes as a process of its own would, and adds up what there is.
+fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> bool + Sync)) -> AxesSummary {
+    let store = Store::open(folder, &settings()).unwrap();
+    let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+    let evaluation = AxesEvaluation {
+        models: &[ModelKind::S],
+        objects: &[ObjectSpec::by_name("pendulum").unwrap()],
+        selection: &Selection::parse(&names).unwrap(),
+        preset: Preset::Edge,
+        store: &store,
+        axis_views: 2,
+        search_points: None,
+        jobs: 2,
+    };
+    let ended = evaluation.run(is_interrupted, &EvaluationProgress::new()).unwrap();
+    let summary = AxesSummary::collect(&evaluation).unwrap();
+    assert_eq!(ended.is_break(), summary.remaining > 0);
+    let comparisons = Against::open(folder).unwrap().compare(&evaluation).unwrap();
+    assert!(comparisons.iter().all(|comparison| comparison.difference == 0.0 && !comparison.differs));
+    let page =
+        sdg_cli::evaluation::axes::page(&summary, comparison_tables(&comparisons, "itself"), &[], "sdg evaluate");
+    assert!(page.to_html().is_ok());
+    summary
+}
+
+#[test]
+fn interrupted_axes_go_on_and_share_the_teaching() {
+    const NAMES: [&str; 4] = ["tilt", "instances", "look-alikes", "mark-height"];
+    let folder = tempfile::tempdir().unwrap();
+    let tilt_file = folder.path().join("axes/S-pendulum.tilt.json");
+    let interrupted = go_on_with_axes(folder.path(), &NAMES, &|| tilt_file.exists());
+    assert!(interrupted.remaining > 0);
+    let (tilt, model) = (fs::read(&tilt_file).unwrap(), fs::read(folder.path().join("models/S-pendulum.sdg")).unwrap());
+
+    let whole = go_on_with_axes(folder.path(), &NAMES, &|| false);
+    assert_eq!(whole.remaining, 0);
+    assert_eq!(fs::read(&tilt_file).unwrap(), tilt, "drawn again");
+    assert_eq!(fs::read(folder.path().join("models/S-pendulum.sdg")).unwrap(), model, "taught again");
+    let [GroupSummary { axes, look_alikes, grasps, .. }] = &whole.groups[..] else { panic!("{:?}", whole.groups) };
+    let found = |axis: &str| axes.iter().find(|figures| figures.axis == axis).unwrap().found;
+    assert_eq!((found("tilt").of, found("instances").of), (2, 6));
+    // The two mildest pictures of the tilt, and orange pendulums three times on a table.
+    assert!(found("tilt").count > 0 && found("instances").count >= 3, "{axes:?}");
+    assert!(axes.iter().all(|figures| figures.way == Way::WithCheck), "S has no network");
+    assert_eq!(
+        look_alikes.iter().filter(|figures| figures.is_sum()).map(|figures| figures.accepted.of).sum::<usize>(),
+        2
+    );
+    assert_eq!((grasps[0].condition, grasps[0].held.of), (GraspCondition::MarkHeight, 2));
+    assert!(whole.seconds.pictures > 0.0 && whole.seconds.grasps > 0.0);
+    // Once more there is nothing to do.
+    assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked of work that there is none of")), whole);
 }

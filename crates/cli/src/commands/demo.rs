@@ -12,7 +12,7 @@ use crate::commands::rehearse::{finish, show_attempt};
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
-use crate::rehearsal::Rehearsal;
+use crate::rehearsal::{Rehearsal, RehearsalErrors};
 use crate::run_page::{self, RunPage, TaughtHere};
 use crate::shipped;
 use crate::teaching_progress::TeachingProgress;
@@ -60,6 +60,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
         attempts: args.attempts,
         seed: args.seed,
         verification: Verification::ByShape,
+        errors: RehearsalErrors::default(),
     };
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);

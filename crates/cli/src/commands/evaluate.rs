@@ -8,7 +8,7 @@ use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use crate::args::EvaluateArgs;
-use crate::evaluation::{Evaluation, EvaluationProgress, Settings, Store, Summary, markdown, page};
+use crate::evaluation::{Evaluation, EvaluationProgress, PartGroup, Settings, Store, Summary, markdown, page};
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
@@ -45,7 +45,8 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     progress.finish();
     let interrupted = ended?.is_break();
 
-    let summary = Summary::collect(&evaluation)?;
+    let summaries = Summary::collect(&evaluation)?;
+    let remaining = evaluation.remaining()?;
     let command = command(args, &settings);
     let facts = [
         ("seed", settings.seed.to_string()),
@@ -54,40 +55,47 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         ("machine", machine()),
         ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
     ];
-    store.write_bytes("tables.md", markdown(&summary, &facts, &command).as_bytes())?;
+    store.write_bytes("tables.md", markdown(&summaries, &facts, &command).as_bytes())?;
+    let of_group = |group: PartGroup| summaries.iter().find(|summary| summary.group == group);
+    let [paper, held_out] = PartGroup::ALL.map(of_group);
     let json = json!({
-        "models": summary.models,
-        "cells": summary.cells,
-        "settings": summary.settings,
-        "remaining": summary.remaining,
+        "models": paper.map_or(&[][..], |summary| &summary.models),
+        "cells": paper.map_or(&[][..], |summary| &summary.cells),
+        "held_out": held_out.map(|summary| json!({ "models": summary.models, "cells": summary.cells })),
+        "settings": settings,
+        "remaining": remaining,
         "machine": machine(),
         "command": command,
     });
     store.write_bytes("tables.json", format!("{json:#}\n").as_bytes())?;
-    let report = page(&summary, &store, &facts, &command)?.write(report_folder)?;
+    let report = page(&summaries, &store, &facts, &command)?.write(report_folder)?;
 
     let tables = store.path("tables.md");
     if args.json {
         let line = json!({
-            "models": summary.models,
-            "remaining": summary.remaining,
+            "models": paper.map_or(&[][..], |summary| &summary.models),
+            "held_out": held_out.map(|summary| json!({ "models": summary.models })),
+            "remaining": remaining,
             "tables": tables.display().to_string(),
             "cells": store.path("tables.json").display().to_string(),
             "report": report.display().to_string(),
         });
         println!("{line}");
     } else {
-        for model in &summary.models {
-            let figures = &model.verified;
-            println!(
-                "{}: held {}, right {}, false alarms {}",
-                model.model, figures.held, figures.right, figures.false_alarms
-            );
+        for summary in &summaries {
+            let of = if summary.group == PartGroup::HeldOut { " (held-out parts)" } else { "" };
+            for model in &summary.models {
+                let figures = &model.verified;
+                println!(
+                    "{}{of}: held {} ({} at the first look), right {}, false alarms {}",
+                    model.model, figures.held, figures.held_at_first_look.count, figures.right, figures.false_alarms
+                );
+            }
         }
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     if interrupted {
-        bail!("interrupted with {} units of work to do: the same command goes on", summary.remaining);
+        bail!("interrupted with {remaining} units of work to do: the same command goes on");
     }
     Ok(Outcome::Done)
 }

@@ -13,7 +13,7 @@ use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
-use crate::rehearsal::{Rehearsal, Rehearsed};
+use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed};
 use crate::run_page::{self, RunPage};
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
@@ -22,8 +22,14 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
-    let rehearsal =
-        Rehearsal { model: &model, object: &object, attempts: args.attempts, seed: args.seed, verification };
+    let rehearsal = Rehearsal {
+        model: &model,
+        object: &object,
+        attempts: args.attempts,
+        seed: args.seed,
+        verification,
+        errors: RehearsalErrors::default(),
+    };
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let command = format!(

@@ -18,6 +18,7 @@
 mod attempting;
 pub mod axes;
 mod cell;
+mod groups;
 mod looking;
 mod page;
 mod paper;
@@ -33,6 +34,7 @@ mod units;
 pub use crate::progress::EvaluationProgress;
 pub use crate::statistics::{Share, percentile, wilson_interval};
 pub use cell::{Cell, Marks};
+pub use groups::PartGroup;
 pub use page::page;
 pub use records::{AttemptRecord, AttemptsRecord, LookRecord, Pictured, Said, SpeedRecord, TeachingRecord};
 pub use settings::{Settings, TeachingSettings};

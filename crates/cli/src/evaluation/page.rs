@@ -6,50 +6,63 @@ use sdg_report::{
 };
 
 use super::cell::Cell;
+use super::groups::PartGroup;
 use super::paper;
 use super::records::{AttemptRecord, LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use super::summary::{Figures, ModelSummary, Summary};
 use super::tables::{Titled, notice, tables};
 
-/// The tables, success at a glance, and a picture of every cell.
-pub fn page(summary: &Summary, store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
-    let parts = summary.cells.len() / summary.models.len().max(1);
+/// Success at a glance, the tables and a picture of every cell, group by group.
+pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
+    let parts: usize = summaries.iter().map(|summary| summary.cells.len() / summary.models.len().max(1)).sum();
+    let letters = summaries.first().into_iter().flat_map(|summary| &summary.models).map(|model| model.model.letter());
     let mut report = Report::new("Every model on every part").kicker("Evaluation in simulation").lead(format!(
         "Models: {}. Parts: {parts}. Each model was taught each part from one photo, and then looked for it and grasped it \
          in poses that it had not seen.",
-        summary.models.iter().map(|model| model.model.letter()).collect::<Vec<_>>().join(", ")
+        letters.collect::<Vec<_>>().join(", ")
     ));
-    for model in &summary.models {
-        let Some(percent) = model.verified.held.percent() else { continue };
-        let tone = if percent >= 95.0 { Tone::Good } else { Tone::Warning };
-        let label = format!("held by model {}, {}", model.model, model.verified.held);
-        report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
+    for summary in summaries {
+        for model in &summary.models {
+            let Some(percent) = model.verified.held.percent() else { continue };
+            let tone = if percent >= 95.0 { Tone::Good } else { Tone::Warning };
+            let of = if summary.group == PartGroup::HeldOut { " (held-out parts)" } else { "" };
+            let label = format!("held by model {}, {}{of}", model.model, model.verified.held);
+            report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
+        }
     }
     // In the first section, whichever that is.
-    let mut notice = notice(summary);
+    let mut notice = summaries.first().and_then(notice);
     let mut begun = |section: Section| match notice.take() {
         Some(notice) => section.notice(Tone::Warning, notice),
         None => section,
     };
-    if summary.cells.iter().any(|cell| cell.verified.held.of > 0) {
-        report = report.section(plots(summary, begun(Section::new("At a glance"))));
-    }
-    for Titled { title, lead, table } in tables(summary) {
-        report = report.section(begun(Section::new(title).lead(lead)).table(table));
-    }
-    if let Some(losses) = losses(summary) {
-        report = report.section(
-            Section::new("How they learn").lead("Models B and C are two readings of one network.").charts(vec![losses]),
-        );
-    }
-    let figures = pictures(summary, store)?;
-    if !figures.is_empty() {
-        report = report.section(
-            Section::new("What they see")
-                .lead("The first unseen picture of each part, with what each model says of it.")
-                .gallery(GallerySize::Small, figures),
-        );
+    for summary in summaries {
+        let titled = |title: &str| match summary.group {
+            PartGroup::Paper => title.to_owned(),
+            PartGroup::HeldOut => format!("{}: {}", summary.group.title(), title.to_lowercase()),
+        };
+        if summary.cells.iter().any(|cell| cell.verified.held.of > 0) {
+            report = report.section(plots(summary, begun(Section::new(titled("At a glance")))));
+        }
+        for Titled { title, lead, table } in tables(summary) {
+            report = report.section(begun(Section::new(title).lead(lead)).table(table));
+        }
+        if let Some(losses) = losses(summary) {
+            report = report.section(
+                Section::new(titled("How they learn"))
+                    .lead("Models B and C are two readings of one network.")
+                    .charts(vec![losses]),
+            );
+        }
+        let figures = pictures(summary, store)?;
+        if !figures.is_empty() {
+            report = report.section(
+                Section::new(titled("What they see"))
+                    .lead("The first unseen picture of each part, with what each model says of it.")
+                    .gallery(GallerySize::Small, figures),
+            );
+        }
     }
     Ok(report
         .section(

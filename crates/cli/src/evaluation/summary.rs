@@ -7,15 +7,19 @@ use sdg_grasp::{ModelKind, Verification};
 use serde::Serialize;
 
 use super::cell::Cell;
+use super::groups::PartGroup;
 use super::records::{AttemptRecord, Said, TeachingRecord};
 use super::settings::Settings;
 use super::store::Store;
 use super::units::Evaluation;
 use crate::statistics::{Share, percentile, wilson_interval};
 
-/// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
+/// All there is to report of a group of parts. What has not been done yet is missing from the sums, and `remaining` says how
+/// much that is, of all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
+    /// Which parts.
+    pub group: PartGroup,
     /// What decides the results.
     pub settings: Settings,
     /// Units of work that are still to do.
@@ -79,6 +83,8 @@ pub struct Figures {
     pub held: Share,
     /// Within which shares the true one lies with 95 % confidence (Wilson).
     pub held_interval: [f64; 2],
+    /// Of all attempts, those held in which both detections came of a first look.
+    pub held_at_first_look: Share,
     /// Failed attempts by the step at which they ended.
     pub failures_by_step: BTreeMap<String, usize>,
     /// Unseen pictures on which the part was found within 10 mm and 10°.
@@ -95,6 +101,13 @@ pub struct Figures {
     pub false_alarms: Share,
     /// Images a second, with the machine to itself.
     pub frames_per_second: Option<f64>,
+}
+
+impl Figures {
+    /// Of all attempts, those held in which the camera looked again at least once.
+    pub fn held_after_further_looks(&self) -> Share {
+        Share { count: self.held.count - self.held_at_first_look.count, of: self.held.of }
+    }
 }
 
 /// The records behind a row of figures.
@@ -127,6 +140,7 @@ impl Gathered {
         Figures {
             held,
             held_interval: wilson_interval(held),
+            held_at_first_look: Share::of(&self.attempts, |attempt| attempt.is_held_at_first_look()),
             failures_by_step,
             right: Share::of(&self.present, |said| said.is_some_and(|said| said.is_right())),
             median_mm: percentile(mm(), 50.0),
@@ -144,14 +158,20 @@ impl Gathered {
 }
 
 impl Summary {
-    /// Adds up what is in the store.
+    /// Adds up what is in the store, the paper's parts and the held-out ones apart; a group without parts is missing.
     ///
     /// # Errors
     /// Records that cannot be read.
-    pub fn collect(evaluation: &Evaluation) -> Result<Self> {
+    pub fn collect(evaluation: &Evaluation) -> Result<Vec<Self>> {
+        let has_part = |group: &PartGroup| evaluation.objects.iter().any(|part| PartGroup::of(&part.name) == *group);
+        PartGroup::ALL.into_iter().filter(has_part).map(|group| Self::of_group(evaluation, group)).collect()
+    }
+
+    fn of_group(evaluation: &Evaluation, group: PartGroup) -> Result<Self> {
         let store = evaluation.store;
         let settings = store.settings().clone();
         let mut summary = Self {
+            group,
             settings,
             remaining: evaluation.remaining()?,
             unverified: evaluation.unverified,
@@ -161,7 +181,7 @@ impl Summary {
         for &model in evaluation.models {
             let mut gathered = [Gathered::default(), Gathered::default()];
             let mut teachings = Vec::new();
-            for object in evaluation.objects {
+            for object in evaluation.objects.iter().filter(|object| PartGroup::of(&object.name) == group) {
                 let cell = Cell { model, object: &object.name };
                 let teaching = cell.teaching(store)?;
                 let attempted_alone = evaluation.unverified && model.has_network();
@@ -318,7 +338,7 @@ mod tests {
             unverified: false,
             jobs: 1,
         };
-        let summary = Summary::collect(&evaluation).unwrap();
+        let summary = Summary::collect(&evaluation).unwrap().remove(0);
         let model = &summary.models[0];
         assert_eq!((model.taught.to_string().as_str(), model.network), ("1 of 2", ModelKind::C));
         assert_eq!(model.verified.held, Share { count: 2, of: 6 });

@@ -17,14 +17,14 @@ use super::schedule::{Task, run_all};
 use super::store::Store;
 use super::teaching::Teaching;
 use crate::progress::EvaluationProgress;
-use crate::rehearsal::Rehearsal;
+use crate::rehearsal::{Rehearsal, RehearsalErrors};
 use crate::trial::try_view;
 
 /// Pictures on which speed is measured, for each part.
 const SPEED_VIEWS: usize = 3;
 
 /// What there is to say of a unit whose teaching failed while it waited.
-const NO_MODEL: &str = "there is no model";
+pub(super) const NO_MODEL: &str = "there is no model";
 
 /// What is kept or lost as a whole.
 #[derive(Debug, Clone, Copy)]
@@ -238,7 +238,14 @@ impl Evaluation<'_> {
         let settings = self.store.settings();
         let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
         let seed = part_seed(settings.seed, object);
-        let rehearsal = Rehearsal { model: &model, object, attempts: settings.attempts, seed, verification };
+        let rehearsal = Rehearsal {
+            model: &model,
+            object,
+            attempts: settings.attempts,
+            seed,
+            verification,
+            errors: RehearsalErrors::default(),
+        };
         let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
         Ok(attempts.map(|attempts| {
             let held = attempts.iter().filter(|attempt| attempt.success).count();

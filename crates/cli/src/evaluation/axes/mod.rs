@@ -1,7 +1,38 @@
-//! Axes along which the paper's protocol is made harder, one at a time.
+//! Axes along which the paper's protocol is made harder, one at a time, and grasps under errors.
+//!
+//! ```text
+//! AxesEvaluation ─ units: teachings (the protocol's, and from jittered marks), pictures of a part and axis, attempts
+//!       │                                    │
+//!       │              each picture drawn once, shown to every model, with the check and to the network alone
+//!       └─ Store ─ AxesSummary (the paper's parts, and apart from them the held-out ones) ─ Markdown, JSON, page
+//! ```
+//!
+//! A **case** is an instance of the part in a picture, or a look-alike: what two models can be compared on. A **condition**
+//! is what is wrong in an attempt. Pictures depend on the part, axis, number and seed alone; attempts meet the scenes of the
+//! paper's protocol.
 
+mod against;
 mod jitter;
+mod matching;
+mod page;
 mod paired;
+mod records;
+mod selection;
+mod settings;
+mod summary;
+mod tables;
+mod told;
+mod units;
 
+pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
 pub use jitter::{MARKS_JITTER_PX, with_jittered_marks};
+pub use page::page;
 pub use paired::PairedCounts;
+pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
+pub use selection::{GraspCondition, Selection};
+pub use settings::{AxisSettings, GraspSettings};
+pub use summary::{
+    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Way, lowest,
+};
+pub use tables::{markdown, tables};
+pub use units::{AxesEvaluation, GRASPING_MODELS};

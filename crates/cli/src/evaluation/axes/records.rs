@@ -1,6 +1,9 @@
 //! What the pictures of an axis leave behind.
 
+use sdg_simulation::scene::Axis;
 use serde::{Deserialize, Serialize};
+
+use super::summary::Way;
 
 /// A detection beside the instance of the part that it lies nearest to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -85,4 +88,39 @@ pub struct AxisRecord {
     pub pictures: Vec<AxisPicture>,
     /// Time for this model's detections, and its part of the time for drawing, in seconds of a worker.
     pub seconds: f64,
+}
+
+/// A case that two models can both be asked for: a picture's number, and the instance of the part in it.
+pub type Case = (u64, usize);
+
+impl AxisPicture {
+    /// What was said in one way.
+    fn answer(&self, way: Way) -> Option<&Answer> {
+        match way {
+            Way::WithCheck => Some(&self.verified),
+            Way::NetworkAlone => self.alone.as_ref(),
+        }
+    }
+}
+
+impl AxisRecord {
+    /// What was said of each picture in one way; nothing for a model that cannot be asked so.
+    pub fn answers(&self, way: Way) -> impl Iterator<Item = &Answer> {
+        self.pictures.iter().filter_map(move |picture| picture.answer(way))
+    }
+
+    /// Each case and whether it was answered right: an instance found, a look-alike refused.
+    pub fn outcomes(&self, axis: Axis, way: Way) -> Vec<(Case, bool)> {
+        let mut outcomes = Vec::new();
+        for picture in &self.pictures {
+            let Some(answer) = picture.answer(way) else { continue };
+            if axis == Axis::LookAlikes {
+                outcomes.push(((picture.number, 0), !answer.is_accepted()));
+            } else {
+                let instances = 0..picture.visible.len();
+                outcomes.extend(instances.map(|instance| ((picture.number, instance), answer.has_found(instance))));
+            }
+        }
+        outcomes
+    }
 }

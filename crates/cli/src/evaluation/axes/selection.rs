@@ -78,8 +78,7 @@ impl Selection {
         for name in if names.is_empty() { everything.as_slice() } else { names } {
             let name = name.trim();
             let is_meant = |own: &str, group: &str| [own, group, EVERYTHING].contains(&name);
-            let axes: Vec<Axis> =
-                Axis::ALL.into_iter().filter(|axis| is_meant(axis.name(), ALL_PICTURES)).collect();
+            let axes: Vec<Axis> = Axis::ALL.into_iter().filter(|axis| is_meant(axis.name(), ALL_PICTURES)).collect();
             let conditions: Vec<GraspCondition> =
                 GraspCondition::ALL.into_iter().filter(|condition| is_meant(condition.name(), ALL_GRASPS)).collect();
             if axes.is_empty() && conditions.is_empty() {

@@ -6,9 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use nalgebra::Isometry3;
 use sdg_grasp::{GraspModel, ModelKind, Preset, Verification};
-use sdg_simulation::SimulationError;
-use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
 use sdg_simulation::scene::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
+use sdg_simulation::{AttemptErrors, SimulationError};
 
 use super::matching::place;
 use super::records::{AxisPicture, AxisRecord, LookAlike};
@@ -135,46 +135,15 @@ impl AxesEvaluation<'_> {
 
     /// What is not in the store yet, part by part, so that an interrupted run has whole parts to show.
     fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
-        let mut tasks = Vec::<Task<Unit>>::new();
+        let mut tasks = Vec::new();
         for object in self.objects {
-            let cell = |model| Cell { model, object: &object.name };
-            let mut teachings: Vec<(ModelKind, Marks, usize)> = Vec::new();
-            let mut teaching_of = |cell: Cell<'_>, marks, tasks: &mut Vec<Task<Unit>>| -> Result<Option<usize>> {
-                if cell.teaching_from(marks, self.store)?.is_some() {
-                    return Ok(None);
-                }
-                let network = cell.network().model;
-                let known = teachings.iter().find(|(model, from, _)| (*model, *from) == (network, marks));
-                Ok(Some(known.map_or(tasks.len(), |(.., task)| *task)).inspect(|&task| {
-                    if task == tasks.len() {
-                        teachings.push((network, marks, task));
-                        let cell = Cell { model: network, object: &object.name };
-                        tasks.push(Task { unit: Unit::Teach(cell, marks), after: Vec::new() });
-                    }
-                }))
-            };
+            let mut plan = Plan { evaluation: self, object, teachings: Vec::new(), tasks: &mut tasks };
             for &axis in &self.selection.axes {
-                let mut after = Vec::new();
-                let mut is_missing = false;
-                for cell in self.models.iter().copied().map(cell) {
-                    if !cell.is_without_model(Marks::Shipped, self.store)? && self.axis_record(cell, axis)?.is_none() {
-                        is_missing = true;
-                        after.extend(teaching_of(cell, Marks::Shipped, &mut tasks)?);
-                    }
-                }
-                if is_missing {
-                    after.dedup();
-                    tasks.push(Task { unit: Unit::Pictures(object, axis), after });
-                }
+                plan.add_pictures(axis)?;
             }
             for &condition in &self.selection.conditions {
-                for cell in self.grasping_models().map(cell) {
-                    let marks = marks_of(condition);
-                    let done = self.grasps(cell, condition)?.len();
-                    if !cell.is_without_model(marks, self.store)? && done < self.store.settings().attempts as usize {
-                        let after = teaching_of(cell, marks, &mut tasks)?.into_iter().collect();
-                        tasks.push(Task { unit: Unit::Grasps(cell, object, condition), after });
-                    }
+                for model in self.grasping_models() {
+                    plan.add_grasps(model, condition)?;
                 }
             }
         }
@@ -205,7 +174,9 @@ impl AxesEvaluation<'_> {
     fn model(&self, cell: Cell, marks: Marks) -> Result<Option<GraspModel>> {
         let model = cell.read_model(marks, self.store)?;
         Ok(match (model, self.search_points) {
-            (Some(model), Some(points)) if !cell.model.has_network() => Some(model.with_search_points(points as usize)?),
+            (Some(model), Some(points)) if !cell.model.has_network() => {
+                Some(model.with_search_points(points as usize)?)
+            }
             (model, _) => model,
         })
     }
@@ -239,7 +210,7 @@ impl AxesEvaluation<'_> {
             let drawing_secs = started.elapsed().as_secs_f64();
             for (_, model, record) in &mut shown {
                 let started = Instant::now();
-                record.pictures.push(ask(model, object, &view)?);
+                record.pictures.push(ask(model, object, number, &view)?);
                 record.seconds += started.elapsed().as_secs_f64() + drawing_secs / num_shown;
             }
         }
@@ -289,6 +260,67 @@ impl AxesEvaluation<'_> {
     }
 }
 
+/// The tasks of one part, as they are listed.
+struct Plan<'e, 't> {
+    evaluation: &'e AxesEvaluation<'e>,
+    object: &'e ObjectSpec,
+    /// Networks that are taught, and the index of the task that does it.
+    teachings: Vec<(ModelKind, Marks, usize)>,
+    tasks: &'t mut Vec<Task<Unit<'e>>>,
+}
+
+impl<'e> Plan<'e, '_> {
+    fn cell(&self, model: ModelKind) -> Cell<'e> {
+        Cell { model, object: &self.object.name }
+    }
+
+    /// Shows an axis' pictures, if there is a model that has not seen them.
+    fn add_pictures(&mut self, axis: Axis) -> Result<()> {
+        let mut after = Vec::new();
+        let mut is_missing = false;
+        for &model in self.evaluation.models {
+            let cell = self.cell(model);
+            let is_usable = !cell.is_without_model(Marks::Shipped, self.evaluation.store)?;
+            if is_usable && self.evaluation.axis_record(cell, axis)?.is_none() {
+                is_missing = true;
+                after.extend(self.teaching_of(cell, Marks::Shipped)?);
+            }
+        }
+        if is_missing {
+            self.tasks.push(Task { unit: Unit::Pictures(self.object, axis), after });
+        }
+        Ok(())
+    }
+
+    /// Tries the attempts that are missing.
+    fn add_grasps(&mut self, model: ModelKind, condition: GraspCondition) -> Result<()> {
+        let (cell, marks) = (self.cell(model), marks_of(condition));
+        let wanted = self.evaluation.store.settings().attempts as usize;
+        let is_usable = !cell.is_without_model(marks, self.evaluation.store)?;
+        if is_usable && self.evaluation.grasps(cell, condition)?.len() < wanted {
+            let after = self.teaching_of(cell, marks)?.into_iter().collect();
+            self.tasks.push(Task { unit: Unit::Grasps(cell, self.object, condition), after });
+        }
+        Ok(())
+    }
+
+    /// The task that teaches a cell's network, listed where it is not yet; `None` where the network is there.
+    fn teaching_of(&mut self, cell: Cell<'e>, marks: Marks) -> Result<Option<usize>> {
+        if cell.teaching_from(marks, self.evaluation.store)?.is_some() {
+            return Ok(None);
+        }
+        let network = cell.network();
+        let known = self.teachings.iter().find(|(model, from, _)| (*model, *from) == (network.model, marks));
+        if let Some((.., task)) = known {
+            return Ok(Some(*task));
+        }
+        let task = self.tasks.len();
+        self.teachings.push((network.model, marks, task));
+        self.tasks.push(Task { unit: Unit::Teach(network, marks), after: Vec::new() });
+        Ok(Some(task))
+    }
+}
+
 impl std::fmt::Display for Unit<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -316,13 +348,15 @@ pub(super) fn marks_of(condition: GraspCondition) -> Marks {
 
 /// What is wrong in attempts.
 fn errors_of(condition: GraspCondition) -> RehearsalErrors {
+    let workcell =
+        |errors: fn(u64) -> AttemptErrors| RehearsalErrors { of_workcell: Some(errors), ..RehearsalErrors::default() };
     match condition {
         // Jittered marks are the teaching's error.
-        GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::none(),
-        GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::none() },
-        GraspCondition::HandEye => RehearsalErrors::hand_eye(),
-        GraspCondition::Friction => RehearsalErrors::friction(),
-        GraspCondition::Shake => RehearsalErrors::shake(),
+        GraspCondition::NoError | GraspCondition::Marks => RehearsalErrors::default(),
+        GraspCondition::MarkHeight => RehearsalErrors { mark_height_m: 0.003, ..RehearsalErrors::default() },
+        GraspCondition::HandEye => workcell(AttemptErrors::hand_eye),
+        GraspCondition::Friction => workcell(AttemptErrors::friction),
+        GraspCondition::Shake => workcell(AttemptErrors::shake),
     }
 }
 
@@ -331,7 +365,7 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
 fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {
-        match axis_view(object, axis, number + round * PICTURES_PER_AXIS.max(1) * 1000, seed) {
+        match axis_view(object, axis, number + round * PICTURES_PER_AXIS * 1000, seed) {
             Err(error @ SimulationError::Configuration { .. }) => impossible = Some(error),
             drawn => return drawn.with_context(|| format!("picture {number}")),
         }
@@ -341,14 +375,14 @@ fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisV
 }
 
 /// What a model says of a picture, both ways.
-fn ask(model: &GraspModel, object: &ObjectSpec, view: &AxisView) -> Result<AxisPicture> {
+fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) -> Result<AxisPicture> {
     let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
     let answer = |verification| -> Result<_> {
         let detections = model.detect(&view.view.image, verification)?;
         Ok(place(object, &view.view.camera, &detections, &instances))
     };
     Ok(AxisPicture {
-        number: view.number,
+        number,
         parameter: view.parameter.value,
         unit: view.parameter.unit.to_owned(),
         visible: view.truths.iter().map(|truth| truth.visible_share).collect(),
@@ -356,4 +390,8 @@ fn ask(model: &GraspModel, object: &ObjectSpec, view: &AxisView) -> Result<AxisP
         verified: answer(Verification::ByShape)?,
         alone: if model.kind().has_network() { Some(answer(Verification::Off)?) } else { None },
     })
+}
+
+fn look_alike(kind: LookAlikeKind) -> LookAlike {
+    LookAlike { kind: kind.to_string(), differs_in_size_alone: matches!(kind, LookAlikeKind::Scaled { .. }) }
 }

@@ -15,6 +15,8 @@ pub(super) fn success(summary: &Summary) -> Titled {
         Column::text("held"),
         Column::number("success").unit("%"),
         Column::text("95 % interval"),
+        Column::text("at the first look").group("held"),
+        Column::text("after further looks").group("held"),
         Column::text("held").group("network alone"),
         Column::number("success").unit("%").group("network alone"),
         Column::number("success").unit("%").group("paper"),
@@ -27,6 +29,8 @@ pub(super) fn success(summary: &Summary) -> Titled {
             share(figures.held, Tone::Plain),
             number(figures.held.percent(), 1),
             Cell::text(interval(figures)),
+            share(figures.held_at_first_look, Tone::Plain),
+            share(figures.held_after_further_looks(), Tone::Plain),
             share(alone, Tone::Plain),
             number(alone.percent(), 1),
             number(paper::row(model.model).map(|row| row.success_percent), 1),
@@ -35,7 +39,8 @@ pub(super) fn success(summary: &Summary) -> Titled {
     let lead = format!(
         "Table II of the paper: {} grasp attempts on each part from random poses, robot starts, lights and things lying \
          about, the same for every model. Held means hanging between both fingers one second after lifting. The interval \
-         is Wilson's.",
+         is Wilson's. At the first look: found in the first picture from the look-out pose and in the first from above it; \
+         otherwise the camera was moved and looked again.",
         summary.settings.attempts
     );
     Titled { title: "Success".to_owned(), lead, table }

@@ -6,6 +6,7 @@ mod models;
 
 use sdg_report::{Cell, Column, Table, Tone};
 
+use super::groups::PartGroup;
 use super::records::TeachingRecord;
 use super::summary::{Figures, ModelSummary, Summary};
 use crate::statistics::Share;
@@ -35,16 +36,21 @@ pub fn tables(summary: &Summary) -> Vec<Titled> {
     if summary.cells.iter().any(|cell| matches!(cell.teaching, Some(TeachingRecord::Failed { .. }))) {
         tables.push(models::not_taught(summary));
     }
+    if summary.group == PartGroup::HeldOut {
+        for titled in &mut tables {
+            titled.title = format!("{}: {}", summary.group.title(), titled.title.to_lowercase());
+        }
+    }
     tables
 }
 
-/// The tables as a document of their own; `facts` are what is needed to see the same numbers again.
-pub fn markdown(summary: &Summary, facts: &[(&str, String)], command: &str) -> String {
+/// The tables as a document of their own, group by group; `facts` are what is needed to see the same numbers again.
+pub fn markdown(summaries: &[Summary], facts: &[(&str, String)], command: &str) -> String {
     let mut text = String::from("# Evaluation\n\n");
-    if let Some(notice) = notice(summary) {
+    if let Some(notice) = summaries.first().and_then(notice) {
         text += &format!("**{notice}**\n\n");
     }
-    for Titled { title, lead, table } in tables(summary) {
+    for Titled { title, lead, table } in summaries.iter().flat_map(tables) {
         text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
     }
     text += "## This run\n\n";
@@ -108,7 +114,7 @@ fn ways(model: &ModelSummary) -> impl Iterator<Item = (String, &Figures)> {
     std::iter::once((model.model.to_string(), &model.verified)).chain(alone)
 }
 
-fn share(share: Share, tone: Tone) -> Cell {
+pub(super) fn share(share: Share, tone: Tone) -> Cell {
     match (share.of, tone) {
         (0, _) => Cell::text("–"),
         (_, Tone::Plain) => Cell::text(share.to_string()),
@@ -116,7 +122,7 @@ fn share(share: Share, tone: Tone) -> Cell {
     }
 }
 
-fn number(value: Option<f64>, decimals: usize) -> Cell {
+pub(super) fn number(value: Option<f64>, decimals: usize) -> Cell {
     value.map_or(Cell::missing(), |value| Cell::number(value, decimals))
 }
 
@@ -132,6 +138,7 @@ mod tests {
         Figures {
             held,
             held_interval: wilson_interval(held),
+            held_at_first_look: Share { count: count.saturating_sub(2), of },
             failures_by_step: BTreeMap::from([("lift".to_owned(), of - count)]),
             right: Share { count: 24, of: 25 },
             median_mm: Some(0.654),
@@ -173,13 +180,20 @@ mod tests {
             views: 25,
             scenes: 25,
         };
-        Summary { settings, remaining: 0, unverified: false, models: vec![model], cells: vec![cell] }
+        Summary {
+            group: PartGroup::Paper,
+            settings,
+            remaining: 0,
+            unverified: false,
+            models: vec![model],
+            cells: vec![cell],
+        }
     }
 
     #[test]
     fn rows_stand_beside_the_paper_s() {
-        let text = markdown(&summary(), &[("seed", "1".to_owned())], "sdg evaluate --seed 1");
-        assert!(text.contains("| B | 9 of 10 | 90.0 | 59.6 to 98.2 | – | – | 82.5 |"), "{text}");
+        let text = markdown(&[summary()], &[("seed", "1".to_owned())], "sdg evaluate --seed 1");
+        assert!(text.contains("| B | 9 of 10 | 90.0 | 59.6 to 98.2 | 7 of 10 | 2 of 10 | – | – | 82.5 |"), "{text}");
         assert!(text.contains("| B | 3456 | 2:32 | 8.91 | 12.3 | 1500 | 7:30 | 450 | 20 |"), "{text}");
         assert!(text.contains("B reads the network taught for C, which is taught once."));
         assert!(text.contains("| rod end | 9 of 10 |\n| all | 9 of 10 |"), "{text}");
@@ -191,8 +205,16 @@ mod tests {
     }
 
     #[test]
+    fn held_out_parts_stand_apart() {
+        let held_out = Summary { group: PartGroup::HeldOut, ..summary() };
+        let text = markdown(&[summary(), held_out], &[], "sdg evaluate");
+        let (paper, apart) = (text.find("## Success").unwrap(), text.find("## Held-out parts: success").unwrap());
+        assert!(paper < apart && text[apart..].contains("| B | 9 of 10 |"), "{text}");
+    }
+
+    #[test]
     fn what_is_missing_is_told_first() {
-        let text = markdown(&Summary { remaining: 3, ..summary() }, &[], "sdg evaluate");
+        let text = markdown(&[Summary { remaining: 3, ..summary() }], &[], "sdg evaluate");
         assert!(text.starts_with("# Evaluation\n\n**Not complete: 3 units"), "{text}");
     }
 }

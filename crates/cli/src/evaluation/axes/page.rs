@@ -1,0 +1,79 @@
+//! The axes and the grasps under errors as a page.
+
+use sdg_report::{KeyFigure, Report, Section, ShareChart, Tone};
+
+use super::summary::{AxesSummary, GroupSummary, Way};
+use super::tables::{notice, tables};
+use crate::evaluation::tables::Titled;
+
+/// The shares at a glance, then all tables; `more` are tables to follow.
+pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> Report {
+    let mut report = Report::new("Axes and grasps under errors").kicker("Evaluation in simulation").lead(
+        "What the models find where one thing is harder than when they were taught, one axis at a time, and what they \
+         grasp where the robot is told something wrong. The paper's parts and the held-out ones stand apart.",
+    );
+    for group in &summary.groups {
+        for figures in group.axes.iter().filter(|figures| figures.way == Way::WithCheck) {
+            let Some(part) = super::summary::lowest(&figures.parts) else { continue };
+            // The worst of each model and group would be a page of figures: those below eight in ten are shown.
+            if part.share.percent().is_some_and(|percent| percent < 50.0) {
+                let label = format!(
+                    "{}, {}: {} found by model {}",
+                    part.object.replace('_', " "),
+                    figures.axis,
+                    part.share,
+                    figures.model
+                );
+                report = report.key_figure(
+                    KeyFigure::new(format!("{:.0}", part.share.percent().unwrap_or(0.0)), "%", label)
+                        .tone(Tone::Warning),
+                );
+            }
+        }
+    }
+    // In the first section, whichever that is.
+    let mut notice = notice(summary);
+    let mut begun = |section: Section| match notice.take() {
+        Some(notice) => section.notice(Tone::Warning, notice),
+        None => section,
+    };
+    for group in &summary.groups {
+        report = report.section(plots(group, begun(Section::new(format!("{} at a glance", group.group.title())))));
+    }
+    for Titled { title, lead, table } in tables(summary).into_iter().chain(more) {
+        report = report.section(begun(Section::new(title).lead(lead)).table(table));
+    }
+    report
+        .section(
+            Section::new("This run")
+                .lead("Everything needed to see the same numbers again.")
+                .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
+                .command(command),
+        )
+        .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
+}
+
+/// A chart for each axis and each error.
+fn plots(group: &GroupSummary, mut section: Section) -> Section {
+    let percent = |interval: [f64; 2]| interval.map(|share| 100.0 * share);
+    let mut axes: Vec<&str> = group.axes.iter().map(|figures| figures.axis).collect();
+    axes.dedup();
+    for axis in axes {
+        let of_axis = || group.axes.iter().filter(|figures| figures.axis == axis);
+        let mut chart = ShareChart::new(format!("Found: {axis}")).reference_name("network alone");
+        for figures in of_axis().filter(|figures| figures.way == Way::WithCheck) {
+            let Some(found) = figures.found.percent() else { continue };
+            let alone = of_axis().find(|other| other.way == Way::NetworkAlone && other.model == figures.model);
+            let reference = alone.and_then(|alone| alone.found.percent());
+            chart = chart.row(figures.model.letter(), found, percent(figures.found_interval), reference);
+        }
+        section = section.shares(chart);
+    }
+    let mut grasps = ShareChart::new("Held").reference_name("at the first look");
+    for figures in &group.grasps {
+        let Some(held) = figures.held.percent() else { continue };
+        let label = format!("{}, {}", figures.condition.name(), figures.model);
+        grasps = grasps.row(label, held, percent(figures.held_interval), figures.held_at_first_look.percent());
+    }
+    if group.grasps.is_empty() { section } else { section.shares(grasps) }
+}

@@ -1,0 +1,339 @@
+//! What was measured along each axis and under each error, as tables: the paper's parts, and apart from them the others.
+
+use sdg_grasp::ModelKind;
+use sdg_report::{Cell, Column, Step, Table, Tone};
+
+use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Way, lowest};
+use super::told::told_from_truth;
+use crate::evaluation::records::AttemptRecord;
+use crate::evaluation::tables::{Titled, number, share};
+use crate::statistics::Share;
+use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
+
+/// All tables, group by group, then what the robot is told.
+pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
+    let mut tables = Vec::new();
+    for group in &summary.groups {
+        let titled = |(title, lead, table): (String, String, Table)| Titled {
+            title: format!("{}: {title}", group.group.title()),
+            lead,
+            table,
+        };
+        if !group.axes.is_empty() {
+            tables.extend(Way::ALL.map(|way| titled(found(group, way))));
+            tables.push(titled(lowest_parts(group)));
+            tables.push(titled(wrong(group)));
+            tables.push(titled(errors(group)));
+        }
+        if !group.look_alikes.is_empty() {
+            tables.push(titled(look_alikes(group)));
+        }
+        if !group.grasps.is_empty() {
+            tables.push(titled(grasps(group)));
+            tables.push(titled(failures(group)));
+        }
+        if !group.axes.is_empty() {
+            tables.push(titled(by_part(group)));
+        }
+        if !group.grasps.is_empty() {
+            tables.push(titled(grasps_by_part(group)));
+        }
+    }
+    tables.push(told());
+    tables
+}
+
+/// What the reader must know before the first number.
+pub fn notice(summary: &AxesSummary) -> Option<String> {
+    (summary.remaining > 0).then(|| {
+        format!("Not complete: {} units of work are still to do. The same command goes on.", summary.remaining)
+    })
+}
+
+/// The tables as a document of their own; `more` are tables to follow, `facts` what is needed to see the same numbers again.
+pub fn markdown(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> String {
+    let mut text = String::from("# Axes and grasps under errors\n\n");
+    if let Some(notice) = notice(summary) {
+        text += &format!("**{notice}**\n\n");
+    }
+    for Titled { title, lead, table } in tables(summary).into_iter().chain(more) {
+        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
+    }
+    text += "## This run\n\n";
+    for (name, value) in facts {
+        text += &format!("- {name}: {value}\n");
+    }
+    text + &format!("\n```\n{command}\n```\n")
+}
+
+/// Each value once, in the order of first appearance.
+fn distinct<T: PartialEq + Copy>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut distinct = Vec::new();
+    for value in values {
+        if !distinct.contains(&value) {
+            distinct.push(value);
+        }
+    }
+    distinct
+}
+
+fn models_of(group: &GroupSummary, way: Way) -> Vec<ModelKind> {
+    let shown = group.axes.iter().map(|f| (f.model, f.way)).chain(group.look_alikes.iter().map(|f| (f.model, f.way)));
+    distinct(shown.filter(|(_, of)| *of == way).map(|(model, _)| model))
+}
+
+fn axes_of(group: &GroupSummary) -> Vec<&'static str> {
+    distinct(group.axes.iter().map(|figures| figures.axis))
+}
+
+fn figures_of<'g>(group: &'g GroupSummary, axis: &str, model: ModelKind, way: Way) -> Option<&'g AxisFigures> {
+    group.axes.iter().find(|f| f.axis == axis && f.model == model && f.way == way)
+}
+
+/// The share in percent with its interval: `97.5 (93.8 to 99.0)`.
+pub(super) fn with_interval(share: Share, [low, high]: [f64; 2]) -> String {
+    let Some(percent) = share.percent() else { return "–".to_owned() };
+    format!("{percent:.1} ({:.1} to {:.1})", 100.0 * low, 100.0 * high)
+}
+
+fn part_name(object: &str) -> String {
+    object.replace('_', " ")
+}
+
+/// The lowest share and its part.
+fn told_lowest(parts: &[PartShare]) -> String {
+    lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
+}
+
+fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
+    let models = models_of(group, way);
+    let mut columns = vec![Column::text("axis"), Column::number("of")];
+    columns.extend(models.iter().map(|model| Column::text(model.letter())));
+    let mut table = Table::new(columns);
+    for axis in axes_of(group) {
+        let of = models.iter().find_map(|model| Some(figures_of(group, axis, *model, way)?.found.of));
+        let mut row = vec![Cell::text(axis), of.map_or(Cell::missing(), |of| Cell::number(of as f64, 0))];
+        row.extend(models.iter().map(|model| {
+            figures_of(group, axis, *model, way)
+                .map_or(Cell::missing(), |f| Cell::text(with_interval(f.found, f.found_interval)))
+        }));
+        table = table.row(row);
+    }
+    let lead = format!(
+        "Share of the part's instances that were found within {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°, in percent, with \
+         Wilson's 95 % interval. Where there is one instance, the best detection alone counts; three instances are found one \
+         to one. Each axis has pictures of its own, the same for every model; nothing tells a model how high the camera is."
+    );
+    (format!("found, {}", way.name()), lead, table)
+}
+
+fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
+    let mut columns = vec![Column::text("axis")];
+    for way in Way::ALL {
+        columns.extend(models_of(group, way).iter().map(|model| Column::text(model.letter()).group(way.name())));
+    }
+    let mut table = Table::new(columns);
+    for axis in axes_of(group) {
+        let mut row = vec![Cell::text(axis)];
+        for way in Way::ALL {
+            row.extend(models_of(group, way).iter().map(|model| {
+                figures_of(group, axis, *model, way).map_or(Cell::missing(), |f| Cell::text(told_lowest(&f.parts)))
+            }));
+        }
+        table = table.row(row);
+    }
+    ("the part found least often".to_owned(), "Instances found of the part with the lowest share.".to_owned(), table)
+}
+
+fn wrong(group: &GroupSummary) -> (String, String, Table) {
+    let mut columns = vec![Column::text("axis"), Column::number("pictures")];
+    for way in Way::ALL {
+        columns.extend(models_of(group, way).iter().map(|model| Column::number(model.letter()).group(way.name())));
+    }
+    let mut table = Table::new(columns);
+    for axis in axes_of(group) {
+        let pictures = group.axes.iter().find(|f| f.axis == axis).map_or(0, |f| f.pictures);
+        let mut row = vec![Cell::text(axis), Cell::number(pictures as f64, 0)];
+        for way in Way::ALL {
+            row.extend(models_of(group, way).iter().map(|model| {
+                figures_of(group, axis, *model, way).map_or(Cell::missing(), |f| Cell::number(f.wrong as f64, 0))
+            }));
+        }
+        table = table.row(row);
+    }
+    let lead = "Detections that were accepted (score 0.5 and above) and not right: beside the part, turned against it, or \
+                elsewhere. Where there is one instance at most one a picture.";
+    ("wrong detections".to_owned(), lead.to_owned(), table)
+}
+
+fn errors(group: &GroupSummary) -> (String, String, Table) {
+    let mut columns = vec![Column::text("axis"), Column::text("")];
+    columns.extend(models_of(group, Way::WithCheck).iter().flat_map(|model| {
+        [Column::text("mm").group(model.letter().to_owned()), Column::text("°").group(model.letter().to_owned())]
+    }));
+    let mut table = Table::new(columns);
+    for axis in axes_of(group) {
+        for way in Way::ALL {
+            let mut row = vec![Cell::text(axis), Cell::text(way.name())];
+            for model in models_of(group, Way::WithCheck) {
+                let figures = figures_of(group, axis, model, way);
+                let told = |pick: fn(&AxisFigures) -> Option<[f64; 2]>| {
+                    Cell::text(figures.and_then(pick).map_or("–".to_owned(), |[a, b]| format!("{a:.2} / {b:.2}")))
+                };
+                row.extend([told(|f| f.distance_mm), told(|f| f.turn_deg)]);
+            }
+            table = table.row(row);
+        }
+    }
+    let lead = "Median and nine tenths of all accepted detections' distances to the truth on the table and of their turns, \
+                right or not; turns that a part's symmetry hides do not count.";
+    ("errors of detections".to_owned(), lead.to_owned(), table)
+}
+
+fn look_alikes(group: &GroupSummary) -> (String, String, Table) {
+    let shown: Vec<(Way, ModelKind)> =
+        Way::ALL.into_iter().flat_map(|way| models_of(group, way).into_iter().map(move |model| (way, model))).collect();
+    let mut columns = vec![Column::text("look-alike"), Column::number("pictures")];
+    columns.extend(shown.iter().map(|(way, model)| Column::text(model.letter()).group(way.name())));
+    let mut table = Table::new(columns);
+    let mut kinds = distinct(group.look_alikes.iter().map(|figures| figures.kind.as_str()));
+    // The two sums last: their order of appearance depends on which kinds the first model met.
+    let sums = [LookAlikeFigures::SAME_SIZE, LookAlikeFigures::SIZE_ALONE];
+    kinds.retain(|kind| !sums.contains(kind));
+    for kind in kinds.into_iter().chain(sums) {
+        let figures = |way: Way, model: ModelKind| {
+            group.look_alikes.iter().find(|f| f.kind == kind && f.model == model && f.way == way)
+        };
+        let pictures = shown.iter().find_map(|(way, model)| Some(figures(*way, *model)?.accepted.of));
+        let label = if sums.contains(&kind) { format!("all of {kind}") } else { kind.to_owned() };
+        let mut row = vec![Cell::text(label), pictures.map_or(Cell::missing(), |of| Cell::number(of as f64, 0))];
+        row.extend(shown.iter().map(|(way, model)| match figures(*way, *model) {
+            Some(f) if sums.contains(&kind) => Cell::text(with_interval(f.accepted, f.accepted_interval)),
+            Some(f) => share(f.accepted, Tone::Plain),
+            None => Cell::missing(),
+        }));
+        table = table.row(row);
+    }
+    let lead = "Pictures in which another part that resembles the taught one lies in its place, and how often it was \
+                accepted: lower is better. Sums in percent, with Wilson's 95 % interval. What differs in size alone cannot be \
+                told in a picture without a camera, so the two sums stand apart.";
+    ("look-alikes taken for the part".to_owned(), lead.to_owned(), table)
+}
+
+fn grasps(group: &GroupSummary) -> (String, String, Table) {
+    let mut table = Table::new(vec![
+        Column::text("error"),
+        Column::text("model"),
+        Column::text("held"),
+        Column::text("held, %"),
+        Column::text("at the first look").group("of these"),
+        Column::text("after further looks").group("of these"),
+        Column::text("part held least often"),
+        Column::text("last detection, mm"),
+    ]);
+    for figures in &group.grasps {
+        table = table.row(vec![
+            Cell::text(figures.condition.description()),
+            Cell::text(figures.model.letter()),
+            share(figures.held, Tone::Plain),
+            Cell::text(with_interval(figures.held, figures.held_interval)),
+            share(figures.held_at_first_look, Tone::Plain),
+            share(figures.held_after_further_looks, Tone::Plain),
+            Cell::text(told_lowest(&figures.parts)),
+            Cell::text(figures.distance_mm.map_or("–".to_owned(), |[a, b]| format!("{a:.2} / {b:.2}"))),
+        ]);
+    }
+    let lead = "Grasp attempts with the check, the same scenes and robot starts under every error. Held at the first look: the \
+                part was found in the first picture from the look-out pose and in the first from above it. After further \
+                looks: the camera was moved and looked again at least once. The last column is the median and nine tenths of \
+                the last detection's distance to the truth, as the robot computes it.";
+    ("grasps under errors".to_owned(), lead.to_owned(), table)
+}
+
+fn failures(group: &GroupSummary) -> (String, String, Table) {
+    let steps: Vec<&str> = std::iter::once(AttemptRecord::TEACH)
+        .chain(Step::ALL.map(Step::name))
+        .chain([AttemptRecord::SIMULATION])
+        .collect();
+    let mut columns = vec![Column::text("error"), Column::text("model"), Column::text("failed")];
+    columns.extend(steps.iter().map(|step| Column::number(*step)));
+    let mut table = Table::new(columns);
+    for figures in &group.grasps {
+        let failed = Share { count: figures.held.of - figures.held.count, of: figures.held.of };
+        let mut row = vec![
+            Cell::text(figures.condition.description()),
+            Cell::text(figures.model.letter()),
+            share(failed, Tone::Plain),
+        ];
+        row.extend(steps.iter().map(|step| {
+            let count = figures.failures_by_step.get(*step).copied().unwrap_or(0);
+            Cell::number(count as f64, 0)
+        }));
+        table = table.row(row);
+    }
+    let lead = "The step at which each failed attempt ended. \"teach\": there was no model to try.";
+    ("failed grasps, by step".to_owned(), lead.to_owned(), table)
+}
+
+fn by_part(group: &GroupSummary) -> (String, String, Table) {
+    let axes = axes_of(group);
+    let mut columns = vec![Column::text("part"), Column::text("model"), Column::text("")];
+    columns.extend(axes.iter().map(|axis| Column::number(*axis)));
+    let mut table = Table::new(columns);
+    for object in &group.objects {
+        for way in Way::ALL {
+            for model in models_of(group, way) {
+                let mut row = vec![Cell::text(part_name(object)), Cell::text(model.letter()), Cell::text(way.name())];
+                row.extend(axes.iter().map(|axis| {
+                    let parts = figures_of(group, axis, model, way).map_or(&[][..], |figures| &figures.parts);
+                    number(share_of(parts, object).map(|share| share.count as f64), 0)
+                }));
+                table = table.row(row);
+            }
+        }
+    }
+    let each = group.axes.iter().flat_map(|figures| &figures.parts).map(|part| part.share.of).min().unwrap_or(0);
+    let lead = format!("Instances found: of {each} on every axis, of three times as many on the axis of instances.");
+    ("found, every part and model".to_owned(), lead, table)
+}
+
+fn grasps_by_part(group: &GroupSummary) -> (String, String, Table) {
+    let mut columns = vec![Column::text("part")];
+    columns.extend(
+        group
+            .grasps
+            .iter()
+            .map(|figures: &GraspFigures| Column::text(figures.model.letter()).group(figures.condition.name())),
+    );
+    let mut table = Table::new(columns);
+    for object in &group.objects {
+        let mut row = vec![Cell::text(part_name(object))];
+        row.extend(
+            group.grasps.iter().map(|figures| {
+                share_of(&figures.parts, object).map_or(Cell::missing(), |held| share(held, Tone::Plain))
+            }),
+        );
+        table = table.row(row);
+    }
+    ("held, every part".to_owned(), "What the sums above are made of.".to_owned(), table)
+}
+
+fn share_of(parts: &[PartShare], object: &str) -> Option<Share> {
+    parts.iter().find(|part| part.object == object).map(|part| part.share)
+}
+
+fn told() -> Titled {
+    let mut table = Table::new(vec![
+        Column::text("what"),
+        Column::text("where it comes from"),
+        Column::text("measured with an error"),
+    ]);
+    for row in told_from_truth() {
+        table = table.row([row.what, row.source, row.error].map(Cell::text).into());
+    }
+    Titled {
+        title: "What the robot is told from truth".to_owned(),
+        lead: "Everything that the simulated robot knows exactly and a real one would have to measure.".to_owned(),
+        table,
+    }
+}

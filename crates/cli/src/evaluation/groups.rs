@@ -1,0 +1,47 @@
+//! The parts in two groups that are never added up: those of the paper, and those on which no constant was ever fitted.
+
+use sdg_simulation::objects::ObjectSpec;
+use serde::Serialize;
+
+/// A group of parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartGroup {
+    /// The paper's eight.
+    Paper,
+    /// Four of another kind, held out of every choice.
+    HeldOut,
+}
+
+impl PartGroup {
+    /// Both, in the order in which they are reported.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::HeldOut];
+
+    /// The group of a shipped part.
+    pub fn of(object: &str) -> Self {
+        if ObjectSpec::held_out_names().any(|name| name == object) { Self::HeldOut } else { Self::Paper }
+    }
+
+    /// Its name in headings.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Paper => "The paper's parts",
+            Self::HeldOut => "Held-out parts",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_parts_are_held_out() {
+        assert_eq!(PartGroup::of("pendulum"), PartGroup::Paper);
+        for name in ["key", "pliers", "printed_circuit_board", "spring_clip"] {
+            let is_shipped = ObjectSpec::held_out_names().any(|shipped| shipped == name);
+            assert!(!is_shipped || PartGroup::of(name) == PartGroup::HeldOut, "{name}");
+        }
+        assert_eq!(ObjectSpec::held_out_names().count(), 4);
+    }
+}
