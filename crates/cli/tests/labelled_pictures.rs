@@ -74,9 +74,15 @@ fn marked(annotation: &Value) -> Marked {
 fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let file = read_json(&samples.join("annotations.json"));
     let demonstration = read_json(&shipped("annotation.json"));
-    let demonstration = &demonstration["annotations"][0];
-    let bbox: Vec<f64> = demonstration["bbox"].as_array().unwrap().iter().map(|b| b.as_f64().unwrap()).collect();
-    let diagonal_per_length = bbox[2].hypot(bbox[3]) / marked(demonstration).length;
+    let points = |kind: &str| {
+        let shapes = demonstration["shapes"].as_array().unwrap();
+        let points = &shapes.iter().find(|s| s["shape_type"] == kind || s["label"] == kind).unwrap()["points"];
+        points.as_array().unwrap().iter().map(|p| [p[0].as_f64().unwrap(), p[1].as_f64().unwrap()]).collect::<Vec<_>>()
+    };
+    let distance = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| (ax - bx).hypot(ay - by);
+    let corners = points("rectangle");
+    let diagonal_per_length =
+        distance(corners[0], corners[1]) / distance(points("grasp_start")[0], points("grasp_end")[0]);
     let [mut parts, mut found, mut wrong, mut negatives, mut false_alarms] = [0; 5];
     for image in file["images"].as_array().unwrap() {
         let picture = samples.join(image["file_name"].as_str().unwrap());
@@ -102,13 +108,26 @@ fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
                     found += usize::from(!truth.optional);
                     is_free = false;
                 }
-                // Without marks to compare with, the reference has nothing to say of it.
-                (false, true) => {}
-                (false, false) => wrong += 1,
+                // Without marks to compare with, its box is what it hits.
+                (false, true) if is_free && iou(detection, here.unwrap()) >= 0.5 => is_free = false,
+                (false, _) => wrong += 1,
             }
         }
     }
     [parts, found, wrong, negatives, false_alarms]
+}
+
+/// Overlap of a detection's box (corners) with a marked one (x, y, width, height), over their union.
+fn iou(detection: &Value, annotation: &Value) -> f64 {
+    let number = |list: &Value, at: usize| list[at].as_f64().unwrap();
+    let (found, marked) = (&detection["box"], &annotation["bbox"]);
+    let overlap = |axis: usize| {
+        let (from, to) = (number(marked, axis), number(marked, axis) + number(marked, axis + 2));
+        (number(found, axis + 2).min(to) - number(found, axis).max(from)).max(0.0)
+    };
+    let inside = overlap(0) * overlap(1);
+    let extent = |axis: usize| number(found, axis + 2) - number(found, axis);
+    inside / (extent(0) * extent(1) + number(marked, 2) * number(marked, 3) - inside)
 }
 
 fn counts(evaluated: &Value) -> [usize; 5] {

@@ -20,6 +20,8 @@ use crate::teaching_page::FOOTER;
 
 /// Pictures drawn on the page at most; of more, the worst.
 const MAX_DRAWN: usize = 200;
+/// Height of a tag's capitals, in widths of a line: small, since there may be many on a picture.
+const TAG_WIDTHS: f64 = 3.4;
 
 /// The page. Pictures are read again from their files.
 ///
@@ -63,7 +65,11 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
             &[Outcome::Wrong, Outcome::Missed][..],
         ),
         ("False alarms", "The part is not on these pictures.", &[Outcome::FalseAlarm]),
-        ("Right", "Every part found, nothing wrong: marks white, detections green, with the grasp.", &[Outcome::Right]),
+        (
+            "Right",
+            "Every part found, nothing wrong: marks white, detections green with their scores, the grasp orange.",
+            &[Outcome::Right],
+        ),
         ("Quiet", "Pictures without the part on which nothing was detected.", &[Outcome::Quiet]),
     ] {
         let here = order.iter().take(MAX_DRAWN).filter(|&&at| outcomes.contains(&judged[at].outcome()));
@@ -261,7 +267,7 @@ fn draw(image: &mut RgbImage, tested: &Tested, judged: &Judged) {
         }
         if missed || instance.optional {
             let text = if missed { "missed" } else { "optional" };
-            draw_label(image, Point2::new(instance.bbox.x1, instance.bbox.y1), text, color, 4.6 * width);
+            draw_label(image, Point2::new(instance.bbox.x1, instance.bbox.y1), text, color, TAG_WIDTHS * width);
         }
     }
     for (detection, hit) in tested.detections.iter().zip(&judged.hits).rev() {
@@ -274,9 +280,9 @@ fn draw_found(image: &mut RgbImage, detection: &GraspDetection, is_hit: bool, wi
     let outline = detection.outline.clone().unwrap_or_else(|| Polygon::from_box(&detection.bbox));
     draw_polygon(image, &outline, &Pen::new(color).width(0.7 * width));
     draw_grasp_jaws(image, &detection.grasp, &Pen::new(Color::GRASP).width(0.8 * width));
-    let text = format!("{:.2} {}", detection.score, if is_hit { "found" } else { "wrong" });
+    let text = format!("{:.2}{}", detection.score, if is_hit { "" } else { " wrong" });
     let bounds = outline.bounds();
-    draw_label(image, Point2::new(bounds.x1, bounds.y2 + 7.0 * width), &text, color, 4.6 * width);
+    draw_label(image, Point2::new(bounds.x1, bounds.y2 + 2.0 * TAG_WIDTHS * width), &text, color, TAG_WIDTHS * width);
 }
 
 fn this_run(evaluated: &Evaluated, command: &str) -> Section {
