@@ -8,11 +8,12 @@
 
 use std::path::PathBuf;
 
-use image::imageops::{crop_imm, overlay};
+use image::imageops::{FilterType, crop_imm, overlay, resize};
 use image::{Rgb, RgbImage};
 use nalgebra::Point3;
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
-use sdg_simulation::scene::{SceneVariation, test_view};
+use sdg_simulation::scene::{SceneVariation, base_from_look_camera};
+use sdg_simulation::{RenderConfig, Workcell, WorkcellConfig};
 
 /// Side of a picture on the sheet in pixels.
 const SIDE: u32 = 250;
@@ -35,8 +36,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut sheet = RgbImage::from_pixel(width, SIDE * parts.len() as u32, Rgb([255; 3]));
     for (row, part) in parts.iter().enumerate() {
         let spec = ObjectSpec::by_name(part)?;
+        let scale = scale_m(&spec);
         let y = i64::from(SIDE) * row as i64;
-        overlay(&mut sheet, &picture(&spec)?, 0, y);
+        overlay(&mut sheet, &picture(&spec, scale)?, 0, y);
         let kinds = spec.look_alike_kinds()?;
         println!("{part}: differs from its mirror image by {:.1} %", 100.0 * spec.mirror_difference()?);
         for (column, &(kind, seed)) in columns.iter().enumerate().filter(|(_, (kind, _))| kinds.contains(kind)) {
@@ -45,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let name = kind.to_string().replace(' ', "_");
             let name = if kind == LookAlikeKind::FeatureMoved { format!("{name}_{seed}") } else { name };
             look_alike.spec.write_folder(&folder.join(part).join(name))?;
-            overlay(&mut sheet, &picture(&look_alike.spec)?, i64::from(SIDE) * (column as i64 + 1), y);
+            overlay(&mut sheet, &picture(&look_alike.spec, scale)?, i64::from(SIDE) * (column as i64 + 1), y);
         }
     }
     std::fs::create_dir_all(&folder)?;
@@ -54,12 +56,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The part alone in even light, seen by the wrist camera.
-fn picture(spec: &ObjectSpec) -> Result<RgbImage, Box<dyn std::error::Error>> {
+/// The part alone in even light, seen by the wrist camera in a fine picture and cut out around it; `scale_m` is what the
+/// side of the cut shows.
+fn picture(spec: &ObjectSpec, scale_m: f64) -> Result<RgbImage, Box<dyn std::error::Error>> {
     let (x, y, yaw_rad) = PLACE;
-    let shown = test_view(SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad)))))?;
-    let middle = shown.view.camera.project(&Point3::new(x, y, 0.0)).ok_or("the camera looks away")?;
-    let half = f64::from(SIDE) / 2.0;
-    let (left, top) = ((middle.x - half).max(0.0) as u32, (middle.y - half).max(0.0) as u32);
-    Ok(crop_imm(&shown.view.image, left, top, SIDE, SIDE).to_image())
+    let scene = SceneVariation::nominal(Some((spec, spec.base_from_object(x, y, yaw_rad))));
+    let wrist_render = RenderConfig { width: 1600, height: 1200, ..RenderConfig::default() };
+    let mut cell = Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) })?;
+    let view = cell.view_from(&base_from_look_camera())?;
+    let footprint = spec.footprint.iter().map(|corner| corner.coords).sum::<nalgebra::Vector2<f64>>();
+    let middle = footprint / spec.footprint.len() as f64;
+    let middle = spec.base_from_object(x, y, yaw_rad) * Point3::new(middle.x, middle.y, 0.0);
+    let at = view.camera.project(&middle).ok_or("the camera looks away")?;
+    let metres_per_pixel = view.camera.metres_per_pixel(&at, 0.0).ok_or("the camera looks away")?;
+    let half = 0.5 * scale_m / metres_per_pixel;
+    let (left, top) = ((at.x - half).max(0.0) as u32, (at.y - half).max(0.0) as u32);
+    let cut = crop_imm(&view.image, left, top, (2.0 * half) as u32, (2.0 * half) as u32).to_image();
+    Ok(resize(&cut, SIDE, SIDE, FilterType::CatmullRom))
+}
+
+/// What the side of a part's pictures shows, in metres: the largest look-alike fits.
+fn scale_m(spec: &ObjectSpec) -> f64 {
+    let distances = spec.footprint.iter().flat_map(|a| spec.footprint.iter().map(move |b| (a - b).norm()));
+    1.3 * distances.fold(0.0, f64::max)
 }

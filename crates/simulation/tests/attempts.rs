@@ -11,8 +11,8 @@ use nalgebra::{Isometry3, Translation3};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep, CameraView, GraspTarget, RecordConfig, RenderConfig,
-    SimulationError, Workcell, WorkcellConfig, camera_looking_down, marked_grasp,
+    AttemptConfig, AttemptErrors, AttemptOutcome, AttemptReport, AttemptStep, CameraView, GraspTarget, RecordConfig,
+    RenderConfig, SimulationError, Workcell, WorkcellConfig, camera_looking_down, marked_grasp,
 };
 
 type Perceived = Result<Option<GraspTarget>, Box<dyn Error + Send + Sync>>;
@@ -33,7 +33,7 @@ fn bar() -> ObjectSpec {
     fs::write(
         folder.join("object.xml"),
         r#"<mujoco><worldbody><body name="object"><freejoint name="object_joint"/>
-           <geom type="box" pos="0 0 0.01" size="0.06 0.01 0.01" mass="0.2" rgba="0.8 0.1 0.1 1"/>
+           <geom type="box" pos="0 0 0.01" size="0.06 0.01 0.01" mass="0.2" friction="0.5 0.005 0.0001" rgba="0.8 0.1 0.1 1"/>
            </body></worldbody></mujoco>"#,
     )
     .unwrap();
@@ -135,6 +135,7 @@ fn who_does_not_find_the_part_looks_from_elsewhere() {
     };
     let report = cell.run_attempt(&mut blind_twice, &AttemptConfig::default(), 1).unwrap();
     assert_eq!(report.outcome, AttemptOutcome::Success);
+    assert_eq!(report.looks, [2, 2]);
     let places: Vec<_> =
         report.views.iter().map(|view| view.camera.world_from_camera.translation.vector.xy()).collect();
     assert_eq!(places.len(), 4);
@@ -227,4 +228,50 @@ fn a_recording_has_a_picture_for_each_period() {
     let expected = report.simulated_secs / 0.25;
     assert!((report.frames.len() as f64 - expected).abs() <= 1.0, "{} frames in {expected}", report.frames.len());
     assert!(report.frames.iter().all(|frame| frame.dimensions() == (64, 48)));
+}
+
+/// A cell with a bar whose pictures are drawn fast, and errors.
+fn bar_cell_with(errors: AttemptErrors) -> Workcell {
+    let spec = bar();
+    let scene = SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6))));
+    let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
+    Workcell::new(&WorkcellConfig { wrist_render, errors, ..WorkcellConfig::new(scene) }).unwrap()
+}
+
+#[test]
+fn a_wrong_hand_eye_calibration_changes_what_perception_is_told_and_nothing_else() {
+    let mut run = |errors| {
+        let mut sure = |_: &CameraView| -> Perceived { Ok(Some(true_target())) };
+        bar_cell_with(errors).run_attempt(&mut sure, &AttemptConfig::default(), 5).unwrap()
+    };
+    let (without, with) = (run(AttemptErrors::default()), run(AttemptErrors::hand_eye(5)));
+    assert_eq!((without.outcome, without.looks), (AttemptOutcome::Success, [1, 1]));
+    assert_eq!(without.shake_amplitude_m, None);
+    // The robot itself does the same, to the bit.
+    assert_eq!(without.simulated_secs, with.simulated_secs);
+    assert_eq!(without.object_height_m, with.object_height_m);
+    for (one, other) in without.views.iter().zip(&with.views) {
+        assert_eq!(one.image, other.image);
+        let told = one.camera.world_from_camera.inverse() * other.camera.world_from_camera;
+        assert!((told.translation.vector.norm() - 0.002).abs() < 1e-9, "{told}");
+        assert!((told.rotation.angle().to_degrees() - 0.5).abs() < 1e-6, "{told}");
+    }
+}
+
+#[test]
+fn worn_pads_and_a_shake_ask_for_more_force() {
+    let run = |errors, grasp_force_n| {
+        let config = AttemptConfig { grasp_force_n, ..AttemptConfig::default() };
+        bar_cell_with(errors).run_oracle_attempt(&config, 5).unwrap()
+    };
+    let worn = AttemptErrors::friction(1);
+    let held = run(AttemptErrors { shake: AttemptErrors::shake(1).shake, ..worn }, 40.0);
+    assert_eq!(held.outcome, AttemptOutcome::Success);
+    // The arm's limits leave much of the 20 to 30 mm that were asked for.
+    let amplitude_m = held.shake_amplitude_m.unwrap();
+    assert!((0.010..=0.030).contains(&amplitude_m), "{amplitude_m}");
+    // The bar weighs 1.96 N. Two new pads pressed with 1.2 N hold 2.4 N; worn ones hold 2 * 0.8 * 1.2 N = 1.92 N at most.
+    assert_eq!(run(AttemptErrors::default(), 1.2).outcome, AttemptOutcome::Success);
+    let (step, why) = failure(run(worn, 1.2));
+    assert!(matches!(step, AttemptStep::Lift | AttemptStep::Hold), "{step}: {why}");
 }

@@ -10,11 +10,10 @@ pub fn rounded_polygon(corners: &[(f64, f64, f64)]) -> Vec<Point2<f64>> {
     let count = corners.len();
     let at = |idx: usize| Point2::new(corners[idx % count].0, corners[idx % count].1);
     let mut points = Vec::new();
-    for idx in 0..count {
-        let (before, corner, after) = (at(idx + count - 1), at(idx), at(idx + 1));
+    for (idx, &(x, y, radius)) in corners.iter().enumerate() {
+        let (before, corner, after) = (at(idx + count - 1), Point2::new(x, y), at(idx + 1));
         let (into, out) = ((corner - before).normalize(), (after - corner).normalize());
         let turn = (into.x * out.y - into.y * out.x).atan2(into.dot(&out));
-        let radius = corners[idx].2;
         if radius == 0.0 || turn.abs() < 1e-6 {
             points.push(corner);
             continue;

@@ -27,7 +27,7 @@ const SAME_HEIGHT_M: f64 = 0.001;
 /// Ground that is this much higher or lower is other ground, in metres.
 const SAME_GROUND_M: f64 = 0.0015;
 /// Share of a feature's cells that may have other ground than before.
-const MAX_OTHER_GROUND: f64 = 0.12;
+const MAX_OTHER_GROUND: f64 = 0.04;
 /// Least share of what is seen from above that must change.
 const MIN_CHANGE: f64 = 0.012;
 /// Distances and directions that are tried for each feature.

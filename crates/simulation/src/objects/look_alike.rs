@@ -211,3 +211,68 @@ pub(super) fn rounded(value: f64) -> f64 {
 fn has_shape(tag: &Tag) -> bool {
     matches!(tag.name.as_str(), "geom" | "inertial" | "site")
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::data::Data;
+    use crate::model::{Body, Model};
+    use crate::scene::SceneVariation;
+
+    #[test]
+    fn mirror_images_are_look_alikes_only_where_they_differ() {
+        for (name, is_chiral) in [
+            ("pendulum", false),
+            ("ball_bearing", false),
+            ("cranfield_face", false),
+            ("fuel_line", true),
+            ("common_line", true),
+        ] {
+            let kinds = ObjectSpec::by_name(name).unwrap().look_alike_kinds().unwrap();
+            assert_eq!(kinds.contains(&LookAlikeKind::Mirrored), is_chiral, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_mirror_image_of_the_mirror_image_is_the_part() {
+        let spec = ObjectSpec::by_name("fuel_line").unwrap();
+        let twice = spec.mirrored().unwrap().mirrored().unwrap();
+        assert_eq!((twice.grasp_start, twice.grasp_end), (spec.grasp_start, spec.grasp_end));
+        assert_eq!(twice.footprint, spec.footprint);
+        assert_eq!(twice.height_map(CELL_M).unwrap(), spec.height_map(CELL_M).unwrap());
+    }
+
+    #[test]
+    fn every_look_alike_differs_is_read_from_its_folder_and_lies_still() {
+        let folder = std::env::temp_dir().join(format!("sdg-look-alikes-{}", std::process::id()));
+        for name in ObjectSpec::names() {
+            let part = ObjectSpec::by_name(name).unwrap();
+            let own = part.height_map(CELL_M).unwrap();
+            for kind in part.look_alike_kinds().unwrap() {
+                let spec = part.look_alike(kind, 1).unwrap().spec;
+                let difference =
+                    spec.height_map(CELL_M).unwrap().difference(&own, &Isometry2::identity(), SAME_HEIGHT_M);
+                assert!(difference > 0.01, "{name} {kind}: {difference}");
+                spec.write_folder(&folder.join(&spec.name)).unwrap();
+                assert_eq!(ObjectSpec::from_folder(&folder.join(&spec.name)).unwrap(), spec, "{name} {kind}");
+
+                let placed = spec.base_from_object(0.5, 0.1, 0.7);
+                let fragment = SceneVariation::nominal(Some((&spec, placed))).fragment();
+                let model = Arc::new(Model::from_xml(&fragment.to_standalone_mjcf(), &fragment.files).unwrap());
+                let body = model.id::<Body>("object").unwrap();
+                assert!((model.mass_kg(body) / spec.mass_kg - 1.0).abs() < 1e-3, "{name} {kind}");
+                let mut data = Data::new(model).unwrap();
+                while data.time_secs() < 1.0 {
+                    data.step().unwrap();
+                }
+                let drift = placed.inverse() * data.world_from_body(body);
+                // A part that was not made for the table's height settles by less than a millimetre.
+                assert!(drift.translation.vector.norm() < 1e-3, "{name} {kind} moved by {}", drift.translation);
+                assert!(drift.rotation.angle() < 0.015, "{name} {kind} turned by {} rad", drift.rotation.angle());
+            }
+        }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}
