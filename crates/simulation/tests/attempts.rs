@@ -19,22 +19,28 @@ type Perceived = Result<Option<GraspTarget>, Box<dyn Error + Send + Sync>>;
 
 /// A square bar of 20 x 20 x 120 mm and 0.2 kg, written and read as a user would bring a part.
 fn bar() -> ObjectSpec {
+    bar_of(0.2)
+}
+
+/// The bar with another mass in kilograms.
+fn bar_of(mass_kg: f64) -> ObjectSpec {
+    let with_mass = |text: &str| text.replace("MASS_KG", &mass_kg.to_string());
     // Each test runs in a process or thread of its own.
     let folder = std::env::temp_dir().join(format!("sdg-bar-{}-{:?}", std::process::id(), std::thread::current().id()));
     fs::create_dir_all(&folder).unwrap();
     fs::write(
         folder.join("object.json"),
-        r#"{"format": 1, "name": "bar", "title": "Bar", "description": "a square bar", "mass_kg": 0.2, "friction": 0.6,
+        with_mass(r#"{"format": 1, "name": "bar", "title": "Bar", "description": "a square bar", "mass_kg": MASS_KG, "friction": 0.6,
             "grasp_start": [-0.02, 0, 0.02], "grasp_end": [0.02, 0, 0.02], "jaw_width_m": 0.02,
             "grasp_height_m": 0.01, "mark_height_m": 0.02, "rest_height_m": 0.0, "symmetry": "none",
-            "footprint": [[-0.06, -0.01], [0.06, -0.01], [0.06, 0.01], [-0.06, 0.01]], "mjcf": "object.xml"}"#,
+            "footprint": [[-0.06, -0.01], [0.06, -0.01], [0.06, 0.01], [-0.06, 0.01]], "mjcf": "object.xml"}"#),
     )
     .unwrap();
     fs::write(
         folder.join("object.xml"),
-        r#"<mujoco><worldbody><body name="object"><freejoint name="object_joint"/>
-           <geom type="box" pos="0 0 0.01" size="0.06 0.01 0.01" mass="0.2" friction="0.5 0.005 0.0001" rgba="0.8 0.1 0.1 1"/>
-           </body></worldbody></mujoco>"#,
+        with_mass(r#"<mujoco><worldbody><body name="object"><freejoint name="object_joint"/>
+           <geom type="box" pos="0 0 0.01" size="0.06 0.01 0.01" mass="MASS_KG" friction="0.5 0.005 0.0001" rgba="0.8 0.1 0.1 1"/>
+           </body></worldbody></mujoco>"#),
     )
     .unwrap();
     let spec = ObjectSpec::from_folder(&folder).unwrap();
@@ -231,8 +237,8 @@ fn a_recording_has_a_picture_for_each_period() {
 }
 
 /// A cell with a bar whose pictures are drawn fast, and errors.
-fn bar_cell_with(errors: AttemptErrors) -> Workcell {
-    let spec = bar();
+fn bar_cell_with(errors: AttemptErrors, mass_kg: f64) -> Workcell {
+    let spec = bar_of(mass_kg);
     let scene = SceneVariation::nominal(Some((&spec, spec.base_from_object(0.48, 0.05, 0.6))));
     let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
     Workcell::new(&WorkcellConfig { wrist_render, errors, ..WorkcellConfig::new(scene) }).unwrap()
@@ -242,7 +248,7 @@ fn bar_cell_with(errors: AttemptErrors) -> Workcell {
 fn a_wrong_hand_eye_calibration_changes_what_perception_is_told_and_nothing_else() {
     let mut run = |errors| {
         let mut sure = |_: &CameraView| -> Perceived { Ok(Some(true_target())) };
-        bar_cell_with(errors).run_attempt(&mut sure, &AttemptConfig::default(), 5).unwrap()
+        bar_cell_with(errors, 0.2).run_attempt(&mut sure, &AttemptConfig::default(), 5).unwrap()
     };
     let (without, with) = (run(AttemptErrors::default()), run(AttemptErrors::hand_eye(5)));
     assert_eq!((without.outcome, without.looks), (AttemptOutcome::Success, [1, 1]));
@@ -260,18 +266,18 @@ fn a_wrong_hand_eye_calibration_changes_what_perception_is_told_and_nothing_else
 
 #[test]
 fn worn_pads_and_a_shake_ask_for_more_force() {
-    let run = |errors, grasp_force_n| {
+    let run = |errors, mass_kg, grasp_force_n| {
         let config = AttemptConfig { grasp_force_n, ..AttemptConfig::default() };
-        bar_cell_with(errors).run_oracle_attempt(&config, 5).unwrap()
+        bar_cell_with(errors, mass_kg).run_oracle_attempt(&config, 5).unwrap()
     };
-    let worn = AttemptErrors::friction(1);
-    let held = run(AttemptErrors { shake: AttemptErrors::shake(1).shake, ..worn }, 40.0);
+    let worn = AttemptErrors { pad_friction: Some(0.6), ..AttemptErrors::default() };
+    let held = run(AttemptErrors { shake: AttemptErrors::shake(1).shake, ..worn }, 0.2, 40.0);
     assert_eq!(held.outcome, AttemptOutcome::Success);
     // The arm's limits leave much of the 20 to 30 mm that were asked for.
     let amplitude_m = held.shake_amplitude_m.unwrap();
     assert!((0.010..=0.030).contains(&amplitude_m), "{amplitude_m}");
-    // The bar weighs 1.96 N. Two new pads pressed with 1.2 N hold 2.4 N; worn ones hold 2 * 0.8 * 1.2 N = 1.92 N at most.
-    assert_eq!(run(AttemptErrors::default(), 1.2).outcome, AttemptOutcome::Success);
-    let (step, why) = failure(run(worn, 1.2));
+    // A bar of 1.2 kg weighs 11.8 N. Two new pads pressed with 8 N hold 16 N; worn ones hold 2 * 0.6 * 8 N = 9.6 N.
+    assert_eq!(run(AttemptErrors::default(), 1.2, 8.0).outcome, AttemptOutcome::Success);
+    let (step, why) = failure(run(worn, 1.2, 8.0));
     assert!(matches!(step, AttemptStep::Lift | AttemptStep::Hold), "{step}: {why}");
 }
