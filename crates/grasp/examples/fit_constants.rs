@@ -10,7 +10,7 @@
 use std::time::Instant;
 
 use sdg_grasp::TaughtDemonstration;
-use sdg_grasp::fitting::{FitInstance, FitOptions, FitPart, FitPicture, constant_names, fit};
+use sdg_grasp::fitting::{FitEvent, FitInstance, FitOptions, FitPart, FitPicture, constant_names, fit};
 use sdg_part_generator::{Condition, Part, PhotoConfig, SceneConfig, Scenes, demonstration};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
@@ -64,8 +64,14 @@ fn main() -> Result<()> {
 
     let held_out = parts.split_off(parts.len() / 2);
     let options = FitOptions { seed: arguments.seed, only: arguments.only };
-    let report = fit(&parts, &held_out, &options, &mut |text| {
-        eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
+    let report = fit(&parts, &held_out, &options, &mut |event| {
+        let seconds = start.elapsed().as_secs_f64();
+        match event {
+            FitEvent::Searching { constant, value } => eprintln!("{seconds:6.0} s  {constant} = {value}"),
+            FitEvent::Joint(report) => eprintln!("{report}"),
+            FitEvent::Fitted(report) => eprintln!("{report}  {}", report.tried()),
+            _ => {}
+        }
     })?;
     println!("{report}");
     Ok(())

@@ -96,49 +96,8 @@ pub(super) const MARGIN: Constant = checked(
     |c| Field::Double(&mut c.threshold.above_negatives),
 );
 
-/// All of them, those of the search first.
+/// All of them: those that need no search, then those of the search.
 pub(super) const CONSTANTS: &[Constant] = &[
-    searched("search.shape.agreement.surface_share", SHAPE, &[0.0, 0.15, 0.3, 0.45, 0.6], |c| {
-        Field::Double(&mut c.search.shape.agreement.surface_share)
-    }),
-    searched("search.shape.agreement.extent", SHAPE, &[32.0, 64.0, 128.0], |c| {
-        Field::Double(&mut c.search.shape.agreement.extent)
-    }),
-    searched("search.shape.surface.cells_share", SHAPE, &[0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0], |c| {
-        Field::Double(&mut c.search.shape.surface.cells_share)
-    }),
-    searched("search.shape.surface.num_cells", SHAPE, &[3.0, 6.0, 12.0], |c| {
-        Field::Double(&mut c.search.shape.surface.num_cells)
-    }),
-    searched("search.shape.surface.noise", SHAPE, &[4.0, 8.0, 16.0], |c| {
-        Field::Double(&mut c.search.shape.surface.noise)
-    }),
-    searched("search.shape.surface.noise_in_cell", SHAPE, &[3.0, 6.0, 12.0], |c| {
-        Field::Double(&mut c.search.shape.surface.noise_in_cell)
-    }),
-    searched("search.shape.gradient.min_gradient", SHAPE, &[0.75, 1.5, 3.0], |c| {
-        Field::Single(&mut c.search.shape.gradient.min_gradient)
-    }),
-    searched("search.shape.gradient.noise_factor", SHAPE, &[1.0, 3.0, 6.0], |c| {
-        Field::Single(&mut c.search.shape.gradient.noise_factor)
-    }),
-    searched("search.shape.outline_weight", SHAPE, &[1.0, 2.0, 4.0], |c| {
-        Field::Double(&mut c.search.shape.outline_weight)
-    }),
-    searched("search.shape.settling.sure_agreement", SHAPE, &[0.55, 0.65, 0.75], |c| {
-        Field::Double(&mut c.search.shape.settling.sure_agreement)
-    }),
-    searched("search.shape.settling.restart_px", SHAPE, &[5.0, 10.0, 20.0], |c| {
-        Field::Double(&mut c.search.shape.settling.restart_px)
-    }),
-    searched("search.shape.settling.min_restart_agreement", SHAPE, &[0.25, 0.33, 0.41], |c| {
-        Field::Double(&mut c.search.shape.settling.min_restart_agreement)
-    }),
-    searched("search.num_points", "crates/shape/src/search/mod.rs", &[32.0, 64.0, 128.0], |c| {
-        Field::Count(&mut c.search.num_points)
-    }),
-    // The ln of the larger end: today 0.88 to 1.14, then 0.78 to 1.28 and 0.67 to 1.49.
-    searched("search.scales", CHECK, &[0.131, 0.25, 0.4], |c| Field::LogRange(&mut c.search.scales)),
     checked("size.free_log", &[0.0, 0.03, 0.06, 0.1, 0.15, 0.25], |c| Field::Double(&mut c.size.free_log)),
     checked("size.cost_per_log", &[0.0, 0.25, 0.5, 1.0, 2.0, 4.0], |c| Field::Double(&mut c.size.cost_per_log)),
     MARGIN,
@@ -150,4 +109,45 @@ pub(super) const CONSTANTS: &[Constant] = &[
         Field::Double(&mut c.threshold.without_negatives)
     }),
     checked("threshold.slope", &[5.0, 10.0, 15.0, 20.0, 25.0, 35.0, 50.0], |c| Field::Double(&mut c.threshold.slope)),
+    searched("search.shape.agreement.surface_share", SHAPE, &[0.0, 0.15, 0.3, 0.45, 0.6], |c| {
+        Field::Double(&mut c.search.shape.agreement.surface_share)
+    }),
+    searched("search.shape.agreement.extent", SHAPE, &[32.0, 64.0, 128.0], |c| {
+        Field::Double(&mut c.search.shape.agreement.extent)
+    }),
+    // The ln of the larger end: today 0.88 to 1.14, then 0.78 to 1.28 and 0.67 to 1.49.
+    searched("search.scales", CHECK, &[0.131, 0.25, 0.4], |c| Field::LogRange(&mut c.search.scales)),
+    searched("search.shape.settling.sure_agreement", SHAPE, &[0.55, 0.65, 0.75], |c| {
+        Field::Double(&mut c.search.shape.settling.sure_agreement)
+    }),
+    searched("search.shape.settling.min_restart_agreement", SHAPE, &[0.25, 0.33, 0.41], |c| {
+        Field::Double(&mut c.search.shape.settling.min_restart_agreement)
+    }),
+    searched("search.shape.settling.restart_px", SHAPE, &[5.0, 10.0, 20.0], |c| {
+        Field::Double(&mut c.search.shape.settling.restart_px)
+    }),
+    searched("search.shape.surface.cells_share", SHAPE, &[0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0], |c| {
+        Field::Double(&mut c.search.shape.surface.cells_share)
+    }),
+    searched("search.shape.surface.noise_in_cell", SHAPE, &[3.0, 6.0, 12.0], |c| {
+        Field::Double(&mut c.search.shape.surface.noise_in_cell)
+    }),
+    searched("search.shape.gradient.noise_factor", SHAPE, &[1.0, 3.0, 6.0], |c| {
+        Field::Single(&mut c.search.shape.gradient.noise_factor)
+    }),
+    searched("search.num_points", "crates/shape/src/search/mod.rs", &[32.0, 64.0, 128.0], |c| {
+        Field::Count(&mut c.search.num_points)
+    }),
+    searched("search.shape.surface.noise", SHAPE, &[4.0, 8.0, 16.0], |c| {
+        Field::Double(&mut c.search.shape.surface.noise)
+    }),
+    searched("search.shape.gradient.min_gradient", SHAPE, &[0.75, 1.5, 3.0], |c| {
+        Field::Single(&mut c.search.shape.gradient.min_gradient)
+    }),
+    searched("search.shape.surface.num_cells", SHAPE, &[3.0, 6.0, 12.0], |c| {
+        Field::Double(&mut c.search.shape.surface.num_cells)
+    }),
+    searched("search.shape.outline_weight", SHAPE, &[1.0, 2.0, 4.0], |c| {
+        Field::Double(&mut c.search.shape.outline_weight)
+    }),
 ];

@@ -5,10 +5,10 @@
 //! constant × grid ──────────────────────────────────────────────────────────────────────────┼─ loss on the training half
 //!                                                                 best value of each ───────┴─ loss on the held-out half
 //! ```
-//! Each constant is fitted alone, the others at today's values: first those of [`CheckConfig::search`], for which every
-//! picture is searched again, then those of size and threshold, for which it is not. The threshold's margin above the
-//! negatives depends on how large agreements are, so that it is fitted again for every value of the former, today's
-//! included. Last, size and threshold are fitted together, by coordinate descent.
+//! Each constant is fitted alone, the others at today's values: first those of size and threshold, for which no picture is
+//! searched again, then those of [`CheckConfig::search`], for which every one is. The threshold's margin above the
+//! negatives depends on how large agreements are, so that it is fitted again for every value of the latter, today's
+//! included. Size and threshold are fitted together, too, by coordinate descent.
 //!
 //! **Loss** ([`Loss`]). A picture's detections are scored as in use: agreement, less the size penalty, through the
 //! logistic at the part's own threshold. Let p be the best score of a right pose of an instance (0 where there is none) and
@@ -52,7 +52,24 @@ pub fn constant_names() -> Vec<&'static str> {
     CONSTANTS.iter().map(|constant| constant.name).collect()
 }
 
-/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` hears of every search.
+/// What a fit is doing: it takes minutes to hours.
+#[derive(Debug)]
+#[non_exhaustive]
+pub enum FitEvent<'a> {
+    /// All pictures are searched with a constant's value.
+    Searching {
+        /// The constant.
+        constant: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// Size and threshold are fitted together.
+    Joint(&'a JointReport),
+    /// A constant is fitted.
+    Fitted(&'a ConstantReport),
+}
+
+/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` hears how it goes.
 ///
 /// # Errors
 /// A name that no constant has, fewer than two parts on either side, and a part that cannot be taught.
@@ -60,7 +77,7 @@ pub fn fit(
     training: &[FitPart],
     held_out: &[FitPart],
     options: &FitOptions,
-    observe: &mut dyn FnMut(&str),
+    observe: &mut dyn FnMut(&FitEvent<'_>),
 ) -> Result<FitReport> {
     let chosen = chosen_constants(&options.only)?;
     for found in [training.len(), held_out.len()] {
@@ -75,16 +92,19 @@ pub fn fit(
     let prepare = |parts| PreparedPart::prepare_all(parts, options.seed);
     let sides = Sides { training: prepare(training)?, held_out: prepare(held_out)? };
     let today = CheckConfig::DEFAULT;
-    observe("today's values");
     let observed = sides.observed(&today)?;
+    let joint = fit_jointly(&observed);
+    observe(&FitEvent::Joint(&joint));
 
     let mut constants = Vec::new();
     for constant in chosen {
-        constants.push(if constant.needs_search {
+        let report = if constant.needs_search {
             fit_of_search(constant, &sides, &observed, observe)?
         } else {
             fit_of_check(constant, &observed)
-        });
+        };
+        observe(&FitEvent::Fitted(&report));
+        constants.push(report);
     }
     Ok(FitReport {
         num_training: training.len(),
@@ -92,7 +112,7 @@ pub fn fit(
         today: mean_loss(&losses(&observed.held_out, &today)),
         today_training: mean_loss(&losses(&observed.training, &today)),
         constants,
-        joint: fit_jointly(&observed),
+        joint,
     })
 }
 
@@ -136,7 +156,7 @@ fn fit_of_search(
     constant: &Constant,
     sides: &Sides<'_>,
     today: &Observed,
-    observe: &mut dyn FnMut(&str),
+    observe: &mut dyn FnMut(&FitEvent<'_>),
 ) -> Result<ConstantReport> {
     let value_today = constant.get(&CheckConfig::DEFAULT);
     let mut trials = Vec::new();
@@ -149,7 +169,7 @@ fn fit_of_search(
         let observed = if value == value_today {
             &today.training
         } else {
-            observe(&format!("{} = {value}", constant.name));
+            observe(&FitEvent::Searching { constant: constant.name, value });
             again = PreparedPart::observe_all(&sides.training, &config)?;
             &again
         };

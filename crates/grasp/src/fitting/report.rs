@@ -93,31 +93,48 @@ impl fmt::Display for FitReport {
         )?;
         writeln!(f, "|---|--:|--:|---|---|---|---|---|")?;
         for constant in &self.constants {
-            let margin = if constant.is_margin_fitted { " (m)" } else { "" };
-            write!(f, "| `{}`{margin} | {} | {} |", constant.name, Short(constant.today), Short(constant.fitted))?;
-            change(f, &constant.before, &constant.after, &constant.difference)?;
-            writeln!(f, " {} |", verdict(constant.today != constant.fitted, &constant.difference))?;
+            writeln!(f, "{constant}")?;
         }
-        writeln!(f, "\nSize and threshold together:\n")?;
-        for (name, today, fitted) in &self.joint.values {
-            writeln!(f, "- `{name}`: {} → {}", Short(*today), Short(*fitted))?;
-        }
-        let JointReport { values, before, after, difference } = &self.joint;
-        write!(
-            f,
-            "\n| loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |\n|---|---|---|---|---|\n|"
-        )?;
-        change(f, before, after, difference)?;
-        let is_other = values.iter().any(|(_, today, fitted)| today != fitted);
-        writeln!(f, " {} |", verdict(is_other, difference))?;
-        writeln!(f, "\nLoss on the training half of every value that was tried:\n")?;
+        writeln!(f, "\n{}", self.joint)?;
+        writeln!(f, "Loss on the training half of every value that was tried:\n")?;
         for constant in &self.constants {
-            let mut trials = constant.trials.clone();
-            trials.sort_by(|a, b| a.value.total_cmp(&b.value));
-            let tried: Vec<String> = trials.iter().map(|t| format!("{}: {:.3}", Short(t.value), t.loss)).collect();
-            writeln!(f, "- `{}`: {}", constant.name, tried.join(", "))?;
+            writeln!(f, "- `{}`: {}", constant.name, constant.tried())?;
         }
         Ok(())
+    }
+}
+
+/// A row of the table.
+impl fmt::Display for ConstantReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let margin = if self.is_margin_fitted { " (m)" } else { "" };
+        write!(f, "| `{}`{margin} | {} | {} |", self.name, Short(self.today), Short(self.fitted))?;
+        change(f, &self.before, &self.after, &self.difference)?;
+        write!(f, " {} |", verdict(self.today != self.fitted, &self.difference))
+    }
+}
+
+impl ConstantReport {
+    /// All values that were tried and their losses, upwards.
+    pub fn tried(&self) -> String {
+        let mut trials = self.trials.clone();
+        trials.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let tried: Vec<String> = trials.iter().map(|t| format!("{}: {:.3}", Short(t.value), t.loss)).collect();
+        tried.join(", ")
+    }
+}
+
+impl fmt::Display for JointReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "Size and threshold together:\n")?;
+        for (name, today, fitted) in &self.values {
+            writeln!(f, "- `{name}`: {} → {}", Short(*today), Short(*fitted))?;
+        }
+        writeln!(f, "\n| loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |")?;
+        write!(f, "|---|---|---|---|---|\n|")?;
+        change(f, &self.before, &self.after, &self.difference)?;
+        let is_other = self.values.iter().any(|(_, today, fitted)| today != fitted);
+        writeln!(f, " {} |", verdict(is_other, &self.difference))
     }
 }
 

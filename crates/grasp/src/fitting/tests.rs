@@ -38,12 +38,14 @@ fn a_fit_reports_today_and_the_best_of_the_grid() {
     let names = ["search.shape.settling.restart_px", "threshold.slope"];
     let options = FitOptions { seed: 1, only: names.map(str::to_owned).to_vec() };
     let mut heard = Vec::new();
-    let report = fit(&training, &held_out, &options, &mut |text| heard.push(text.to_owned())).unwrap();
-    // Today's values once, then the two other values of the one constant that needs another search.
-    assert_eq!(
-        heard,
-        ["today's values", "search.shape.settling.restart_px = 5", "search.shape.settling.restart_px = 20"]
-    );
+    let report = fit(&training, &held_out, &options, &mut |event| match event {
+        FitEvent::Searching { value, .. } => heard.push(*value),
+        FitEvent::Fitted(constant) => assert!(names.contains(&constant.name)),
+        FitEvent::Joint(joint) => assert_eq!(joint.values.len(), 7),
+    })
+    .unwrap();
+    // The two other values of the one constant that needs another search.
+    assert_eq!(heard, [5.0, 20.0]);
     assert_eq!(report.constants.len(), 2);
     for constant in &report.constants {
         let least = constant.trials.iter().map(|trial| trial.loss).fold(f64::INFINITY, f64::min);
