@@ -1,11 +1,11 @@
 //! Draws contact sheets to look at: parts, scenes, look-alikes beside their part.
 //!
-//! `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED]`
+//! `cargo run --release -p sdg-part-generator --example contact_sheet FOLDER [SEED [ZOOM]]`
 //!
 //! Writes `parts_N.png` (100 parts, a photo each, marks and outline drawn in), `scenes_N.png` (100 scenes of as many parts) and
 //! `look_alikes.png` (a row is a part, its mirror image, two with a feature moved, four sizes) into FOLDER.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use image::{GenericImage, Rgb, RgbImage};
 use nalgebra::Point2;
@@ -13,13 +13,14 @@ use rayon::prelude::*;
 use sdg_geometry::GraspLine;
 use sdg_part_generator::{DemonstrationPhoto, LookAlike, Part, PhotoConfig, SceneConfig, Scenes, demonstration};
 
-/// Pictures in a row, and rows on a sheet.
-const SHEET: [u32; 2] = [5, 4];
+/// Pictures in a row, and rows on a sheet, at their own size.
+const SHEET: [u32; 2] = [4, 5];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let folder = PathBuf::from(arguments.first().ok_or("usage: contact_sheet FOLDER [SEED]")?);
+    let folder = PathBuf::from(arguments.first().ok_or("usage: contact_sheet FOLDER [SEED [ZOOM]]")?);
     let seed: u64 = arguments.get(1).map_or(Ok(0), |seed| seed.parse())?;
+    let zoom: u32 = arguments.get(2).map_or(Ok(1), |zoom| zoom.parse())?;
     std::fs::create_dir_all(&folder)?;
     let parts: Vec<Part> = (0..100).into_par_iter().map(|k| Part::generate(seed + k)).collect();
 
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             image
         })
         .collect();
-    write_sheets(&folder, "parts", &photos)?;
+    write_sheets(&folder, "parts", &photos, zoom)?;
 
     let scenes = Scenes::new(&parts, SceneConfig::default(), seed)?;
     let pictures: Vec<RgbImage> = (0..100u64)
@@ -53,7 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             image
         })
         .collect();
-    write_sheets(&folder, "scenes", &pictures)?;
+    write_sheets(&folder, "scenes", &pictures, zoom)?;
 
     let rows: Vec<RgbImage> = parts
         .par_iter()
@@ -93,15 +94,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn write_sheets(folder: &std::path::Path, name: &str, pictures: &[RgbImage]) -> image::ImageResult<()> {
-    let [columns, rows] = SHEET;
+/// Writes pictures on sheets, each pixel `zoom` pixels wide.
+fn write_sheets(folder: &Path, name: &str, pictures: &[RgbImage], zoom: u32) -> image::ImageResult<()> {
+    let [columns, rows] = SHEET.map(|count| (count / zoom).max(1));
     for (idx, chunk) in pictures.chunks((columns * rows) as usize).enumerate() {
-        let (width, height) = chunk[0].dimensions();
+        let (width, height) = (chunk[0].width() * zoom, chunk[0].height() * zoom);
         let mut sheet = RgbImage::new(columns * width, rows * height);
         for (k, picture) in (0u32..).zip(chunk) {
-            sheet.copy_from(picture, k % columns * width, k / columns * height)?;
+            let picture = image::imageops::resize(picture, width, height, image::imageops::FilterType::Nearest);
+            sheet.copy_from(&picture, k % columns * width, k / columns * height)?;
         }
-        sheet.save(folder.join(format!("{name}_{idx}.png")))?;
+        sheet.save(folder.join(format!("{name}_{idx:02}.png")))?;
     }
     Ok(())
 }

@@ -142,3 +142,50 @@ pub(crate) fn symmetry(relief: &Relief, center: [f32; 2]) -> RotationalSymmetry 
         .find(|&fold| comparison.is_same(std::f32::consts::TAU / fold as f32))
         .map_or(RotationalSymmetry::None, RotationalSymmetry::Fold)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recipe::{Edge, Feature, Material, Operation, Recipe, Shape};
+
+    /// A disc of radius 20 with holes at angles in degrees, at 12 mm from its middle.
+    fn disc(holes: &[f32], metal: Material) -> Relief {
+        let feature = |shape, center, operation| Feature { shape, center, turn: 0.0, operation, material: 0, group: 0 };
+        let body = Operation::Add { bottom: 0.0, top: 5.0, edge: Edge::SHARP };
+        let mut features = vec![feature(Shape::Disc { radius: 20.0 }, [0.0; 2], body)];
+        for angle in holes {
+            let (sin, cos) = angle.to_radians().sin_cos();
+            let cut = Operation::Cut { floor: 0.0, chamfer: 0.0, machined: false };
+            features.push(feature(Shape::Disc { radius: 3.0 }, [12.0 * cos, 12.0 * sin], cut));
+        }
+        Relief::draw(&Recipe { materials: vec![metal], features, grain_seed: 1 })
+    }
+
+    fn metal() -> Material {
+        Material::metal(&mut crate::random::generator(1, crate::random::Stream::Recipe, 0))
+    }
+
+    #[test]
+    fn symmetry_of_known_recipes() {
+        let of = |holes: &[f32]| {
+            let relief = disc(holes, metal());
+            symmetry(&relief, centroid(&relief))
+        };
+        assert_eq!(of(&[]), RotationalSymmetry::Full);
+        assert_eq!(of(&[0.0, 120.0, 240.0]), RotationalSymmetry::Fold(3));
+        assert_eq!(of(&[0.0, 72.0, 144.0, 216.0, 288.0]), RotationalSymmetry::Fold(5));
+        assert_eq!(of(&[10.0, 190.0]), RotationalSymmetry::Fold(2));
+        assert_eq!(of(&[0.0, 120.0, 200.0]), RotationalSymmetry::None);
+    }
+
+    #[test]
+    fn a_mirror_image_is_the_same_only_where_it_is() {
+        let same = |holes: &[f32]| {
+            let mirrored: Vec<f32> = holes.iter().map(|angle| 180.0 - angle).collect();
+            let (one, other) = (disc(holes, metal()), disc(&mirrored, metal()));
+            Comparison::new(&one, centroid(&one), &other, centroid(&other)).is_same_at_some_turn()
+        };
+        assert!(same(&[0.0, 100.0]));
+        assert!(!same(&[0.0, 60.0, 200.0]));
+    }
+}

@@ -1,6 +1,6 @@
 //! A part as a grid of heights, normals and materials, drawn once from its recipe.
 
-use crate::recipe::{Brushing, Material, Recipe};
+use crate::recipe::{Brushing, Material, Recipe, State};
 use crate::tiles::Tiles;
 
 /// Cells along the longer side of the finest grid.
@@ -15,8 +15,11 @@ const NUM_LEVELS: usize = 4;
 /// Heights are stored in so many steps a millimetre.
 const STEPS_PER_MM: f32 = 200.0;
 
-/// Slopes above this belong to walls and are left out of normals.
+/// The steepest slope of a normal.
 const MAX_SLOPE: f32 = 3.0;
+
+/// Steps higher than so many cells between neighbours are walls and left out of normals.
+const MIN_WALL_CELLS: f32 = 7.0;
 
 /// What stands above one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -81,12 +84,14 @@ impl Relief {
         let whole = 1usize << (NUM_LEVELS - 1);
         let cells = |extent: f32| (((extent + 2.0 * margin) / cell).ceil() as usize).next_multiple_of(whole);
         let (width, height) = (cells(x1 - x0), cells(y1 - y0));
+        let features = recipe.prepare();
         let mut tops = vec![0.0f32; width * height];
         let mut texels = vec![Texel::default(); width * height];
         for y in 0..height {
             for x in 0..width {
                 let (px, py) = (min[0] + (x as f32 + 0.5) * cell, min[1] + (y as f32 + 0.5) * cell);
-                let state = recipe.state_at(px, py);
+                let mut state = State::EMPTY;
+                features.iter().for_each(|feature| feature.apply(px, py, &mut state));
                 if state.is_covered() {
                     let idx = y * width + x;
                     tops[idx] = state.top;
@@ -107,11 +112,20 @@ impl Relief {
                 }
                 let slope = |before: usize, after: usize| {
                     let limit = |rise: f32, covered: f32| {
-                        (covered > 0.0 && rise.abs() < MAX_SLOPE * cell).then_some(rise / cell)
+                        let wall = covered <= 0.0 || rise.abs() > MIN_WALL_CELLS * cell;
+                        (!wall).then_some((rise / cell).clamp(-MAX_SLOPE, MAX_SLOPE))
                     };
                     let back = limit(tops[idx] - tops[before], tops[before]);
                     let ahead = limit(tops[after] - tops[idx], tops[after]);
                     match (back, ahead) {
+                        // At the foot or rim of a step, the level side counts.
+                        (Some(a), Some(b)) if (a - b).abs() > 1.0 => {
+                            if a.abs() < b.abs() {
+                                a
+                            } else {
+                                b
+                            }
+                        }
                         (Some(a), Some(b)) => 0.5 * (a + b),
                         (Some(one), None) | (None, Some(one)) => one,
                         (None, None) => 0.0,

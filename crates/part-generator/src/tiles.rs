@@ -14,7 +14,16 @@ const NORMALS: usize = 1 << 15;
 
 /// Values around 0, mostly in [-1, 1], that repeat every 256 texels without a seam.
 pub(crate) struct Tile {
-    values: Box<[f32]>,
+    /// An array, whose length the compiler knows: a masked place needs no check.
+    values: Box<[f32; SIDE * SIDE]>,
+}
+
+/// The largest whole number that is not above `value`. Without a call: the machines that are compiled for have no
+/// instruction for it.
+#[inline(always)]
+pub(crate) fn floor(value: f32) -> i32 {
+    let cut = value as i32;
+    cut - i32::from(value < cut as f32)
 }
 
 /// Everything that is drawn once.
@@ -34,8 +43,13 @@ pub(crate) struct Tiles {
 }
 
 impl Tile {
+    fn new(values: Vec<f32>) -> Self {
+        let values = values.into_boxed_slice().try_into().unwrap_or_else(|_| Box::new([0.0; SIDE * SIDE]));
+        Self { values }
+    }
+
     fn from_fn(mut value: impl FnMut(usize, usize) -> f32) -> Self {
-        Self { values: (0..SIDE * SIDE).map(|k| value(k % SIDE, k / SIDE)).collect() }
+        Self::new((0..SIDE * SIDE).map(|k| value(k % SIDE, k / SIDE)).collect())
     }
 
     /// Sums octaves of smooth noise of so many cells a side, then brings the standard deviation to 0.5.
@@ -61,21 +75,20 @@ impl Tile {
         let mean = values.iter().sum::<f32>() / n;
         let deviation = (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / n).sqrt();
         values.iter_mut().for_each(|v| *v = 0.5 * (*v - mean) / deviation);
-        Self { values: values.into() }
+        Self::new(values)
     }
 
     /// The nearest value.
     #[inline(always)]
     pub fn nearest(&self, x: f32, y: f32) -> f32 {
-        self.texel(x.floor() as i32, y.floor() as i32)
+        self.texel(floor(x), floor(y))
     }
 
     /// Bilinear.
     #[inline(always)]
     pub fn at(&self, x: f32, y: f32) -> f32 {
-        let (column, row) = (x.floor(), y.floor());
-        let (fx, fy) = (x - column, y - row);
-        let (u, v) = (column as i32, row as i32);
+        let (u, v) = (floor(x), floor(y));
+        let (fx, fy) = (x - u as f32, y - v as f32);
         let upper = self.texel(u, v) + (self.texel(u + 1, v) - self.texel(u, v)) * fx;
         let lower = self.texel(u, v + 1) + (self.texel(u + 1, v + 1) - self.texel(u, v + 1)) * fx;
         upper + (lower - upper) * fy
@@ -131,7 +144,7 @@ impl Tiles {
         }
         // Box and Muller's transform.
         let normals = (0..NORMALS).map(|_| (-2.0 * rng.uniform(1e-7, 1.0).ln()).sqrt() * rng.angle().cos()).collect();
-        Self { cloud, grain, streak, wood, spots: Tile { values: dots.into() }, normals }
+        Self { cloud, grain, streak, wood, spots: Tile::new(dots), normals }
     }
 
     /// `len` normal numbers from a place of the table that `address` chooses; `len` is at most half of the table.

@@ -51,7 +51,7 @@ impl Builder {
     /// The surface above a point as it stands.
     pub fn state_at(&self, x: f32, y: f32) -> State {
         let mut state = State::EMPTY;
-        self.features.iter().for_each(|feature| feature.apply(x, y, &mut state));
+        self.features.iter().for_each(|feature| feature.prepare().apply(x, y, &mut state));
         state
     }
 

@@ -181,22 +181,43 @@ pub(crate) struct Feature {
     pub group: u16,
 }
 
-impl Feature {
+/// A feature with what is the same for all points worked out.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Prepared<'a> {
+    feature: &'a Feature,
+    sin_cos: [f32; 2],
+    /// Square of the distance beyond which nothing changes.
+    reach_squared: f32,
+}
+
+impl Prepared<'_> {
     /// Changes the surface above a point of the part's frame.
     pub fn apply(&self, x: f32, y: f32, state: &mut State) {
-        let (px, py) = (x - self.center[0], y - self.center[1]);
+        let (px, py) = (x - self.feature.center[0], y - self.feature.center[1]);
+        if px * px + py * py <= self.reach_squared {
+            let [sin, cos] = self.sin_cos;
+            self.feature.apply_local(cos * px + sin * py, cos * py - sin * px, state);
+        }
+    }
+}
+
+impl Feature {
+    /// Works out what is the same for all points.
+    pub fn prepare(&self) -> Prepared<'_> {
         let (sin, cos) = self.turn.sin_cos();
-        let (lx, ly) = (cos * px + sin * py, cos * py - sin * px);
         let reach = match &self.operation {
-            Operation::Blend { fillet, .. } => *fillet,
-            Operation::Cut { chamfer, .. } => *chamfer,
-            Operation::Turned { profile, axis_z, ripples } => {
-                turned(profile, *axis_z, ripples, lx, ly, self.material, state);
-                return;
-            }
-            _ => 0.0,
+            Operation::Blend { fillet, .. } => self.shape.reach() + fillet,
+            Operation::Cut { chamfer, .. } => self.shape.reach() + chamfer,
+            Operation::Turned { profile, .. } => profile.iter().map(|[x, r]| x.hypot(*r)).fold(0.0, f32::max),
+            _ => self.shape.reach(),
         };
-        if px * px + py * py > (self.shape.reach() + reach).powi(2) {
+        Prepared { feature: self, sin_cos: [sin, cos], reach_squared: reach * reach }
+    }
+
+    /// Changes the surface above a point of the feature's own frame.
+    fn apply_local(&self, lx: f32, ly: f32, state: &mut State) {
+        if let Operation::Turned { profile, axis_z, ripples } = &self.operation {
+            turned(profile, *axis_z, ripples, lx, ly, self.material, state);
             return;
         }
         let (distance, z) = self.shape.locate(lx, ly);

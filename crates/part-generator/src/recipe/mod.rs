@@ -13,7 +13,9 @@ mod turned;
 use rand_pcg::Pcg64Mcg;
 
 pub(crate) use cover::cover;
-pub(crate) use feature::{Feature, Operation, State};
+#[cfg(test)]
+pub(crate) use feature::Edge;
+pub(crate) use feature::{Feature, Operation, Prepared, State};
 pub(crate) use material::{Brushing, Material, paint_color};
 pub(crate) use shape::Shape;
 
@@ -46,13 +48,9 @@ impl Recipe {
         }
     }
 
-    /// The surface above a point.
-    pub fn state_at(&self, x: f32, y: f32) -> State {
-        let mut state = State::EMPTY;
-        for feature in &self.features {
-            feature.apply(x, y, &mut state);
-        }
-        state
+    /// The features, ready to be applied to many points.
+    pub fn prepare(&self) -> Vec<Prepared<'_>> {
+        self.features.iter().map(Feature::prepare).collect()
     }
 
     /// Smallest box around everything that features add: [min x, min y, max x, max y].

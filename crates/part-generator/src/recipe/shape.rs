@@ -46,10 +46,10 @@ impl Shape {
     /// Signed distance of a point, and the height of the centre line there (0 but for paths).
     pub fn locate(&self, x: f32, y: f32) -> (f32, f32) {
         match self {
-            Self::Disc { radius } => (x.hypot(y) - radius, 0.0),
+            Self::Disc { radius } => ((x * x + y * y).sqrt() - radius, 0.0),
             Self::Rectangle { half, corner } => {
                 let (qx, qy) = (x.abs() - half[0] + corner, y.abs() - half[1] + corner);
-                (qx.max(0.0).hypot(qy.max(0.0)) + qx.max(qy).min(0.0) - corner, 0.0)
+                ((qx.max(0.0).powi(2) + qy.max(0.0).powi(2)).sqrt() + qx.max(qy).min(0.0) - corner, 0.0)
             }
             Self::Polygon { vertices, corner } => (polygon_distance(vertices, x, y) - corner, 0.0),
             Self::Lobed { radius, lobes, depth, steepness } => {

@@ -11,15 +11,22 @@ pub(crate) struct Ground {
     tops: Vec<f32>,
     /// Heights blurred over some millimetres: how much stands around a place.
     blurred: Vec<f32>,
+    /// Light on the table: red, green, blue, and a factor for reflections.
+    table_light: Vec<[f32; 4]>,
 }
 
 /// Height below which a place is in the shadow of a direction of light, for several directions of one lamp.
 pub(crate) struct Shadow {
-    sweeps: Vec<Vec<f32>>,
-    /// Share of the light that reaches the table itself.
-    on_table: Vec<f32>,
+    /// For each cell the heights of the lamp's directions.
+    heights: Vec<[f32; SWEEPS]>,
     softness: f32,
 }
+
+/// Directions that stand for a lamp's width: shares of its radius aside and up.
+const LAMP_DIRECTIONS: [[f32; 2]; SWEEPS] = [[0.7, 0.5], [-0.7, 0.5], [0.0, -0.9], [0.0, 0.0]];
+
+/// How many there are.
+const SWEEPS: usize = 4;
 
 impl Ground {
     /// A grid over a box of the table, without anything on it.
@@ -27,7 +34,7 @@ impl Ground {
         let min = [bounds[0] - 8.0 * cell, bounds[1] - 8.0 * cell];
         let count = |low: f32, high: f32| ((high - low) / cell).ceil().clamp(1.0, 1024.0) as usize + 16;
         let (width, height) = (count(bounds[0], bounds[2]), count(bounds[1], bounds[3]));
-        Self { min, cell, width, height, tops: vec![0.0; width * height], blurred: Vec::new() }
+        Self { min, cell, width, height, tops: vec![0.0; width * height], blurred: Vec::new(), table_light: Vec::new() }
     }
 
     #[inline(always)]
@@ -107,7 +114,7 @@ impl Ground {
     #[inline]
     pub fn openness(&self, place: [f32; 2], z: f32, radius: f32) -> f32 {
         let around = self.index(place).map_or(0.0, |idx| self.blurred[idx]);
-        1.0 - 0.65 * ((around - z) / (0.6 * radius)).clamp(0.0, 1.0)
+        open_share(around, z, radius)
     }
 
     /// The shadows of a lamp in a direction (x, y, z up, a unit vector) that appears `radius` radians wide.
@@ -115,17 +122,13 @@ impl Ground {
         let level = direction[0].hypot(direction[1]);
         let azimuth = direction[1].atan2(direction[0]);
         let elevation = direction[2].atan2(level);
-        let sweeps: Vec<Vec<f32>> = [(0.7, 0.5), (-0.7, 0.5), (0.0, -0.9), (0.0, 0.0)]
-            .iter()
-            .map(|&(aside, up)| {
-                let raised = (elevation + up * radius).clamp(0.15, 1.55);
-                self.sweep(azimuth + aside * radius / elevation.cos().max(0.2), raised.tan())
-            })
-            .collect();
-        let softness = self.cell * elevation.tan().min(4.0);
-        let mut shadow = Shadow { sweeps, on_table: Vec::new(), softness };
-        shadow.on_table = (0..self.tops.len()).map(|idx| shadow.light_at(idx, 0.0)).collect();
-        shadow
+        let mut heights = vec![[0.0; SWEEPS]; self.tops.len()];
+        for (k, [aside, up]) in LAMP_DIRECTIONS.into_iter().enumerate() {
+            let raised = (elevation + up * radius).clamp(0.15, 1.55);
+            let swept = self.sweep(azimuth + aside * radius / elevation.cos().max(0.2), raised.tan());
+            heights.iter_mut().zip(swept).for_each(|(cell, height)| cell[k] = height);
+        }
+        Shadow { heights, softness: self.cell * elevation.tan().min(4.0) }
     }
 
     /// Carries heights away from the light, falling by `slope` for each millimetre.
@@ -165,29 +168,51 @@ impl Ground {
         self.index(place).map_or(1.0, |idx| shadow.light_at(idx, z))
     }
 
-    /// Share of a lamp's light that reaches the table.
-    #[inline]
-    pub fn light_on_table(&self, shadow: &Shadow, [x, y]: [f32; 2]) -> f32 {
-        let (gx, gy) = ((x - self.min[0]) / self.cell - 0.5, (y - self.min[1]) / self.cell - 0.5);
-        let (column, row) = (gx.floor(), gy.floor());
-        if column < 0.0 || row < 0.0 || column >= (self.width - 1) as f32 || row >= (self.height - 1) as f32 {
-            return 1.0;
+    /// Prepares the light on the table itself: `light` is given the place, the share of light from all around and that of
+    /// each lamp, and returns red, green, blue and a factor for reflections.
+    pub fn light_table(&mut self, radius: f32, shadows: &[Shadow], light: impl Fn([f32; 2], f32, &[f32]) -> [f32; 4]) {
+        let mut reached = vec![1.0; shadows.len()];
+        let mut made = Vec::with_capacity(self.tops.len());
+        for y in 0..self.height {
+            for x in 0..self.width {
+                let idx = y * self.width + x;
+                let place = [self.min[0] + (x as f32 + 0.5) * self.cell, self.min[1] + (y as f32 + 0.5) * self.cell];
+                reached.iter_mut().zip(shadows).for_each(|(share, shadow)| *share = shadow.light_at(idx, 0.0));
+                made.push(light(place, open_share(self.blurred[idx], 0.0, radius), &reached));
+            }
         }
-        let (fx, fy) = (gx - column, gy - row);
-        let idx = row as usize * self.width + column as usize;
-        let light = &shadow.on_table;
-        let upper = light[idx] + (light[idx + 1] - light[idx]) * fx;
-        let below = idx + self.width;
-        let lower = light[below] + (light[below + 1] - light[below]) * fx;
-        upper + (lower - upper) * fy
+        self.table_light = made;
     }
+
+    /// What [`light_table`](Self::light_table) prepared, between cells.
+    #[inline(always)]
+    pub fn on_table(&self, [x, y]: [f32; 2]) -> [f32; 4] {
+        let gx = ((x - self.min[0]) / self.cell - 0.5).clamp(0.0, self.width as f32 - 1.01);
+        let gy = ((y - self.min[1]) / self.cell - 0.5).clamp(0.0, self.height as f32 - 1.01);
+        let (column, row) = (gx as usize, gy as usize);
+        let (fx, fy) = (gx - column as f32, gy - row as f32);
+        let idx = row * self.width + column;
+        let (upper, lower) = (&self.table_light[idx..idx + 2], &self.table_light[idx + self.width..][..2]);
+        let mut sum = [0.0; 4];
+        for k in 0..4 {
+            let a = upper[0][k] + (upper[1][k] - upper[0][k]) * fx;
+            let b = lower[0][k] + (lower[1][k] - lower[0][k]) * fx;
+            sum[k] = a + (b - a) * fy;
+        }
+        sum
+    }
+}
+
+/// Share of the light from all around that reaches height `z` where the surroundings stand `around` high.
+#[inline(always)]
+fn open_share(around: f32, z: f32, radius: f32) -> f32 {
+    1.0 - 0.55 * ((around - z) / (0.7 * radius)).clamp(0.0, 1.0)
 }
 
 impl Shadow {
     #[inline(always)]
     fn light_at(&self, idx: usize, z: f32) -> f32 {
-        let lit: f32 =
-            self.sweeps.iter().map(|sweep| (1.0 - (sweep[idx] - z - 0.15) / self.softness).clamp(0.0, 1.0)).sum();
-        lit / self.sweeps.len() as f32
+        let lit = self.heights[idx].map(|height| (1.0 - (height - z - 0.15) / self.softness).clamp(0.0, 1.0));
+        0.25 * (lit[0] + lit[1] + lit[2] + lit[3])
     }
 }

@@ -6,10 +6,10 @@ use crate::random::Draw;
 use crate::recipe::Material;
 
 /// Side of the map of reflections.
-const SIDE: usize = 48;
+const SIDE: usize = 32;
 
 /// Blur of the maps, in texels: a mirror first, a matt surface last.
-const BLURS: [f32; 4] = [0.0, 1.5, 4.0, 9.0];
+const BLURS: [f32; 4] = [0.0, 1.0, 2.7, 6.0];
 
 /// A lamp far away.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +57,13 @@ impl Lighting {
         } else {
             rng.uniform(0.35, 0.75)
         };
-        let num_lamps = if style.even { rng.whole(1, 2) } else { rng.whole(1, 3) };
+        let num_lamps = if style.even {
+            rng.whole(1, 2)
+        } else if rng.chance(0.2) {
+            3
+        } else {
+            rng.whole(1, 2)
+        };
         let shares: Vec<f32> = (0..num_lamps).map(|_| rng.uniform(0.3, 1.0)).collect();
         let total: f32 = shares.iter().sum();
         let lamps: Vec<Lamp> = shares
@@ -178,7 +184,7 @@ fn add_lamp(map: &mut [[f32; 3]], lamp: &Lamp, blur: f32) {
     // A perfect half-vector lobe: the reflected direction spreads twice as far as the normal.
     let texels = 0.5 * SIDE as f32;
     let width = (lamp.radius * texels).hypot(1.1 * blur).max(0.7);
-    let energy = 14.0 * lamp.glare * (1.0 + (lamp.radius * texels).powi(2) * 0.3);
+    let energy = 6.2 * lamp.glare * (1.0 + (lamp.radius * texels).powi(2) * 0.3);
     let peak = (energy / (width * width)).min(30.0);
     let (cx, cy) = ((lamp.direction[0] + 1.0) * texels - 0.5, (lamp.direction[1] + 1.0) * texels - 0.5);
     for (idx, texel) in map.iter_mut().enumerate() {

@@ -8,7 +8,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, oute
 
 use super::light::{LightStyle, Lighting};
 use super::placement::Placement;
-use super::render::Scene;
+use super::render::{Footprint, Scene};
 use super::sensor::{self, Sensor};
 use super::table::{Table, TableStyle};
 use super::view::View;
@@ -17,6 +17,10 @@ use crate::random::{Draw, Stream, generator};
 
 /// Focal length over the picture's width: that of the project's wrist camera.
 pub(crate) const FOCAL_OVER_WIDTH: f32 = 0.86;
+
+/// A table that differs less from the part than this (sum over channels of square roots of linear values) is changed for
+/// another, if there is a better one.
+const MIN_CONTRAST: f32 = 0.5;
 
 /// How the photo is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,10 +85,10 @@ impl DemonstrationPhoto {
             far_shadow: None,
         };
         let sensor = Sensor::clean(&mut rng);
-        let mut rendered = scene.render();
+        let mut rendered = scene.render(1);
         let image = sensor::take(&mut rendered.light, config.width as usize, &sensor, &mut rng);
         let pose = pose(&scene, 0);
-        let silhouette = Silhouette::of(&scene, 0);
+        let silhouette = Silhouette::of(&rendered.footprints[0]);
         let outline = silhouette.outline().map(|outline| outline.clip(config.width.into(), config.height.into()));
         let annotation = Annotation {
             label: "part".into(),
@@ -114,9 +118,9 @@ fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
     };
     let contrast = |table: &Table| -> f32 { (0..3).map(|k| (table.mean()[k].sqrt() - look[k]).abs()).sum() };
     let mut best = Table::draw(TableStyle::Plain, rng);
-    for _ in 0..3 {
+    for _ in 0..5 {
         let other = Table::draw(TableStyle::Plain, rng);
-        if contrast(&best) < 0.35 && contrast(&other) > contrast(&best) {
+        if contrast(&best) < MIN_CONTRAST && contrast(&other) > contrast(&best) {
             best = other;
         }
     }
@@ -158,10 +162,10 @@ pub(crate) struct Silhouette {
 }
 
 impl Silhouette {
-    pub fn of(scene: &Scene, body: usize) -> Self {
-        let ([x0, y0, x1, y1], shown) = scene.silhouette(body);
-        let (width, height) = ((x1 - x0).max(0) as u32, (y1 - y0).max(0) as u32);
-        let mask = Mask::from_fn(width, height, |x, y| shown[(y * width + x) as usize]);
+    pub fn of(footprint: &Footprint) -> Self {
+        let [x0, y0, x1, y1] = footprint.bounds;
+        let (width, height) = ((x1 - x0) as u32, (y1 - y0) as u32);
+        let mask = Mask::from_fn(width, height, |x, y| footprint.shown[(y * width + x) as usize]);
         Self { origin: [x0, y0], mask }
     }
 

@@ -29,14 +29,22 @@ pub(crate) struct Placement {
 }
 
 /// What a line of sight meets.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Contact {
     /// Height above the table.
     pub z: f32,
     /// The grid's texel there.
     pub texel: Texel,
-    /// Horizontal outward normal in the table's frame, where the contact is on a wall.
-    pub wall: Option<[f32; 2]>,
+    /// Horizontal outward normal in the table's frame where the contact is on a wall, else zero.
+    pub wall: [f32; 2],
+}
+
+impl Contact {
+    /// Whether the contact is on a wall.
+    #[inline(always)]
+    pub fn is_on_wall(&self) -> bool {
+        self.wall != [0.0; 2]
+    }
 }
 
 impl Placement {
@@ -73,21 +81,60 @@ impl Placement {
         [cos * x + sin * y, cos * y - sin * x]
     }
 
-    /// The box in the picture that the part cannot leave: whole pixels [x0, y0, x1, y1], not clipped.
-    pub fn picture_box(&self, view: &View) -> [i32; 4] {
+    /// Where the corners of the box around the part appear.
+    fn picture_corners(&self, view: &View) -> Vec<[f32; 2]> {
         let level = self.level();
         let min = self.part.relief.min;
         let max = [min[0] + level.width as f32 * level.cell, min[1] + level.height as f32 * level.cell];
-        let mut b = [f32::MAX, f32::MAX, f32::MIN, f32::MIN];
-        for corner in [[min[0], min[1]], [max[0], min[1]], [min[0], max[1]], [max[0], max[1]]] {
-            let [x, y] = self.to_table(corner);
-            for z in [self.base, self.base + self.part.relief.top_mm] {
-                if let Some([px, py]) = view.project([x, y, z]) {
-                    b = [b[0].min(px), b[1].min(py), b[2].max(px), b[3].max(py)];
+        [[min[0], min[1]], [max[0], min[1]], [min[0], max[1]], [max[0], max[1]]]
+            .into_iter()
+            .flat_map(|corner| {
+                let [x, y] = self.to_table(corner);
+                [self.base, self.base + self.part.relief.top_mm]
+                    .into_iter()
+                    .filter_map(move |z| view.project([x, y, z]))
+            })
+            .collect()
+    }
+
+    /// The box in the picture that the part cannot leave: whole pixels [x0, y0, x1, y1]; reaches at most a picture's size
+    /// beyond the picture.
+    pub fn picture_box(&self, view: &View) -> [i32; 4] {
+        let b = self.picture_corners(view).into_iter().fold([f32::MAX, f32::MAX, f32::MIN, f32::MIN], |b, [x, y]| {
+            [b[0].min(x), b[1].min(y), b[2].max(x), b[3].max(y)]
+        });
+        let (w, h) = (view.width as f32, view.height as f32);
+        let (x0, x1) = (b[0].floor().clamp(-w, 2.0 * w), b[2].ceil().clamp(-w, 2.0 * w));
+        let (y0, y1) = (b[1].floor().clamp(-h, 2.0 * h), b[3].ceil().clamp(-h, 2.0 * h));
+        [x0 as i32, y0 as i32, (x1 as i32).max(x0 as i32), (y1 as i32).max(y0 as i32)]
+    }
+
+    /// For each row of a box of pixels the columns [first, end) that the part cannot leave: those between the corners of
+    /// the box around it.
+    pub fn row_spans(&self, view: &View, bounds: [i32; 4]) -> Vec<[i32; 2]> {
+        let corners = self.picture_corners(view);
+        (bounds[1]..bounds[3])
+            .map(|row| {
+                let (upper, lower) = (row as f32 - 0.5, row as f32 + 1.5);
+                let mut span = [f32::MAX, f32::MIN];
+                for (k, a) in corners.iter().enumerate() {
+                    for b in &corners[k..] {
+                        let (high, low) = if a[1] < b[1] { (a, b) } else { (b, a) };
+                        if high[1] > lower || low[1] < upper {
+                            continue;
+                        }
+                        // The piece of the line within the row.
+                        let fall = (low[1] - high[1]).max(1e-6);
+                        for y in [high[1].max(upper), low[1].min(lower)] {
+                            let x = high[0] + (low[0] - high[0]) * ((y - high[1]) / fall).clamp(0.0, 1.0);
+                            span = [span[0].min(x), span[1].max(x)];
+                        }
+                    }
                 }
-            }
-        }
-        [b[0].floor() as i32, b[1].floor() as i32, b[2].ceil() as i32, b[3].ceil() as i32]
+                let first = (span[0].floor().max(-1e6) as i32 - 1).clamp(bounds[0], bounds[2]);
+                [first, (span[1].ceil().min(1e6) as i32 + 1).clamp(first, bounds[2])]
+            })
+            .collect()
     }
 
     /// The first point of the part along a line of sight.
@@ -117,8 +164,8 @@ impl Placement {
         if high < low {
             return None;
         }
-        let sideways = drift[0].hypot(drift[1]) * (high - low);
-        let steps = (sideways.ceil() as usize + 1).min(MAX_STEPS);
+        let sideways = (drift[0] * drift[0] + drift[1] * drift[1]).sqrt() * (high - low);
+        let steps = (sideways as usize + 2).min(MAX_STEPS);
         let step = (high - low) / steps as f32;
         let mut above = high + step;
         for k in 0..=steps {
@@ -130,12 +177,12 @@ impl Placement {
                 if top > above + MIN_WALL_MM {
                     let z = 0.5 * (z + above).min(2.0 * top);
                     let wall = self.wall_normal(level, gx as i32, gy as i32, drift);
-                    return Some(Contact { z: z + self.base, texel, wall: Some(wall) });
+                    return Some(Contact { z: z + self.base, texel, wall });
                 }
                 // Where the sight passes the upper side.
                 let exact = level.get((start[0] + drift[0] * top) as i32, (start[1] + drift[1] * top) as i32);
                 let texel = if exact.top > 0 && exact.top.abs_diff(texel.top) < 100 { exact } else { texel };
-                return Some(Contact { z: top + self.base, texel, wall: None });
+                return Some(Contact { z: top + self.base, texel, wall: [0.0; 2] });
             }
             above = z;
         }
@@ -150,10 +197,10 @@ impl Placement {
             fall[0] += top(-reach, 0) - top(reach, 0);
             fall[1] += top(0, -reach) - top(0, reach);
         }
-        if fall[0].hypot(fall[1]) < 1.0 {
-            fall = drift;
+        if fall == [0.0; 2] {
+            fall = [drift[0], drift[1] + 1e-6];
         }
-        let norm = fall[0].hypot(fall[1]).max(1e-6);
+        let norm = (fall[0] * fall[0] + fall[1] * fall[1]).sqrt();
         self.direction_to_table([fall[0] / norm, fall[1] / norm])
     }
 }

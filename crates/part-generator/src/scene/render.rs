@@ -14,6 +14,9 @@ pub(crate) const TABLE: u8 = u8::MAX;
 /// Samples of a pixel on an edge.
 const EDGE_SAMPLES: [[f32; 2]; 4] = [[0.375, 0.125], [0.875, 0.375], [0.125, 0.625], [0.625, 0.875]];
 
+/// Cells of the grid of heights that shadows are made from, in pixels.
+const GROUND_CELL_PX: f32 = 1.6;
+
 /// Neighbouring pixels whose heights differ by more than this many pixels' width lie on an edge.
 const EDGE_STEP_PX: f32 = 0.9;
 
@@ -31,57 +34,120 @@ pub(crate) struct Scene {
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     body: u8,
-    z: f32,
-    contact: Option<Contact>,
+    contact: Contact,
 }
 
-/// A picture in linear light, and which body each pixel's centre shows.
+/// The pixels of a body as if nothing covered it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Footprint {
+    /// Pixels [x0, y0, x1, y1]; may reach outside the picture.
+    pub bounds: [i32; 4],
+    /// Whether each pixel's centre shows the body, row by row.
+    pub shown: Vec<bool>,
+}
+
+/// A picture in linear light, and what it shows.
 pub(crate) struct Rendered {
     pub light: Vec<[f32; 3]>,
+    /// The body that each pixel's centre shows.
     pub ids: Vec<u8>,
+    /// The first bodies' pixels.
+    pub footprints: Vec<Footprint>,
 }
 
 impl Scene {
-    /// Draws the picture.
-    pub fn render(&self) -> Rendered {
+    /// Draws the picture, and the whole footprints of the first `num_footprints` bodies.
+    pub fn render(&self, num_footprints: usize) -> Rendered {
         let (width, height) = (self.view.width, self.view.height);
         let mm_per_px = self.view.mm_per_px();
-        let mut ground = Ground::new(self.view.ground(), 1.35 * mm_per_px);
+        let mut ground = Ground::new(self.view.ground(), GROUND_CELL_PX * mm_per_px);
         self.bodies.iter().for_each(|body| ground.put(body));
         let contact_mm = 6.0f32.max(3.0 * mm_per_px);
         ground.blur(contact_mm);
         let shadows: Vec<Shadow> =
             self.lighting.lamps.iter().map(|lamp| ground.shadow(lamp.direction, lamp.radius)).collect();
+        ground.light_table(contact_mm, &shadows, |place, open, reached| self.light_on_table(place, open, reached));
         let shading = Shading { scene: self, ground: &ground, shadows: &shadows, contact_mm, mm_per_px };
 
-        let mut seen = vec![Seen { body: TABLE, z: 0.0, contact: None }; width * height];
-        let boxes: Vec<[usize; 4]> =
-            self.bodies.iter().map(|body| clipped(body.picture_box(&self.view), width, height)).collect();
-        for (idx, (body, &[x0, y0, x1, y1])) in self.bodies.iter().zip(&boxes).enumerate() {
-            for y in y0..y1 {
-                for x in x0..x1 {
-                    let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
-                    let pixel = &mut seen[y * width + x];
-                    if let Some(contact) = body.meet(&sight)
-                        && contact.z > pixel.z
-                    {
-                        *pixel = Seen { body: idx as u8, z: contact.z, contact: Some(contact) };
-                    }
-                }
+        let mut seen = vec![Seen { body: TABLE, contact: Contact::default() }; width * height];
+        let boxes: Vec<[i32; 4]> = self.bodies.iter().map(|body| body.picture_box(&self.view)).collect();
+        let mut footprints = Vec::with_capacity(num_footprints);
+        for (idx, &bounds) in boxes.iter().enumerate() {
+            if idx < num_footprints {
+                let area = (bounds[2] - bounds[0]) * (bounds[3] - bounds[1]);
+                let mut shown = Vec::with_capacity(area as usize);
+                self.meet_all(idx, bounds, &mut seen, |is_met| shown.push(is_met));
+                footprints.push(Footprint { bounds, shown });
+            } else {
+                let inside = clipped(bounds, width, height).map(|v| v as i32);
+                self.meet_all(idx, inside, &mut seen, |_| {});
             }
         }
         let mut light = Vec::with_capacity(width * height);
-        for y in 0..height {
-            for x in 0..width {
+        for (y, row) in seen.chunks_exact(width).enumerate() {
+            for (x, pixel) in row.iter().enumerate() {
                 let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
-                light.push(match &seen[y * width + x] {
-                    Seen { body, contact: Some(contact), .. } => shading.body(*body, contact, &sight),
-                    _ => shading.table(&sight),
+                light.push(match pixel.body {
+                    TABLE => shading.table(&sight),
+                    body => shading.body(body, &pixel.contact, &sight),
                 });
             }
         }
+        let boxes: Vec<[usize; 4]> = boxes.into_iter().map(|bounds| clipped(bounds, width, height)).collect();
         self.smooth_edges(&seen, &boxes, &shading, &mut light);
-        Rendered { light, ids: seen.iter().map(|pixel| pixel.body).collect() }
+        Rendered { light, ids: seen.iter().map(|pixel| pixel.body).collect(), footprints }
+    }
+
+    /// Follows the sights of a box of pixels to a body and keeps what is nearest; `tell` learns of each pixel, row by row,
+    /// whether it meets the body.
+    fn meet_all(&self, idx: usize, bounds: [i32; 4], seen: &mut [Seen], mut tell: impl FnMut(bool)) {
+        let body = &self.bodies[idx];
+        let (width, height) = (self.view.width as i32, self.view.height as i32);
+        let spans = body.row_spans(&self.view, bounds);
+        for (y, [first, end]) in (bounds[1]..bounds[3]).zip(spans) {
+            (bounds[0]..first).for_each(|_| tell(false));
+            for x in first..end {
+                let met = body.meet(&self.view.sight(x as f32 + 0.5, y as f32 + 0.5));
+                tell(met.is_some());
+                if let Some(contact) = met
+                    && (0..width).contains(&x)
+                    && (0..height).contains(&y)
+                {
+                    let pixel = &mut seen[(y * width + x) as usize];
+                    if contact.z > pixel.contact.z {
+                        *pixel = Seen { body: idx as u8, contact };
+                    }
+                }
+            }
+            (end..bounds[2]).for_each(|_| tell(false));
+        }
+    }
+
+    /// Light on the table (red, green, blue) and a factor for what it mirrors.
+    fn light_on_table(&self, place: [f32; 2], open: f32, reached: &[f32]) -> [f32; 4] {
+        let exposure = self.exposure(place);
+        let ambient = self.lighting.ambient;
+        let mut light = [ambient[0] * open, ambient[1] * open, ambient[2] * open, open];
+        for (lamp, reached) in self.lighting.lamps.iter().zip(reached) {
+            light[3] *= 0.4 + 0.6 * reached;
+            for k in 0..3 {
+                light[k] += lamp.color[k] * lamp.direction[2] * reached;
+            }
+        }
+        light.map(|l| l * exposure)
+    }
+
+    /// Change of the light across the picture, and shadows from outside.
+    #[inline]
+    fn exposure(&self, place: [f32; 2]) -> f32 {
+        let across = self.view.mm_per_px() * self.view.width as f32;
+        let g = self.lighting.gradient;
+        let mut factor = 1.0 + (g[0] * place[0] + g[1] * place[1]) / across;
+        if let Some((normal, distance, soft, strength)) = self.far_shadow {
+            let d = normal[0] * place[0] + normal[1] * place[1] - distance;
+            factor *= 1.0 - strength * (d / soft + 0.5).clamp(0.0, 1.0);
+        }
+        factor.max(0.1)
     }
 
     /// Draws pixels on edges anew, from several samples.
@@ -90,17 +156,19 @@ impl Scene {
         let step = EDGE_STEP_PX * shading.mm_per_px;
         let differ = |a: &Seen, b: &Seen| {
             a.body != b.body
-                || match (&a.contact, &b.contact) {
-                    (Some(one), Some(other)) => {
-                        (one.z - other.z).abs() > step
-                            || one.texel.material != other.texel.material
-                            || one.wall.is_some() != other.wall.is_some()
-                    }
-                    _ => false,
-                }
+                || (a.contact.z - b.contact.z).abs() > step
+                || a.contact.texel.material != b.contact.texel.material
+                || a.contact.is_on_wall() != b.contact.is_on_wall()
         };
-        for y in 0..height {
-            for x in 0..width {
+        // Away from bodies there is no edge.
+        let mut spans = vec![[width, 0]; height];
+        for &[x0, y0, x1, y1] in boxes {
+            for span in &mut spans[y0.saturating_sub(1)..(y1 + 1).min(height)] {
+                *span = [span[0].min(x0.saturating_sub(1)), span[1].max((x1 + 1).min(width))];
+            }
+        }
+        for (y, &[first, end]) in spans.iter().enumerate() {
+            for x in first..end {
                 let idx = y * width + x;
                 let here = &seen[idx];
                 let neighbours = [
@@ -150,22 +218,6 @@ impl Scene {
             }
         }
     }
-
-    /// The pixels of a body alone, as if nothing covered it: the box and whether each pixel's centre shows it.
-    pub fn silhouette(&self, body: usize) -> ([i32; 4], Vec<bool>) {
-        let b = self.bodies[body].picture_box(&self.view);
-        // A body far outside has no use for pixels without end.
-        let (w, h) = (self.view.width as i32, self.view.height as i32);
-        let b = [b[0].max(-w), b[1].max(-h), b[2].min(2 * w), b[3].min(2 * h)];
-        let mut shown = Vec::with_capacity(((b[2] - b[0]).max(0) * (b[3] - b[1]).max(0)) as usize);
-        for y in b[1]..b[3] {
-            for x in b[0]..b[2] {
-                let sight = self.view.sight(x as f32 + 0.5, y as f32 + 0.5);
-                shown.push(self.bodies[body].meet(&sight).is_some());
-            }
-        }
-        (b, shown)
-    }
 }
 
 fn clipped(b: [i32; 4], width: usize, height: usize) -> [usize; 4] {
@@ -184,44 +236,19 @@ struct Shading<'a> {
 }
 
 impl Shading<'_> {
-    /// Change of the light across the picture, and shadows from outside.
-    #[inline]
-    fn exposure(&self, place: [f32; 2]) -> f32 {
-        let across = self.mm_per_px * self.scene.view.width as f32;
-        let g = self.scene.lighting.gradient;
-        let mut factor = 1.0 + (g[0] * place[0] + g[1] * place[1]) / across;
-        if let Some((normal, distance, soft, strength)) = self.scene.far_shadow {
-            let d = normal[0] * place[0] + normal[1] * place[1] - distance;
-            factor *= 1.0 - strength * (d / soft + 0.5).clamp(0.0, 1.0);
-        }
-        factor.max(0.1)
-    }
-
     #[inline]
     fn table(&self, sight: &Sight) -> [f32; 3] {
         let Scene { lighting, table, .. } = self.scene;
         let place = sight.foot;
         let albedo = table.color(place, self.mm_per_px);
-        let open = self.ground.openness(place, 0.0, self.contact_mm);
-        let mut light = lighting.ambient.map(|c| c * open);
-        let mut lit = open;
-        for (lamp, shadow) in lighting.lamps.iter().zip(self.shadows) {
-            let reached = self.ground.light_on_table(shadow, place);
-            lit *= 0.4 + 0.6 * reached;
-            let strength = lamp.direction[2] * reached;
-            for k in 0..3 {
-                light[k] += lamp.color[k] * strength;
-            }
-        }
-        let exposure = self.exposure(place);
-        let mut color = [0, 1, 2].map(|k| albedo[k] * light[k] * exposure);
+        let light = self.ground.on_table(place);
+        let mut color = [albedo[0] * light[0], albedo[1] * light[1], albedo[2] * light[2]];
         if table.gloss > 0.0 {
             let slopes = table.slopes(place);
-            let view = towards_viewer(sight);
-            let reflection = mirrored(view, normalized([-slopes[0], -slopes[1], 1.0]));
+            let reflection = mirrored(towards_viewer(sight), normalized([-slopes[0], -slopes[1], 1.0]));
             let seen = lighting.reflected(reflection, table.gloss_level);
             for k in 0..3 {
-                color[k] += (table.gloss * (0.3 + 0.7 * albedo[k])).min(0.6) * seen[k] * lit * exposure;
+                color[k] += (table.gloss * (0.3 + 0.7 * albedo[k])).min(0.6) * seen[k] * light[3];
             }
         }
         color
@@ -234,13 +261,12 @@ impl Shading<'_> {
         let texel = &contact.texel;
         let material = &body.part.relief.materials[texel.material as usize];
         let place = sight.at(contact.z);
-        let normal = match contact.wall {
-            Some(wall) => normalized([wall[0], wall[1], 0.25]),
-            None => {
-                let [x, y] = texel.normal.map(|n| f32::from(n) * (1.0 / 127.0));
-                let [x, y] = body.direction_to_table([x, y]);
-                [x, y, (1.0 - x * x - y * y).max(0.01).sqrt()]
-            }
+        let normal = if contact.is_on_wall() {
+            normalized([contact.wall[0], contact.wall[1], 0.25])
+        } else {
+            let [x, y] = texel.normal.map(|n| f32::from(n) * (1.0 / 127.0));
+            let [x, y] = body.direction_to_table([x, y]);
+            [x, y, (1.0 - x * x - y * y).max(0.01).sqrt()]
         };
         let open = self.ground.openness(place, contact.z, self.contact_mm);
         // What faces sideways gets its light from walls and from the table.
@@ -263,7 +289,7 @@ impl Shading<'_> {
         let facing = dot(normal, view).clamp(0.0, 1.0);
         let grazing = (1.0 - facing).powi(5) * (1.0 - material.roughness);
         let tone = f32::from(texel.tone) * (1.0 / 128.0);
-        let exposure = self.exposure(place);
+        let exposure = self.scene.exposure(place);
         [0, 1, 2].map(|k| {
             let reflectance = material.reflectance[k] + (1.0 - material.reflectance[k]) * grazing;
             exposure * tone * (material.albedo[k] * light[k] + reflectance * seen[k] * lit)
@@ -295,7 +321,7 @@ impl Shading<'_> {
             Brushing::Along(angle) => body.direction_to_table([-angle.sin(), angle.cos()]),
             Brushing::Around => {
                 let (x, y) = (place[0] - body.at[0], place[1] - body.at[1]);
-                let radius = x.hypot(y).max(0.1);
+                let radius = (x * x + y * y).sqrt().max(0.1);
                 [x / radius, y / radius]
             }
         };

@@ -11,7 +11,7 @@ use super::config::SceneConfig;
 use super::layout::Layout;
 use super::light::{LightStyle, Lighting};
 use super::photo::{DemonstrationPhoto, FOCAL_OVER_WIDTH, Silhouette, grasp_line, pose};
-use super::render::{Rendered, Scene};
+use super::render::{Footprint, Rendered, Scene};
 use super::sample::{Conditions, Instance, OtherKind, OtherObject, Sample};
 use super::sensor::{self, Sensor};
 use super::table::{Table, TableStyle};
@@ -27,6 +27,12 @@ const NUM_MOVED: u64 = 3;
 
 /// Covers to choose from for each part.
 const NUM_COVERS: u64 = 6;
+
+/// Other parts are at most so many times as large or as small as the part, where a few draws find such a one.
+const SIZE_RATIO: f64 = 1.8;
+
+/// How many those draws are.
+const MAX_SIZE_DRAWS: usize = 6;
 
 /// The most bodies in a picture: their numbers fit a byte beside the table's.
 const MAX_BODIES: usize = 200;
@@ -110,10 +116,11 @@ impl Scenes {
         let mut rng = generator(self.seed, Stream::Sample, index);
         let (scene, kinds, num_instances, conditions) = self.compose(part_idx, &mut rng);
         let sensor = self.sensor(&conditions, &mut rng);
-        let Rendered { mut light, ids } = scene.render();
+        let Rendered { mut light, ids, footprints } = scene.render(num_instances);
         let image = sensor::take(&mut light, scene.view.width, &sensor, &mut rng);
         let subject = &self.subjects[part_idx];
-        let instances = (0..num_instances).map(|k| instance(subject, &scene, k, &ids)).collect();
+        let instances =
+            footprints.iter().enumerate().map(|(k, footprint)| instance(subject, &scene, k, footprint, &ids)).collect();
         let others = kinds
             .into_iter()
             .enumerate()
@@ -216,7 +223,17 @@ impl Scenes {
             }
         }
         let pool = if self.others.is_empty() { std::slice::from_ref(&subject.part) } else { &self.others[..] };
-        let part = &pool[rng.whole(0, pool.len() - 1)];
+        // Things that lie about are about as large as the part, or the picture would show little else.
+        let mut best = &pool[rng.whole(0, pool.len() - 1)];
+        let ratio = |other: &Arc<Part>| (other.diagonal_mm() / subject.part.diagonal_mm()).ln().abs();
+        for _ in 0..MAX_SIZE_DRAWS {
+            if ratio(best) < SIZE_RATIO.ln() {
+                break;
+            }
+            let other = &pool[rng.whole(0, pool.len() - 1)];
+            best = if ratio(other) < ratio(best) { other } else { best };
+        }
+        let part = best;
         (OtherKind::Part(part.kind()), part.clone())
     }
 
@@ -251,11 +268,11 @@ impl Scenes {
 }
 
 /// The truth about an instance.
-fn instance(subject: &Subject, scene: &Scene, body: usize, ids: &[u8]) -> Instance {
+fn instance(subject: &Subject, scene: &Scene, body: usize, footprint: &Footprint, ids: &[u8]) -> Instance {
     let picture_from_part = pose(scene, body);
     let image_from_demonstration: PlanarSimilarity =
         picture_from_part.compose(&subject.photo.photo_from_part.inverse());
-    let silhouette = Silhouette::of(scene, body);
+    let silhouette = Silhouette::of(footprint);
     let visible = ids.iter().filter(|&&id| usize::from(id) == body).count();
     Instance {
         grasp: grasp_line(&subject.part, &picture_from_part),

@@ -4,7 +4,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::random::Draw;
 use crate::recipe::paint_color;
-use crate::tiles::{Tile, Tiles};
+use crate::tiles::{Tile, Tiles, floor};
 
 /// A layer of noise over the base colour.
 struct Layer {
@@ -105,7 +105,7 @@ impl Table {
             tiles,
         };
         if style == TableStyle::Plain {
-            made.base = grey(rng, 0.2, 0.75);
+            made.base = grey(rng, 0.1, 0.75);
             made.add(&tiles.cloud, [0.8, 0.8], 0.03, rng);
             made.add(&tiles.grain, [1.1, 1.1], 0.02, rng);
             return made;
@@ -114,7 +114,9 @@ impl Table {
         // Dirt, wear and grain on everything.
         let stains = rng.uniform(0.0, 0.09);
         let scale = rng.log_uniform(0.25, 1.2);
-        made.add(&tiles.cloud, [scale, scale], stains, rng);
+        if stains > 0.03 {
+            made.add(&tiles.cloud, [scale, scale], stains, rng);
+        }
         let fine = rng.uniform(0.005, 0.05);
         made.add(&tiles.grain, [1.4, 1.4], fine, rng);
         if rng.chance(0.2) {
@@ -247,7 +249,10 @@ impl Table {
         let mut color = self.base;
         self.print(x, y, mm_per_px, &mut color);
         for layer in &self.layers {
-            let value = layer.tile.at(x * layer.scale[0] + layer.shift[0], y * layer.scale[1] + layer.shift[1]);
+            let (u, v) = (x * layer.scale[0] + layer.shift[0], y * layer.scale[1] + layer.shift[1]);
+            // Texels finer than pixels need nothing between them.
+            let fine = layer.scale[0].min(layer.scale[1]) * mm_per_px > 0.6;
+            let value = if fine { layer.tile.nearest(u, v) } else { layer.tile.at(u, v) };
             for k in 0..3 {
                 color[k] += value * layer.color[k];
             }
@@ -265,7 +270,7 @@ impl Table {
         // How much of a pixel lies within `half` of a line at distance `d`.
         let inside =
             |d: f32, half: f32| ((half - d) / mm_per_px + 0.5).clamp(0.0, 1.0) * (2.0 * half / mm_per_px).min(1.0);
-        let to_line = |v: f32, pitch: f32| (v - pitch * (v / pitch).round()).abs();
+        let to_line = |v: f32, pitch: f32| (v - pitch * floor(v / pitch + 0.5) as f32).abs();
         match &self.pattern {
             Pattern::None => {}
             Pattern::Grid { pitch, width, color: ink } => {
@@ -276,15 +281,15 @@ impl Table {
             Pattern::Checks { pitch, color: other } => {
                 let (u, v) = (x / pitch, y / pitch);
                 // Distance to the next edge, signed by the square's colour.
-                let odd = (u.floor() as i32 + v.floor() as i32) & 1 == 1;
+                let odd = (floor(u) + floor(v)) & 1 == 1;
                 let d = to_line(x, *pitch).min(to_line(y, *pitch));
                 let share = (d / mm_per_px + 0.5).clamp(0.0, 1.0);
                 mix(color, other, if odd { share } else { 1.0 - share });
             }
             Pattern::Boards { width, length, joint, vary } => {
-                let board = (y / width).floor();
+                let board = floor(y / width) as f32;
                 let offset = self.tiles.grain.nearest(board * 7.0, board * 3.0) * length;
-                let piece = ((x + offset) / length).floor();
+                let piece = floor((x + offset) / length) as f32;
                 let shade = 1.0 + vary * self.tiles.grain.nearest(board * 5.0 + 11.0, piece * 13.0 + board);
                 let d = to_line(y, *width).min(to_line(x + offset, *length));
                 let dark = 1.0 - 0.7 * inside(d, 0.5 * joint);
@@ -292,7 +297,7 @@ impl Table {
             }
             Pattern::Dots { pitch, radius, color: other } => {
                 let (dx, dy) = (to_line(x, *pitch), to_line(y, *pitch));
-                mix(color, other, ((radius - dx.hypot(dy)) / mm_per_px + 0.5).clamp(0.0, 1.0));
+                mix(color, other, ((radius - (dx * dx + dy * dy).sqrt()) / mm_per_px + 0.5).clamp(0.0, 1.0));
             }
             Pattern::Waves { pitch, strength } => {
                 let fade = (pitch / (2.5 * mm_per_px)).min(1.0);
@@ -306,9 +311,9 @@ impl Table {
                 color.iter_mut().for_each(|c| *c *= shade);
             }
             Pattern::Text { pitch, color: ink } => {
-                let line = (y / pitch).floor();
+                let line = floor(y / pitch) as f32;
                 let within = y / pitch - line;
-                let letter = (x / (0.55 * pitch)).floor();
+                let letter = floor(x / (0.55 * pitch)) as f32;
                 let written = self.tiles.cloud.nearest(letter * 0.31, line * 17.0) > -0.5
                     && self.tiles.grain.nearest(letter, line * 3.0) > -0.55;
                 if written && within > 0.25 && within < 0.75 {
