@@ -64,9 +64,11 @@ fn picture(spec: &ObjectSpec, scale_m: f64) -> Result<RgbImage, Box<dyn std::err
     let wrist_render = RenderConfig { width: 1600, height: 1200, ..RenderConfig::default() };
     let mut cell = Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) })?;
     let view = cell.view_from(&base_from_look_camera())?;
-    let footprint = spec.footprint.iter().map(|corner| corner.coords).sum::<nalgebra::Vector2<f64>>();
-    let middle = footprint / spec.footprint.len() as f64;
-    let middle = spec.base_from_object(x, y, yaw_rad) * Point3::new(middle.x, middle.y, 0.0);
+    let ends = |k: usize| {
+        let along = spec.footprint.iter().map(|corner| corner[k]);
+        along.clone().fold(f64::INFINITY, f64::min) + along.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let middle = spec.base_from_object(x, y, yaw_rad) * Point3::new(0.5 * ends(0), 0.5 * ends(1), 0.0);
     let at = view.camera.project(&middle).ok_or("the camera looks away")?;
     let metres_per_pixel = view.camera.metres_per_pixel(&at, 0.0).ok_or("the camera looks away")?;
     let half = 0.5 * scale_m / metres_per_pixel;

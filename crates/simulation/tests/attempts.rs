@@ -246,7 +246,7 @@ fn bar_cell_with(errors: AttemptErrors, mass_kg: f64) -> Workcell {
 
 #[test]
 fn a_wrong_hand_eye_calibration_changes_what_perception_is_told_and_nothing_else() {
-    let mut run = |errors| {
+    let run = |errors| {
         let mut sure = |_: &CameraView| -> Perceived { Ok(Some(true_target())) };
         bar_cell_with(errors, 0.2).run_attempt(&mut sure, &AttemptConfig::default(), 5).unwrap()
     };
