@@ -112,7 +112,8 @@ fn go_on_with_axes(folder: &Path, names: &[&str], is_interrupted: &(dyn Fn() -> 
     };
     let ended = evaluation.run(is_interrupted, &EvaluationProgress::new()).unwrap();
     let summary = AxesSummary::collect(&evaluation).unwrap();
-    assert_eq!(ended.is_break(), summary.remaining > 0);
+    assert_eq!(ended.remaining, summary.remaining);
+    assert!(ended.failures.is_empty(), "{:?}", ended.failures);
     let comparisons = Against::open(folder).unwrap().compare(&evaluation).unwrap();
     assert!(comparisons.iter().all(|comparison| comparison.difference == 0.0 && !comparison.differs));
     let page =

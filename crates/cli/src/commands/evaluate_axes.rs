@@ -10,7 +10,7 @@ use serde_json::json;
 use super::evaluate::{models, objects};
 use crate::args::EvaluateArgs;
 use crate::evaluation::axes::{
-    Against, AxesEvaluation, AxesSummary, Comparison, Selection, Way, comparison_tables, markdown, page,
+    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
 };
 use crate::evaluation::{EvaluationProgress, Settings, Store};
 use crate::exit::{Outcome, Usage};
@@ -55,7 +55,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let progress = EvaluationProgress::new();
     let ended = evaluation.run(&|| interrupt.is_requested(), &progress);
     progress.finish();
-    let interrupted = ended?.is_break();
+    let RunEnd { remaining, failures } = ended?;
 
     let summary = AxesSummary::collect(&evaluation)?;
     let command = command(args, names);
@@ -100,10 +100,14 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         println!("seconds of a worker: {}", facts[2].1);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
-    if interrupted {
-        bail!("interrupted with {} units of work to do: the same command goes on", summary.remaining);
+    match (failures.first(), remaining) {
+        (None, 0) => Ok(Outcome::Done),
+        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command goes on"),
+        (Some(first), _) => bail!(
+            "{} units of work failed, {remaining} are to do: the same command tries them again; the first: {first}",
+            failures.len()
+        ),
     }
-    Ok(Outcome::Done)
 }
 
 /// A line for each model in each group and way, and for each error.

@@ -35,4 +35,4 @@ pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Way, lowest,
 };
 pub use tables::{markdown, tables};
-pub use units::{AxesEvaluation, GRASPING_MODELS};
+pub use units::{AxesEvaluation, GRASPING_MODELS, RunEnd};

@@ -1,8 +1,9 @@
 //! The axes and the grasps under errors as a page.
 
+use sdg_grasp::ModelKind;
 use sdg_report::{KeyFigure, Report, Section, ShareChart, Tone};
 
-use super::summary::{AxesSummary, GroupSummary, Way};
+use super::summary::{AxesSummary, AxisFigures, GroupSummary, Way};
 use super::tables::{notice, tables};
 use crate::evaluation::tables::Titled;
 
@@ -13,22 +14,11 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
          grasp where the robot is told something wrong. The paper's parts and the held-out ones stand apart.",
     );
     for group in &summary.groups {
-        for figures in group.axes.iter().filter(|figures| figures.way == Way::WithCheck) {
-            let Some(part) = super::summary::lowest(&figures.parts) else { continue };
-            // The worst of each model and group would be a page of figures: those below eight in ten are shown.
-            if part.share.percent().is_some_and(|percent| percent < 50.0) {
-                let label = format!(
-                    "{}, {}: {} found by model {}",
-                    part.object.replace('_', " "),
-                    figures.axis,
-                    part.share,
-                    figures.model
-                );
-                report = report.key_figure(
-                    KeyFigure::new(format!("{:.0}", part.share.percent().unwrap_or(0.0)), "%", label)
-                        .tone(Tone::Warning),
-                );
-            }
+        for (model, figures) in worst_axes(group) {
+            let Some(percent) = figures.found.percent() else { continue };
+            let label = format!("{}: model {model} on its worst axis, {}", group.group.title(), figures.axis);
+            let tone = if percent >= 80.0 { Tone::Plain } else { Tone::Warning };
+            report = report.key_figure(KeyFigure::new(format!("{percent:.0}"), "%", label).tone(tone));
         }
     }
     // In the first section, whichever that is.
@@ -51,6 +41,19 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
                 .command(command),
         )
         .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
+}
+
+/// Of each model the axis on which it finds the least, with the check.
+fn worst_axes(group: &GroupSummary) -> Vec<(ModelKind, &AxisFigures)> {
+    let mut worst: Vec<(ModelKind, &AxisFigures)> = Vec::new();
+    for figures in group.axes.iter().filter(|figures| figures.way == Way::WithCheck && figures.found.of > 0) {
+        match worst.iter_mut().find(|(model, _)| *model == figures.model) {
+            Some((_, least)) if figures.found.percent() < least.found.percent() => *least = figures,
+            Some(_) => {}
+            None => worst.push((figures.model, figures)),
+        }
+    }
+    worst
 }
 
 /// A chart for each axis and each error.

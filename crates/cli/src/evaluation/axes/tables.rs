@@ -20,7 +20,8 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
             table,
         };
         if !group.axes.is_empty() {
-            tables.extend(Way::ALL.map(|way| titled(found(group, way))));
+            let ways = Way::ALL.into_iter().filter(|way| !models_of(group, *way).is_empty());
+            tables.extend(ways.map(|way| titled(found(group, way))));
             tables.push(titled(lowest_parts(group)));
             tables.push(titled(wrong(group)));
             tables.push(titled(errors(group)));
@@ -173,7 +174,7 @@ fn errors(group: &GroupSummary) -> (String, String, Table) {
     }));
     let mut table = Table::new(columns);
     for axis in axes_of(group) {
-        for way in Way::ALL {
+        for way in Way::ALL.into_iter().filter(|way| !models_of(group, *way).is_empty()) {
             let mut row = vec![Cell::text(axis), Cell::text(way.name())];
             for model in models_of(group, Way::WithCheck) {
                 let figures = figures_of(group, axis, model, way);
@@ -335,5 +336,123 @@ fn told() -> Titled {
         title: "What the robot is told from truth".to_owned(),
         lead: "Everything that the simulated robot knows exactly and a real one would have to measure.".to_owned(),
         table,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::evaluation::axes::{AxisSettings, GraspCondition, GraspSettings, Seconds};
+    use crate::evaluation::settings::TeachingSettings;
+    use crate::evaluation::{PartGroup, wilson_interval};
+
+    fn share_of_parts(counts: [(&str, usize); 2]) -> Vec<PartShare> {
+        counts.map(|(object, count)| PartShare { object: object.into(), share: Share { count, of: 20 } }).into()
+    }
+
+    fn group(group: PartGroup, parts: [(&str, usize); 2]) -> GroupSummary {
+        let parts = share_of_parts(parts);
+        let found: Share = parts.iter().map(|part| part.share).sum();
+        let axis = |model: ModelKind, way| AxisFigures {
+            axis: "tilt",
+            model,
+            way,
+            found,
+            found_interval: wilson_interval(found),
+            wrong: 3,
+            pictures: 40,
+            distance_mm: Some([0.5, 1.25]),
+            turn_deg: None,
+            parts: parts.clone(),
+        };
+        let look_alike = |kind: &str, count| {
+            let accepted = Share { count, of: 20 };
+            LookAlikeFigures {
+                kind: kind.into(),
+                model: ModelKind::C,
+                way: Way::WithCheck,
+                accepted,
+                accepted_interval: wilson_interval(accepted),
+                parts: Vec::new(),
+            }
+        };
+        let held = Share { count: 18, of: 20 };
+        let grasps = GraspFigures {
+            condition: GraspCondition::HandEye,
+            model: ModelKind::C,
+            held,
+            held_interval: wilson_interval(held),
+            held_at_first_look: Share { count: 15, of: 20 },
+            held_after_further_looks: Share { count: 3, of: 20 },
+            failures_by_step: BTreeMap::from([("close".to_owned(), 2)]),
+            distance_mm: Some([2.0, 3.5]),
+            parts: parts.clone(),
+        };
+        GroupSummary {
+            group,
+            objects: parts.iter().map(|part| part.object.clone()).collect(),
+            axes: vec![
+                axis(ModelKind::C, Way::WithCheck),
+                axis(ModelKind::C, Way::NetworkAlone),
+                axis(ModelKind::S, Way::WithCheck),
+            ],
+            look_alikes: vec![
+                look_alike("size 0.90", 12),
+                look_alike(LookAlikeFigures::SAME_SIZE, 5),
+                look_alike(LookAlikeFigures::SIZE_ALONE, 12),
+                look_alike("mirrored", 5),
+            ],
+            grasps: vec![grasps],
+        }
+    }
+
+    fn summary(remaining: usize) -> AxesSummary {
+        let teaching = TeachingSettings { preset: "edge".into(), steps: None, seed: 1 };
+        AxesSummary {
+            axis_settings: AxisSettings { axes: 1, teaching: teaching.clone(), axis_views: 20, search_points: None },
+            grasp_settings: GraspSettings { errors: 1, teaching, attempts: 10, search_points: None },
+            remaining,
+            seconds: Seconds::default(),
+            groups: vec![
+                group(PartGroup::Paper, [("pendulum", 20), ("rod_end", 14)]),
+                group(PartGroup::HeldOut, [("key", 3), ("pliers", 1)]),
+            ],
+        }
+    }
+
+    #[test]
+    fn the_two_groups_are_never_added_up() {
+        let text = markdown(&summary(0), Vec::new(), &[("seed", "1".to_owned())], "sdg evaluate --axes");
+        // 34 of 40, and apart from them 4 of 40.
+        assert!(text.contains("| tilt | 40 | 85.0 (70.9 to 92.9) | 85.0 (70.9 to 92.9) |"), "{text}");
+        assert!(text.contains("| tilt | 40 | 10.0 (4.0 to 23.1) | 10.0 (4.0 to 23.1) |"), "{text}");
+        assert!(text.contains("The paper's parts: found, network alone") && text.contains("Held-out parts: found"));
+        assert!(!text.contains("38 of 80") && !text.contains("Not complete"), "{text}");
+        assert!(text.contains("| tilt | 14 of 20, rod end | 14 of 20, rod end | 14 of 20, rod end |"), "{text}");
+        assert!(text.contains("1 of 20, pliers"), "{text}");
+    }
+
+    #[test]
+    fn look_alikes_of_the_same_size_and_of_another_stand_apart() {
+        let text = markdown(&summary(0), Vec::new(), &[], "");
+        let places = [
+            "| size 0.90 | 20 | 12 of 20 |",
+            "| mirrored | 20 | 5 of 20 |",
+            "| all of same size | 20 | 25.0 (",
+            "| all of size alone | 20 | 60.0 (",
+        ]
+        .map(|row| text.find(row).unwrap_or_else(|| panic!("{row} in {text}")));
+        assert!(places.is_sorted(), "{places:?}");
+    }
+
+    #[test]
+    fn grasps_tell_first_from_further_looks_and_what_is_told_from_truth() {
+        let text = markdown(&summary(2), Vec::new(), &[], "");
+        let row = "| hand-eye wrong by 2 mm and 0.5° | C | 18 of 20 | 90.0 (69.9 to 97.2) | 15 of 20 | 3 of 20 |";
+        assert!(text.contains(row), "{text}");
+        assert!(text.contains("camera intrinsics") && text.contains("height of the marks over the table"), "{text}");
+        assert!(text.contains("**Not complete: 2 units"), "{text}");
     }
 }

@@ -1,6 +1,7 @@
 //! What there is to do for the axes, and the doing of it.
 
 use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -23,6 +24,7 @@ use crate::evaluation::schedule::{Task, run_all};
 use crate::evaluation::store::Store;
 use crate::evaluation::teaching::Teaching;
 use crate::evaluation::units::{NO_MODEL, caught};
+use crate::exit::one_line;
 use crate::rehearsal::{Rehearsal, RehearsalErrors};
 
 /// The models that grasp under errors: the paper's best, and the one without a network.
@@ -62,27 +64,40 @@ pub struct AxesEvaluation<'a> {
     pub jobs: usize,
 }
 
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunEnd {
+    /// Units that are not in the store.
+    pub remaining: usize,
+    /// Those of them that failed, with their errors.
+    pub failures: Vec<String>,
+}
+
 impl AxesEvaluation<'_> {
-    /// Does what is not in the store yet; breaks when `is_interrupted` says so, with everything kept that has ended.
+    /// Does what is not in the store yet, until `is_interrupted` says so; everything is kept that has ended. A unit that
+    /// fails does not end the others, so that hours of work do not wait for one part: it is told, and tried again next time.
     ///
     /// # Errors
-    /// Files that cannot be read or written, and errors of the simulator itself. A teaching that fails is a result.
-    pub fn run(
-        &self,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-        progress: &EvaluationProgress,
-    ) -> Result<ControlFlow<()>> {
+    /// A store that cannot be read. A teaching that leads to no model is a result.
+    pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &EvaluationProgress) -> Result<RunEnd> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let failures = Mutex::new(Vec::new());
         let work = |unit: &Unit| {
             if is_interrupted() {
                 return Ok(ControlFlow::Break(()));
             }
-            caught(|| self.work(*unit, is_interrupted, progress)).with_context(|| unit.to_string())
+            caught(|| self.work(*unit, is_interrupted, progress)).or_else(|error| {
+                let failure = format!("{unit}: {}", one_line(&error));
+                progress.unit_done(&format!("failed: {failure}"));
+                failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
+                Ok(ControlFlow::Continue(()))
+            })
         };
         run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)?;
-        Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        let failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(RunEnd { remaining: self.remaining()?, failures })
     }
 
     /// How many units are not in the store yet.
@@ -394,4 +409,148 @@ fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) ->
 
 fn look_alike(kind: LookAlikeKind) -> LookAlike {
     LookAlike { kind: kind.to_string(), differs_in_size_alone: matches!(kind, LookAlikeKind::Scaled { .. }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::records::{AttemptsRecord, TeachingRecord};
+    use crate::evaluation::{PartGroup, Settings};
+    use crate::statistics::Share;
+
+    use super::super::summary::{AxesSummary, Way};
+
+    fn settings() -> Settings {
+        Settings {
+            protocol: Settings::PROTOCOL,
+            preset: "edge".into(),
+            steps: None,
+            seed: 1,
+            attempts: 2,
+            views: 1,
+            scenes: 1,
+        }
+    }
+
+    fn told(evaluation: &AxesEvaluation) -> Vec<String> {
+        evaluation.tasks().unwrap().iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect()
+    }
+
+    fn picture(number: u64, found: bool) -> AxisPicture {
+        let detection = super::super::records::PlacedDetection {
+            score: 0.9,
+            network_score: 0.9,
+            agreement: None,
+            error_mm: Some(if found { 1.0 } else { 30.0 }),
+            error_deg: Some(1.0),
+            found: found.then_some(0),
+        };
+        let answer = super::super::records::Answer { detections: vec![detection] };
+        AxisPicture {
+            number,
+            parameter: 1.0,
+            unit: "degrees".into(),
+            visible: vec![1.0],
+            look_alike: None,
+            verified: answer.clone(),
+            alone: Some(answer),
+        }
+    }
+
+    #[test]
+    fn teachings_are_shared_and_what_is_there_is_not_done_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &settings()).unwrap();
+        let objects = ["pendulum", "key"].map(|name| ObjectSpec::by_name(name).unwrap());
+        let selection = Selection {
+            axes: vec![Axis::Tilt],
+            conditions: vec![GraspCondition::NoError, GraspCondition::Marks, GraspCondition::Shake],
+        };
+        let evaluation = AxesEvaluation {
+            models: &[ModelKind::B, ModelKind::C],
+            objects: &objects,
+            selection: &selection,
+            preset: Preset::Edge,
+            store: &store,
+            axis_views: 2,
+            search_points: None,
+            jobs: 1,
+        };
+        // B reads C's network; B does not grasp under errors; jittered marks have a teaching of their own.
+        assert_eq!(
+            told(&evaluation)[..6],
+            [
+                "teach C pendulum []",
+                "tilt pendulum [0, 0]",
+                "grasp C pendulum, no-error [0]",
+                "teach C pendulum from jittered marks []",
+                "grasp C pendulum, marks [3]",
+                "grasp C pendulum, shake [0]"
+            ]
+        );
+        assert_eq!(told(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
+
+        // The protocol's attempts are the control's, and a part whose teaching failed needs nothing more.
+        let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
+        let done = AttemptsRecord::new(vec![attempt(1), attempt(2)]);
+        store.write("cells/C-pendulum.attempts-verified.json", &done).unwrap();
+        let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
+        for file in ["cells/C-key.teaching.json", "cells/C-key.teaching-jittered-marks.json"] {
+            store.write_made_with(file, &store.settings().teaching(), &failed).unwrap();
+        }
+        for (model, found) in [(ModelKind::B, [true, false]), (ModelKind::C, [true, true])] {
+            let pictures = (0..2).map(|number| picture(number, found[number as usize])).collect();
+            let record = AxisRecord { pictures, seconds: 2.0 };
+            let file = axis_file(Cell { model, object: "pendulum" }, Axis::Tilt);
+            store.write_made_with(&file, &evaluation.axis_settings(), &record).unwrap();
+        }
+        assert_eq!(
+            told(&evaluation),
+            [
+                "teach C pendulum from jittered marks []",
+                "grasp C pendulum, marks [0]",
+                "teach C pendulum []",
+                "grasp C pendulum, shake [2]"
+            ]
+        );
+
+        let summary = AxesSummary::collect(&evaluation).unwrap();
+        assert_eq!((summary.remaining, summary.seconds.pictures), (4, 4.0));
+        let [paper, held_out] = &summary.groups[..] else { panic!("{:?}", summary.groups) };
+        assert_eq!((paper.group, held_out.group), (PartGroup::Paper, PartGroup::HeldOut));
+        let found = |group: &super::super::summary::GroupSummary, model| {
+            let figures = group.axes.iter().find(|f| f.model == model && f.way == Way::NetworkAlone).unwrap();
+            (figures.found, figures.wrong)
+        };
+        assert_eq!(found(paper, ModelKind::B), (Share { count: 1, of: 2 }, 1));
+        assert_eq!(found(paper, ModelKind::C), (Share { count: 2, of: 2 }, 0));
+        // Where there is no model every part was missed, and every attempt failed.
+        assert_eq!(found(held_out, ModelKind::C), (Share { count: 0, of: 2 }, 0));
+        assert_eq!(held_out.grasps[1].failures_by_step[AttemptRecord::TEACH], 2);
+        assert_eq!(paper.grasps[0].held, Share { count: 0, of: 2 });
+    }
+
+    #[test]
+    fn other_pictures_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &settings()).unwrap();
+        let cell = Cell { model: ModelKind::S, object: "pendulum" };
+        let selection = Selection::parse(&["tilt".to_owned()]).unwrap();
+        let evaluation = |axis_views, search_points| AxesEvaluation {
+            models: &[ModelKind::S],
+            objects: &[],
+            selection: &selection,
+            preset: Preset::Edge,
+            store: &store,
+            axis_views,
+            search_points,
+            jobs: 1,
+        };
+        let record = AxisRecord { pictures: Vec::new(), seconds: 0.0 };
+        store.write_made_with(&axis_file(cell, Axis::Tilt), &evaluation(20, None).axis_settings(), &record).unwrap();
+        assert_eq!(evaluation(20, None).axis_record(cell, Axis::Tilt).unwrap(), Some(record));
+        let refused = |evaluation: AxesEvaluation| evaluation.axis_record(cell, Axis::Tilt).unwrap_err().to_string();
+        assert!(refused(evaluation(30, None)).contains("axis_views: expected 30, found 20"));
+        assert!(refused(evaluation(20, Some(32))).contains("search_points: expected 32, found none"));
+    }
 }
