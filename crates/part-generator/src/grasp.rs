@@ -110,12 +110,16 @@ fn along(
             }
             (a, b) = (0.0, 0.0);
         }
-        let half = (0.3 * (high - low)).clamp(0.1 * diagonal, 0.28 * diagonal).max(3.0);
+        // Both marks lie beside the part, not beyond its ends.
+        let room = (high - a).min(a - low);
+        let half = (0.3 * (high - low)).min(0.28 * diagonal).min(room).max((0.06 * diagonal).max(1.5));
         let place = |along: f32| [center[0] + cos * along - sin * b, center[1] + sin * along + cos * b];
         let top = extents[middle][2];
         let grasp =
             PartGrasp { start: place(a - half), end: place(a + half), jaw_width_mm: width, height_mm: 0.5 * top };
-        let cost = 1.2 * off_center + 0.5 * width / MAX_JAW_WIDTH_MM + 0.8 * uneven - 0.15 * (high - low) / diagonal;
+        let cost = 1.2 * off_center + 0.5 * width / MAX_JAW_WIDTH_MM + 0.8 * uneven
+            - 0.15 * (high - low) / diagonal
+            - 0.6 * (half / diagonal).min(0.15);
         found.push((cost, grasp));
     }
     found

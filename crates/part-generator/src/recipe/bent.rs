@@ -10,11 +10,14 @@ use super::material::Material;
 use super::{Recipe, Shape};
 use crate::random::Draw;
 
+/// Thinnest wire: its radius over the part's size. In a photo thinner ones fall apart into pieces.
+const MIN_WIRE_SHARE: f32 = 0.018;
+
 /// Draws a bent wire or tube with straight legs, eyes, sleeves and fittings, or a coil.
 pub(super) fn draw_wire(rng: &mut Pcg64Mcg) -> Recipe {
     let mut builder = Builder::new(Material::draw(rng));
     let size = rng.log_uniform(40.0, 190.0);
-    let radius = (size * rng.log_uniform(0.008, 0.05)).clamp(0.8, 7.0);
+    let radius = (size * rng.log_uniform(MIN_WIRE_SHARE, 0.05)).clamp(0.8, 7.0);
     let points = if rng.chance(0.12) { coil(size, radius, rng) } else { bends(size, radius, rng) };
     let ends = [points[0], points[points.len() - 1]];
     let count = points.len();

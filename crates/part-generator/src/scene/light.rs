@@ -55,7 +55,7 @@ impl Lighting {
         } else if style.hard {
             rng.uniform(0.2, 0.4)
         } else {
-            rng.uniform(0.35, 0.75)
+            rng.uniform(0.25, 0.65)
         };
         let num_lamps = if style.even {
             rng.whole(1, 2)
@@ -87,7 +87,7 @@ impl Lighting {
                 }
             })
             .collect();
-        let slope = if style.even { 0.1 } else { 0.5 };
+        let slope = if style.even { 0.1 } else { 0.8 };
         let gradient = [rng.uniform(-slope, slope), rng.uniform(-slope, slope)];
         let ambient = hall.map(|c| c * share_ambient);
         let maps = reflections(&lamps, ambient, style, rng);

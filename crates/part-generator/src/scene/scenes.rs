@@ -252,8 +252,8 @@ impl Scenes {
             motion: [cos * way, sin * way],
             vignetting: rng.uniform(0.0, 0.4),
             veil: if rng.chance(0.2) { rng.uniform(0.0, 0.06) } else { 0.0 },
-            contrast: rng.uniform(0.85, 1.25),
-            saturation: rng.uniform(0.7, 1.15),
+            contrast: rng.uniform(0.95, 1.5),
+            saturation: rng.uniform(0.8, 1.5),
             jpeg: rng.chance(self.config.jpeg_probability as f32).then(|| rng.uniform(40.0, 92.0) as u8),
         };
         if conditions.blur_px > 0.0 {

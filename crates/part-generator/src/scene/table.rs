@@ -94,7 +94,7 @@ impl Table {
         let (sin, cos) = rng.angle().sin_cos();
         let shift = [rng.uniform(0.0, 500.0), rng.uniform(0.0, 500.0)];
         let mut made = Self {
-            base: grey(rng, 0.12, 0.75),
+            base: grey(rng, 0.05, 0.85),
             layers: Vec::new(),
             pattern: Pattern::None,
             sin_cos: [sin, cos],
@@ -129,8 +129,8 @@ impl Table {
 
     fn draw_kind(&mut self, rng: &mut Pcg64Mcg) {
         let tiles = self.tiles;
-        match rng.whole(0, 13) {
-            0 => {
+        match rng.whole(0, 15) {
+            0 | 14 | 15 => {
                 // Painted or laminated board.
                 self.base = paint_color(rng).map(|c| 0.8 * c + 0.03);
                 self.shine(rng.uniform(0.0, 0.12), rng);
