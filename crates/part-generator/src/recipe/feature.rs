@@ -244,7 +244,10 @@ impl Feature {
                 if let Shape::Path { radius, .. } = &self.shape {
                     let across = distance + radius;
                     let rise = (radius * radius - across * across).max(0.0).sqrt();
-                    state.fill((z - rise).max(0.0), z + rise, self.material);
+                    // One layer is kept above a point: a raised strand is filled down to the table, or what lies
+                    // below it would be lost and the part would fall apart.
+                    let bottom = if z > 1.6 * radius { 0.0 } else { (z - rise).max(0.0) };
+                    state.fill(bottom, z + rise, self.material);
                 }
             }
             Operation::Cut { floor, chamfer, machined } if state.is_covered() => {
