@@ -32,7 +32,7 @@ pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetect
 pub use selection::{GraspCondition, Selection};
 pub use settings::{AxisSettings, GraspSettings};
 pub use summary::{
-    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Way, lowest,
+    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, Way, lowest,
 };
 pub use tables::{markdown, tables};
 pub use units::{AxesEvaluation, GRASPING_MODELS, RunEnd};

@@ -122,8 +122,20 @@ pub struct AxisFigures {
     pub distance_mm: Option<[f64; 2]>,
     /// The same of their turns, in degrees.
     pub turn_deg: Option<[f64; 2]>,
+    /// The same in the first, the middle and the last third of the axis' pictures: what the axis changes grows from the first
+    /// picture to the last.
+    pub thirds: [Third; 3],
     /// The share of each part.
     pub parts: Vec<PartShare>,
+}
+
+/// A third of an axis' pictures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Third {
+    /// Instances of the part that were found.
+    pub found: Share,
+    /// From where to where the axis' parameter goes; `None` of no pictures.
+    pub range: Option<[f64; 2]>,
 }
 
 /// How often a model took a look-alike for the part.
@@ -281,6 +293,7 @@ fn axis_figures(
     let answers: Vec<&Answer> =
         records.iter().filter_map(|(_, record)| record.as_ref()).flat_map(|record| record.answers(way)).collect();
     let accepted = || answers.iter().flat_map(|answer| &answer.detections).filter(|detection| detection.is_accepted());
+    let shown = || records.iter().filter_map(|(_, record)| record.as_ref());
     AxisFigures {
         axis: axis.name(),
         model,
@@ -291,8 +304,25 @@ fn axis_figures(
         pictures: records.iter().map(|(_, record)| record.as_ref().map_or(axis_views, |r| r.pictures.len())).sum(),
         distance_mm: spread(&accepted().filter_map(|detection| detection.error_mm).collect::<Vec<_>>()),
         turn_deg: spread(&accepted().filter_map(|detection| detection.error_deg).collect::<Vec<_>>()),
+        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, shown())),
         parts,
     }
+}
+
+/// A third of the pictures of all parts that were shown.
+fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item = &'r AxisRecord>) -> Third {
+    let mut sum = Third::default();
+    for record in records {
+        let count = record.pictures.len();
+        let is_in_third = |number: u64| number as usize * 3 / count.max(1) == third;
+        let outcomes = record.outcomes(axis, way).into_iter().filter(|((number, _), _)| is_in_third(*number));
+        sum.found = sum.found + Share::of(outcomes, |(_, is_right)| *is_right);
+        for picture in record.pictures.iter().filter(|picture| is_in_third(picture.number)) {
+            let [low, high] = sum.range.unwrap_or([picture.parameter; 2]);
+            sum.range = Some([low.min(picture.parameter), high.max(picture.parameter)]);
+        }
+    }
+    sum
 }
 
 /// By kind, then the two sums. A model that could not be taught takes nothing for the part: it is left out.

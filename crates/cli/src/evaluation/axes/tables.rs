@@ -22,6 +22,7 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
         if !group.axes.is_empty() {
             let ways = Way::ALL.into_iter().filter(|way| !models_of(group, *way).is_empty());
             tables.extend(ways.map(|way| titled(found(group, way))));
+            tables.push(titled(thirds(group)));
             tables.push(titled(lowest_parts(group)));
             tables.push(titled(wrong(group)));
             tables.push(titled(errors(group)));
@@ -126,6 +127,26 @@ fn found(group: &GroupSummary, way: Way) -> (String, String, Table) {
          to one. Each axis has pictures of its own, the same for every model; nothing tells a model how high the camera is."
     );
     (format!("found, {}", way.name()), lead, table)
+}
+
+fn thirds(group: &GroupSummary) -> (String, String, Table) {
+    let models = models_of(group, Way::WithCheck);
+    let mut columns = vec![Column::text("axis"), Column::text("from"), Column::text("to")];
+    columns.extend(models.iter().map(|model| Column::text(model.letter())));
+    let mut table = Table::new(columns);
+    for axis in axes_of(group) {
+        for third in 0..3 {
+            let of = |model: ModelKind| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
+            let Some([low, high]) = models.iter().find_map(|model| of(*model)?.range) else { continue };
+            let mut row = vec![Cell::text(axis), Cell::text(format!("{low:.2}")), Cell::text(format!("{high:.2}"))];
+            row.extend(models.iter().map(|model| share(of(*model).unwrap_or_default().found, Tone::Plain)));
+            table = table.row(row);
+        }
+    }
+    let lead = "With the check, in the first, the middle and the last third of each axis' pictures, in which the axis changes \
+                more and more: height in shares of the usual one, tilt in degrees, covered in shares of the part, dark in shares \
+                of the usual light, blur in pixels; the parameters of the others are counts or ratios.";
+    ("found, by how much the axis changes".to_owned(), lead.to_owned(), table)
 }
 
 fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
@@ -344,7 +365,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::evaluation::axes::{AxisSettings, GraspCondition, GraspSettings, Seconds};
+    use crate::evaluation::axes::{AxisSettings, GraspCondition, GraspSettings, Seconds, Third};
     use crate::evaluation::settings::TeachingSettings;
     use crate::evaluation::{PartGroup, wilson_interval};
 
@@ -365,6 +386,7 @@ mod tests {
             pictures: 40,
             distance_mm: Some([0.5, 1.25]),
             turn_deg: None,
+            thirds: [5, 4, 3].map(|count| Third { found: Share { count, of: 13 }, range: Some([5.0, 9.5]) }),
             parts: parts.clone(),
         };
         let look_alike = |kind: &str, count| {
@@ -432,6 +454,7 @@ mod tests {
         assert!(!text.contains("38 of 80") && !text.contains("Not complete"), "{text}");
         assert!(text.contains("| tilt | 14 of 20, rod end | 14 of 20, rod end | 14 of 20, rod end |"), "{text}");
         assert!(text.contains("1 of 20, pliers"), "{text}");
+        assert!(text.contains("| tilt | 5.00 | 9.50 | 4 of 13 | 4 of 13 |"), "{text}");
     }
 
     #[test]

@@ -11,7 +11,7 @@ pub(super) struct Told {
 }
 
 /// All of it, in the order in which an attempt uses it.
-pub(super) fn told_from_truth() -> [Told; 12] {
+pub(super) fn told_from_truth() -> [Told; 13] {
     let told = |what, source, error| Told { what, source, error };
     [
         told(
@@ -31,6 +31,7 @@ pub(super) fn told_from_truth() -> [Told; 12] {
         told("height of the table", "the simulated table, flat and level at z = 0", "none"),
         told("height of the marks over the table", "the part's description (object.json)", "3 mm"),
         told("height of the grasp over the table", "the part's description (object.json)", "none"),
+        told("the area where parts lie", "scenes place the part where the look-out pose shows it whole", "none"),
         told("that the part rests on the face it was shown on", "scenes place it so", "none"),
         told("dynamics of the arm for its controller", "the simulated arm's own mass matrix", "none"),
         told(
