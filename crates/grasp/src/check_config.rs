@@ -183,7 +183,8 @@ mod tests {
     fn another_size_costs_what_lies_beyond_the_free_range() {
         let penalty = SizePenalty { free_log: 0.1, cost_per_log: 2.0 };
         assert_eq!(penalty.apply(0.7, 1.0), 0.7);
-        assert_eq!(penalty.apply(0.7, (0.1f64).exp()), 0.7);
+        // ln 1.1 is 0.095.
+        assert_eq!(penalty.apply(0.7, 1.1), 0.7);
         // 0.25 of ln scale, 0.15 of them beyond the free range.
         assert!((penalty.apply(0.7, (-0.25f64).exp()) - 0.4).abs() < 1e-12);
         assert_eq!(penalty.apply(0.2, 2.0), 0.0);
