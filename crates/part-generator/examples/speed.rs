@@ -1,8 +1,9 @@
 //! Measures how fast samples are drawn: pictures a second, and processor time a picture.
 //!
-//! `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS]]`
+//! `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
 //!
-//! Prints a line for the default scenes and one for each condition alone, at 320x240, ten parts. Processor time is that of
+//! Prints a line for the default scenes and one for each condition alone, at 320x240, ten parts; with a
+//! name (`default`, `tilt`, …) that line only. Processor time is that of
 //! the process, so it says something on a busy machine too.
 
 use std::time::Instant;
@@ -14,6 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let samples: u64 = arguments.first().map_or(Ok(300), |count| count.parse())?;
     let threads: usize = arguments.get(1).map_or(Ok(2), |count| count.parse())?;
+    let only = arguments.get(2);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
 
     let (wall, before) = (Instant::now(), cpu_seconds());
@@ -25,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let configs = std::iter::once(("default", SceneConfig::default()))
         .chain(Condition::ALL.map(|condition| (condition.name(), SceneConfig::only(condition))));
-    for (name, config) in configs {
+    for (name, config) in configs.filter(|(name, _)| only.is_none_or(|only| only == name)) {
         let before = cpu_seconds();
         let scenes = pool.install(|| Scenes::new(&parts, config, 1))?;
         let prepared = cpu_seconds() - before;

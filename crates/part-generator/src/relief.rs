@@ -1,7 +1,7 @@
 //! A part as a grid of heights, normals and materials, drawn once from its recipe.
 
 use crate::recipe::{Brushing, Material, Recipe, State};
-use crate::tiles::Tiles;
+use crate::tiles::{Tiles, floor};
 
 /// Cells along the longer side of the finest grid.
 const MAX_CELLS: f32 = 288.0;
@@ -11,6 +11,9 @@ const MIN_CELL_MM: f32 = 0.12;
 
 /// Number of grids: each next one has cells twice as wide.
 const NUM_LEVELS: usize = 4;
+
+/// Side of the blocks of cells whose highest points are known.
+pub(crate) const BLOCK_CELLS: usize = 8;
 
 /// Heights are stored in so many steps a millimetre.
 const STEPS_PER_MM: f32 = 200.0;
@@ -44,9 +47,39 @@ pub(crate) struct Level {
     /// Millimetres.
     pub cell: f32,
     pub texels: Vec<Texel>,
+    /// The highest top within a block of cells and the blocks around it, block by block.
+    block_tops: Vec<u16>,
+    blocks_across: usize,
 }
 
 impl Level {
+    fn new(width: usize, height: usize, cell: f32, texels: Vec<Texel>) -> Self {
+        let (across, down) = (width.div_ceil(BLOCK_CELLS), height.div_ceil(BLOCK_CELLS));
+        let mut tops = vec![0u16; across * down];
+        for (y, row) in texels.chunks_exact(width).enumerate() {
+            for (x, texel) in row.iter().enumerate() {
+                let block = &mut tops[y / BLOCK_CELLS * across + x / BLOCK_CELLS];
+                *block = texel.top.max(*block);
+            }
+        }
+        let block_tops = (0..across * down)
+            .map(|idx| {
+                let (x, y) = (idx % across, idx / across);
+                let rows = y.saturating_sub(1)..(y + 2).min(down);
+                rows.flat_map(|v| &tops[v * across + x.saturating_sub(1)..v * across + (x + 2).min(across)])
+                    .fold(0, |top, &other| top.max(other))
+            })
+            .collect();
+        Self { width, height, cell, texels, block_tops, blocks_across: across }
+    }
+
+    /// At least the highest top of all cells within [`BLOCK_CELLS`] of a place in cells, which lies on the grid.
+    #[inline(always)]
+    pub fn top_around(&self, x: f32, y: f32) -> u16 {
+        let (u, v) = (floor(x).max(0) as usize / BLOCK_CELLS, floor(y).max(0) as usize / BLOCK_CELLS);
+        self.block_tops.get(v * self.blocks_across + u).copied().unwrap_or(0)
+    }
+
     /// The texel at whole coordinates; nothing outside.
     #[inline(always)]
     pub fn get(&self, x: i32, y: i32) -> Texel {
@@ -142,7 +175,7 @@ impl Relief {
                 texels[idx].tone = (128.0 * (1.0 + tone)).clamp(20.0, 255.0) as u8;
             }
         }
-        let mut levels = vec![Level { width, height, cell, texels }];
+        let mut levels = vec![Level::new(width, height, cell, texels)];
         while levels.len() < NUM_LEVELS {
             levels.push(halved(&levels[levels.len() - 1]));
         }
@@ -221,5 +254,5 @@ fn halved(level: &Level) -> Level {
             });
         }
     }
-    Level { width, height, cell: 2.0 * level.cell, texels }
+    Level::new(width, height, 2.0 * level.cell, texels)
 }

@@ -1,11 +1,13 @@
 //! Heights of everything on the table as one grid; shadows and contact darkening from it.
 
 use super::placement::Placement;
+use crate::tiles::floor;
 
 /// Heights above the table, seen from straight above.
 pub(crate) struct Ground {
     min: [f32; 2],
     cell: f32,
+    inverse_cell: f32,
     width: usize,
     height: usize,
     tops: Vec<f32>,
@@ -19,7 +21,7 @@ pub(crate) struct Ground {
 pub(crate) struct Shadow {
     /// For each cell the heights of the lamp's directions.
     heights: Vec<[f32; SWEEPS]>,
-    softness: f32,
+    inverse_softness: f32,
 }
 
 /// Directions that stand for a lamp's width: shares of its radius aside and up.
@@ -34,14 +36,24 @@ impl Ground {
         let min = [bounds[0] - 8.0 * cell, bounds[1] - 8.0 * cell];
         let count = |low: f32, high: f32| ((high - low) / cell).ceil().clamp(1.0, 1024.0) as usize + 16;
         let (width, height) = (count(bounds[0], bounds[2]), count(bounds[1], bounds[3]));
-        Self { min, cell, width, height, tops: vec![0.0; width * height], blurred: Vec::new(), table_light: Vec::new() }
+        Self {
+            min,
+            cell,
+            inverse_cell: 1.0 / cell,
+            width,
+            height,
+            tops: vec![0.0; width * height],
+            blurred: Vec::new(),
+            table_light: Vec::new(),
+        }
     }
 
+    /// The cell of a place; none outside.
     #[inline(always)]
-    fn index(&self, [x, y]: [f32; 2]) -> Option<usize> {
-        let (gx, gy) = ((x - self.min[0]) / self.cell, (y - self.min[1]) / self.cell);
+    pub fn index(&self, [x, y]: [f32; 2]) -> Option<usize> {
+        let (gx, gy) = ((x - self.min[0]) * self.inverse_cell, (y - self.min[1]) * self.inverse_cell);
         let inside = gx >= 0.0 && gy >= 0.0 && gx < self.width as f32 && gy < self.height as f32;
-        inside.then(|| gy as usize * self.width + gx as usize)
+        inside.then(|| floor(gy).max(0) as usize * self.width + floor(gx).max(0) as usize)
     }
 
     /// Calls `visit` with (index of the cell, top of the body there) for the cells that a body covers.
@@ -110,11 +122,10 @@ impl Ground {
         self.blurred = blurred;
     }
 
-    /// Share of the light from all around that reaches a place: less beside and between bodies.
-    #[inline]
-    pub fn openness(&self, place: [f32; 2], z: f32, radius: f32) -> f32 {
-        let around = self.index(place).map_or(0.0, |idx| self.blurred[idx]);
-        open_share(around, z, radius)
+    /// Share of the light from all around that reaches height `z` above a cell: less beside and between bodies.
+    #[inline(always)]
+    pub fn openness(&self, cell: Option<usize>, z: f32, radius: f32) -> f32 {
+        open_share(cell.map_or(0.0, |idx| self.blurred[idx]), z, radius)
     }
 
     /// The shadows of a lamp in a direction (x, y, z up, a unit vector) that appears `radius` radians wide.
@@ -125,47 +136,55 @@ impl Ground {
         let mut heights = vec![[0.0; SWEEPS]; self.tops.len()];
         for (k, [aside, up]) in LAMP_DIRECTIONS.into_iter().enumerate() {
             let raised = (elevation + up * radius).clamp(0.15, 1.55);
-            let swept = self.sweep(azimuth + aside * radius / elevation.cos().max(0.2), raised.tan());
-            heights.iter_mut().zip(swept).for_each(|(cell, height)| cell[k] = height);
+            self.sweep(azimuth + aside * radius / elevation.cos().max(0.2), raised.tan(), k, &mut heights);
         }
-        Shadow { heights, softness: self.cell * elevation.tan().min(4.0) }
+        Shadow { heights, inverse_softness: self.inverse_cell / elevation.tan().min(4.0) }
     }
 
-    /// Carries heights away from the light, falling by `slope` for each millimetre.
-    fn sweep(&self, azimuth: f32, slope: f32) -> Vec<f32> {
+    /// Carries heights away from the light, falling by `slope` for each millimetre, into component `k` of `shade`.
+    fn sweep(&self, azimuth: f32, slope: f32, k: usize, shade: &mut [[f32; SWEEPS]]) {
         let (sin, cos) = azimuth.sin_cos();
-        let (width, height) = (self.width as i32, self.height as i32);
-        let mut shade = vec![0.0f32; self.tops.len()];
         let along_x = cos.abs() >= sin.abs();
         let (major, minor) = if along_x { (cos, sin) } else { (sin, cos) };
-        let (count, across) = if along_x { (width, height) } else { (height, width) };
-        let (stride, stride_across) = if along_x { (1, width) } else { (width, 1) };
+        let (count, across) = if along_x { (self.width, self.height) } else { (self.height, self.width) };
+        let (stride, stride_across) = if along_x { (1, self.width) } else { (self.width, 1) };
         let lean = minor / major.abs();
         let fall = self.cell / major.abs() * slope;
-        let towards = if major > 0.0 { 1 } else { -1 };
+        // A line of cells across the way: the higher of what stands there and what shades it. Two cells more at both
+        // ends, since the lean of -1 to 1 reads beyond.
+        let (mut before, mut line) = (vec![0.0f32; across + 4], vec![0.0f32; across]);
+        let shift = lean.floor();
+        let share = lean - shift;
+        let first = (2 + shift as i32) as usize;
         // From the side of the light to the other.
-        for k in 1..count {
-            let at = if towards > 0 { count - 1 - k } else { k };
-            let from = (at + towards) * stride;
-            let shift = lean.floor() as i32;
-            let share = lean - lean.floor();
-            let first = (-shift).clamp(0, across);
-            let end = (across - shift - 1).clamp(first, across);
-            for j in first..end {
-                let a = (from + (j + shift) * stride_across) as usize;
-                let b = (from + (j + shift + 1) * stride_across) as usize;
-                let (high_a, high_b) = (self.tops[a].max(shade[a]), self.tops[b].max(shade[b]));
-                let carried = high_a + (high_b - high_a) * share - fall;
-                shade[(at * stride + j * stride_across) as usize] = carried.max(0.0);
+        for step in 0..count {
+            let at = if major > 0.0 { count - 1 - step } else { step };
+            for ((carried, a), b) in line.iter_mut().zip(&before[first..]).zip(&before[first + 1..]) {
+                *carried = (a + (b - a) * share - fall).max(0.0);
+            }
+            let start = at * stride;
+            if stride_across == 1 {
+                let tops = &self.tops[start..start + across];
+                let cells = shade[start..start + across].iter_mut();
+                for (((carried, top), cell), next) in line.iter().zip(tops).zip(cells).zip(&mut before[2..]) {
+                    cell[k] = *carried;
+                    *next = carried.max(*top);
+                }
+            } else {
+                let tops = self.tops[start..].iter().step_by(stride_across);
+                let cells = shade[start..].iter_mut().step_by(stride_across);
+                for (((carried, top), cell), next) in line.iter().zip(tops).zip(cells).zip(&mut before[2..]) {
+                    cell[k] = *carried;
+                    *next = carried.max(*top);
+                }
             }
         }
-        shade
     }
 
-    /// Share of a lamp's light that reaches a point.
-    #[inline]
-    pub fn light(&self, shadow: &Shadow, place: [f32; 2], z: f32) -> f32 {
-        self.index(place).map_or(1.0, |idx| shadow.light_at(idx, z))
+    /// Share of a lamp's light that reaches height `z` above a cell.
+    #[inline(always)]
+    pub fn light(&self, shadow: &Shadow, cell: Option<usize>, z: f32) -> f32 {
+        cell.map_or(1.0, |idx| shadow.light_at(idx, z))
     }
 
     /// Prepares the light on the table itself: `light` is given the place, the share of light from all around and that of
@@ -187,10 +206,11 @@ impl Ground {
     /// What [`light_table`](Self::light_table) prepared, between cells.
     #[inline(always)]
     pub fn on_table(&self, [x, y]: [f32; 2]) -> [f32; 4] {
-        let gx = ((x - self.min[0]) / self.cell - 0.5).clamp(0.0, self.width as f32 - 1.01);
-        let gy = ((y - self.min[1]) / self.cell - 0.5).clamp(0.0, self.height as f32 - 1.01);
-        let (column, row) = (gx as usize, gy as usize);
+        let gx = ((x - self.min[0]) * self.inverse_cell - 0.5).max(0.01).min(self.width as f32 - 1.01);
+        let gy = ((y - self.min[1]) * self.inverse_cell - 0.5).max(0.01).min(self.height as f32 - 1.01);
+        let (column, row) = (floor(gx), floor(gy));
         let (fx, fy) = (gx - column as f32, gy - row as f32);
+        let (column, row) = (column as usize, row as usize);
         let idx = row * self.width + column;
         let (upper, lower) = (&self.table_light[idx..idx + 2], &self.table_light[idx + self.width..][..2]);
         let mut sum = [0.0; 4];
@@ -212,7 +232,7 @@ fn open_share(around: f32, z: f32, radius: f32) -> f32 {
 impl Shadow {
     #[inline(always)]
     fn light_at(&self, idx: usize, z: f32) -> f32 {
-        let lit = self.heights[idx].map(|height| (1.0 - (height - z - 0.15) / self.softness).clamp(0.0, 1.0));
+        let lit = self.heights[idx].map(|height| (1.0 - (height - z - 0.15) * self.inverse_softness).clamp(0.0, 1.0));
         0.25 * (lit[0] + lit[1] + lit[2] + lit[3])
     }
 }

@@ -4,6 +4,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::random::Draw;
 use crate::recipe::Material;
+use crate::tiles::floor;
 
 /// Side of the map of reflections.
 const SIDE: usize = 32;
@@ -31,8 +32,8 @@ pub(crate) struct Lighting {
     pub ambient: [f32; 3],
     /// Change of the light across the picture, a share for a picture's width: x, y.
     pub gradient: [f32; 2],
-    /// What is reflected in a direction, by roughness.
-    maps: Vec<Vec<[f32; 3]>>,
+    /// What is reflected in a direction, by roughness; the fourth channel is unused.
+    maps: Vec<Vec<[f32; 4]>>,
 }
 
 /// What kind of light is drawn.
@@ -95,21 +96,21 @@ impl Lighting {
     }
 
     /// What a surface of a roughness reflects from a direction, the mean over its lobe.
-    #[inline]
-    pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 3] {
+    #[inline(always)]
+    pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 4] {
         let half = 0.5 * SIDE as f32;
-        let x = (direction[0] + 1.0) * half - 0.5;
-        let y = (direction[1] + 1.0) * half - 0.5;
-        let (column, row) = (x.clamp(0.0, SIDE as f32 - 1.01), y.clamp(0.0, SIDE as f32 - 1.01));
-        let (fx, fy) = (column.fract(), row.fract());
-        let map = &self.maps[level];
+        let x = (direction[0] * half + (half - 0.5)).max(0.01).min(SIDE as f32 - 1.01);
+        let y = (direction[1] * half + (half - 0.5)).max(0.01).min(SIDE as f32 - 1.01);
+        let (column, row) = (floor(x), floor(y));
+        let (fx, fy) = (x - column as f32, y - row as f32);
         let idx = row as usize * SIDE + column as usize;
-        let (a, b, c, d) = (&map[idx], &map[idx + 1], &map[idx + SIDE], &map[idx + SIDE + 1]);
-        let mut sum = [0.0; 3];
-        for k in 0..3 {
-            let upper = a[k] + (b[k] - a[k]) * fx;
-            let lower = c[k] + (d[k] - c[k]) * fx;
-            sum[k] = upper + (lower - upper) * fy;
+        let map = &self.maps[level];
+        let (upper, lower) = (&map[idx..idx + 2], &map[idx + SIDE..][..2]);
+        let mut sum = [0.0; 4];
+        for k in 0..4 {
+            let a = upper[0][k] + (upper[1][k] - upper[0][k]) * fx;
+            let b = lower[0][k] + (lower[1][k] - lower[0][k]) * fx;
+            sum[k] = a + (b - a) * fy;
         }
         sum
     }
@@ -132,7 +133,7 @@ fn tint(rng: &mut Pcg64Mcg, share: f32) -> [f32; 3] {
 }
 
 /// The upper half of the surroundings seen in a level mirror: walls, ceiling, windows, the dark camera above.
-fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut Pcg64Mcg) -> Vec<Vec<[f32; 3]>> {
+fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut Pcg64Mcg) -> Vec<Vec<[f32; 4]>> {
     let (ceiling, wall) = (rng.uniform(0.7, 1.5), rng.uniform(0.25, 1.0));
     let lean = [rng.uniform(-0.6, 0.6), rng.uniform(-0.6, 0.6)];
     // Windows and soft boxes: centre, half size, turn, brightness.
@@ -174,7 +175,7 @@ fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut P
             for lamp in lamps {
                 add_lamp(&mut blurred, lamp, blur);
             }
-            blurred
+            blurred.into_iter().map(|[red, green, blue]| [red, green, blue, 0.0]).collect()
         })
         .collect()
 }

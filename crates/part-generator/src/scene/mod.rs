@@ -1,6 +1,7 @@
 //! Pictures of parts on tables, with the truth.
 
 mod config;
+mod edges;
 mod ground;
 mod layout;
 mod light;
@@ -10,6 +11,7 @@ mod render;
 mod sample;
 mod scenes;
 mod sensor;
+mod shading;
 mod table;
 mod view;
 

@@ -8,7 +8,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, oute
 
 use super::light::{LightStyle, Lighting};
 use super::placement::Placement;
-use super::render::{Footprint, Scene};
+use super::render::{Canvas, Footprint, Scene};
 use super::sensor::{self, Sensor};
 use super::table::{Table, TableStyle};
 use super::view::View;
@@ -85,8 +85,9 @@ impl DemonstrationPhoto {
             far_shadow: None,
         };
         let sensor = Sensor::clean(&mut rng);
-        let mut rendered = scene.render(1);
-        let image = sensor::take(&mut rendered.light, config.width as usize, &sensor, &mut rng);
+        let mut canvas = Canvas::default();
+        let rendered = scene.render(1, &mut canvas);
+        let image = sensor::take(&mut canvas, config.width as usize, &sensor, &mut rng);
         let pose = pose(&scene, 0);
         let silhouette = Silhouette::of(&rendered.footprints[0]);
         let outline = silhouette.outline().map(|outline| outline.clip(config.width.into(), config.height.into()));

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use crate::Part;
-use crate::relief::{Level, Texel};
+use crate::relief::{BLOCK_CELLS, Level, Texel};
+use crate::tiles::floor;
 
 use super::view::{Sight, View};
 
@@ -151,11 +152,13 @@ impl Placement {
         // The heights between which the sight is above the grid.
         let (mut high, mut low) = (relief.top_mm, 0.0f32);
         for (s, d, size) in [(start[0], drift[0], level.width as f32), (start[1], drift[1], level.height as f32)] {
-            if d.abs() < 1e-6 {
-                if s < 0.0 || s >= size {
-                    return None;
-                }
+            let upper = s + d * relief.top_mm;
+            let (near, far) = (s.min(upper), s.max(upper));
+            if near >= 0.0 && far < size {
                 continue;
+            }
+            if far < 0.0 || near >= size {
+                return None;
             }
             let (a, b) = ((0.0 - s) / d, (size - s) / d);
             high = high.min(a.max(b));
@@ -164,23 +167,33 @@ impl Placement {
         if high < low {
             return None;
         }
-        let sideways = (drift[0] * drift[0] + drift[1] * drift[1]).sqrt() * (high - low);
-        let steps = (sideways as usize + 2).min(MAX_STEPS);
+        let slant = (drift[0] * drift[0] + drift[1] * drift[1]).sqrt();
+        if slant * (high - low) < 2.0 * BLOCK_CELLS as f32 {
+            // The whole piece of the sight lies within a block of its middle.
+            let middle = 0.5 * (high + low);
+            let (gx, gy) = (start[0] + drift[0] * middle, start[1] + drift[1] * middle);
+            high = high.min(level.top_around(gx, gy) as f32 * relief.step);
+            if high <= 0.0 || high < low {
+                return None;
+            }
+        }
+        let steps = (floor(slant * (high - low)) as usize + 1).clamp(1, MAX_STEPS);
         let step = (high - low) / steps as f32;
         let mut above = high + step;
         for k in 0..=steps {
             let z = high - step * k as f32;
             let (gx, gy) = (start[0] + drift[0] * z, start[1] + drift[1] * z);
-            let texel = level.get(gx as i32, gy as i32);
+            let (column, row) = (floor(gx), floor(gy));
+            let texel = level.get(column, row);
             let top = texel.top as f32 * relief.step;
             if texel.top > 0 && z <= top + 0.01 && above >= texel.bottom as f32 * relief.step {
                 if top > above + MIN_WALL_MM {
                     let z = 0.5 * (z + above).min(2.0 * top);
-                    let wall = self.wall_normal(level, gx as i32, gy as i32, drift);
+                    let wall = self.wall_normal(level, column, row, drift);
                     return Some(Contact { z: z + self.base, texel, wall });
                 }
                 // Where the sight passes the upper side.
-                let exact = level.get((start[0] + drift[0] * top) as i32, (start[1] + drift[1] * top) as i32);
+                let exact = level.get(floor(start[0] + drift[0] * top), floor(start[1] + drift[1] * top));
                 let texel = if exact.top > 0 && exact.top.abs_diff(texel.top) < 100 { exact } else { texel };
                 return Some(Contact { z: top + self.base, texel, wall: [0.0; 2] });
             }

@@ -4,11 +4,12 @@ use image::RgbImage;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
+use super::render::Canvas;
 use crate::random::{Draw, scramble};
-use crate::tiles::Tiles;
+use crate::tiles::{Tiles, floor};
 
-/// Entries of the tone curve.
-const CURVE: usize = 4096;
+/// Entries of the tone curve; a power of two.
+const CURVE: usize = 1024;
 
 /// What the camera does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,29 +36,36 @@ pub(crate) struct Sensor {
     pub jpeg: Option<u8>,
 }
 
-/// Takes the picture.
-pub(crate) fn take(light: &mut Vec<[f32; 3]>, width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
+/// Takes the picture on the canvas.
+pub(crate) fn take(canvas: &mut Canvas, width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
+    let Canvas { light, spare, .. } = canvas;
     let height = light.len() / width;
     // Automatic exposure brings the mean half-way to middle grey.
     let mean = light.iter().step_by(7).map(|p| p[1].min(1.5)).sum::<f32>() / light.len().div_ceil(7) as f32;
     let automatic = (0.33 / mean.max(0.01)).powf(0.55).clamp(0.5, 2.4);
     let gain = sensor.white_balance.map(|w| w * automatic * sensor.exposure);
+    // Squares of the distance from the middle, from 0 to 1, times the loss.
+    let loss_at = |k: usize, count: usize| {
+        let v = (k as f32 + 0.5) / count as f32 * 2.0 - 1.0;
+        sensor.vignetting * 0.5 * v * v
+    };
+    let losses: Vec<f32> = (0..width).map(|x| loss_at(x, width)).collect();
     for (y, row) in light.chunks_exact_mut(width).enumerate() {
-        let v = (y as f32 + 0.5) / height as f32 * 2.0 - 1.0;
-        for (x, pixel) in row.iter_mut().enumerate() {
-            let u = (x as f32 + 0.5) / width as f32 * 2.0 - 1.0;
-            let loss = 1.0 - sensor.vignetting * 0.5 * (u * u + v * v);
-            let lit = [0, 1, 2].map(|k| pixel[k] * gain[k] * loss);
+        let kept = 1.0 - loss_at(y, height);
+        for (pixel, loss) in row.iter_mut().zip(&losses) {
+            let lit = [0, 1, 2].map(|k| pixel[k] * gain[k] * (kept - loss));
             let grey = 0.3 * lit[0] + 0.59 * lit[1] + 0.11 * lit[2];
             // Clipped before blurring, not by much: highlights bloom a little.
             *pixel = lit.map(|c| (grey + (c - grey) * sensor.saturation + sensor.veil).clamp(0.0, 2.5));
         }
     }
     if sensor.motion[0].hypot(sensor.motion[1]) > 0.7 {
-        motion(light, width, sensor.motion);
+        spare.clone_from(light);
+        motion(spare, light, width, sensor.motion);
     }
     if sensor.blur > 0.2 {
-        blur(light, width, sensor.blur);
+        spare.resize(light.len(), [0.0; 3]);
+        blur(light, spare, width, sensor.blur);
     }
     let image = expose(light, width, sensor, rng);
     match sensor.jpeg {
@@ -66,93 +74,106 @@ pub(crate) fn take(light: &mut Vec<[f32; 3]>, width: usize, sensor: &Sensor, rng
     }
 }
 
-/// A normal blur, one axis after the other.
-fn blur(light: &mut Vec<[f32; 3]>, width: usize, sigma: f32) {
+/// A normal blur, one axis after the other; `spare` is as long as the picture.
+fn blur(light: &mut [[f32; 3]], spare: &mut [[f32; 3]], width: usize, sigma: f32) {
     let height = light.len() / width;
     let reach = ((2.3 * sigma).ceil() as usize).clamp(1, 12);
     let weights: Vec<f32> = (0..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
     let total = weights[0] + 2.0 * weights[1..].iter().sum::<f32>();
     let weights: Vec<f32> = weights.iter().map(|w| w / total).collect();
-    let mut padded = vec![[0.0f32; 3]; width + 2 * reach];
-    for row in light.chunks_exact_mut(width) {
-        padded[reach..reach + width].copy_from_slice(row);
-        padded[..reach].fill(row[0]);
-        padded[reach + width..].fill(row[width - 1]);
-        row.iter_mut().zip(&padded[reach..]).for_each(|(out, center)| *out = center.map(|c| c * weights[0]));
+    // Channels of neighbouring pixels stand side by side: the loops below take several values at once.
+    let (light, spare, row_len) = (light.as_flattened_mut(), spare.as_flattened_mut(), 3 * width);
+    let mut padded = vec![0.0f32; row_len + 6 * reach];
+    let (start, end) = (3 * reach, 3 * reach + row_len);
+    for (row, out) in light.chunks_exact(row_len).zip(spare.chunks_exact_mut(row_len)) {
+        padded[start..end].copy_from_slice(row);
+        for k in 0..start {
+            padded[k] = row[k % 3];
+            padded[end + k] = row[row_len - 3 + k % 3];
+        }
+        out.iter_mut().zip(&padded[start..]).for_each(|(out, center)| *out = center * weights[0]);
         for (d, &weight) in weights.iter().enumerate().skip(1) {
-            let (left, right) = (&padded[reach - d..], &padded[reach + d..]);
-            for ((out, a), b) in row.iter_mut().zip(left).zip(right) {
-                for k in 0..3 {
-                    out[k] += (a[k] + b[k]) * weight;
-                }
+            let (left, right) = (&padded[start - 3 * d..][..row_len], &padded[start + 3 * d..][..row_len]);
+            for ((out, a), b) in out.iter_mut().zip(left).zip(right) {
+                *out += (a + b) * weight;
             }
         }
     }
-    let source = light.clone();
     let row = |y: isize| {
         let y = y.clamp(0, height as isize - 1) as usize;
-        &source[y * width..(y + 1) * width]
+        &spare[y * row_len..(y + 1) * row_len]
     };
-    for (y, out) in light.chunks_exact_mut(width).enumerate() {
-        out.iter_mut().for_each(|pixel| *pixel = pixel.map(|c| c * weights[0]));
+    for (y, out) in light.chunks_exact_mut(row_len).enumerate() {
+        out.iter_mut().zip(row(y as isize)).for_each(|(out, center)| *out = center * weights[0]);
         for (d, &weight) in weights.iter().enumerate().skip(1) {
             let (above, below) = (row(y as isize - d as isize), row(y as isize + d as isize));
             for ((out, a), b) in out.iter_mut().zip(above).zip(below) {
-                for k in 0..3 {
-                    out[k] += (a[k] + b[k]) * weight;
-                }
+                *out += (a + b) * weight;
             }
         }
     }
 }
 
 /// The mean along the camera's way.
-fn motion(light: &mut [[f32; 3]], width: usize, way: [f32; 2]) {
+fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 2]) {
     let height = light.len() / width;
     let taps = (way[0].hypot(way[1]).ceil() as usize + 1).clamp(2, 24);
-    let source = light.to_vec();
     let share = 1.0 / taps as f32;
     let offsets: Vec<[isize; 2]> = (0..taps)
         .map(|tap| tap as f32 / (taps - 1) as f32 - 0.5)
         .map(|t| [(way[0] * t).round() as isize, (way[1] * t).round() as isize])
         .collect();
-    for (y, out) in light.chunks_exact_mut(width).enumerate() {
-        out.fill([0.0; 3]);
+    let reach = offsets.iter().map(|[dx, _]| dx.unsigned_abs()).max().unwrap_or(0);
+    let row_len = 3 * width;
+    let (source, mut padded) = (source.as_flattened(), vec![0.0f32; row_len + 6 * reach]);
+    let (start, end) = (3 * reach, 3 * reach + row_len);
+    for (y, out) in light.as_flattened_mut().chunks_exact_mut(row_len).enumerate() {
+        out.fill(0.0);
         for &[dx, dy] in &offsets {
             let v = (y as isize + dy).clamp(0, height as isize - 1) as usize;
-            let row = &source[v * width..(v + 1) * width];
-            for (x, pixel) in out.iter_mut().enumerate() {
-                let u = (x as isize + dx).clamp(0, width as isize - 1) as usize;
-                for k in 0..3 {
-                    pixel[k] += row[u][k] * share;
-                }
+            let row = &source[v * row_len..][..row_len];
+            padded[start..end].copy_from_slice(row);
+            for k in 0..start {
+                padded[k] = row[k % 3];
+                padded[end + k] = row[row_len - 3 + k % 3];
             }
+            let shifted = &padded[start.wrapping_add_signed(3 * dx)..][..row_len];
+            out.iter_mut().zip(shifted).for_each(|(out, value)| *out += value * share);
         }
     }
 }
 
 /// The tone curve, noise, and rounding to 8 bits.
 fn expose(light: &[[f32; 3]], width: usize, sensor: &Sensor, rng: &mut Pcg64Mcg) -> RgbImage {
-    let curve: Vec<f32> = (0..CURVE)
-        .map(|k| {
-            let v = k as f32 / (CURVE - 1) as f32;
-            let encoded = if v < 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
-            255.0 * encoded.powf(sensor.contrast)
-        })
-        .collect();
+    // Over the square root of light: the curve is steep near black.
+    let curve: [f32; CURVE] = std::array::from_fn(|k| {
+        let root = k as f32 / (CURVE - 1) as f32;
+        let v = root * root;
+        let encoded = if v < 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        255.0 * encoded.powf(sensor.contrast)
+    });
     let tiles = Tiles::get();
     let address: u64 = rng.random();
     let sigma = 255.0 * sensor.noise;
+    let row_len = 3 * width;
     let mut bytes = vec![0u8; 3 * light.len()];
-    for (y, (row, out)) in light.chunks_exact(width).zip(bytes.chunks_exact_mut(3 * width)).enumerate() {
-        let noise = tiles.normals(scramble(address.wrapping_add(y as u64)), 3 * width + 3);
-        for (x, (pixel, out)) in row.iter().zip(out.chunks_exact_mut(3)).enumerate() {
+    let mut values = vec![0.0f32; row_len];
+    for (y, (row, out)) in light.as_flattened().chunks_exact(row_len).zip(bytes.chunks_exact_mut(row_len)).enumerate() {
+        let noise = tiles.normals(scramble(address.wrapping_add(y as u64)), row_len + 3);
+        for (value, light) in values.iter_mut().zip(row) {
+            *value = light.min(1.0).sqrt() * (CURVE - 1) as f32 + 0.5;
+        }
+        for value in &mut values {
+            // From 0 to CURVE - 1; the mask spares a check.
+            *value = curve[floor(*value) as usize & (CURVE - 1)];
+        }
+        let pixels = values.chunks_exact(3).zip(noise.chunks_exact(3)).zip(noise[3..].iter().step_by(3));
+        for (((value, noise), shared), out) in pixels.zip(out.chunks_exact_mut(3)) {
             // Part of the noise is shared by the channels.
-            let shared = noise[3 * x + 3];
             for k in 0..3 {
-                let value = curve[(pixel[k].min(1.0) * (CURVE - 1) as f32) as usize];
-                let strength = sigma * (0.45 + 0.55 * (value * (1.0 / 128.0)).min(1.3));
-                out[k] = (value + strength * (0.75 * noise[3 * x + k] + 0.6 * shared) + 0.5) as u8;
+                let strength = sigma * (0.45 + 0.55 * (value[k] * (1.0 / 128.0)).min(1.3));
+                let noisy = value[k] + strength * (0.75 * noise[k] + 0.6 * shared);
+                out[k] = floor(noisy.clamp(0.0, 255.0) + 0.5) as u8;
             }
         }
     }

@@ -4,7 +4,9 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::random::Draw;
 use crate::recipe::paint_color;
-use crate::tiles::{Tile, Tiles, floor};
+use crate::tiles::{Tile, Tiles};
+
+mod color;
 
 /// A layer of noise over the base colour.
 struct Layer {
@@ -238,111 +240,6 @@ impl Table {
     fn shine(&mut self, gloss: f32, rng: &mut Pcg64Mcg) {
         self.gloss = if gloss < 0.02 { 0.0 } else { gloss };
         self.gloss_level = rng.whole(1, 3);
-    }
-
-    /// The colour at a place, in linear light, and two slopes of its grain; `mm_per_px` smooths lines.
-    #[inline]
-    pub fn color(&self, place: [f32; 2], mm_per_px: f32) -> [f32; 3] {
-        let [sin, cos] = self.sin_cos;
-        let x = cos * place[0] + sin * place[1] + self.shift[0];
-        let y = cos * place[1] - sin * place[0] + self.shift[1];
-        let mut color = self.base;
-        self.print(x, y, mm_per_px, &mut color);
-        for layer in &self.layers {
-            let (u, v) = (x * layer.scale[0] + layer.shift[0], y * layer.scale[1] + layer.shift[1]);
-            // Texels finer than pixels need nothing between them.
-            let fine = layer.scale[0].min(layer.scale[1]) * mm_per_px > 0.6;
-            let value = if fine { layer.tile.nearest(u, v) } else { layer.tile.at(u, v) };
-            for k in 0..3 {
-                color[k] += value * layer.color[k];
-            }
-        }
-        color.map(|c| c.max(0.004))
-    }
-
-    #[inline]
-    fn print(&self, x: f32, y: f32, mm_per_px: f32, color: &mut [f32; 3]) {
-        let mix = |color: &mut [f32; 3], other: &[f32; 3], share: f32| {
-            for k in 0..3 {
-                color[k] += (other[k] - color[k]) * share;
-            }
-        };
-        // How much of a pixel lies within `half` of a line at distance `d`.
-        let inside =
-            |d: f32, half: f32| ((half - d) / mm_per_px + 0.5).clamp(0.0, 1.0) * (2.0 * half / mm_per_px).min(1.0);
-        let to_line = |v: f32, pitch: f32| (v - pitch * floor(v / pitch + 0.5) as f32).abs();
-        match &self.pattern {
-            Pattern::None => {}
-            Pattern::Grid { pitch, width, color: ink } => {
-                let fine = inside(to_line(x, *pitch).min(to_line(y, *pitch)), 0.5 * width);
-                let strong = inside(to_line(x, 5.0 * pitch).min(to_line(y, 5.0 * pitch)), 0.9 * width);
-                mix(color, ink, (0.5 * fine).max(strong));
-            }
-            Pattern::Checks { pitch, color: other } => {
-                let (u, v) = (x / pitch, y / pitch);
-                // Distance to the next edge, signed by the square's colour.
-                let odd = (floor(u) + floor(v)) & 1 == 1;
-                let d = to_line(x, *pitch).min(to_line(y, *pitch));
-                let share = (d / mm_per_px + 0.5).clamp(0.0, 1.0);
-                mix(color, other, if odd { share } else { 1.0 - share });
-            }
-            Pattern::Boards { width, length, joint, vary } => {
-                let board = floor(y / width) as f32;
-                let offset = self.tiles.grain.nearest(board * 7.0, board * 3.0) * length;
-                let piece = floor((x + offset) / length) as f32;
-                let shade = 1.0 + vary * self.tiles.grain.nearest(board * 5.0 + 11.0, piece * 13.0 + board);
-                let d = to_line(y, *width).min(to_line(x + offset, *length));
-                let dark = 1.0 - 0.7 * inside(d, 0.5 * joint);
-                color.iter_mut().for_each(|c| *c *= shade * dark);
-            }
-            Pattern::Dots { pitch, radius, color: other } => {
-                let (dx, dy) = (to_line(x, *pitch), to_line(y, *pitch));
-                mix(color, other, ((radius - (dx * dx + dy * dy).sqrt()) / mm_per_px + 0.5).clamp(0.0, 1.0));
-            }
-            Pattern::Waves { pitch, strength } => {
-                let fade = (pitch / (2.5 * mm_per_px)).min(1.0);
-                let shade = 1.0 + fade * strength * (std::f32::consts::TAU * y / pitch).sin();
-                color.iter_mut().for_each(|c| *c *= shade);
-            }
-            Pattern::Weave { pitch, strength } => {
-                let fade = (pitch / (2.5 * mm_per_px)).min(1.0);
-                let k = std::f32::consts::TAU / pitch;
-                let shade = 1.0 + fade * strength * (k * x).sin() * (k * y).sin();
-                color.iter_mut().for_each(|c| *c *= shade);
-            }
-            Pattern::Text { pitch, color: ink } => {
-                let line = floor(y / pitch) as f32;
-                let within = y / pitch - line;
-                let letter = floor(x / (0.55 * pitch)) as f32;
-                let written = self.tiles.cloud.nearest(letter * 0.31, line * 17.0) > -0.5
-                    && self.tiles.grain.nearest(letter, line * 3.0) > -0.55;
-                if written && within > 0.25 && within < 0.75 {
-                    let stroke = self.tiles.grain.at(x / pitch * 7.0, y / pitch * 7.0);
-                    let legible = (0.55 * pitch / (3.0 * mm_per_px)).min(1.0);
-                    let share = (0.5 + 2.5 * stroke).clamp(0.0, 1.0) * legible + 0.4 * (1.0 - legible);
-                    mix(color, ink, share);
-                }
-            }
-            Pattern::Sheets(sheets) => {
-                for (normal, distance, other) in sheets {
-                    let (dx, dy) = (x - self.shift[0], y - self.shift[1]);
-                    let d = normal[0] * dx + normal[1] * dy - distance;
-                    mix(color, other, (d / mm_per_px + 0.5).clamp(0.0, 1.0));
-                }
-            }
-        }
-    }
-
-    /// Slopes of the top's grain at a place.
-    #[inline]
-    pub fn slopes(&self, place: [f32; 2]) -> [f32; 2] {
-        if self.ripple <= 0.0 {
-            return [0.0; 2];
-        }
-        let [sin, cos] = self.sin_cos;
-        let (x, y) = (cos * place[0] + sin * place[1], cos * place[1] - sin * place[0]);
-        let across = self.ripple * self.tiles.streak.at(0.3 * x, 1.3 * y);
-        [-sin * across, cos * across]
     }
 
     /// The mean colour, roughly: what walls and shiny parts reflect from below.

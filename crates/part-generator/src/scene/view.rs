@@ -16,6 +16,28 @@ pub(crate) struct View {
     axes: [[f32; 3]; 3],
 }
 
+/// The lines of sight of a row of the picture.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SightRow {
+    position: [f32; 3],
+    /// Direction at the left edge, and its change for a pixel.
+    first: [f32; 3],
+    step: [f32; 3],
+}
+
+impl SightRow {
+    /// The line of sight through a place in the row.
+    #[inline(always)]
+    pub fn at(&self, px: f32) -> Sight {
+        let ray = [0, 1, 2].map(|k| self.first[k] + self.step[k] * px);
+        // Down at least a little, so that the sight meets the table.
+        let inverse = 1.0 / ray[2].min(-0.05);
+        let drift = [ray[0] * inverse, ray[1] * inverse];
+        let z = self.position[2];
+        Sight { foot: [self.position[0] - drift[0] * z, self.position[1] - drift[1] * z], drift }
+    }
+}
+
 /// A line of sight: where it meets the table, and how far it moves sideways for a millimetre of height.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sight {
@@ -52,16 +74,21 @@ impl View {
         Self { width: width as usize, height: height as usize, focal, position, axes }
     }
 
-    /// The line of sight through a place in the picture.
-    #[inline(always)]
-    pub fn sight(&self, px: f32, py: f32) -> Sight {
-        let (x, y) = ((px - 0.5 * self.width as f32) / self.focal, (py - 0.5 * self.height as f32) / self.focal);
+    /// The lines of sight through a row of the picture.
+    #[inline]
+    pub fn row(&self, py: f32) -> SightRow {
         let [u, v, w] = &self.axes;
-        let ray = [w[0] + u[0] * x + v[0] * y, w[1] + u[1] * x + v[1] * y, w[2] + u[2] * x + v[2] * y];
-        // Down at least a little, so that the sight meets the table.
-        let drift = [ray[0] / ray[2].min(-0.05), ray[1] / ray[2].min(-0.05)];
-        let z = self.position[2];
-        Sight { foot: [self.position[0] - drift[0] * z, self.position[1] - drift[1] * z], drift }
+        let (left, y) = (-0.5 * self.width as f32 / self.focal, (py - 0.5 * self.height as f32) / self.focal);
+        SightRow {
+            position: self.position,
+            first: [0, 1, 2].map(|k| w[k] + u[k] * left + v[k] * y),
+            step: u.map(|c| c / self.focal),
+        }
+    }
+
+    /// The line of sight through a place in the picture.
+    pub fn sight(&self, px: f32, py: f32) -> Sight {
+        self.row(py).at(px)
     }
 
     /// Where a point appears; none behind the camera.
