@@ -7,7 +7,9 @@
 
 use sdg_shape::{SearchConfig, ShapeConfig};
 
+#[cfg(feature = "teach")]
 use crate::calibration::Calibration;
+#[cfg(feature = "teach")]
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 
@@ -123,6 +125,7 @@ pub struct ThresholdConfig {
 }
 
 /// With fewer negatives that agree at all there is no mean. Chosen by hand, not measured.
+#[cfg(feature = "teach")]
 const MIN_NEGATIVES: usize = 3;
 
 impl ThresholdConfig {
@@ -130,6 +133,7 @@ impl ThresholdConfig {
     pub const DEFAULT: Self = Self { above_negatives: 0.2, bounds: [0.44, 0.6], without_negatives: 0.5, slope: 25.0 };
 
     /// The calibration of a part whose negatives agree so well: the highest agreement in each, where there was any.
+    #[cfg(feature = "teach")]
     pub(crate) fn calibration(&self, negatives: &[f64]) -> Calibration {
         let threshold = if negatives.len() < MIN_NEGATIVES {
             self.without_negatives
@@ -190,6 +194,7 @@ mod tests {
         assert_eq!(penalty.apply(0.2, 2.0), 0.0);
     }
 
+    #[cfg(feature = "teach")]
     #[test]
     fn the_threshold_stands_above_the_negatives_mean_within_bounds() {
         let config = ThresholdConfig::default();
