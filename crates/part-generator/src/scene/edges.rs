@@ -57,6 +57,8 @@ pub(crate) fn smooth_edges(
     }
     let mut table_row = TableRow::default();
     let mut drawn: Vec<(usize, [f32; 3])> = Vec::new();
+    // The row of the picture that they belong to, and for each body its lines of sight at the samples' heights.
+    let (mut rows_at, mut rows) = (usize::MAX, Vec::new());
     for (idx, _) in on_edge.iter().enumerate().filter(|(_, on_edge)| **on_edge) {
         let (x, y) = (idx % width, idx / width);
         // The pixel itself and its neighbours, as far as there are any.
@@ -75,9 +77,14 @@ pub(crate) fn smooth_edges(
             continue;
         }
         bodies.sort_unstable();
+        if rows_at != y {
+            rows_at = y;
+            rows.clear();
+            let sights = EDGE_SAMPLES.map(|[_, dy]| scene.view.row(y as f32 + dy));
+            rows.extend(scene.bodies.iter().map(|body| [0, 1, 2, 3].map(|k| body.grid_row(&sights[k]))));
+        }
         let mut sum = [0.0f32; 3];
-        for [dx, dy] in EDGE_SAMPLES {
-            let sight = scene.view.row(y as f32 + dy).at(x as f32 + dx);
+        for (sample, [dx, dy]) in EDGE_SAMPLES.into_iter().enumerate() {
             let mut nearest: Option<(u8, Contact)> = None;
             for (k, &body) in bodies.iter().enumerate() {
                 if body == TABLE || (k > 0 && bodies[k - 1] == body) {
@@ -87,7 +94,7 @@ pub(crate) fn smooth_edges(
                 if x < x0 || x >= x1 || y < y0 || y >= y1 {
                     continue;
                 }
-                if let Some(contact) = scene.bodies[body as usize].meet(&sight)
+                if let Some(contact) = scene.bodies[body as usize].meet(&rows[body as usize][sample].at(x as f32 + dx))
                     && nearest.as_ref().is_none_or(|(_, other)| contact.z > other.z)
                 {
                     nearest = Some((body, contact));
@@ -99,7 +106,9 @@ pub(crate) fn smooth_edges(
             });
             let sample = match (same, &nearest) {
                 (Some(other), _) => light[other],
-                (None, Some((body, contact))) => shading.body(*body, contact, &sight),
+                (None, Some((body, contact))) => {
+                    shading.body(*body, contact, &scene.view.row(y as f32 + dy).at(x as f32 + dx))
+                }
                 (None, None) => {
                     let mut one = [[0.0; 3]];
                     shading.table_row(&scene.view, x as f32 + dx, y as f32 + dy, &mut table_row, &mut one);

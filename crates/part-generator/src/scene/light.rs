@@ -168,10 +168,14 @@ fn reflections(lamps: &[Lamp], ambient: [f32; 3], style: LightStyle, rng: &mut P
         }
         *texel = ambient.map(|c| c * light.max(0.02) * 1.25);
     }
+    let mut spare = map.clone();
     BLURS
         .iter()
         .map(|&blur| {
-            let mut blurred = blurred(&map, blur);
+            let mut blurred = map.clone();
+            if blur > 0.0 {
+                super::blur::blur(&mut blurred, &mut spare, SIDE, blur);
+            }
             for lamp in lamps {
                 add_lamp(&mut blurred, lamp, blur);
             }
@@ -198,32 +202,4 @@ fn add_lamp(map: &mut [[f32; 3]], lamp: &Lamp, blur: f32) {
             }
         }
     }
-}
-
-/// A normal blur.
-fn blurred(map: &[[f32; 3]], sigma: f32) -> Vec<[f32; 3]> {
-    if sigma <= 0.0 {
-        return map.to_vec();
-    }
-    let reach = (2.0 * sigma).ceil() as i32;
-    let weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();
-    let total: f32 = weights.iter().sum();
-    let pass = |source: &[[f32; 3]], along_x: bool| -> Vec<[f32; 3]> {
-        (0..SIDE * SIDE)
-            .map(|idx| {
-                let (x, y) = ((idx % SIDE) as i32, (idx / SIDE) as i32);
-                let mut sum = [0.0f32; 3];
-                for (weight, d) in weights.iter().zip(-reach..) {
-                    let (u, v) = if along_x { (x + d, y) } else { (x, y + d) };
-                    let (u, v) = (u.clamp(0, SIDE as i32 - 1) as usize, v.clamp(0, SIDE as i32 - 1) as usize);
-                    let texel = &source[v * SIDE + u];
-                    for k in 0..3 {
-                        sum[k] += weight * texel[k];
-                    }
-                }
-                sum.map(|s| s / total)
-            })
-            .collect()
-    };
-    pass(&pass(map, true), false)
 }

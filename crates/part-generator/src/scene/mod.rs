@@ -1,5 +1,6 @@
 //! Pictures of parts on tables, with the truth.
 
+mod blur;
 mod config;
 mod edges;
 mod ground;

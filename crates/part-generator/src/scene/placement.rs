@@ -6,7 +6,7 @@ use crate::Part;
 use crate::relief::{BLOCK_CELLS, Level, Texel};
 use crate::tiles::floor;
 
-use super::view::{Sight, View};
+use super::view::{Sight, SightRow, View};
 
 /// A wall is what a sight meets this far below the upper side, in millimetres.
 const MIN_WALL_MM: f32 = 0.4;
@@ -138,17 +138,47 @@ impl Placement {
             .collect()
     }
 
-    /// The first point of the part along a line of sight.
+    /// The lines of sight of a row of the picture in the part's grid: in cells, heights from the part's underside in
+    /// millimetres.
+    #[inline]
+    pub fn grid_row(&self, row: &SightRow) -> SightRow {
+        let (min, inverse) = (self.part.relief.min, 1.0 / self.level().cell);
+        let turned = |v: [f32; 2]| self.direction_to_part(v).map(|c| c * inverse);
+        row.in_frame(turned, self.at, min.map(|v| v * inverse), self.base)
+    }
+
+    /// The most cells of the part's grid between neighbouring pixels of a row, within a box of pixels.
+    pub fn cells_per_px(&self, view: &View, [x0, y0, x1, y1]: [i32; 4]) -> f32 {
+        // The corners of the box are farthest and nearest to the camera.
+        let apart = |x: i32, y: i32| {
+            let row = self.grid_row(&view.row(y as f32));
+            let ([ax, ay], [bx, by]) = (row.at(x as f32).foot, row.at(x as f32 + 1.0).foot);
+            (bx - ax).hypot(by - ay)
+        };
+        [apart(x0, y0), apart(x1, y0), apart(x0, y1), apart(x1, y1)].into_iter().fold(0.0, f32::max)
+    }
+
+    /// Whether no line of sight within `reach` cells of one in the part's grid meets the part.
+    #[inline]
+    pub fn is_clear_around(&self, sight: &Sight, reach: f32) -> bool {
+        let (level, top_mm) = (self.level(), self.part.relief.top_mm);
+        let [dx, dy] = sight.drift.map(|d| d * top_mm);
+        let [x, y] = sight.at(0.5 * top_mm);
+        let reach = reach + 0.5 * (dx * dx + dy * dy).sqrt();
+        let (width, height) = (level.width as f32, level.height as f32);
+        if x < -reach || y < -reach || x > width + reach || y > height + reach {
+            return true;
+        }
+        let on_grid = x >= 0.0 && y >= 0.0 && x < width && y < height;
+        on_grid && reach < BLOCK_CELLS as f32 && level.top_around(x, y) == 0
+    }
+
+    /// The first point of the part along a line of sight in the part's grid.
     #[inline]
     pub fn meet(&self, sight: &Sight) -> Option<Contact> {
         let relief = &self.part.relief;
         let level = self.level();
-        let inverse = 1.0 / level.cell;
-        // Grid coordinates at the part's underside, and their change for a millimetre of height.
-        let foot = sight.at(self.base);
-        let local = self.direction_to_part([foot[0] - self.at[0], foot[1] - self.at[1]]);
-        let start = [(local[0] - relief.min[0]) * inverse, (local[1] - relief.min[1]) * inverse];
-        let drift = self.direction_to_part(sight.drift).map(|d| d * inverse);
+        let Sight { foot: start, drift } = *sight;
         // The heights between which the sight is above the grid.
         let (mut high, mut low) = (relief.top_mm, 0.0f32);
         for (s, d, size) in [(start[0], drift[0], level.width as f32), (start[1], drift[1], level.height as f32)] {

@@ -13,6 +13,9 @@ pub(crate) const TABLE: u8 = u8::MAX;
 /// Cells of the grid of heights that shadows are made from, in pixels.
 const GROUND_CELL_PX: f32 = 2.0;
 
+/// So many neighbouring pixels of a row are first looked at together.
+const GROUP_PX: i32 = 4;
+
 /// Everything that is drawn.
 pub(crate) struct Scene {
     pub view: View,
@@ -103,11 +106,16 @@ impl Scene {
         let body = &self.bodies[idx];
         let (width, height) = (self.view.width as i32, self.view.height as i32);
         let spans = body.row_spans(&self.view, bounds);
+        let reach = body.cells_per_px(&self.view, bounds) * 0.5 * GROUP_PX as f32;
         for (y, [first, end]) in (bounds[1]..bounds[3]).zip(spans) {
             (bounds[0]..first).for_each(|_| tell(false));
-            let sights = self.view.row(y as f32 + 0.5);
+            let sights = body.grid_row(&self.view.row(y as f32 + 0.5));
+            let mut clear_until = first;
             for x in first..end {
-                let met = body.meet(&sights.at(x as f32 + 0.5));
+                if (x - first) % GROUP_PX == 0 && body.is_clear_around(&sights.at((x + GROUP_PX / 2) as f32), reach) {
+                    clear_until = x + GROUP_PX;
+                }
+                let met = if x < clear_until { None } else { body.meet(&sights.at(x as f32 + 0.5)) };
                 tell(met.is_some());
                 if let Some(contact) = met
                     && (0..width).contains(&x)

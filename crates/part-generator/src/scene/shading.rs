@@ -11,6 +11,9 @@ use super::view::{Sight, View};
 /// Mirrored surroundings of a smooth table are found at every so many pixels, and lie on lines between.
 const GLOSS_STEP_PX: usize = 4;
 
+/// Those of a table with grain.
+const RIPPLE_STEP_PX: usize = 2;
+
 /// Scratches bend the directions that a brushed surface mirrors by these slopes.
 const BRUSHED_SLOPES: [f32; 3] = [-0.22, 0.0, 0.22];
 
@@ -25,6 +28,7 @@ pub(crate) struct Shading<'a> {
     below: [f32; 3],
     /// For each body its materials.
     surfaces: Vec<Vec<Surface>>,
+    exposure: Exposure,
 }
 
 /// A material of a body, as shading reads it.
@@ -62,12 +66,12 @@ impl<'a> Shading<'a> {
         ground.blur(contact_mm);
         let shadows: Vec<Shadow> =
             scene.lighting.lamps.iter().map(|lamp| ground.shadow(lamp.direction, lamp.radius)).collect();
-        let across = mm_per_px * scene.view.width as f32;
+        let exposure = Exposure::new(scene);
         ground.light_table(contact_mm, &shadows, |place, open, reached| {
-            light_on_table(scene, across, place, open, reached)
+            light_on_table(scene, &exposure, place, open, reached)
         });
         let surfaces = scene.bodies.iter().map(surfaces).collect();
-        Self { scene, ground, shadows, contact_mm, mm_per_px, below: scene.table.mean(), surfaces }
+        Self { scene, ground, shadows, contact_mm, mm_per_px, below: scene.table.mean(), surfaces, exposure }
     }
 
     /// Writes the light that a row of the table sends to the camera: pixels from `first_px` on, at `py`.
@@ -90,21 +94,24 @@ impl<'a> Shading<'a> {
         let mirrored_at = |k: usize, normal: [f32; 3]| {
             lighting.reflected(mirrored(towards_viewer(&sight(k)), normal), table.gloss_level)
         };
-        let is_smooth = table.ripple <= 0.0;
-        let (mut seen, mut next) = ([0.0; 4], mirrored_at(0, [0.0, 0.0, 1.0]));
+        let step = if table.ripple > 0.0 { RIPPLE_STEP_PX } else { GLOSS_STEP_PX };
+        let surroundings_at = |x: usize| {
+            if table.ripple > 0.0 {
+                let slopes = table.slopes(sight(x).foot);
+                mirrored_at(x, normalized([-slopes[0], -slopes[1], 1.0]))
+            } else {
+                mirrored_at(x, [0.0, 0.0, 1.0])
+            }
+        };
+        let (mut seen, mut next) = ([0.0; 4], surroundings_at(0));
         for (x, ((place, albedo), out)) in places.iter().zip(colors.iter()).zip(out).enumerate() {
             let light = self.ground.on_table(*place);
-            let surroundings = if is_smooth {
-                if x % GLOSS_STEP_PX == 0 {
-                    seen = next;
-                    next = mirrored_at(x + GLOSS_STEP_PX, [0.0, 0.0, 1.0]);
-                }
-                let share = (x % GLOSS_STEP_PX) as f32 / GLOSS_STEP_PX as f32;
-                [0, 1, 2, 3].map(|k| seen[k] + (next[k] - seen[k]) * share)
-            } else {
-                let slopes = table.slopes(*place);
-                mirrored_at(x, normalized([-slopes[0], -slopes[1], 1.0]))
-            };
+            if x % step == 0 {
+                seen = next;
+                next = surroundings_at(x + step);
+            }
+            let share = (x % step) as f32 / step as f32;
+            let surroundings = [0, 1, 2].map(|k| seen[k] + (next[k] - seen[k]) * share);
             *out = [0, 1, 2].map(|k| {
                 let gloss = (table.gloss * (0.3 + 0.7 * albedo[k])).min(0.6);
                 albedo[k] * light[k] + gloss * surroundings[k] * light[3]
@@ -163,8 +170,7 @@ impl<'a> Shading<'a> {
         let aside = 1.0 - dot(normal, view).clamp(0.0, 1.0);
         // Fresnel's rise of reflectance at grazing angles (Schlick 1994).
         let grazing = aside * aside * (aside * aside) * aside * surface.gloss;
-        let across = self.mm_per_px * self.scene.view.width as f32;
-        let factor = exposure(self.scene, across, place) * f32::from(texel.tone) * (1.0 / 128.0);
+        let factor = self.exposure.at(place) * f32::from(texel.tone) * (1.0 / 128.0);
         [0, 1, 2].map(|k| {
             let reflectance = surface.reflectance[k] + (1.0 - surface.reflectance[k]) * grazing;
             factor * (surface.albedo[k] * light[k] + reflectance * seen[k] * lit)
@@ -201,29 +207,46 @@ fn surfaces(body: &Placement) -> Vec<Surface> {
 }
 
 /// Light on the table (red, green, blue) and a factor for what it mirrors.
-fn light_on_table(scene: &Scene, across: f32, place: [f32; 2], open: f32, reached: &[f32]) -> [f32; 4] {
-    let exposure = exposure(scene, across, place);
-    let ambient = scene.lighting.ambient;
-    let mut light = [ambient[0] * open, ambient[1] * open, ambient[2] * open, open];
+#[inline]
+fn light_on_table(scene: &Scene, exposure: &Exposure, place: [f32; 2], open: f32, reached: &[f32]) -> [f32; 4] {
+    let factor = exposure.at(place);
+    let [red, green, blue] = scene.lighting.ambient;
+    let mut light = [red * open, green * open, blue * open, open];
     for (lamp, reached) in scene.lighting.lamps.iter().zip(reached) {
+        let level = lamp.direction[2] * reached;
         light[3] *= 0.4 + 0.6 * reached;
-        for k in 0..3 {
-            light[k] += lamp.color[k] * lamp.direction[2] * reached;
-        }
+        light[0] += lamp.color[0] * level;
+        light[1] += lamp.color[1] * level;
+        light[2] += lamp.color[2] * level;
     }
-    light.map(|l| l * exposure)
+    [light[0] * factor, light[1] * factor, light[2] * factor, light[3] * factor]
 }
 
-/// Change of the light across the picture, which is `across` millimetres wide, and shadows from outside.
-#[inline(always)]
-fn exposure(scene: &Scene, across: f32, place: [f32; 2]) -> f32 {
-    let g = scene.lighting.gradient;
-    let mut factor = 1.0 + (g[0] * place[0] + g[1] * place[1]) / across;
-    if let Some((normal, distance, soft, strength)) = scene.far_shadow {
-        let d = normal[0] * place[0] + normal[1] * place[1] - distance;
-        factor *= 1.0 - strength * (d / soft + 0.5).clamp(0.0, 1.0);
+/// Change of the light across the picture, and the shadow from outside.
+struct Exposure {
+    /// For a millimetre in x and in y.
+    gradient: [f32; 2],
+    /// For a millimetre in x and in y and at the origin: 0 to 1 across the shadow's edge.
+    edge: [f32; 3],
+    strength: f32,
+}
+
+impl Exposure {
+    fn new(scene: &Scene) -> Self {
+        let across = scene.view.mm_per_px() * scene.view.width as f32;
+        let gradient = scene.lighting.gradient.map(|g| g / across);
+        let (edge, strength) = scene.far_shadow.map_or(([0.0; 3], 0.0), |(normal, distance, soft, strength)| {
+            ([normal[0] / soft, normal[1] / soft, 0.5 - distance / soft], strength)
+        });
+        Self { gradient, edge, strength }
     }
-    factor.max(0.1)
+
+    #[inline(always)]
+    fn at(&self, [x, y]: [f32; 2]) -> f32 {
+        let dark = (self.edge[0] * x + self.edge[1] * y + self.edge[2]).clamp(0.0, 1.0);
+        let factor = 1.0 + self.gradient[0] * x + self.gradient[1] * y;
+        (factor * (1.0 - self.strength * dark)).max(0.1)
+    }
 }
 
 #[inline(always)]

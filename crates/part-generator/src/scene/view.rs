@@ -26,6 +26,22 @@ pub(crate) struct SightRow {
 }
 
 impl SightRow {
+    /// The same lines in another frame, in which [`Sight::foot`] lies at height `base`: `turned` takes directions to it,
+    /// `origin` is the place that it turns about, and `min` is what lies there at 0.
+    #[inline]
+    pub fn in_frame(&self, turned: impl Fn([f32; 2]) -> [f32; 2], origin: [f32; 2], min: [f32; 2], base: f32) -> Self {
+        let direction = |v: [f32; 3]| {
+            let [x, y] = turned([v[0], v[1]]);
+            [x, y, v[2]]
+        };
+        let [x, y] = turned([self.position[0] - origin[0], self.position[1] - origin[1]]);
+        Self {
+            position: [x - min[0], y - min[1], self.position[2] - base],
+            first: direction(self.first),
+            step: direction(self.step),
+        }
+    }
+
     /// The line of sight through a place in the row.
     #[inline(always)]
     pub fn at(&self, px: f32) -> Sight {
