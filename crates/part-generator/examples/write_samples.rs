@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenes = Scenes::new(&[Part::generate(part_seed)], config, seed)?;
     let taught = &scenes.photo(0).demonstration;
     taught.image.save(folder.join("demo.png"))?;
-    write_labels(&folder, "demo", taught.image.dimensions(), &[taught.annotation.clone()], &[false])?;
+    write_labels(&folder, "demo", taught.image.dimensions(), std::slice::from_ref(&taught.annotation), &[false])?;
     for index in 0..count {
         let sample = scenes.sample(index);
         let name = format!("{index:03}");

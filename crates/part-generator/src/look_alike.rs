@@ -148,3 +148,38 @@ fn moved(recipe: &Recipe, shift: f32, direction: f32, group: u16) -> Option<Reci
     }
     Some(made)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turns that are compared, in a whole turn: twice as many as look-alikes are chosen with.
+    const NUM_TURNS: usize = 720;
+
+    fn is_same_at_some_turn(one: &Part, other: &Part) -> bool {
+        let comparison = Comparison::new(&one.relief, one.center, &other.relief, other.center);
+        (0..NUM_TURNS).any(|k| comparison.is_same(std::f32::consts::TAU * k as f32 / NUM_TURNS as f32))
+    }
+
+    #[test]
+    fn moved_and_mirrored_parts_differ_from_every_turn_of_the_part() {
+        let mut compared = [0, 0];
+        for seed in 0..10 {
+            let part = Part::generate(seed);
+            if let Some(mirrored) = part.look_alike(LookAlike::Mirrored, 0) {
+                assert!(!is_same_at_some_turn(&part, &mirrored), "mirror image of part {seed}");
+                // A mirror image of the mirror image is the part: the comparison can find one.
+                let twice = Part::from_recipe(part.kind, mirrored.recipe.mirrored()).unwrap();
+                assert!(is_same_at_some_turn(&part, &twice), "part {seed} mirrored twice");
+                compared[0] += 1;
+            }
+            for draw in 0..2 {
+                if let Some(moved) = part.look_alike(LookAlike::FeatureMoved, draw) {
+                    assert!(!is_same_at_some_turn(&part, &moved), "part {seed} with a feature moved, {draw}");
+                    compared[1] += 1;
+                }
+            }
+        }
+        assert!(compared[0] >= 4 && compared[1] >= 10, "{compared:?} mirrored and moved");
+    }
+}

@@ -197,9 +197,7 @@ fn add_lamp(map: &mut [[f32; 3]], lamp: &Lamp, blur: f32) {
         let exponent = 0.5 * (dx * dx + dy * dy) / (width * width);
         if exponent < 8.0 {
             let strength = peak * (-exponent).exp();
-            for k in 0..3 {
-                texel[k] += lamp.color[k] * strength;
-            }
+            texel.iter_mut().zip(lamp.color).for_each(|(light, color)| *light += color * strength);
         }
     }
 }

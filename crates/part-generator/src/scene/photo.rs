@@ -110,9 +110,9 @@ fn contrasting_table(part: &Part, rng: &mut rand_pcg::Pcg64Mcg) -> Table {
         let mut count = 0.0f32;
         for texel in level.texels.iter().filter(|texel| texel.top > 0) {
             let material = &part.relief.materials[texel.material as usize];
-            for k in 0..3 {
-                sum[k] += material.albedo[k] + 0.8 * material.reflectance[k];
-            }
+            let looks =
+                material.albedo.iter().zip(material.reflectance).map(|(albedo, mirrored)| albedo + 0.8 * mirrored);
+            sum.iter_mut().zip(looks).for_each(|(sum, look)| *sum += look);
             count += 1.0;
         }
         sum.iter().map(|s| (s / count.max(1.0)).sqrt()).collect()

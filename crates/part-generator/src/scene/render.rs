@@ -81,10 +81,11 @@ impl Scene {
         for (y, row) in canvas.light.chunks_exact_mut(width).enumerate() {
             shading.table_row(&self.view, 0.5, y as f32 + 0.5, &mut canvas.row, row);
             let sights = self.view.row(y as f32 + 0.5);
-            for x in spans[y][0]..spans[y][1] {
+            let [first, end] = spans[y];
+            for (x, pixel) in row.iter_mut().enumerate().take(end).skip(first) {
                 let idx = y * width + x;
                 if ids[idx] != TABLE {
-                    row[x] = shading.body(ids[idx], &canvas.contacts[idx], &sights.at(x as f32 + 0.5));
+                    *pixel = shading.body(ids[idx], &canvas.contacts[idx], &sights.at(x as f32 + 0.5));
                 }
             }
         }

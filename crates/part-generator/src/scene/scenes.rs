@@ -223,12 +223,11 @@ impl Scenes {
 
     fn draw_other(&self, subject: &Subject, rng: &mut Pcg64Mcg) -> (OtherKind, Arc<Part>) {
         let similar = rng.chance(self.config.look_alike_share as f32) && !subject.look_alikes.is_empty();
-        if similar || self.others.is_empty() {
-            if let Some((kind, part)) =
+        if (similar || self.others.is_empty())
+            && let Some((kind, part)) =
                 subject.look_alikes.get(rng.random_range(0..subject.look_alikes.len().max(1) as u32) as usize)
-            {
-                return (OtherKind::LookAlike(*kind), part.clone());
-            }
+        {
+            return (OtherKind::LookAlike(*kind), part.clone());
         }
         let pool = if self.others.is_empty() { std::slice::from_ref(&subject.part) } else { &self.others[..] };
         // Things that lie about are about as large as the part, or the picture would show little else.
