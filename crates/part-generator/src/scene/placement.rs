@@ -247,3 +247,43 @@ impl Placement {
         self.direction_to_table([fall[0] / norm, fall[1] / norm])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether small steps along a line of sight in the grid get below the part's upper side.
+    fn is_met_in_small_steps(body: &Placement, sight: &Sight) -> bool {
+        let (relief, level) = (&body.part.relief, body.level());
+        (0..=400).any(|k| {
+            let z = relief.top_mm * k as f32 / 400.0;
+            let [x, y] = sight.at(z);
+            let texel = level.get(x.floor() as i32, y.floor() as i32);
+            texel.top > 0 && z <= texel.top as f32 * relief.step && z >= texel.bottom as f32 * relief.step
+        })
+    }
+
+    #[test]
+    fn what_is_passed_over_is_clear() {
+        let (mut clear, mut met) = (0, 0);
+        for (seed, tilt) in [(1, 0.0), (2, 0.3), (3, 0.3), (4, 0.1)] {
+            let view = View::new(320, 240, 275.0, 400.0, tilt, 1.1);
+            let body = Placement::new(Arc::new(Part::generate(seed)), [20.0, -10.0], 0.7, 0.0, view.mm_per_px());
+            let bounds = body.picture_box(&view);
+            let reach = 1.5 * body.cells_per_px(&view, bounds);
+            for y in bounds[1]..bounds[3] {
+                let row = body.grid_row(&view.row(y as f32 + 0.5));
+                for x in (bounds[0]..bounds[2]).step_by(4) {
+                    let is_clear = body.is_clear_around(&row.at((x + 2) as f32), reach);
+                    for sight in (x..x + 4).map(|x| row.at(x as f32 + 0.5)) {
+                        let is_met = is_met_in_small_steps(&body, &sight);
+                        assert!(!(is_clear && is_met), "part {seed}, row {y}, group at {x}");
+                        clear += usize::from(is_clear);
+                        met += usize::from(is_met);
+                    }
+                }
+            }
+        }
+        assert!(clear > 1000 && met > 1000, "{clear} clear, {met} met");
+    }
+}
