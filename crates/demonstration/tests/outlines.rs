@@ -7,7 +7,7 @@ use std::path::Path;
 use sdg_demonstration::{Demonstration, propose_outline};
 use sdg_geometry::BoundingBox;
 
-/// Measured: 0.954 as drawn and 0.957 a tenth looser; least the thin fuel line, 0.905 and 0.889. OpenCV's grabCut, with its
+/// Measured on the paper's eight parts: 0.954 as drawn and 0.957 a tenth looser; least the thin fuel line, 0.905 and 0.889. OpenCV's grabCut, with its
 /// five rounds, reaches 0.960 and 0.956 on the same boxes.
 const LEAST_MEAN_OVERLAP: f64 = 0.93;
 const LEAST_OVERLAP: f64 = 0.85;
@@ -28,7 +28,7 @@ fn shipped() -> Vec<(String, Demonstration)> {
 }
 
 #[test]
-fn proposals_overlap_the_drawn_outlines_of_all_eight_parts() {
+fn proposals_overlap_the_drawn_outlines_of_all_parts() {
     // The box as drawn, and a tenth looser on every side.
     for looseness in [0.0, 0.1] {
         let mut overlaps = Vec::new();
@@ -46,8 +46,9 @@ fn proposals_overlap_the_drawn_outlines_of_all_eight_parts() {
             assert!(overlap >= LEAST_OVERLAP, "{name}, {looseness} looser: {overlap:.3}");
             overlaps.push(overlap);
         }
-        assert_eq!(overlaps.len(), 8);
-        let mean = overlaps.iter().sum::<f64>() / 8.0;
+        assert_eq!(overlaps.len(), 12);
+        let mean = overlaps.iter().sum::<f64>() / overlaps.len() as f64;
+        println!("{looseness} looser: {mean:.3}");
         assert!(mean >= LEAST_MEAN_OVERLAP, "{looseness} looser: {mean:.3}");
     }
 }
