@@ -4,7 +4,7 @@
 
 use std::ops::ControlFlow;
 
-use sdg_cli::rehearsal::Rehearsal;
+use sdg_cli::rehearsal::{Rehearsal, RehearsalErrors};
 use sdg_cli::shipped;
 use sdg_cli::trial::{Trial, try_views};
 use sdg_grasp::{Device, GraspModel, TeachOptions, Verification, teach};
@@ -33,8 +33,14 @@ fn the_pendulum_is_taught_found_and_grasped() {
     assert!(right >= 95, "right on {right} of 100 unseen pictures");
     assert_eq!(false_alarms, 0, "false alarms on 50 pictures without the part");
 
-    let rehearsal =
-        Rehearsal { model: &model, object: &object, attempts: 10, seed: 1, verification: Verification::ByShape };
+    let rehearsal = Rehearsal {
+        model: &model,
+        object: &object,
+        attempts: 10,
+        seed: 1,
+        verification: Verification::ByShape,
+        errors: RehearsalErrors::default(),
+    };
     let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
     println!("grasped in {} of 10, failures {:?}", rehearsed.successes(), rehearsed.failures());
     assert!(rehearsed.successes() >= 9, "{:?}", rehearsed.failures());
