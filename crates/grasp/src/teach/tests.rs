@@ -155,13 +155,10 @@ fn one_network_serves_the_models_that_are_taught_alike() {
 #[test]
 fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
-    // The quickest of three: a machine at other work is no slower model.
-    let taught: Vec<Taught> = (0..3)
-        .map(|_| teach(&[demonstration()], &options, &mut |_: &Event| panic!("nothing is trained")).unwrap())
-        .collect();
-    let seconds = taught.iter().map(|taught| taught.model.facts().seconds).fold(f64::INFINITY, f64::min);
-    assert!(taught[0].history.is_none() && seconds < 1.0, "{seconds} s");
-    let model = &taught[0].model;
+    let taught = teach(&[demonstration()], &options, &mut |_: &Event| panic!("nothing is trained")).unwrap();
+    // How long it takes depends on the machine: `sdg evaluate` measures that.
+    assert!(taught.history.is_none() && taught.model.facts().steps == 0);
+    let model = &taught.model;
     assert!(model.to_bytes().unwrap().len() < 100_000);
     assert_same_after_a_file(model);
 }

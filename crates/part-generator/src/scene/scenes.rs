@@ -259,15 +259,15 @@ impl Scenes {
             motion: [cos * way, sin * way],
             vignetting: rng.uniform(0.0, 0.4),
             veil: if rng.chance(0.2) { rng.uniform(0.0, 0.06) } else { 0.0 },
-            contrast: rng.uniform(0.95, 1.5),
-            saturation: rng.uniform(0.8, 1.5),
+            contrast: rng.uniform(0.95, 1.7),
+            saturation: rng.uniform(0.8, 1.7),
             jpeg: rng.chance(self.config.jpeg_probability as f32).then(|| rng.uniform(40.0, 92.0) as u8),
         };
         if conditions.blur_px > 0.0 {
             sensor.blur = conditions.blur_px as f32 * px;
         }
         if conditions.dark {
-            sensor.exposure *= rng.log_uniform(0.06, 0.25);
+            sensor.exposure *= rng.log_uniform(0.09, 0.25);
             sensor.noise = rng.log_uniform(0.03, 0.08);
         }
         sensor

@@ -8,6 +8,9 @@ use crate::tiles::{Tile, Tiles};
 
 mod color;
 
+/// Share of the tables on which sheets lie: brightness differs within a photograph more than one table top does.
+const SHEETS_PROBABILITY: f32 = 0.4;
+
 /// A layer of noise over the base colour.
 struct Layer {
     tile: &'static Tile,
@@ -60,8 +63,15 @@ enum Pattern {
         pitch: f32,
         color: [f32; 3],
     },
-    /// Sheets of other colours, each in a half-plane.
-    Sheets(Vec<([f32; 2], f32, [f32; 3])>),
+}
+
+/// A half-plane of another colour: a sheet of paper, a mat, the floor beside the table.
+struct Sheet {
+    /// From the table top to the sheet, a unit vector.
+    normal: [f32; 2],
+    /// Millimetres from the picture's middle to the sheet's edge.
+    distance: f32,
+    color: [f32; 3],
 }
 
 /// A table top.
@@ -69,6 +79,7 @@ pub(crate) struct Table {
     base: [f32; 3],
     layers: Vec<Layer>,
     pattern: Pattern,
+    sheets: Vec<Sheet>,
     sin_cos: [f32; 2],
     shift: [f32; 2],
     /// Share of mirrored light: 0 for matt tops.
@@ -99,6 +110,7 @@ impl Table {
             base: grey(rng, 0.05, 0.85),
             layers: Vec::new(),
             pattern: Pattern::None,
+            sheets: Vec::new(),
             sin_cos: [sin, cos],
             shift,
             gloss: 0.0,
@@ -113,6 +125,9 @@ impl Table {
             return made;
         }
         made.draw_kind(rng);
+        if rng.chance(SHEETS_PROBABILITY) {
+            made.sheets = (0..rng.whole(1, 2)).map(|_| Sheet::draw(rng)).collect();
+        }
         // Dirt, wear and grain on everything.
         let stains = rng.uniform(0.0, 0.09);
         let scale = rng.log_uniform(0.25, 1.2);
@@ -202,18 +217,7 @@ impl Table {
                 self.base = grey(rng, 0.55, 0.82);
                 self.pattern = Pattern::Text { pitch: rng.uniform(3.5, 12.0), color: grey(rng, 0.02, 0.2) };
             }
-            11 => {
-                // Sheets and edges: a table with papers, tape and shadows of things outside.
-                let sheets = (0..rng.whole(1, 3))
-                    .map(|_| {
-                        let angle = rng.angle();
-                        let color = if rng.chance(0.6) { grey(rng, 0.05, 0.8) } else { paint_color(rng) };
-                        ([angle.cos(), angle.sin()], rng.uniform(20.0, 160.0), color)
-                    })
-                    .collect();
-                self.pattern = Pattern::Sheets(sheets);
-            }
-            12 => {
+            11 | 12 => {
                 // Black: foam, rubber, painted steel.
                 self.base = grey(rng, 0.01, 0.05);
                 self.shine(rng.uniform(0.0, 0.05), rng);
@@ -245,6 +249,19 @@ impl Table {
     /// The mean colour, roughly: what walls and shiny parts reflect from below.
     pub fn mean(&self) -> [f32; 3] {
         self.base
+    }
+}
+
+impl Sheet {
+    fn draw(rng: &mut Pcg64Mcg) -> Self {
+        let (sin, cos) = rng.angle().sin_cos();
+        let color = match rng.whole(0, 3) {
+            0 => grey(rng, 0.6, 0.9),
+            1 => grey(rng, 0.01, 0.06),
+            2 => grey(rng, 0.05, 0.8),
+            _ => paint_color(rng),
+        };
+        Self { normal: [cos, sin], distance: rng.uniform(-40.0, 140.0), color }
     }
 }
 

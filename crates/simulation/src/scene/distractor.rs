@@ -472,7 +472,8 @@ mod tests {
     #[test]
     fn no_edge_is_walked_twice_in_one_direction() {
         for kind in DistractorKind::ALL {
-            for seed in 0..12 {
+            // The last three make tubes with a corner that hardly turns.
+            for seed in (0..12).chain([453, 1383, 1453]) {
                 for piece in pieces(kind, seed) {
                     let obj = piece.mesh.to_obj();
                     let mut edges = std::collections::HashSet::new();

@@ -13,6 +13,9 @@ use super::mesh::{MeshVertex, TriangleMesh};
 /// Metres of surface that one repeat of a texture covers, where a solid chooses.
 pub const METRES_PER_REPEAT: f64 = 0.05;
 
+/// Chords shorter than this (metres) would end on one point: OBJ text holds hundredths of a millimetre.
+const MIN_CHORD_M: f64 = 2e-5;
+
 /// A circle of `count` points, counter-clockwise.
 pub fn circle(centre: Point2<f64>, radius: f64, count: usize) -> Vec<Point2<f64>> {
     (0..count)
@@ -247,7 +250,8 @@ pub fn thread(major_radius: f64, pitch: f64, length: f64, segments: usize) -> Tr
     mesh
 }
 
-/// Rounds the corners of a polyline by arcs of `radius` metres; each arc gets `steps` chords.
+/// Rounds the corners of a polyline by arcs of `radius` metres; each arc gets `steps` chords. A corner that hardly turns
+/// stays as it is.
 pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<Point3<f64>> {
     let mut path = vec![corners[0]];
     for window in corners.windows(3) {
@@ -256,6 +260,10 @@ pub fn rounded_path(corners: &[Point3<f64>], radius: f64, steps: usize) -> Vec<P
         let Some(axis) = into.cross(&out).try_normalize(1e-9) else {
             continue;
         };
+        if radius * turn < steps as f64 * MIN_CHORD_M {
+            path.push(window[1]);
+            continue;
+        }
         let start = window[1] - into * radius * (turn / 2.0).tan();
         let centre = start + axis.cross(&into) * radius;
         for step in 0..=steps {

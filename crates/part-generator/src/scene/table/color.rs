@@ -1,6 +1,6 @@
 //! The colours of a table top, a row of the picture at a time.
 
-use super::{Layer, Pattern, Table};
+use super::{Layer, Pattern, Sheet, Table};
 use crate::tiles::floor;
 
 /// A layer with fewer texels for a pixel is read at every second pixel only.
@@ -27,6 +27,9 @@ impl Table {
             turned.iter().zip(out.iter_mut()).for_each(|(&[x, y], color)| self.print(x, y, mm_per_px, color));
         }
         self.layers.iter().for_each(|layer| layer.add_to(turned, mm_per_px, out));
+        for sheet in &self.sheets {
+            sheet.lay_on(places, mm_per_px, out);
+        }
         out.iter_mut().for_each(|color| *color = color.map(|c| c.max(MIN_ALBEDO)));
     }
 
@@ -87,13 +90,6 @@ impl Table {
                     mix(color, ink, share);
                 }
             }
-            Pattern::Sheets(sheets) => {
-                for (normal, distance, other) in sheets {
-                    let (dx, dy) = (x - self.shift[0], y - self.shift[1]);
-                    let d = normal[0] * dx + normal[1] * dy - distance;
-                    mix(color, other, (d * per_px + 0.5).clamp(0.0, 1.0));
-                }
-            }
         }
     }
 
@@ -104,6 +100,17 @@ impl Table {
         let (x, y) = (cos * place[0] + sin * place[1], cos * place[1] - sin * place[0]);
         let across = self.ripple * self.tiles.streak.at(0.3 * x, 1.3 * y);
         [-sin * across, cos * across]
+    }
+}
+
+impl Sheet {
+    fn lay_on(&self, places: &[[f32; 2]], mm_per_px: f32, out: &mut [[f32; 4]]) {
+        let per_px = 1.0 / mm_per_px;
+        let [nx, ny] = self.normal;
+        for (place, color) in places.iter().zip(out) {
+            let depth = nx * place[0] + ny * place[1] - self.distance;
+            mix(color, &self.color, (depth * per_px + 0.5).clamp(0.0, 1.0));
+        }
     }
 }
 
