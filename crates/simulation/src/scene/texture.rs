@@ -128,11 +128,11 @@ impl Noise {
 
     /// The noise at (u, v), both taken modulo 1.
     pub fn at(&self, u: f64, v: f64) -> f64 {
-        let (x, y) = (u.rem_euclid(1.0) * self.columns as f64, v.rem_euclid(1.0) * self.rows as f64);
+        let (x, y) = (wrapped(u) * self.columns as f64, wrapped(v) * self.rows as f64);
         let value = |column: usize, row: usize| self.values[(row % self.rows) * self.columns + column % self.columns];
         let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
         let (column, row) = (x as usize, y as usize);
-        let (a, b) = (smooth(x.fract()), smooth(y.fract()));
+        let (a, b) = (smooth(x - column as f64), smooth(y - row as f64));
         let upper = value(column, row) * (1.0 - a) + value(column + 1, row) * a;
         let lower = value(column, row + 1) * (1.0 - a) + value(column + 1, row + 1) * a;
         upper * (1.0 - b) + lower * b
@@ -147,10 +147,23 @@ impl Noise {
     }
 }
 
+/// `v.rem_euclid(1.0)`, to the bit, without the processor's slow remainder; `v` is far below 2^63.
+fn wrapped(v: f64) -> f64 {
+    let rest = v - (v as i64) as f64;
+    if rest < 0.0 { rest + 1.0 } else { rest }
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn wrapping_is_the_euclidean_remainder() {
+        for v in [0.0, -0.0, 0.3, 1.0, -1.0, 7.25, -3.1, -1e-17, 1e9 + 0.5] {
+            assert_eq!(wrapped(v), f64::rem_euclid(v, 1.0), "{v}");
+        }
+    }
 
     #[test]
     fn noise_wraps_round_and_stays_in_range() {
