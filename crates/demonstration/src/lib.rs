@@ -50,6 +50,7 @@ mod labelme;
 mod npy;
 mod opendr;
 mod outline_proposal;
+pub mod random;
 mod yolo_pose;
 
 pub use annotation::{Annotation, ImageFacts};

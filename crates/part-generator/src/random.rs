@@ -1,7 +1,9 @@
 //! Random numbers by address: every part, photo and sample has a generator of its own.
 
-use rand::{Rng, SeedableRng};
+use rand::Rng;
 use rand_pcg::Pcg64Mcg;
+use sdg_demonstration::random::generator_at;
+pub(crate) use sdg_demonstration::random::scramble;
 
 /// What a generator is for; generators of different streams are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,23 +24,7 @@ pub(crate) enum Stream {
 
 /// The generator of item `index` of a stream of a seed.
 pub(crate) fn generator(seed: u64, stream: Stream, index: u64) -> Pcg64Mcg {
-    let first = scramble(seed ^ scramble(stream as u64 ^ scramble(index)));
-    let second = scramble(first ^ index);
-    let mut state = [0u8; 16];
-    state[..8].copy_from_slice(&first.to_le_bytes());
-    state[8..].copy_from_slice(&second.to_le_bytes());
-    Pcg64Mcg::from_seed(state)
-}
-
-/// A bijection of 64 bits that separates neighbouring values.
-///
-/// # Source
-/// Steele, Lea and Flood 2014, the output function of SplitMix64.
-pub(crate) fn scramble(value: u64) -> u64 {
-    let z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    generator_at(seed, stream as u64, index)
 }
 
 /// The draws that the generator needs, in single precision.

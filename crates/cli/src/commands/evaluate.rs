@@ -14,13 +14,11 @@ use crate::files;
 use crate::interrupt::Interrupt;
 use crate::machine::machine;
 
-/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
-pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
-    if let Some(names) = &args.axes {
-        return super::evaluate_axes::run(args, names);
-    }
-    let models = models(&args.models)?;
-    let objects = objects(&args.objects, ObjectSpec::paper_names())?;
+/// The preset, and what the store's results depend on.
+///
+/// # Errors
+/// No preset of that name.
+pub(super) fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
     let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
     let settings = Settings {
         protocol: Settings::PROTOCOL,
@@ -31,12 +29,27 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         views: args.views,
         scenes: args.scenes,
     };
+    Ok((preset, settings))
+}
+
+/// Units of work side by side: as asked for, else one for each core.
+pub(super) fn jobs(args: &EvaluateArgs) -> usize {
+    args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
+}
+
+/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
+    if let Some(names) = &args.axes {
+        return super::evaluate_axes::run(args, names);
+    }
+    let models = models(&args.models)?;
+    let objects = objects(&args.objects, ObjectSpec::paper_names())?;
+    let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let report_folder = args.report.as_ref().unwrap_or(&args.out);
     files::prepare_folder(report_folder)?;
 
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = args.jobs.map_or(cores, |jobs| jobs as usize);
+    let jobs = jobs(args);
     let evaluation =
         Evaluation { models: &models, objects: &objects, preset, store: &store, unverified: args.unverified, jobs };
     let interrupt = Interrupt::watch();

@@ -3,16 +3,15 @@
 use std::fmt::Write;
 
 use anyhow::{Result, bail};
-use sdg_grasp::{GraspError, Preset};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use super::evaluate::{models, objects};
+use super::evaluate::{jobs, models, objects, settings};
 use crate::args::EvaluateArgs;
 use crate::evaluation::axes::{
     Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
 };
-use crate::evaluation::{EvaluationProgress, Settings, Store};
+use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
@@ -23,24 +22,14 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let selection = Selection::parse(names).map_err(|error| Usage(format!("--axes: {error}")))?;
     let models = models(&args.models)?;
     let objects = objects(&args.objects, ObjectSpec::names())?;
-    let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
-    let settings = Settings {
-        protocol: Settings::PROTOCOL,
-        preset: preset.name().to_owned(),
-        steps: args.steps,
-        seed: args.seed,
-        attempts: args.attempts,
-        views: args.views,
-        scenes: args.scenes,
-    };
+    let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let against = args.against.as_deref().map(Against::open).transpose()?;
     // Beside the page of the paper's protocol, not in its place.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
     files::prepare_folder(&report_folder)?;
 
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = args.jobs.map_or(cores, |jobs| jobs as usize);
+    let jobs = jobs(args);
     let evaluation = AxesEvaluation {
         models: &models,
         objects: &objects,

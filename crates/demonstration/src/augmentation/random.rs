@@ -1,8 +1,10 @@
 //! Randomness by address: every sample has its own generator, made from (seed, stream, index).
 
 use rand::Rng;
-use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+
+use crate::random::generator_at;
+pub(crate) use crate::random::scramble;
 
 /// The generator of one sample.
 pub(crate) type SampleRng = Pcg64Mcg;
@@ -20,23 +22,7 @@ pub(crate) enum Stream {
 
 /// The generator of sample `index`, the same whoever asks and in whatever order.
 pub(crate) fn sample_rng(seed: u64, stream: Stream, index: u64) -> SampleRng {
-    let first = scramble(seed ^ scramble(stream as u64 ^ scramble(index)));
-    let second = scramble(first ^ index);
-    let mut state = [0u8; 16];
-    state[..8].copy_from_slice(&first.to_le_bytes());
-    state[8..].copy_from_slice(&second.to_le_bytes());
-    Pcg64Mcg::from_seed(state)
-}
-
-/// A bijection of 64 bits in which neighbours end up far apart.
-///
-/// # Source
-/// Steele, Lea and Flood 2014, the output function of SplitMix64.
-pub(crate) fn scramble(value: u64) -> u64 {
-    let z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    generator_at(seed, stream as u64, index)
 }
 
 /// Uniform in `[low, high)`, or `low` where the two agree.

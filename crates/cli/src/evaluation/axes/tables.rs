@@ -135,11 +135,16 @@ fn thirds(group: &GroupSummary) -> (String, String, Table) {
     columns.extend(models.iter().map(|model| Column::text(model.letter())));
     let mut table = Table::new(columns);
     for axis in axes_of(group) {
+        let of = |model: ModelKind, third: usize| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
+        let range = |third: usize| models.iter().find_map(|model| of(*model, third)?.range);
+        // Three instances are three instances in every third.
+        if range(0) == range(2) && range(0).is_some_and(|[low, high]| low == high) {
+            continue;
+        }
         for third in 0..3 {
-            let of = |model: ModelKind| Some(figures_of(group, axis, model, Way::WithCheck)?.thirds[third]);
-            let Some([low, high]) = models.iter().find_map(|model| of(*model)?.range) else { continue };
+            let Some([low, high]) = range(third) else { continue };
             let mut row = vec![Cell::text(axis), Cell::text(format!("{low:.2}")), Cell::text(format!("{high:.2}"))];
-            row.extend(models.iter().map(|model| share(of(*model).unwrap_or_default().found, Tone::Plain)));
+            row.extend(models.iter().map(|model| share(of(*model, third).unwrap_or_default().found, Tone::Plain)));
             table = table.row(row);
         }
     }

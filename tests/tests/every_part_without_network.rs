@@ -1,0 +1,68 @@
+//! Model S from end to end on every shipped part: one photo, no network, unseen pictures, grasps in MuJoCo.
+#![allow(clippy::unwrap_used)]
+
+use std::ops::ControlFlow;
+
+use sdg_cli::rehearsal::{Rehearsal, RehearsalErrors};
+use sdg_cli::shipped;
+use sdg_cli::trial::{Trial, try_views};
+use sdg_grasp::{Device, GraspModel, ModelKind, TeachOptions, Verification, teach};
+use sdg_simulation::objects::ObjectSpec;
+
+/// Seeds of the pictures: neither those of `sdg evaluate` nor of the other tests.
+const VIEWS_SEED: u64 = 7000;
+/// Pictures of each part, with it and without it.
+const NUM_PRESENT: usize = 8;
+const NUM_ABSENT: usize = 3;
+/// Grasps of each part.
+const NUM_ATTEMPTS: u32 = 1;
+
+/// Of 8 pictures of one part. The evaluation finds 22 to 25 of 25 (datasets/RESULTS.md); the seeds are fixed, so a bound
+/// that holds keeps holding.
+const MIN_RIGHT_OF_PART: usize = 6;
+/// Of all pictures of all parts: the evaluation's 98 %, less two standard deviations of 96 pictures.
+const MIN_RIGHT_SHARE: f64 = 0.95;
+/// Of all grasps, one of each part: the evaluation holds 80 of 80.
+const MAX_DROPPED: usize = 1;
+
+fn model_without_network(object: &ObjectSpec) -> GraspModel {
+    let options = TeachOptions { kind: ModelKind::S, symmetry: object.symmetry, ..TeachOptions::new(1) };
+    let demonstration = shipped::demonstration(&object.name).unwrap();
+    let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    // What is used from here on is what a file gives back.
+    GraspModel::from_bytes(&taught.model.to_bytes().unwrap(), &Device::flex()).unwrap()
+}
+
+#[test]
+fn model_s_finds_and_grasps_every_part() {
+    let (mut right, mut pictures, mut dropped) = (0, 0, Vec::new());
+    for name in ObjectSpec::names() {
+        let object = ObjectSpec::by_name(name).unwrap();
+        let model = model_without_network(&object);
+        let tried =
+            |present, count| try_views(&model, &object, present, count, VIEWS_SEED, Verification::ByShape).unwrap();
+        let right_of_part = tried(true, NUM_PRESENT).iter().filter(|trial| trial.is_right()).count();
+        let false_alarms = tried(false, NUM_ABSENT).iter().filter(|trial| Trial::is_false_alarm(trial)).count();
+        let rehearsal = Rehearsal {
+            model: &model,
+            object: &object,
+            attempts: NUM_ATTEMPTS,
+            seed: 1,
+            verification: Verification::ByShape,
+            errors: RehearsalErrors::default(),
+        };
+        let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
+        println!(
+            "{name}: right on {right_of_part} of {NUM_PRESENT}, {false_alarms} false alarms on {NUM_ABSENT}, grasped in {} \
+             of {NUM_ATTEMPTS}",
+            rehearsed.successes()
+        );
+        assert!(right_of_part >= MIN_RIGHT_OF_PART, "{name}: right on {right_of_part} of {NUM_PRESENT}");
+        assert_eq!(false_alarms, 0, "{name}: false alarms on {NUM_ABSENT} pictures without it");
+        right += right_of_part;
+        pictures += NUM_PRESENT;
+        dropped.extend(rehearsed.failures().into_iter().map(|failure| (name, failure)));
+    }
+    assert!(right as f64 >= MIN_RIGHT_SHARE * pictures as f64, "right on {right} of {pictures}");
+    assert!(dropped.len() <= MAX_DROPPED, "{dropped:?}");
+}

@@ -1,0 +1,68 @@
+//! Fails when a network learns badly: model C's network alone, taught from one photo of a generated part, on generated
+//! pictures with the part and without it.
+//!
+//! The check against the demonstration hides what a network lacks, so it is off here. The part is no shipped one, and its
+//! pictures come from another program than the samples that the network is taught on.
+#![allow(clippy::unwrap_used)]
+
+use std::ops::ControlFlow;
+
+use sdg_geometry::PlanarGrasp;
+use sdg_grasp::{GraspModel, TeachOptions, Verification, teach};
+use sdg_part_generator::{Condition, Part, Sample, SceneConfig, Scenes};
+
+/// Which part: one without symmetry, so that its turn counts.
+const PART_SEED: u64 = 4;
+/// Which pictures.
+const SCENES_SEED: u64 = 11;
+/// Pictures with the part, and as many without.
+const NUM_PICTURES: u64 = 40;
+/// A hit lies within this share of the part's box diagonal: 10 mm of a part of 150 mm.
+const MAX_DISTANCE: f64 = 1.0 / 15.0;
+/// And within this turn.
+const MAX_TURN_DEG: f64 = 10.0;
+
+/// Bounds on the network alone. Seed 1, edge preset: 29 hits and 5 false alarms; after a third of the steps 2
+/// hits and 39 false alarms.
+const MIN_HITS: usize = 24;
+const MAX_FALSE_ALARMS: usize = 12;
+
+fn scenes(part: &Part, config: SceneConfig) -> Scenes {
+    let config = SceneConfig { num_other_parts: 12, ..config };
+    Scenes::new(std::slice::from_ref(part), config, SCENES_SEED).unwrap()
+}
+
+/// Whether the network's best detection, where it is accepted, lies on the part.
+fn is_hit(model: &GraspModel, part: &Part, sample: &Sample) -> bool {
+    let detections = model.detect(&sample.image, Verification::Off).unwrap();
+    let Some(best) = detections.first().filter(|best| best.is_accepted()) else { return false };
+    let truth = &sample.instances[0];
+    let expected = PlanarGrasp::from_line(&truth.grasp, truth.jaw_width_px);
+    let diagonal = truth.bbox.width().hypot(truth.bbox.height());
+    let distance = (best.grasp.x - expected.x).hypot(best.grasp.y - expected.y);
+    let turn = part.symmetry().distance(best.grasp.angle, expected.angle);
+    distance <= MAX_DISTANCE * diagonal && turn.to_degrees() <= MAX_TURN_DEG
+}
+
+#[test]
+fn the_network_learns() {
+    let part = Part::generate(PART_SEED);
+    let with_part = scenes(&part, SceneConfig::only(Condition::Nominal));
+    let without_part =
+        scenes(&part, SceneConfig { absent_share: 1.0, others: [1, 4], ..SceneConfig::only(Condition::Nominal) });
+    let demonstration = with_part.photo(0).demonstration.clone();
+    let options = TeachOptions { symmetry: part.symmetry(), ..TeachOptions::new(1) };
+    let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
+    let model = taught.model;
+    let hits = (0..NUM_PICTURES).filter(|&i| is_hit(&model, &part, &with_part.sample(i))).count();
+    let is_false_alarm = |sample: Sample| {
+        model.detect(&sample.image, Verification::Off).unwrap().first().is_some_and(|best| best.is_accepted())
+    };
+    let false_alarms = (0..NUM_PICTURES).filter(|&i| is_false_alarm(without_part.sample(i))).count();
+    println!(
+        "network alone, taught in {:.0} s: {hits} hits and {false_alarms} false alarms of {NUM_PICTURES} each",
+        model.facts().seconds
+    );
+    assert!(hits >= MIN_HITS, "{hits} hits of {NUM_PICTURES}");
+    assert!(false_alarms <= MAX_FALSE_ALARMS, "{false_alarms} false alarms of {NUM_PICTURES}");
+}
