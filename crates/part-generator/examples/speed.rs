@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p sdg-part-generator --example speed [SAMPLES [THREADS [NAME]]]`
 //!
-//! Prints a line for the default scenes and one for each condition alone, at 320x240, ten parts; with a
-//! name (`default`, `tilt`, …) that line only. Processor time is that of
-//! the process, so it says something on a busy machine too.
+//! Prints a line for the default scenes and one for each condition alone, at 320x240, ten parts; with a name
+//! (`default`, `tilt`, …) that line only. Processor time is that of the process, so it says something on a busy machine
+//! too.
 
 use std::time::Instant;
 

@@ -1,4 +1,14 @@
-//! A normal blur of pictures in linear light.
+//! A normal blur of pictures in linear light, and rows that go on beyond the picture.
+
+/// Copies a row of pixels, three values each, with `reach` pixels more at both ends: the first and the last pixel again.
+pub(crate) fn pad_row(row: &[f32], reach: usize, padded: &mut [f32]) {
+    let (start, end) = (3 * reach, 3 * reach + row.len());
+    padded[start..end].copy_from_slice(row);
+    for k in 0..start {
+        padded[k] = row[k % 3];
+        padded[end + k] = row[row.len() - 3 + k % 3];
+    }
+}
 
 /// A normal blur, one axis after the other; `spare` is as long as the picture.
 pub(crate) fn blur(light: &mut [[f32; 3]], spare: &mut [[f32; 3]], width: usize, sigma: f32) {
@@ -10,13 +20,9 @@ pub(crate) fn blur(light: &mut [[f32; 3]], spare: &mut [[f32; 3]], width: usize,
     // Channels of neighbouring pixels stand side by side: the loops below take several values at once.
     let (light, spare, row_len) = (light.as_flattened_mut(), spare.as_flattened_mut(), 3 * width);
     let mut padded = vec![0.0f32; row_len + 6 * reach];
-    let (start, end) = (3 * reach, 3 * reach + row_len);
+    let start = 3 * reach;
     for (row, out) in light.chunks_exact(row_len).zip(spare.chunks_exact_mut(row_len)) {
-        padded[start..end].copy_from_slice(row);
-        for k in 0..start {
-            padded[k] = row[k % 3];
-            padded[end + k] = row[row_len - 3 + k % 3];
-        }
+        pad_row(row, reach, &mut padded);
         out.iter_mut().zip(&padded[start..]).for_each(|(out, center)| *out = center * weights[0]);
         for (d, &weight) in weights.iter().enumerate().skip(1) {
             let (left, right) = (&padded[start - 3 * d..][..row_len], &padded[start + 3 * d..][..row_len]);

@@ -4,7 +4,7 @@ use image::RgbImage;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
-use super::blur::blur;
+use super::blur::{blur, pad_row};
 use super::render::Canvas;
 use crate::random::{Draw, scramble};
 use crate::tiles::{Tiles, floor};
@@ -87,17 +87,13 @@ fn motion(source: &[[f32; 3]], light: &mut [[f32; 3]], width: usize, way: [f32; 
     let reach = offsets.iter().map(|[dx, _]| dx.unsigned_abs()).max().unwrap_or(0);
     let row_len = 3 * width;
     let (source, mut padded) = (source.as_flattened(), vec![0.0f32; row_len + 6 * reach]);
-    let (start, end) = (3 * reach, 3 * reach + row_len);
+    let start = 3 * reach;
     for (y, out) in light.as_flattened_mut().chunks_exact_mut(row_len).enumerate() {
         out.fill(0.0);
         for &[dx, dy] in &offsets {
             let v = (y as isize + dy).clamp(0, height as isize - 1) as usize;
             let row = &source[v * row_len..][..row_len];
-            padded[start..end].copy_from_slice(row);
-            for k in 0..start {
-                padded[k] = row[k % 3];
-                padded[end + k] = row[row_len - 3 + k % 3];
-            }
+            pad_row(row, reach, &mut padded);
             let shifted = &padded[start.wrapping_add_signed(3 * dx)..][..row_len];
             out.iter_mut().zip(shifted).for_each(|(out, value)| *out += value * share);
         }
