@@ -74,18 +74,6 @@ impl Surface {
         inside as f64 / (self.points().count() as f64).max(1.0)
     }
 
-    /// Mean brightness of the image at a pose over that of the cut-out; 1 where none of it is in the image.
-    pub(crate) fn brightness(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
-        let (mut taught, mut seen) = (0.0, 0.0);
-        for (point, color) in self.cells.iter().flatten() {
-            if let Some(found) = color_at(image, &image_from_cutout.apply(point)) {
-                taught += color.iter().sum::<f64>();
-                seen += found.iter().sum::<f64>();
-            }
-        }
-        if taught > 0.0 { seen / taught } else { 1.0 }
-    }
-
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
     /// none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
@@ -249,14 +237,6 @@ mod tests {
         let center = Point2::new(60.0, 40.0);
         let half_turn = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
         assert!(surface().agreement(&plate(1.0, false), &half_turn) < 0.4);
-    }
-
-    #[test]
-    fn half_the_light_is_half_as_bright() {
-        let brightness = |image: &RgbImage| surface().brightness(image, &PlanarSimilarity::IDENTITY);
-        assert!((brightness(&plate(0.5, false)) - 0.5).abs() < 0.01);
-        let away = PlanarSimilarity { tx: 500.0, ..PlanarSimilarity::IDENTITY };
-        assert_eq!(surface().brightness(&plate(1.0, false), &away), 1.0);
     }
 
     #[test]

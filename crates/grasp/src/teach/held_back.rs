@@ -7,9 +7,9 @@ use sdg_training::{Outcome, median};
 use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
-use crate::models::Network;
+use crate::models::{Network, instant};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Overlay, Scene, search, verify};
+use crate::verification::{Overlay, Scene, verify};
 
 /// Samples that no network is trained on.
 pub(super) struct HeldBack<'a> {
@@ -62,7 +62,7 @@ impl HeldBack<'_> {
             // The highest score of a candidate that ended beside the part, and of one on it.
             let (mut beside, mut on_part) = (0.0f64, 0.0f64);
             let mut is_on_part = |overlay: &Overlay| {
-                let grasp = overlay.demonstration.grasp(&overlay.image_from_marks);
+                let grasp = overlay.demonstration.grasp(&overlay.image_from_cutout);
                 let outcome = sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0));
                 match outcome {
                     Some(found @ Outcome::Found { error_px, error_degrees, .. }) if found.is_hit() => {
@@ -74,13 +74,13 @@ impl HeldBack<'_> {
                 }
             };
             for candidate in network.candidates(&sample.image, demonstrations)? {
-                let Some(overlay) = verify(&candidate, &scene) else { continue };
+                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
                 let best = if is_on_part(&overlay) { &mut on_part } else { &mut beside };
                 *best = best.max(candidate.network_score);
             }
             if on_part == 0.0 {
-                // What the search finds is no merit of the network, but its errors are the model's.
-                for overlay in search(&scene) {
+                // The second opinion is no merit of the network, but its errors are the model's.
+                for overlay in instant::search(demonstrations, &scene) {
                     is_on_part(&overlay);
                 }
             }

@@ -2,20 +2,18 @@
 //!
 //! How well a demonstration agrees with what it is not depends on the part: a ring agrees with anything round, a housing
 //! full of edges with nothing. Composed scenes tell by how much before a single real one was seen. Their highest
-//! agreement varies with the seed more than parts differ, and was no guide; their mean is one: over the eight shipped
-//! parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
+//! agreement varies with the seed more than parts differ, and was no guide; their mean is one. Over the eight shipped
+//! parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures, where
+//! the highest wrong agreement lay 0.03 to 0.17 above it. At 0.2 above, 10 of 960 right poses are refused; 0.545 for all
+//! parts, as agreement was measured then, refused 83.
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
 
-use crate::check_config::ScoreConfig;
-use crate::decimal::decimal;
+use crate::calibration::Calibration;
 use crate::error::Result;
-use crate::models::Network;
+use crate::models::{Network, instant};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Scene, search, verify};
-
-/// With fewer scenes in which anything agrees at all there is no mean. Chosen by hand, not measured.
-const MIN_SCENES: usize = 3;
+use crate::verification::{Scene, better_way_round, verify};
 
 /// Scenes without the part.
 pub(crate) struct Strangers {
@@ -35,17 +33,17 @@ impl Strangers {
         Ok(Self { scenes: (0..count).map(|i| augmenter.held_out(i)).collect() })
     }
 
-    /// How much other things resemble the part: the mean over scenes of the highest agreement, as the network proposes them and
-    /// as they are searched for.
+    /// Where the agreement decides: above what strangers have, as the network proposes them and as they are searched for.
     ///
     /// # Errors
     /// An image that the network refuses.
-    pub(crate) fn resemblance(&self, network: Option<&Network>, demonstrations: &[TaughtDemonstration]) -> Result<f64> {
-        let agreements = self.agreements(network, demonstrations)?;
-        if agreements.len() < MIN_SCENES {
-            return Ok(ScoreConfig::DEFAULT.resemblance.neutral);
-        }
-        Ok(decimal(agreements.iter().sum::<f64>() / agreements.len() as f64))
+    pub(super) fn calibrate(
+        &self,
+        network: Option<&Network>,
+        demonstrations: &[TaughtDemonstration],
+    ) -> Result<Calibration> {
+        let config = demonstrations.first().map(|first| first.check().threshold).unwrap_or_default();
+        Ok(config.calibration(&self.agreements(network, demonstrations)?))
     }
 
     /// The highest agreement in each scene in which anything agrees at all.
@@ -60,9 +58,19 @@ impl Strangers {
         let mut highest = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
             let scene = Scene::new(&sample.image, demonstrations);
-            let mut agreements: Vec<f64> = search(&scene).iter().map(|overlay| overlay.agreement).collect();
+            // At any size: what another size costs is there to part strangers further from the part, not to lower the bar.
+            let mut agreements = Vec::new();
+            for overlay in instant::search(demonstrations, &scene) {
+                agreements.push(overlay.agreement_at_any_size);
+                if network.is_some() {
+                    // It may propose the same place, and what it proposes is refined from both ways round.
+                    let refined = better_way_round(overlay.demonstration, &overlay.image_from_cutout, &scene);
+                    agreements.push(refined.agreement_at_any_size);
+                }
+            }
             for candidate in network.map_or(Ok(Vec::new()), |n| n.candidates(&sample.image, demonstrations))? {
-                agreements.extend(verify(&candidate, &scene).map(|overlay| overlay.agreement));
+                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
+                agreements.push(overlay.agreement_at_any_size);
             }
             highest.extend(agreements.into_iter().reduce(f64::max));
         }
@@ -76,19 +84,18 @@ mod tests {
     use crate::teach::tests::demonstration;
 
     #[test]
-    fn other_things_resemble_the_part_less_than_it_resembles_itself() {
+    fn the_threshold_stands_above_strangers_and_below_the_part() {
         let demonstrations = [demonstration()];
         let taught = [TaughtDemonstration::new(&demonstrations[0]).unwrap()];
         let strangers = Strangers::new(&demonstrations, 3, 12).unwrap();
-        let resemblance = strangers.resemblance(None, &taught).unwrap();
-        let best =
-            |image| search(&Scene::new(image, &taught)).iter().map(|overlay| overlay.agreement).fold(0.0, f64::max);
-        let agreements: Vec<f64> = strangers.scenes.iter().map(|sample| best(&sample.image)).collect();
+        let calibration = strangers.calibrate(None, &taught).unwrap();
+        let best = |image| {
+            let found = instant::search(&taught, &Scene::new(image, &taught));
+            found.iter().map(|overlay| calibration.apply(overlay.agreement)).fold(0.0, f64::max)
+        };
+        let scores: Vec<f64> = strangers.scenes.iter().map(|sample| best(&sample.image)).collect();
         // Some resemble it, or there would be nothing to tell apart.
-        assert!(
-            resemblance > 0.1 && agreements.iter().all(|&agreement| agreement < 0.6),
-            "{resemblance} {agreements:?}"
-        );
-        assert!(best(&demonstrations[0].image) > 0.9);
+        assert!(scores.iter().any(|&score| score > 0.0) && scores.iter().all(|&score| score < 0.5), "{scores:?}");
+        assert!(best(&demonstrations[0].image) > 0.95);
     }
 }
