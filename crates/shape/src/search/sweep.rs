@@ -7,9 +7,11 @@
 //! A place keeps its best variant for each quarter of the turn, so that a part which looks much the same turned by
 //! half a turn keeps both for the finer levels to decide.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::parallel;
 use crate::search::bank::Bank;
-use crate::search::responses::{FULL, Responses};
+use crate::search::responses::{BLOCK, FULL, Responses};
 
 /// Places worked on at once; their sums stay in the first-level cache. Chosen for time; results do not depend on it.
 const STRETCH: usize = 1024;
@@ -19,7 +21,7 @@ const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
 /// measured.
 const NUM_SECTORS: usize = 4;
 /// A start is the best within this many places. Chosen by hand, not measured.
-const PEAK_RADIUS: isize = 2;
+const PEAK_RADIUS: usize = 2;
 
 /// A place, a variant, and how well they agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,31 +43,29 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     let end = responses.idx_of(width - 1, height - 1) + 1;
     let shifts: Vec<Vec<(usize, isize)>> = bank.variants.iter().map(|v| v.shifts(responses.stride())).collect();
     let stretches: Vec<usize> = (first..end).step_by(STRETCH).collect();
-    let swept = parallel::map(&stretches, |&at| sweep_stretch(responses, &shifts, at, STRETCH.min(end - at)));
+    let arch = Arch::new();
+    let swept = parallel::map(&stretches, |&at| {
+        arch.dispatch(SweepStretch { responses, shifts: &shifts, at, len: STRETCH.min(end - at) })
+    });
 
     let full = f64::from(FULL) * bank.num_points as f64;
     let least = (least_response * full).ceil() as i16;
     let mut starts: Vec<Start> = Vec::new();
     for sector in 0..NUM_SECTORS {
-        let best = |x: isize, y: isize| -> i16 {
-            if x < 0 || y < 0 || x >= width as isize || y >= height as isize {
-                return -1;
+        let mut sums = vec![0i16; width * height];
+        for (y, row) in sums.chunks_exact_mut(width).enumerate() {
+            for (x, sum) in row.iter_mut().enumerate() {
+                let offset = responses.idx_of(x, y) - first;
+                *sum = swept[offset / STRETCH].sums[sector][offset % STRETCH];
             }
-            let offset = responses.idx_of(x as usize, y as usize) - first;
-            swept[offset / STRETCH].sums[sector][offset % STRETCH]
-        };
-        for y in 0..height as isize {
-            for x in 0..width as isize {
-                let here = best(x, y);
-                if here >= least && is_peak(&best, x, y, here) {
-                    let offset = responses.idx_of(x as usize, y as usize) - first;
-                    starts.push(Start {
-                        place: [x as usize, y as usize],
-                        variant_idx: usize::from(swept[offset / STRETCH].variants[sector][offset % STRETCH]),
-                        response: f64::from(here) / full,
-                    });
-                }
-            }
+        }
+        for place in peaks(&sums, width, least) {
+            let offset = responses.idx_of(place[0], place[1]) - first;
+            starts.push(Start {
+                place,
+                variant_idx: usize::from(swept[offset / STRETCH].variants[sector][offset % STRETCH]),
+                response: f64::from(sums[place[1] * width + place[0]]) / full,
+            });
         }
     }
     // A stable sort: equal ones stay in the order of sectors and rows, whatever the threads did.
@@ -74,17 +74,41 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     starts
 }
 
-fn is_peak(best: &impl Fn(isize, isize) -> i16, x: isize, y: isize, here: i16) -> bool {
-    for dy in -PEAK_RADIUS..=PEAK_RADIUS {
-        for dx in -PEAK_RADIUS..=PEAK_RADIUS {
-            let there = best(x + dx, y + dy);
+/// Places of at least `least` that are the best within [`PEAK_RADIUS`], row by row.
+fn peaks(sums: &[i16], width: usize, least: i16) -> Vec<[usize; 2]> {
+    let height = sums.len() / width;
+    let raise = |to: &mut [i16], from: &[i16]| to.iter_mut().zip(from).for_each(|(to, &from)| *to = (*to).max(from));
+    let mut across = sums.to_vec();
+    for (out, row) in across.chunks_exact_mut(width).zip(sums.chunks_exact(width)) {
+        for shift in 1..=PEAK_RADIUS.min(width - 1) {
+            raise(&mut out[shift..], &row[..width - shift]);
+            raise(&mut out[..width - shift], &row[shift..]);
+        }
+    }
+    let mut found = Vec::new();
+    let mut highest = vec![0i16; width];
+    for y in 0..height {
+        let rows = y.saturating_sub(PEAK_RADIUS)..(y + PEAK_RADIUS + 1).min(height);
+        highest.fill(i16::MIN);
+        rows.clone().for_each(|near| raise(&mut highest, &across[near * width..][..width]));
+        for x in 0..width {
+            let here = sums[y * width + x];
+            if here < least || here < highest[x] {
+                continue;
+            }
             // Of equal neighbours the first is kept.
-            if there > here || (there == here && (dy, dx) < (0, 0)) {
-                return false;
+            let columns = x.saturating_sub(PEAK_RADIUS)..(x + PEAK_RADIUS + 1).min(width);
+            let is_first = rows
+                .clone()
+                .flat_map(|row| columns.clone().map(move |column| (row, column)))
+                .take_while(|&place| place < (y, x))
+                .all(|(row, column)| sums[row * width + column] < here);
+            if is_first {
+                found.push([x, y]);
             }
         }
     }
-    true
+    found
 }
 
 /// The best of each place of a stretch, per sector.
@@ -93,36 +117,54 @@ struct Swept {
     variants: [Vec<u16>; NUM_SECTORS],
 }
 
-fn sweep_stretch(responses: &Responses, shifts: &[Vec<(usize, isize)>], at: usize, len: usize) -> Swept {
-    let mut swept =
-        Swept { sums: [(); NUM_SECTORS].map(|()| vec![-1; len]), variants: [(); NUM_SECTORS].map(|()| vec![0; len]) };
-    let mut bytes = [0u8; STRETCH];
-    let mut sums = [0i16; STRETCH];
-    let (bytes, sums) = (&mut bytes[..len], &mut sums[..len]);
-    for (variant_idx, looks) in shifts.iter().enumerate() {
-        sums.fill(0);
-        for some in looks.chunks(LOOKS_PER_BYTE) {
-            bytes.fill(0);
-            for &(table, shift) in some {
-                let from = (at as isize + shift) as usize;
-                let row = &responses.table(table)[from..from + len];
-                for (sum, &value) in bytes.iter_mut().zip(row) {
-                    *sum = sum.wrapping_add(value);
+/// All variants at the places from `at` on.
+struct SweepStretch<'a> {
+    responses: &'a Responses,
+    shifts: &'a [Vec<(usize, isize)>],
+    at: usize,
+    len: usize,
+}
+
+impl WithSimd for SweepStretch<'_> {
+    type Output = Swept;
+
+    /// Plain loops over blocks that stay in registers; compiled for the widest instructions that the machine has.
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Swept {
+        let Self { responses, shifts, at, len } = self;
+        let mut swept = Swept {
+            sums: [(); NUM_SECTORS].map(|()| vec![-1; len.next_multiple_of(BLOCK)]),
+            variants: [(); NUM_SECTORS].map(|()| vec![0; len.next_multiple_of(BLOCK)]),
+        };
+        // Neighbouring variants look at nearly the same bytes: block by block, those stay in the first-level cache.
+        for start in (0..len).step_by(BLOCK) {
+            let from = (at + start) as isize;
+            for (variant_idx, looks) in shifts.iter().enumerate() {
+                let mut sums = [0i16; BLOCK];
+                for some in looks.chunks(LOOKS_PER_BYTE) {
+                    let mut bytes = [0u8; BLOCK];
+                    for &(table, shift) in some {
+                        let row = &responses.table(table)[(from + shift) as usize..][..BLOCK];
+                        for (sum, &value) in bytes.iter_mut().zip(row) {
+                            *sum = sum.wrapping_add(value);
+                        }
+                    }
+                    for (sum, &byte) in sums.iter_mut().zip(&bytes) {
+                        *sum += i16::from(byte);
+                    }
+                }
+                let sector = variant_idx * NUM_SECTORS / shifts.len();
+                let best = &mut swept.sums[sector][start..][..BLOCK];
+                let variants = &mut swept.variants[sector][start..][..BLOCK];
+                for ((best, variant), &sum) in best.iter_mut().zip(variants).zip(&sums) {
+                    let is_better = sum > *best;
+                    *best = if is_better { sum } else { *best };
+                    *variant = if is_better { variant_idx as u16 } else { *variant };
                 }
             }
-            for (sum, &byte) in sums.iter_mut().zip(bytes.iter()) {
-                *sum += i16::from(byte);
-            }
         }
-        let sector = variant_idx * NUM_SECTORS / shifts.len();
-        let (best, variants) = (&mut swept.sums[sector], &mut swept.variants[sector]);
-        for ((best, variant), &sum) in best.iter_mut().zip(variants.iter_mut()).zip(sums.iter()) {
-            let is_better = sum > *best;
-            *best = if is_better { sum } else { *best };
-            *variant = if is_better { variant_idx as u16 } else { *variant };
-        }
+        swept
     }
-    swept
 }
 
 #[cfg(test)]
