@@ -13,7 +13,7 @@ use crate::parallel;
 use crate::search::bank::Bank;
 use crate::search::responses::{BLOCK, FULL, Responses};
 
-/// Places worked on at once; their sums stay in the first-level cache. Chosen for time; results do not depend on it.
+/// Places that one thread takes at a time, in blocks of [`BLOCK`]. Chosen for time; results do not depend on it.
 const STRETCH: usize = 1024;
 /// Looks added up in bytes before they are carried over into 16 bits. Derived.
 const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
@@ -21,7 +21,7 @@ const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
 /// measured.
 const NUM_SECTORS: usize = 4;
 /// A start is the best within this many places. Chosen by hand, not measured.
-const PEAK_RADIUS: usize = 2;
+const PEAK_RADIUS: isize = 2;
 
 /// A place, a variant, and how well they agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,20 +52,25 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     let least = (least_response * full).ceil() as i16;
     let mut starts: Vec<Start> = Vec::new();
     for sector in 0..NUM_SECTORS {
-        let mut sums = vec![0i16; width * height];
-        for (y, row) in sums.chunks_exact_mut(width).enumerate() {
-            for (x, sum) in row.iter_mut().enumerate() {
-                let offset = responses.idx_of(x, y) - first;
-                *sum = swept[offset / STRETCH].sums[sector][offset % STRETCH];
+        let best = |x: isize, y: isize| -> i16 {
+            if x < 0 || y < 0 || x >= width as isize || y >= height as isize {
+                return -1;
             }
-        }
-        for place in peaks(&sums, width, least) {
-            let offset = responses.idx_of(place[0], place[1]) - first;
-            starts.push(Start {
-                place,
-                variant_idx: usize::from(swept[offset / STRETCH].variants[sector][offset % STRETCH]),
-                response: f64::from(sums[place[1] * width + place[0]]) / full,
-            });
+            let offset = responses.idx_of(x as usize, y as usize) - first;
+            swept[offset / STRETCH].sums[sector][offset % STRETCH]
+        };
+        for y in 0..height as isize {
+            for x in 0..width as isize {
+                let here = best(x, y);
+                if here >= least && is_peak(&best, x, y, here) {
+                    let offset = responses.idx_of(x as usize, y as usize) - first;
+                    starts.push(Start {
+                        place: [x as usize, y as usize],
+                        variant_idx: usize::from(swept[offset / STRETCH].variants[sector][offset % STRETCH]),
+                        response: f64::from(here) / full,
+                    });
+                }
+            }
         }
     }
     // A stable sort: equal ones stay in the order of sectors and rows, whatever the threads did.
@@ -74,41 +79,17 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     starts
 }
 
-/// Places of at least `least` that are the best within [`PEAK_RADIUS`], row by row.
-fn peaks(sums: &[i16], width: usize, least: i16) -> Vec<[usize; 2]> {
-    let height = sums.len() / width;
-    let raise = |to: &mut [i16], from: &[i16]| to.iter_mut().zip(from).for_each(|(to, &from)| *to = (*to).max(from));
-    let mut across = sums.to_vec();
-    for (out, row) in across.chunks_exact_mut(width).zip(sums.chunks_exact(width)) {
-        for shift in 1..=PEAK_RADIUS.min(width - 1) {
-            raise(&mut out[shift..], &row[..width - shift]);
-            raise(&mut out[..width - shift], &row[shift..]);
-        }
-    }
-    let mut found = Vec::new();
-    let mut highest = vec![0i16; width];
-    for y in 0..height {
-        let rows = y.saturating_sub(PEAK_RADIUS)..(y + PEAK_RADIUS + 1).min(height);
-        highest.fill(i16::MIN);
-        rows.clone().for_each(|near| raise(&mut highest, &across[near * width..][..width]));
-        for x in 0..width {
-            let here = sums[y * width + x];
-            if here < least || here < highest[x] {
-                continue;
-            }
+fn is_peak(best: &impl Fn(isize, isize) -> i16, x: isize, y: isize, here: i16) -> bool {
+    for dy in -PEAK_RADIUS..=PEAK_RADIUS {
+        for dx in -PEAK_RADIUS..=PEAK_RADIUS {
+            let there = best(x + dx, y + dy);
             // Of equal neighbours the first is kept.
-            let columns = x.saturating_sub(PEAK_RADIUS)..(x + PEAK_RADIUS + 1).min(width);
-            let is_first = rows
-                .clone()
-                .flat_map(|row| columns.clone().map(move |column| (row, column)))
-                .take_while(|&place| place < (y, x))
-                .all(|(row, column)| sums[row * width + column] < here);
-            if is_first {
-                found.push([x, y]);
+            if there > here || (there == here && (dy, dx) < (0, 0)) {
+                return false;
             }
         }
     }
-    found
+    true
 }
 
 /// The best of each place of a stretch, per sector.
