@@ -128,6 +128,11 @@ pub struct TeachArgs {
     /// How often the part looks the same in a whole turn: 1 for most, 4 for a square, full for a disc
     #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
     pub symmetry: RotationalSymmetry,
+    /// Smallest and largest size of the part in a picture, over its size in the photo: 0.95-1.05 where the camera always has
+    /// the same height, which also tells parts that differ in size; more where it does not, or where the photo was both
+    /// cropped and resized
+    #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
+    pub size_tolerance: SizeTolerance,
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
@@ -160,7 +165,13 @@ pub struct DetectArgs {
     /// Leave out the check against the demonstration: the network alone decides and places
     #[arg(long)]
     pub no_verify: bool,
-    /// Also list detections scored below 0.5
+    /// Most parts to find in an image, the surest first
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub max: u32,
+    /// Smallest and largest size of the part over its size in the photo, instead of what it was taught with
+    #[arg(long, value_name = "LOW-HIGH", value_parser = size_tolerance)]
+    pub size_tolerance: Option<SizeTolerance>,
+    /// Also list detections scored below 0.5, with what speaks against them
     #[arg(long)]
     pub all: bool,
     /// A JSON line for each image
@@ -530,6 +541,32 @@ fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     }
 }
 
+/// Smallest and largest size of a part over the usual one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizeTolerance {
+    /// From 0.5 to 1.
+    pub low: f64,
+    /// From 1 to 2.
+    pub high: f64,
+}
+
+impl SizeTolerance {
+    /// As a range.
+    pub fn range(self) -> std::ops::RangeInclusive<f64> {
+        self.low..=self.high
+    }
+}
+
+fn size_tolerance(text: &str) -> Result<SizeTolerance, String> {
+    let bounds = text.split_once('-').map(|(low, high)| (low.trim().parse(), high.trim().parse()));
+    match bounds {
+        Some((Ok(low), Ok(high))) if (0.5..=1.0).contains(&low) && (1.0..=2.0).contains(&high) => {
+            Ok(SizeTolerance { low, high })
+        }
+        _ => Err("expected LOW-HIGH with LOW from 0.5 to 1 and HIGH from 1 to 2, such as 0.75-1.35".to_owned()),
+    }
+}
+
 /// A number from 0 to 1.
 fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -550,6 +587,14 @@ fn seconds(text: &str) -> Result<f64, String> {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+
+    #[test]
+    fn a_size_tolerance_holds_the_usual_size() {
+        assert_eq!(size_tolerance("0.75-1.35"), Ok(SizeTolerance { low: 0.75, high: 1.35 }));
+        for text in ["", "0.75", "1.1-1.3", "0.9-0.95", "0.1-1.2", "0.9-3", "0.9..1.1"] {
+            assert!(size_tolerance(text).unwrap_err().contains("such as 0.75-1.35"), "{text}");
+        }
+    }
 
     #[test]
     fn the_definition_is_consistent() {

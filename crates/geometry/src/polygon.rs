@@ -75,6 +75,21 @@ impl Polygon {
         })
     }
 
+    /// The share of this area that lies inside another polygon, in `[0, 1]`, from a grid of 16 × 16 points over its box.
+    pub fn share_inside(&self, other: &Self) -> f64 {
+        const SIDE: u32 = 16;
+        let bounds = self.bounds();
+        let along = |low: f64, high: f64, k: u32| low + (high - low) * (f64::from(k) + 0.5) / f64::from(SIDE);
+        let points = (0..SIDE * SIDE)
+            .map(|k| Point2::new(along(bounds.x1, bounds.x2, k % SIDE), along(bounds.y1, bounds.y2, k / SIDE)));
+        let (mut own, mut shared) = (0u32, 0u32);
+        for point in points.filter(|point| self.contains(point)) {
+            own += 1;
+            shared += u32::from(other.contains(&point));
+        }
+        f64::from(shared) / f64::from(own.max(1))
+    }
+
     /// Distance from a point to the nearest edge, in pixels, inside and outside alike.
     pub fn distance_to_edge(&self, point: &Point2<f64>) -> f64 {
         self.edges()
@@ -165,6 +180,16 @@ impl Polygon {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn half_of_a_square_lies_in_its_neighbour_shifted_by_half() {
+        let square = |x: f64| Polygon::from_box(&BoundingBox { x1: x, y1: 0.0, x2: x + 32.0, y2: 32.0 });
+        assert_eq!(square(0.0).share_inside(&square(16.0)), 0.5);
+        assert_eq!(square(0.0).share_inside(&square(40.0)), 0.0);
+        // A quarter of the large square is the small one.
+        let small = Polygon::from_box(&BoundingBox { x1: 0.0, y1: 0.0, x2: 16.0, y2: 16.0 });
+        assert_eq!((square(0.0).share_inside(&small), small.share_inside(&square(0.0))), (0.25, 1.0));
+    }
     use proptest::prelude::*;
 
     fn l_shape() -> Polygon {

@@ -105,6 +105,27 @@ pub enum GraspError {
     /// Nothing to teach from.
     #[error("expected at least one demonstration, found none")]
     NoDemonstration,
+    /// Demonstrations that do not show one part.
+    #[error("expected demonstrations of one part: {expected}; found {found}")]
+    ContradictingDemonstrations {
+        /// What the first ones say.
+        expected: String,
+        /// What another one says.
+        found: String,
+    },
+    /// A part with too few pixels in its photo.
+    #[error(
+        "expected a part of at least {least} pixels in its photo, found {width:.0} × {height:.0}: photograph it from nearer, \
+         or with more pixels"
+    )]
+    PartTooSmall {
+        /// The least extent.
+        least: f64,
+        /// Width of the part's box.
+        width: f64,
+        /// Height of the part's box.
+        height: f64,
+    },
     /// A demonstration that the model cannot be taught from.
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),

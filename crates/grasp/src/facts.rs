@@ -111,6 +111,9 @@ pub struct TeachingFacts {
     /// Which turns of the part cannot be told from none, as whoever taught it said; files of older versions do not tell.
     #[serde(default, skip_serializing_if = "is_without_symmetry")]
     pub symmetry: RotationalSymmetry,
+    /// Smallest and largest size over the usual one at which the part is looked for; files of older versions do not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size_tolerance: Option<[f64; 2]>,
     /// Samples that the network saw.
     pub samples: usize,
     /// Optimiser steps.

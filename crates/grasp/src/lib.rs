@@ -46,19 +46,24 @@ pub mod fitting;
 mod model;
 mod model_file;
 mod models;
+mod network_evidence;
 mod pose;
+mod prepared;
 mod record;
 mod safetensors_file;
+mod sighting;
+mod sizes;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;
+mod verdict;
 mod verification;
 
 #[cfg(feature = "teach")]
 pub use base_weights::BaseWeights;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
-pub use check_config::{CheckConfig, SizePenalty, ThresholdConfig};
+pub use check_config::{CheckConfig, ScoreConfig, Term};
 pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
 pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
@@ -73,3 +78,4 @@ pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, Vali
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use teach::{Event, Preset, Taught, TeachOptions, teach};
+pub use verdict::Contributions;

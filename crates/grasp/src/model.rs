@@ -1,22 +1,28 @@
 //! The grasp model: what was taught, and how it looks at an image.
 //!
 //! ```text
-//! RgbImage ─ Network: detections, each read as a pose of the demonstration ─ laid over the image, refined, scored
-//!     └───── no network, or nothing accepted: the demonstration looked for in the whole image ─────┘       │
-//!                                                                                            PlanarGrasp ──┘
+//! RgbImage ─┬─ Network: detections, each read as a pose of the demonstration ─ laid over the image, refined ─┐
+//!           └─ search: the demonstration looked for in the whole image ───────────────────────────────────────┤
+//!                                    PlanarGrasp, score ─ of those on one part the best ─ verdict ─ evidence ─┘
 //! ```
+
+use std::iter::repeat;
+use std::ops::RangeInclusive;
 
 use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 
+use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::model_file::Calibrations;
-use crate::models::{Candidate, Network, instant};
+use crate::models::{Candidate, Network};
+use crate::sighting::{SAME_PART_IOU, Sighting, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Overlay, Scene, verify};
+use crate::verdict::{Clues, Contributions, judge_picture};
+use crate::verification::{Overlay, Scene};
 
 /// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
 const LEAST_SIDE_PX: u32 = 32;
@@ -47,10 +53,12 @@ pub enum Verification {
 pub struct GraspDetection {
     /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
     pub score: f64,
-    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, second opinions).
+    /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, what only the search found).
     pub network_score: f64,
     /// How well the demonstration agrees with the image there, in `[0, 1]`; `None` without verification.
     pub agreement: Option<f64>,
+    /// What the score is made of; `None` without verification.
+    pub evidence: Option<Contributions>,
     /// The box around the part.
     pub bbox: BoundingBox,
     /// Keypoints along the grasp line, each with the network's score; empty for models without.
@@ -61,12 +69,30 @@ pub struct GraspDetection {
     pub grasp: PlanarGrasp,
     /// What the turn was first read from.
     pub turn_source: TurnSource,
+    /// Mean brightness there over that of the demonstration; 1 without verification.
+    pub light: f64,
 }
 
 impl GraspDetection {
     /// Whether the part is there.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
+    }
+
+    /// Why it is not accepted, in words: the strongest objection. `None` for what is accepted.
+    pub fn refused(&self) -> Option<&'static str> {
+        if self.is_accepted() {
+            return None;
+        }
+        let objection =
+            self.evidence.as_ref().map_or(Some("the network is not sure"), Contributions::strongest_objection);
+        Some(objection.unwrap_or("all evidence together is too weak"))
+    }
+
+    /// The further demonstration, or the setting, that would help where this is the part and was refused.
+    pub fn advice(&self) -> Option<&'static str> {
+        let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
+        evidence.advice(self.light)
     }
 }
 
@@ -118,8 +144,59 @@ impl GraspModel {
     /// # Errors
     /// A number of points outside 8 to 1024.
     pub fn with_search_points(self, num_points: usize) -> Result<Self> {
-        let demonstrations = self.demonstrations.into_iter().map(|taught| taught.with_search_points(num_points));
-        Ok(Self { demonstrations: demonstrations.collect::<Result<_>>()?, ..self })
+        self.with_check(|check| check.search.num_points = num_points)
+    }
+
+    /// The same model with other bounds of a part's size over the usual one; its file tells those that it was taught with.
+    ///
+    /// # Errors
+    /// Bounds that do not lie within 0.5 to 1 and 1 to 2.
+    pub fn with_size_tolerance(self, tolerance: RangeInclusive<f64>) -> Result<Self> {
+        self.with_check(|check| check.search.scales = tolerance.clone())
+    }
+
+    /// The same model that finds at most so many parts in a picture; 100 otherwise.
+    ///
+    /// # Errors
+    /// None at all.
+    pub fn with_max_detections(self, max_detections: usize) -> Result<Self> {
+        if max_detections == 0 {
+            return Err(GraspError::InvalidConfig { name: "most detections", expected: "at least 1", found: 0.0 });
+        }
+        self.with_check(|check| check.search.max_matches = max_detections)
+    }
+
+    /// Bounds of a part's size over the usual one, within which it is looked for.
+    pub fn size_tolerance(&self) -> RangeInclusive<f64> {
+        self.demonstrations[0].check().search.scales.clone()
+    }
+
+    fn with_check(self, change: impl Fn(&mut CheckConfig)) -> Result<Self> {
+        let changed = |demonstration: TaughtDemonstration| {
+            let mut check = demonstration.check().clone();
+            change(&mut check);
+            demonstration.with_check(check)
+        };
+        let demonstrations = self.demonstrations.into_iter().map(changed).collect::<Result<_>>()?;
+        Ok(Self { demonstrations, ..self })
+    }
+
+    /// What the file lacks because an older version wrote it, and what is done instead; empty for today's.
+    pub fn lacks(&self) -> Vec<&'static str> {
+        let mut lacks = Vec::new();
+        if self.facts.size_tolerance.is_none() {
+            lacks.push("it was taught before sizes were free: the part is looked for within the default tolerance");
+        }
+        if self.calibrations.resemblance.is_none() {
+            lacks.push("how much other things resemble the part is taken from its old threshold; teach again for a better score");
+        }
+        if self.network.is_some() && self.calibrations.evidence.is_none() {
+            lacks.push("how far its network can be trusted was not measured: the network proposes and counts for nothing; teach again");
+        }
+        if self.demonstrations.iter().any(|demonstration| demonstration.marks.photo_size.is_none()) {
+            lacks.push("the photo's size is not known: pictures with another number of pixels are taken as crops");
+        }
+        lacks
     }
 
     /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for whoever wants to see
@@ -150,19 +227,15 @@ impl GraspModel {
             (Some(network), Verification::ByShape) => {
                 let scene = Scene::new(image, &self.demonstrations);
                 let candidates = network.candidates_async(image, &self.demonstrations).await?;
-                let mut found: Vec<_> = candidates.iter().map(|c| self.verified(c, &scene)).collect();
-                if !found.iter().any(GraspDetection::is_accepted) {
-                    // A second opinion: the network finds nothing that the demonstration agrees with.
-                    found.extend(self.searched(&scene));
-                }
-                found
+                self.judged(sightings(&candidates, &scene))
             }
-            (None, _) => self.searched(&Scene::new(image, &self.demonstrations)),
+            (None, _) => self.judged(sightings(&[], &Scene::new(image, &self.demonstrations))),
         };
         let (width, height) = (f64::from(width), f64::from(height));
         found.iter_mut().for_each(|detection| detection.bbox = detection.bbox.clip(width, height));
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         drop_repeated(&mut found);
+        found.truncate(self.demonstrations[0].check().search.max_matches);
         Ok(found)
     }
 
@@ -171,63 +244,71 @@ impl GraspModel {
             score: self.calibrations.network.apply(candidate.network_score),
             network_score: candidate.network_score,
             agreement: None,
+            evidence: None,
             bbox: candidate.bbox,
             keypoints: candidate.keypoints.clone(),
             outline: None,
             grasp: candidate.grasp,
             turn_source: candidate.turn_source,
+            light: 1.0,
         }
     }
 
-    /// Lays the demonstration over the image where the network proposes.
-    fn verified(&self, candidate: &Candidate, scene: &Scene) -> GraspDetection {
-        let overlay = verify(&self.demonstrations[candidate.demonstration_idx], candidate, scene);
-        let keypoint_scores = candidate.keypoints.iter().map(|(_, score)| *score);
-        self.laid_over(&overlay, candidate.network_score, keypoint_scores, candidate.turn_source)
-    }
-
-    /// Looks for the demonstrations in the whole image, with no network's help.
-    fn searched(&self, scene: &Scene) -> Vec<GraspDetection> {
+    /// Scores them, first each alone, then by the size of the surest among them.
+    fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<GraspDetection> {
+        let resemblance = self.calibrations.resemblance();
+        let clues: Vec<Clues> = sightings
+            .iter()
+            .map(|sighting| {
+                let network =
+                    self.network.as_ref().and_then(|_| self.calibrations.log_likelihood_ratio(sighting.network_score));
+                let Overlay { evidence, log_size, .. } = sighting.overlay;
+                Clues { evidence, log_size, network, resemblance }
+            })
+            .collect();
+        let judged = judge_picture(&clues, &self.demonstrations[0].check().score);
         let num_keypoints = if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 };
-        let overlays = instant::search(&self.demonstrations, scene);
-        let no_scores = || (0..num_keypoints).map(|_| 0.0);
-        overlays.iter().map(|overlay| self.laid_over(overlay, 0.0, no_scores(), TurnSource::Search)).collect()
+        sightings
+            .into_iter()
+            .zip(judged)
+            .map(|(sighting, (score, evidence))| sighting.detection(score, evidence, num_keypoints))
+            .collect()
     }
+}
 
-    /// A detection as the demonstration says, where it lies; a keypoint for each score.
-    fn laid_over(
-        &self,
-        overlay: &Overlay,
-        network_score: f64,
-        keypoint_scores: impl Iterator<Item = f64>,
-        turn_source: TurnSource,
-    ) -> GraspDetection {
-        let &Overlay { demonstration, image_from_cutout: pose, agreement, .. } = overlay;
-        let outline = demonstration.outline(&pose);
-        let taught = demonstration.keypoints();
+impl Sighting<'_> {
+    /// A detection as the demonstration says, where it lies.
+    fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
+        let Overlay { demonstration, image_from_cutout, image_from_marks, agreement, .. } = self.overlay;
+        let outline = demonstration.outline(&image_from_cutout);
+        let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
         GraspDetection {
-            score: self.calibrations.agreement.apply(agreement),
-            network_score,
+            score,
+            network_score: self.network_score,
             agreement: Some(agreement),
+            evidence: Some(evidence),
             bbox: outline.bounds(),
-            keypoints: taught.iter().zip(keypoint_scores).map(|(k, score)| (pose.apply(&k.point()), score)).collect(),
+            keypoints: marked.zip(self.keypoint_scores.into_iter().chain(repeat(0.0))).take(num_keypoints).collect(),
             outline: Some(outline),
-            grasp: demonstration.grasp(&pose),
-            turn_source,
+            grasp: demonstration.grasp(&image_from_marks),
+            turn_source: self.turn_source,
+            light: self.overlay.light,
         }
     }
 }
 
-/// Detections that verification moved onto the same part, by the overlap of their boxes: the best one stays. Of those that
-/// ended in the same pose it is the one that the network was surest of, and not a matter of the last bit.
+/// Outlines of which one lies so far in the other are the same part's: parts do not lie in each other. Chosen by hand.
+const SAME_PART_SHARE: f64 = 0.3;
+
+/// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no
+/// outlines. Of those that ended in the same pose it is the one that the network was surest of, and not a matter of the
+/// last bit.
 fn drop_repeated(found: &mut Vec<GraspDetection>) {
-    // Chosen by hand, not measured.
-    const SAME_PART_IOU: f64 = 0.5;
     // Chosen by hand: above the rounding of single precision, below any difference that tells poses apart.
     const SAME_SCORE: f64 = 1e-4;
     let mut kept: Vec<GraspDetection> = Vec::with_capacity(found.len());
     for detection in found.drain(..) {
-        match kept.iter_mut().find(|better| better.bbox.iou(&detection.bbox) >= SAME_PART_IOU) {
+        match kept.iter_mut().find(|better| are_of_same_part(better, &detection)) {
             None => kept.push(detection),
             Some(better) => {
                 let as_good = better.score - detection.score < SAME_SCORE;
@@ -240,6 +321,16 @@ fn drop_repeated(found: &mut Vec<GraspDetection>) {
     *found = kept;
 }
 
+fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> bool {
+    match (&one.outline, &other.outline) {
+        (Some(one), Some(other)) if one.bounds().intersection(&other.bounds()) > 0.0 => {
+            one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
+        }
+        (Some(_), Some(_)) => false,
+        _ => one.bbox.iou(&other.bbox) >= SAME_PART_IOU,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,11 +341,13 @@ mod tests {
             score,
             network_score,
             agreement: Some(score),
+            evidence: None,
             bbox: BoundingBox { x1: x, y1: 0.0, x2: x + 20.0, y2: 10.0 },
             keypoints: Vec::new(),
             outline: None,
             grasp: PlanarGrasp { x: x + 10.0, y: 5.0, angle: Angle::from_degrees(0.0), width: 4.0 },
             turn_source: TurnSource::Keypoints,
+            light: 1.0,
         }
     }
 

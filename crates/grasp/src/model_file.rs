@@ -5,7 +5,7 @@
 //!            teaching       seed, samples, steps, seconds, validation figures, base weights' hash   (JSON)
 //!            network        the detector's configuration; none in model S                           (JSON)
 //!            orientation    the orientation CNN's configuration; in model A alone                   (JSON)
-//!            calibration    of the network's score and of the agreement                             (JSON)
+//!            calibration    of the network's score; how much other things resemble the part         (JSON)
 //!            demonstrations marks of each, in pixels of its cut-out                                 (JSON)
 //! tensors    network.NAME              f16
 //!            orientation.NAME          f16
@@ -26,25 +26,55 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
+use crate::check_config::{CheckConfig, ScoreConfig};
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{self, Network, Reading};
+use crate::network_evidence::NetworkEvidence;
 use crate::safetensors_file::{self, TensorBytes};
 use crate::taught::{TaughtDemonstration, TaughtMarks};
 
-/// The version written and read here. Any change that an older reader would misread raises it.
-pub const FORMAT_VERSION: u32 = 1;
+/// The version written here. Any change that an older reader would misread raises it.
+pub const FORMAT_VERSION: u32 = 2;
+/// The oldest version that is read. Version 1 had a threshold of the agreement instead of one score from all evidence.
+const OLDEST_VERSION: u32 = 1;
 
 /// More demonstrations than anybody takes; bounds the work on a forged file.
 const MOST_DEMONSTRATIONS: usize = 1000;
 
-/// The two calibrations, as stored.
+/// What was measured of the part while teaching, as stored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Calibrations {
     pub(crate) network: Calibration,
-    pub(crate) agreement: Calibration,
+    /// What the network's scores are worth; `None` without a network, and in version 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) evidence: Option<NetworkEvidence>,
+    /// Mean agreement of other things with the part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) resemblance: Option<f64>,
+    /// Version 1: the agreement from which on the part counted as found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    agreement: Option<Calibration>,
+}
+
+impl Calibrations {
+    pub(crate) fn new(network: Calibration, evidence: Option<NetworkEvidence>, resemblance: f64) -> Self {
+        Self { network, evidence, resemblance: Some(resemblance), agreement: None }
+    }
+
+    /// What the network's score says of a place, 0 where it proposes nothing; `None` where that is not known.
+    pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {
+        Some(self.evidence?.log_likelihood_ratio(network_score, &self.network))
+    }
+
+    /// Mean agreement of other things with the part. Version 1 set its threshold 0.2 above that, within bounds.
+    pub(crate) fn resemblance(&self) -> f64 {
+        const MARGIN_OF_VERSION_1: f64 = 0.2;
+        let from_threshold = || self.agreement.map(|agreement| agreement.threshold - MARGIN_OF_VERSION_1);
+        self.resemblance.or_else(from_threshold).unwrap_or(ScoreConfig::DEFAULT.resemblance.neutral)
+    }
 }
 
 /// What a file says of itself, without its weights.
@@ -132,20 +162,25 @@ impl GraspModel {
                 found: marks.len().to_string(),
             });
         }
+        let facts: TeachingFacts = metadata.json("teaching")?;
         let demonstrations = marks
             .into_iter()
             .enumerate()
             .map(|(i, marks)| {
                 let png = tensor(&file, &format!("demonstrations.{i}.cutout"), Dtype::U8)?;
                 let cutout = decode_image(png.data(), &ImageLimits::default())?;
-                TaughtDemonstration::from_parts(cutout, marks)
+                let mut check = CheckConfig::DEFAULT;
+                if let Some([low, high]) = facts.size_tolerance {
+                    check.search.scales = low..=high;
+                }
+                TaughtDemonstration::with_config(cutout, marks, check)
             })
             .collect::<Result<Vec<_>>>()?;
 
         Ok(Self {
             preset: metadata.text("preset")?.to_owned(),
             calibrations: metadata.json("calibration")?,
-            facts: metadata.json("teaching")?,
+            facts,
             network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
         })
@@ -252,7 +287,7 @@ fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     let Some(version) = metadata.get("format_version").filter(|_| metadata.contains_key("model")) else {
         return Err(GraspError::NotAModel { found: "a safetensors file without a grasp model's metadata".to_owned() });
     };
-    if *version != FORMAT_VERSION.to_string() {
+    if !(OLDEST_VERSION..=FORMAT_VERSION).any(|known| *version == known.to_string()) {
         return Err(GraspError::OtherVersion { expected: FORMAT_VERSION, found: version.clone() });
     }
     let expected = 8 + header_length + header.data_len();
@@ -339,10 +374,11 @@ mod tests {
             preset: "edge".to_owned(),
             network,
             demonstrations,
-            calibrations: Calibrations { network: Calibration::NEUTRAL, agreement: Calibration::NEUTRAL },
+            calibrations: Calibrations::new(Calibration::NEUTRAL, None, 0.3),
             facts: TeachingFacts {
                 seed: 3,
                 symmetry: RotationalSymmetry::None,
+                size_tolerance: Some([0.75, 1.35]),
                 samples: 0,
                 steps: 0,
                 seconds: 0.5,
@@ -390,9 +426,27 @@ mod tests {
     #[test]
     fn other_versions_are_told_apart_from_damage() {
         let bytes = untaught(ModelKind::C).to_bytes().unwrap();
-        let newer = with_metadata(&bytes, r#""format_version":"1""#, r#""format_version":"7""#);
+        let newer = with_metadata(&bytes, r#""format_version":"2""#, r#""format_version":"7""#);
         let refused = GraspModel::from_bytes(&newer, &Device::flex()).unwrap_err();
-        assert!(matches!(&refused, GraspError::OtherVersion { expected: 1, found } if found == "7"), "{refused}");
+        assert!(matches!(&refused, GraspError::OtherVersion { expected: 2, found } if found == "7"), "{refused}");
+    }
+
+    #[test]
+    fn a_file_of_version_1_is_read_and_says_what_it_lacks() {
+        let today = untaught(ModelKind::S).to_bytes().unwrap();
+        assert!(GraspModel::from_bytes(&today, &Device::flex()).unwrap().lacks().len() == 1, "the photo's size alone");
+        // The same as version 1 wrote it: a threshold instead of the resemblance, no tolerance.
+        let mut old = untaught(ModelKind::S);
+        old.facts.size_tolerance = None;
+        old.calibrations = serde_json::from_str(
+            r#"{"network":{"threshold":0.5,"slope":4.0},"agreement":{"threshold":0.56,"slope":25.0}}"#,
+        )
+        .unwrap();
+        let bytes = with_metadata(&old.to_bytes().unwrap(), r#""format_version":"2""#, r#""format_version":"1""#);
+        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+        assert!((read.calibrations.resemblance() - 0.36).abs() < 1e-12);
+        assert_eq!(read.size_tolerance(), CheckConfig::DEFAULT_SIZE_TOLERANCE);
+        assert_eq!(read.lacks().len(), 3, "{:?}", read.lacks());
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::TurnSource;
 use crate::model::GraspDetection;
+use crate::{Contributions, TurnSource};
 
 /// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,6 +26,12 @@ pub struct DetectionRecord {
     pub grasp: GraspRecord,
     /// What the turn was first read from.
     pub turn_source: TurnSource,
+    /// What the score is made of, in log-odds; absent without verification.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub evidence: Option<Contributions>,
+    /// Why it is not accepted, in words; absent for what is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<&'static str>,
 }
 
 /// A [`sdg_geometry::PlanarGrasp`] in pixels and degrees.
@@ -54,6 +60,8 @@ impl From<&GraspDetection> for DetectionRecord {
             polygon: detection.outline.as_ref().map(|o| o.vertices.iter().map(|v| [v.x, v.y]).collect()),
             grasp: GraspRecord { x: grasp.x, y: grasp.y, angle_deg: grasp.angle.degrees(), width_px: grasp.width },
             turn_source: detection.turn_source,
+            evidence: detection.evidence,
+            refused: detection.refused(),
         }
     }
 }
@@ -71,11 +79,13 @@ mod tests {
             score: 0.75,
             network_score: 0.5,
             agreement: None,
+            evidence: None,
             bbox,
             keypoints: vec![(Point2::new(1.5, 2.5), 0.25)],
             outline: None,
             grasp: PlanarGrasp { x: 2.0, y: 3.0, angle: Angle::from_degrees(90.0), width: 8.0 },
             turn_source: TurnSource::Keypoints,
+            light: 1.0,
         };
         let json = serde_json::to_string(&DetectionRecord::from(&detection)).unwrap();
         let expected = r#"{"score":0.75,"network_score":0.5,"agreement":null,"box":[1.0,2.0,3.0,4.0],"#.to_owned()
@@ -85,5 +95,20 @@ mod tests {
         let verified = GraspDetection { outline: Some(Polygon::from_box(&bbox)), agreement: Some(0.9), ..detection };
         let json = serde_json::to_string(&DetectionRecord::from(&verified)).unwrap();
         assert!(json.contains(r#""agreement":0.9"#) && json.contains(r#""polygon":[[1.0,2.0],"#), "{json}");
+        let evidence = Contributions {
+            network: None,
+            edges: 1.5,
+            surface: 0.5,
+            hue: 0.0,
+            weakest_region: 0.0,
+            visible: -2.5,
+            size: 0.0,
+            outside: -0.25,
+            resemblance: 0.0,
+        };
+        let refused = GraspDetection { evidence: Some(evidence), score: 0.25, ..verified };
+        let json = serde_json::to_string(&DetectionRecord::from(&refused)).unwrap();
+        assert!(json.contains(r#""evidence":{"edges":1.5,"surface":0.5,"#), "{json}");
+        assert!(json.ends_with(r#""refused":"too little of it is visible"}"#), "{json}");
     }
 }

@@ -4,11 +4,14 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use sdg_shape::{Comparison, GradientField, InstantSearch, Match, ShapeTemplate, Surface};
 use serde::{Deserialize, Serialize};
+
+use std::sync::Arc;
 
 use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
+use crate::prepared::{Prepared, PreparedSizes, WorkingSize};
+use crate::sizes::SizeRange;
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides. Chosen by hand, not measured.
@@ -32,16 +35,21 @@ pub struct TaughtMarks {
     pub photo_size: Option<[u32; 2]>,
 }
 
-/// The cut-out, its marks, and the template that is laid over images.
+impl TaughtMarks {
+    /// The outline; the box where none was drawn.
+    pub fn region(&self) -> Polygon {
+        self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
+    }
+}
+
+/// The cut-out, its marks, and what is laid over images.
 #[derive(Debug, Clone)]
 pub struct TaughtDemonstration {
     /// The photo, cut to the part and a margin.
     pub cutout: RgbImage,
     /// The marks on it.
     pub marks: TaughtMarks,
-    template: ShapeTemplate,
-    surface: Surface,
-    search: InstantSearch,
+    prepared: PreparedSizes,
     check: CheckConfig,
 }
 
@@ -94,13 +102,24 @@ impl TaughtDemonstration {
         Self::with_config(cutout, marks, CheckConfig::DEFAULT)
     }
 
-    fn with_config(cutout: RgbImage, marks: TaughtMarks, check: CheckConfig) -> Result<Self, GraspError> {
+    pub(crate) fn with_config(cutout: RgbImage, marks: TaughtMarks, check: CheckConfig) -> Result<Self, GraspError> {
         check.check()?;
-        let outline = marks.outline.clone().unwrap_or_else(|| Polygon::from_box(&marks.bbox));
-        let template = ShapeTemplate::new(&cutout, &outline, &check.search.shape)?;
-        let surface = Surface::new(&cutout, &outline, &check.search.shape.surface);
-        let search = InstantSearch::new(&cutout, &outline, &check.search)?;
-        Ok(Self { cutout, marks, template, surface, search, check })
+        let made = Self { cutout, marks, prepared: PreparedSizes::default(), check };
+        // What is wrong with a demonstration should come out here, not at the first picture.
+        let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
+        made.prepared(own_size)?;
+        Ok(made)
+    }
+
+    /// Ready for pictures in which the part is as large as `range` says, and how those are to be resized.
+    ///
+    /// # Errors
+    /// A part with nothing to compare at that size.
+    pub(crate) fn prepared(&self, range: &SizeRange) -> Result<(WorkingSize, Arc<Prepared>), GraspError> {
+        let bounds = self.marks.region().bounds();
+        let working = WorkingSize::new(bounds.width().max(bounds.height()), range.middle());
+        let prepared = self.prepared.get(&self.cutout, &self.marks, &working, range, &self.check.search)?;
+        Ok((working, prepared))
     }
 
     /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration
@@ -117,23 +136,6 @@ impl TaughtDemonstration {
         &self.check
     }
 
-    /// The same demonstration, searched for with `num_points` edge points a pose.
-    ///
-    /// # Errors
-    /// A number of points that [`InstantSearch::new`] refuses.
-    pub(crate) fn with_search_points(self, num_points: usize) -> Result<Self, GraspError> {
-        let mut check = self.check.clone();
-        check.search.num_points = num_points;
-        self.with_check(check)
-    }
-
-    /// The scale at which the part lies in an image of that size that is taken as the photo was, with as many pixels or
-    /// not: both are resized alike before a network sees them.
-    pub(crate) fn usual_scale(&self, width: u32, height: u32) -> f64 {
-        let shorter = |[width, height]: [u32; 2]| f64::from(width.min(height));
-        self.marks.photo_size.map_or(1.0, |photo| shorter([width, height]) / shorter(photo))
-    }
-
     /// The twelve keypoints, in pixels of the cut-out.
     pub fn keypoints(&self) -> Vec<Keypoint> {
         self.marks.grasp.keypoints(NUM_KEYPOINTS)
@@ -147,20 +149,7 @@ impl TaughtDemonstration {
 
     /// The outline, where the cut-out lies in an image; the box's corners when no outline was drawn.
     pub fn outline(&self, image_from_cutout: &PlanarSimilarity) -> Polygon {
-        match &self.marks.outline {
-            Some(outline) => outline.transformed(image_from_cutout),
-            None => Polygon::from_box(&self.marks.bbox).transformed(image_from_cutout),
-        }
-    }
-
-    /// The cut-out against an image, whose gradients are `field`.
-    pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
-        Comparison { template: &self.template, surface: &self.surface, image, field }
-    }
-
-    /// Looks for the part in the whole image, with no network's help.
-    pub fn search(&self, image: &RgbImage, field: &GradientField) -> Vec<Match> {
-        self.search.search_field(image, field)
+        self.marks.region().transformed(image_from_cutout)
     }
 }
 

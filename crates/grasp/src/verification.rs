@@ -1,26 +1,96 @@
-//! The check by the demonstration: laid over the image where a model proposes, refined and scored.
+//! The check by the demonstration: laid over the image where a model proposes or where the search leads, and refined.
+//!
+//! ```text
+//! picture ─ halved for each size that is looked for ─ Scene ─┬─ search: the whole picture ─────┬─ Overlay {pose, Evidence}
+//! network ─ Candidate ───────────────────────────────────────┴─ verify: about the candidate ───┘
+//! ```
+//! What an overlay is worth, [`crate::verdict`] decides.
 
-use std::ops::RangeInclusive;
+use std::borrow::Cow;
+use std::sync::Arc;
 
 use image::RgbImage;
 use sdg_geometry::{Angle, PlanarSimilarity};
-use sdg_shape::GradientField;
+use sdg_shape::{Evidence, GradientField};
 
 use crate::models::Candidate;
+use crate::prepared::{Prepared, WorkingSize, scaling};
+use crate::sizes::SizeRange;
 use crate::taught::TaughtDemonstration;
 
-/// An image with its gradients, which every overlay reads.
+/// An image and the demonstrations that are looked for in it, at every size that they may have.
 pub(crate) struct Scene<'a> {
-    pub(crate) image: &'a RgbImage,
-    pub(crate) field: GradientField,
+    views: Vec<View<'a>>,
+    sized: Vec<SizedDemonstration<'a>>,
+}
+
+/// The image, halved some times, with its gradients, which every overlay reads.
+struct View<'a> {
+    halvings: u32,
+    image: Cow<'a, RgbImage>,
+    field: GradientField,
+}
+
+/// A demonstration within one range of sizes.
+struct SizedDemonstration<'a> {
+    demonstration: &'a TaughtDemonstration,
+    demonstration_idx: usize,
+    range: SizeRange,
+    working: WorkingSize,
+    prepared: Arc<Prepared>,
+    view_idx: usize,
 }
 
 impl<'a> Scene<'a> {
-    /// An image in which these demonstrations are looked for; all of them are compared alike.
-    pub(crate) fn new(image: &'a RgbImage, demonstrations: &[TaughtDemonstration]) -> Self {
-        let gradient = demonstrations.first().map(|first| first.check().search.shape.gradient).unwrap_or_default();
-        Self { image, field: GradientField::with_config(image, &gradient) }
+    /// Makes every demonstration ready for the image's size. One that shows nothing to compare at some size is not looked
+    /// for at that size.
+    pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
+        let (width, height) = image.dimensions();
+        let mut scene = Self { views: Vec::new(), sized: Vec::new() };
+        for (demonstration_idx, demonstration) in demonstrations.iter().enumerate() {
+            let tolerance = &demonstration.check().search.scales;
+            for range in SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance) {
+                if let Ok((working, prepared)) = demonstration.prepared(&range) {
+                    let view_idx = scene.view(image, working.halvings, demonstration);
+                    let sized =
+                        SizedDemonstration { demonstration, demonstration_idx, range, working, prepared, view_idx };
+                    scene.sized.push(sized);
+                }
+            }
+        }
+        scene
     }
+
+    /// The index of the image halved so often.
+    fn view(&mut self, image: &'a RgbImage, halvings: u32, demonstration: &TaughtDemonstration) -> usize {
+        if let Some(idx) = self.views.iter().position(|view| view.halvings == halvings) {
+            return idx;
+        }
+        let mut view = Cow::Borrowed(image);
+        for _ in 0..halvings {
+            view = Cow::Owned(halved(&view));
+        }
+        let field = GradientField::with_config(&view, &demonstration.check().search.shape.gradient);
+        self.views.push(View { halvings, image: view, field });
+        self.views.len() - 1
+    }
+}
+
+/// The mean of 2×2 pixels; an odd last row or column is left out, so that places are exactly halved.
+fn halved(image: &RgbImage) -> RgbImage {
+    let (width, height) = (image.width() / 2, image.height() / 2);
+    let stride = 3 * image.width() as usize;
+    let mut out = Vec::with_capacity(3 * (width * height) as usize);
+    for rows in image.as_raw().chunks_exact(2 * stride.max(1)).take(height as usize) {
+        let (above, below) = rows.split_at(stride);
+        for (a, b) in above.chunks_exact(6).zip(below.chunks_exact(6)) {
+            out.extend((0..3).map(|c| {
+                let sum = u16::from(a[c]) + u16::from(a[c + 3]) + u16::from(b[c]) + u16::from(b[c + 3]);
+                ((sum + 2) / 4) as u8
+            }));
+        }
+    }
+    RgbImage::from_raw(width, height, out).unwrap_or_default()
 }
 
 /// A demonstration laid over an image.
@@ -28,62 +98,99 @@ impl<'a> Scene<'a> {
 pub(crate) struct Overlay<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) image_from_cutout: PlanarSimilarity,
-    /// How well it agrees with the image there, in `[0, 1]`, less what another size than the usual one costs.
+    /// The same for the marks and what surrounds them, which may be shifted against the outline.
+    pub(crate) image_from_marks: PlanarSimilarity,
+    /// Edges and surface together, in `[0, 1]`.
     pub(crate) agreement: f64,
-    /// The same whatever its size; teaching calibrates on it.
-    #[cfg_attr(not(feature = "teach"), expect(dead_code))]
-    pub(crate) agreement_at_any_size: f64,
+    pub(crate) evidence: Evidence,
+    /// ln of its size over the nearest that is usual.
+    pub(crate) log_size: f64,
+    /// Mean brightness there over that of the demonstration.
+    pub(crate) light: f64,
 }
 
-/// Sizes at which a part may lie in an image, over the usual one: those of teaching's augmentation, and a little more. The
-/// camera's height above the table is known, so that what has another size is another part: a lever of 0.7 times the
-/// pendulum's length agreed with it by 0.56 before. That there must be such a range was found on that lever (`make test`, 50
-/// pictures); its ends were chosen by hand, not measured.
-const SCALES: RangeInclusive<f64> = 0.8..=1.25;
+impl<'a> SizedDemonstration<'a> {
+    /// The pose in which the halved picture shows the resized cut-out, and back.
+    fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
+        let view_from_image = scaling(1.0 / self.working.shrink());
+        view_from_image.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
+    }
 
-/// Lays the demonstration over the image where the candidate is, both ways round, and returns the better one.
+    fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
+        scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+    }
+
+    fn overlay(
+        &self,
+        view: &View<'_>,
+        view_from_working: &PlanarSimilarity,
+        agreement: f64,
+        evidence: Evidence,
+    ) -> Overlay<'a> {
+        let image_from_cutout = self.image_from_cutout(view_from_working);
+        let marks = self.prepared.settle_marks(&view.field, view_from_working);
+        Overlay {
+            demonstration: self.demonstration,
+            image_from_cutout,
+            image_from_marks: self.image_from_cutout(&marks),
+            agreement,
+            evidence,
+            log_size: self.range.log_size(image_from_cutout.scale),
+            light: self.prepared.search.brightness(&view.image, view_from_working),
+        }
+    }
+}
+
+/// Every place in the image where a demonstration agrees well enough to be mentioned.
+pub(crate) fn search<'a>(scene: &Scene<'a>) -> Vec<Overlay<'a>> {
+    let mut found = Vec::new();
+    for sized in &scene.sized {
+        let view = &scene.views[sized.view_idx];
+        for found_there in sized.prepared.search.search_field(&view.image, &view.field) {
+            let pose = &found_there.image_from_demonstration;
+            found.push(sized.overlay(view, pose, found_there.agreement, found_there.evidence));
+        }
+    }
+    found
+}
+
+/// Lays the demonstration over the image where the candidate is, both ways round, and returns the better one; `None` where
+/// its size there is not looked for.
 ///
 /// Keypoints give place and turn well, but a short grasp line gives the scale badly, so the box decides that: the
 /// start takes the scale at which the outline is as large as the detected box. A network that mistakes one end of a
 /// part for the other is half a turn off; the demonstration sees which end it is.
-pub(crate) fn verify<'a>(
-    demonstration: &'a TaughtDemonstration,
-    candidate: &Candidate,
-    scene: &Scene<'_>,
-) -> Overlay<'a> {
+pub(crate) fn verify<'a>(candidate: &Candidate, scene: &Scene<'a>) -> Option<Overlay<'a>> {
+    let of_it = scene.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
+    let demonstration = of_it.clone().next()?.demonstration;
     let pose = candidate.image_from_cutout;
     let outline = demonstration.outline(&pose).bounds();
-    let box_over_outline = (candidate.bbox.area() / outline.area()).sqrt();
-    let usual = usual_scale(demonstration, scene);
-    let scale = (pose.scale * box_over_outline).clamp(usual * SCALES.start(), usual * SCALES.end());
-    let rescaled = about_middle(demonstration, &pose, Angle::ZERO, scale / pose.scale);
-    better_way_round(demonstration, &rescaled, scene)
+    let scale = pose.scale * (candidate.bbox.area() / outline.area()).sqrt();
+    let sized = of_it.min_by(|a, b| a.range.distance(scale).total_cmp(&b.range.distance(scale)))?;
+    let start = about_middle(demonstration, &pose, Angle::ZERO, sized.range.clamp(scale) / pose.scale);
+    better_way_round(sized, &start, scene)
 }
 
-/// Refined from `start` and from half a turn further; the one that agrees better, brought to rest.
-pub(crate) fn better_way_round<'a>(
-    demonstration: &'a TaughtDemonstration,
+/// Refined from `start` and from half a turn further; the one that agrees better, settled. `None` where it has a size that is
+/// not looked for: that is another part.
+fn better_way_round<'a>(
+    sized: &SizedDemonstration<'a>,
     start: &PlanarSimilarity,
     scene: &Scene<'_>,
-) -> Overlay<'a> {
-    let comparison = demonstration.comparison(scene.image, &scene.field);
-    let turned = about_middle(demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
+) -> Option<Overlay<'a>> {
+    let view = &scene.views[sized.view_idx];
+    let comparison = sized.prepared.search.comparison(&view.image, &view.field);
+    let turned = about_middle(sized.demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
     let [straight, turned] = [*start, turned].map(|start| {
+        let start = sized.view_from_working(&start);
         let refined = comparison.refined_by_edges(&start);
         (start, refined, comparison.agreement(&refined).both())
     });
     let (start, refined, _) = if turned.2 > straight.2 { turned } else { straight };
-    let usual = usual_scale(demonstration, scene);
-    let scales = usual * SCALES.start()..=usual * SCALES.end();
-    let image_from_cutout = comparison.settled(&start, refined, &scales);
-    let is_of_its_size = scales.contains(&image_from_cutout.scale);
-    let seen = if is_of_its_size { comparison.agreement(&image_from_cutout).both() } else { 0.0 };
-    let agreement = demonstration.check().size.apply(seen, image_from_cutout.scale / usual);
-    Overlay { demonstration, image_from_cutout, agreement, agreement_at_any_size: seen }
-}
-
-pub(crate) fn usual_scale(demonstration: &TaughtDemonstration, scene: &Scene<'_>) -> f64 {
-    demonstration.usual_scale(scene.image.width(), scene.image.height())
+    let scales = sized.prepared.search.scales();
+    let settled = comparison.settled(&start, refined, scales);
+    let agreement = comparison.agreement(&settled).both();
+    scales.contains(&settled.scale).then(|| sized.overlay(view, &settled, agreement, comparison.evidence(&settled)))
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.
@@ -95,64 +202,4 @@ fn about_middle(
 ) -> PlanarSimilarity {
     let pivot = demonstration.outline(pose).bounds().center();
     PlanarSimilarity::about(pivot, pivot, turn, scale).compose(pose)
-}
-
-#[cfg(test)]
-mod tests {
-    use image::{Rgb, RgbImage};
-    use nalgebra::Point2;
-    use sdg_demonstration::{Annotation, Demonstration};
-    use sdg_geometry::{GraspLine, Polygon};
-
-    use super::*;
-
-    /// An L on a dim ramp, `scale` times as large as in the first photo, `pixels` times as finely seen.
-    fn picture(scale: f64, pixels: f64) -> Demonstration {
-        let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
-        let factor = scale * pixels;
-        let outline = Polygon { vertices: corners.map(|(x, y)| Point2::new(factor * x, factor * y)).to_vec() };
-        let (width, height) = ((192.0 * pixels) as u32, (144.0 * pixels) as u32);
-        let mask = outline.rasterize(width, height);
-        let image = RgbImage::from_fn(width, height, |x, y| {
-            let table = (50 + x / 8) as u8;
-            let part = if f64::from(x) > factor * 100.0 { [230, 200, 60] } else { [190, 40, 30] };
-            Rgb(if mask.get(x, y) { part } else { [table, table, 70] })
-        });
-        let grasp =
-            GraspLine::new(Point2::new(factor * 70.0, factor * 50.0), Point2::new(factor * 70.0, factor * 80.0));
-        let bbox = outline.bounds();
-        Demonstration {
-            image,
-            annotation: Annotation {
-                label: "L".into(),
-                bbox,
-                grasp: Some(grasp),
-                jaw_width: None,
-                outline: Some(outline),
-            },
-        }
-    }
-
-    #[test]
-    fn a_part_of_another_size_is_another_part() {
-        let taught = TaughtDemonstration::new(&picture(1.0, 1.0)).unwrap();
-        for (scale, pixels, is_it) in
-            [(1.0, 1.0, true), (1.15, 1.0, true), (0.7, 1.0, false), (1.0, 2.0, true), (0.7, 2.0, false)]
-        {
-            let shown = picture(scale, pixels);
-            let grasp = shown.annotation.grasp.unwrap();
-            let (from, to) = (taught.marks.grasp, [grasp.start, grasp.end]);
-            let candidate = Candidate {
-                network_score: 0.9,
-                bbox: shown.annotation.bbox,
-                keypoints: Vec::new(),
-                grasp: sdg_geometry::PlanarGrasp::from_line(&grasp, 20.0),
-                demonstration_idx: 0,
-                image_from_cutout: PlanarSimilarity::fit(&[from.start, from.end], &to).unwrap(),
-                turn_source: crate::TurnSource::Keypoints,
-            };
-            let overlay = verify(&taught, &candidate, &Scene::new(&shown.image, std::slice::from_ref(&taught)));
-            assert_eq!(overlay.agreement > 0.6, is_it, "{scale} {pixels}: {overlay:?}");
-        }
-    }
 }

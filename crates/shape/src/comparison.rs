@@ -21,6 +21,7 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 
 use crate::config::{AgreementConfig, SettlingConfig};
 use crate::gradient_field::GradientField;
+use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
 
@@ -42,6 +43,8 @@ pub struct Comparison<'a> {
     pub template: &'a ShapeTemplate,
     /// What lies inside its outline.
     pub surface: &'a Surface,
+    /// Its edges over the whole area, compared both ways.
+    pub structure: &'a Structure,
     /// The image.
     pub image: &'a RgbImage,
     /// The image's gradients.
@@ -69,7 +72,38 @@ impl Agreement {
     }
 }
 
+/// Everything that an image says of a pose, for whoever decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    /// [`ShapeTemplate::agreement`], in `[0, 1]`.
+    pub edges: f64,
+    /// [`Surface::agreement`], in `[0, 1]`; `None` where the demonstration's surface is plain.
+    pub surface: Option<f64>,
+    /// How far the hue lies from the demonstration's, in shares of red, green and blue: 0.1 a little tinted, 0.5 another paint.
+    pub hue_shift: f64,
+    /// [`crate::StructureAgreement::weakest`], in `[-1, 1]`.
+    pub weakest_region: f64,
+    /// [`crate::StructureAgreement::visible`], in `[0, 1]`.
+    pub visible: f64,
+    /// The share of the part outside the image, in `[0, 1]`.
+    pub outside: f64,
+}
+
 impl Comparison<'_> {
+    /// Everything that the image says of a pose. Slower than [`Self::agreement`], which suffices to climb.
+    pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
+        let Agreement { edges, surface, .. } = self.agreement(image_from_demonstration);
+        let structure = self.structure.agreement(self.field, image_from_demonstration);
+        Evidence {
+            edges,
+            surface: (!self.surface.is_plain()).then_some(surface),
+            hue_shift: self.surface.hue_shift(self.image, image_from_demonstration),
+            weakest_region: structure.weakest,
+            visible: structure.visible,
+            outside: structure.outside,
+        }
+    }
+
     /// How well the image agrees with the demonstration at a pose.
     ///
     /// # Units and frames

@@ -12,7 +12,8 @@
 //! image ──► GradientField ────────┼──► agreement(pose)   in [0, 1]
 //!           directions, pyramid   └──► refine(pose) ──► Refinement { pose, agreement }
 //! ```
-//! [`Surface`] compares the colours inside the outline; a [`Comparison`] scores edges and surface together.
+//! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area both ways; a
+//! [`Comparison`] scores edges and surface together and gathers the [`Evidence`] for a pose.
 //! [`InstantSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
 //! best. [`ShapeConfig`] holds what was fitted, with its origin.
 //!
@@ -63,14 +64,18 @@ mod parallel;
 mod pose;
 mod refinement;
 mod search;
+mod structure;
 mod surface;
 mod template;
 
-pub use comparison::{Agreement, Comparison};
-pub use config::{AgreementConfig, GradientConfig, ScaleRange, SettlingConfig, ShapeConfig, SurfaceConfig};
+pub use comparison::{Agreement, Comparison, Evidence};
+pub use config::{
+    AgreementConfig, GradientConfig, ScaleRange, SettlingConfig, ShapeConfig, StructureConfig, SurfaceConfig,
+};
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
 pub use refinement::Refinement;
 pub use search::{InstantSearch, Match, SearchConfig};
+pub use structure::{Structure, StructureAgreement};
 pub use surface::Surface;
 pub use template::ShapeTemplate;

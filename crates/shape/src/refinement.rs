@@ -53,17 +53,26 @@ impl ShapeTemplate {
     /// Poses map demonstration pixels to pixels of the image the field was computed from.
     pub fn refine(&self, field: &GradientField, initial: &PlanarSimilarity) -> Refinement {
         let start = Pose::from_similarity(initial, self.center);
-        let initial_agreement = self.agreement_at(field, &start);
-        let range = CaptureRange::new(self, field, start);
+        self.refine_within(field, start, &CaptureRange::new(self, field, start))
+    }
 
-        let mut candidates = self.grid_candidates(field, &range);
+    /// As [`refine`](Self::refine), but only shifted, by at most `max_shift_px` pixels of the image in x and in y.
+    pub fn refine_shift(&self, field: &GradientField, initial: &PlanarSimilarity, max_shift_px: f64) -> Refinement {
+        let start = Pose::from_similarity(initial, self.center);
+        self.refine_within(field, start, &CaptureRange::around(start, [max_shift_px, max_shift_px, 0.0, 0.0]))
+    }
+
+    fn refine_within(&self, field: &GradientField, start: Pose, range: &CaptureRange) -> Refinement {
+        let initial_agreement = self.agreement_at(field, &start);
+
+        let mut candidates = self.grid_candidates(field, range);
         candidates.push(start);
         let mut num_rounds = 0;
         for (idx, level) in self.levels.iter().enumerate().rev() {
             let overlay = level.overlay(field, &start);
             let mut snapped: Vec<Snapped> = candidates
                 .iter()
-                .map(|&pose| snap(level, &overlay, &range, climb(level, &overlay, &range, pose)))
+                .map(|&pose| snap(level, &overlay, range, climb(level, &overlay, range, pose)))
                 .collect();
             snapped.sort_by(|a, b| b.score.total_cmp(&a.score));
             num_rounds = snapped[0].num_rounds;

@@ -18,7 +18,7 @@
 use std::collections::BTreeMap;
 
 use image::RgbImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector3};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::config::SurfaceConfig;
@@ -31,6 +31,10 @@ const LEAST_IN_CELL: usize = 4;
 /// Points this near to the outline show the background when the pose is a pixel off. Chosen by that reasoning, not
 /// measured.
 const EDGE_MARGIN_PX: f64 = 2.0;
+/// Grey values that a colour needs to have a hue. Chosen by hand, not measured.
+const DARK: f64 = 3.0;
+/// How pale highlights may make a colour, and how strong shadow, as a share of what was taught. Chosen by hand, not measured.
+const STRENGTHS: (f64, f64) = (0.6, 1.4);
 /// Least share of the points that must lie inside the image. Chosen by hand, not measured.
 const LEAST_INSIDE: f64 = 0.5;
 
@@ -39,6 +43,7 @@ const LEAST_INSIDE: f64 = 0.5;
 pub struct Surface {
     /// Cell by cell.
     cells: Vec<Vec<(Point2<f64>, [f64; 3])>>,
+    is_plain: bool,
     config: SurfaceConfig,
 }
 
@@ -61,7 +66,17 @@ impl Surface {
                 cells.entry([right, down].map(|d| (d / cell_side) as usize)).or_default().push((point, color));
             }
         }
-        Self { cells: cells.into_values().collect(), config: *config }
+        let cells: Vec<Vec<_>> = cells.into_values().collect();
+        let mut whole = Correlation::default();
+        cells.iter().flatten().for_each(|(_, color)| whole.add(color, color));
+        let is_plain = whole.about_means()[0] < whole.floor(config.noise);
+        Self { cells, is_plain, config: *config }
+    }
+
+    /// Whether the demonstration has less contrast than noise, as a black silhouette: what correlates with it then tells
+    /// nothing.
+    pub fn is_plain(&self) -> bool {
+        self.is_plain
     }
 
     fn points(&self) -> impl Iterator<Item = &Point2<f64>> {
@@ -72,6 +87,38 @@ impl Surface {
     pub(crate) fn share_inside(&self, outline: &Polygon, outline_from_cutout: &PlanarSimilarity) -> f64 {
         let inside = self.points().filter(|point| outline.contains(&outline_from_cutout.apply(point))).count();
         inside as f64 / (self.points().count() as f64).max(1.0)
+    }
+
+    /// Mean brightness of the image at a pose over that of the cut-out; 1 where none of it is in the image.
+    pub(crate) fn brightness(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
+        let (mut taught, mut seen) = (0.0, 0.0);
+        for (point, color) in self.cells.iter().flatten() {
+            if let Some(found) = color_at(image, &image_from_cutout.apply(point)) {
+                taught += color.iter().sum::<f64>();
+                seen += found.iter().sum::<f64>();
+            }
+        }
+        if taught > 0.0 { seen / taught } else { 1.0 }
+    }
+
+    /// How far the hue lies from the demonstration's: the median over cells of the distance between the shares of red, green
+    /// and blue, colours paler or stronger than taught not counted, which highlights and shadows are; 0 where none of it is in the image. The light's strength does not count,
+    /// its tint does, and what covers less than half does not.
+    pub(crate) fn hue_shift(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
+        let mut shifts = Vec::with_capacity(self.cells.len());
+        for cell in &self.cells {
+            let mut sums = Correlation::default();
+            for (point, taught) in cell {
+                if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
+                    sums.add(taught, &seen);
+                }
+            }
+            if sums.count >= LEAST_IN_CELL {
+                let mean = |sum: [f64; 3]| sum.map(|channel| channel / sums.count as f64);
+                shifts.push((hue_distance(&mean(sums.taught), &mean(sums.seen)), sums.count));
+            }
+        }
+        weighted_median(shifts)
     }
 
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
@@ -166,6 +213,28 @@ impl Correlation {
     }
 }
 
+/// Distance of the shares of red, green and blue between a colour and another, or the same made paler or stronger.
+fn hue_distance(taught: &[f64; 3], seen: &[f64; 3]) -> f64 {
+    let from_grey = |color: &[f64; 3]| {
+        let sum = color.iter().sum::<f64>() + 3.0 * DARK;
+        Vector3::from(color.map(|channel| (channel + DARK) / sum - 1.0 / 3.0))
+    };
+    let (taught, seen) = (from_grey(taught), from_grey(seen));
+    let strength = taught.dot(&seen) / taught.norm_squared().max(f64::MIN_POSITIVE);
+    (seen - strength.clamp(STRENGTHS.0, STRENGTHS.1) * taught).norm()
+}
+
+fn weighted_median(mut values: Vec<(f64, usize)>) -> f64 {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = values.iter().map(|(_, weight)| weight).sum::<usize>() / 2;
+    let mut below = 0;
+    let middle = values.iter().find(|(_, weight)| {
+        below += weight;
+        below > half
+    });
+    middle.map_or(0.0, |(value, _)| *value)
+}
+
 /// The colour at a point between pixel centres, by bilinear interpolation; `None` outside the image.
 fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f64; 3]> {
     let (x, y) = (point.x - 0.5, point.y - 0.5);
@@ -222,6 +291,35 @@ mod tests {
     }
 
     #[test]
+    fn the_hue_shifts_with_another_paint_and_not_with_the_light() {
+        let shift = |image: &RgbImage| surface().hue_shift(image, &PlanarSimilarity::IDENTITY);
+        assert!(shift(&plate(1.0, false)) < 1e-9 && shift(&plate(0.6, false)) < 0.06);
+        // What covers a third does not count.
+        let covered =
+            RgbImage::from_fn(
+                120,
+                80,
+                |x, y| {
+                    if x < 40 { Rgb([20, 40, 200]) } else { *plate(1.0, false).get_pixel(x, y) }
+                },
+            );
+        assert!(shift(&covered) < 0.02);
+        let swapped = RgbImage::from_fn(120, 80, |x, y| {
+            let Rgb([red, green, blue]) = *plate(1.0, false).get_pixel(x, y);
+            Rgb([blue, green, red])
+        });
+        assert!(shift(&swapped) > 0.5, "{}", shift(&swapped));
+    }
+
+    #[test]
+    fn a_silhouette_is_plain_and_a_printed_part_is_not() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 10.0, y1: 15.0, x2: 110.0, y2: 65.0 });
+        let silhouette = RgbImage::from_pixel(120, 80, Rgb([12; 3]));
+        assert!(Surface::new(&silhouette, &outline, &SurfaceConfig::default()).is_plain());
+        assert!(!surface().is_plain());
+    }
+
+    #[test]
     fn a_shadow_across_the_part_costs_little() {
         let shadowed = RgbImage::from_fn(120, 80, |x, y| {
             let Rgb(color) = *plate(1.0, false).get_pixel(x, y);
@@ -237,6 +335,14 @@ mod tests {
         let center = Point2::new(60.0, 40.0);
         let half_turn = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
         assert!(surface().agreement(&plate(1.0, false), &half_turn) < 0.4);
+    }
+
+    #[test]
+    fn half_the_light_is_half_as_bright() {
+        let brightness = |image: &RgbImage| surface().brightness(image, &PlanarSimilarity::IDENTITY);
+        assert!((brightness(&plate(0.5, false)) - 0.5).abs() < 0.01);
+        let away = PlanarSimilarity { tx: 500.0, ..PlanarSimilarity::IDENTITY };
+        assert_eq!(surface().brightness(&plate(1.0, false), &away), 1.0);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use sdg_grasp::{TeachOptions, Verification, teach};
+use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
 use sdg_report::write_atomically;
 use sdg_simulation::objects::ObjectSpec;
 
@@ -32,6 +32,8 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());
     let options = TeachOptions {
+        // The workcell's camera hovers as high as it was for the photo.
+        size_tolerance: CheckConfig::FIXED_HEIGHT_TOLERANCE,
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         symmetry: object.symmetry,
         ..TeachOptions::new(args.seed)

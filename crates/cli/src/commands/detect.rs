@@ -4,69 +4,132 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use image::{ImageFormat, RgbImage};
-use sdg_grasp::{DetectionRecord, GraspDetection, Verification};
+use sdg_grasp::{CheckConfig, DetectionRecord, GraspDetection, GraspModel, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::args::DetectArgs;
 use crate::commands::devices;
-use crate::exit::Outcome;
+use crate::exit::{Outcome, one_line};
 use crate::files;
 use crate::pictures;
 
-/// Every image gets its line; the first one that cannot be read ends the run, after the lines before it.
+/// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
-    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    for lack in model.lacks() {
+        eprintln!("{}: {lack}", args.grasp_model.display());
+    }
+    if let Some(tolerance) = args.size_tolerance {
+        model = model.with_size_tolerance(tolerance.range())?;
+    }
+    if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
+        model = model.with_max_detections(args.max as usize)?;
+    }
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }
-    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let mut stdout = std::io::stdout().lock();
-    let mut found_any = false;
+    let (mut found_any, mut failed) = (false, 0);
     for path in &args.images {
-        let image = files::read_image(path)?;
-        let start = Instant::now();
-        let mut detections = model.detect(&image, verification).with_context(|| path.display().to_string())?;
-        let seconds = start.elapsed().as_secs_f64();
-        found_any |= detections.iter().any(GraspDetection::is_accepted);
-        if let Some(folder) = &args.draw {
-            draw(folder, path, &image, &detections)?;
-        }
-        if !args.all {
-            detections.retain(GraspDetection::is_accepted);
-        }
-        if args.json {
-            let line = ImageLine::new(path, &image, seconds, &detections);
-            writeln!(stdout, "{}", serde_json::to_string(&line)?)?;
-        } else {
-            write_text(&mut stdout, path, &detections)?;
+        match detect(args, &model, path) {
+            Ok(seen) => {
+                found_any |= seen.detections.iter().any(GraspDetection::is_accepted);
+                seen.write(&mut stdout, args, path)?;
+            }
+            Err(error) => {
+                failed += 1;
+                let error = one_line(&error);
+                if args.json {
+                    let line = ErrorLine { image: path.display().to_string(), error };
+                    writeln!(stdout, "{}", serde_json::to_string(&line)?)?;
+                } else {
+                    stdout.flush()?;
+                    eprintln!("error: {error}");
+                }
+            }
         }
     }
-    Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
+    match (failed, found_any) {
+        (0, true) => Ok(Outcome::Done),
+        (0, false) => Ok(Outcome::NothingToGrasp),
+        _ => bail!("{failed} of {} images could not be used", args.images.len()),
+    }
 }
 
-fn write_text(out: &mut impl Write, path: &Path, detections: &[GraspDetection]) -> Result<()> {
-    if detections.is_empty() {
-        writeln!(out, "{}: nothing to grasp", path.display())?;
+/// An image and everything that was detected in it.
+struct Seen {
+    size: (u32, u32),
+    seconds: f64,
+    detections: Vec<GraspDetection>,
+}
+
+fn detect(args: &DetectArgs, model: &GraspModel, path: &Path) -> Result<Seen> {
+    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
+    let image = files::read_image(path)?;
+    let start = Instant::now();
+    let detections = model.detect(&image, verification).with_context(|| path.display().to_string())?;
+    let seconds = start.elapsed().as_secs_f64();
+    if let Some(folder) = &args.draw {
+        draw(folder, path, &image, &detections)?;
     }
-    for detection in detections {
-        let grasp = detection.grasp;
-        let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
-        writeln!(
-            out,
-            "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide; score {:.2} (network {:.2}{agreement}; turn by {})",
-            path.display(),
-            grasp.x,
-            grasp.y,
-            grasp.angle.degrees(),
-            grasp.width,
-            detection.score,
-            detection.network_score,
-            detection.turn_source.name(),
-        )?;
+    Ok(Seen { size: image.dimensions(), seconds, detections })
+}
+
+impl Seen {
+    fn write(mut self, out: &mut impl Write, args: &DetectArgs, path: &Path) -> Result<()> {
+        let best_refused = self.detections.first().filter(|best| !best.is_accepted()).cloned();
+        if !args.all {
+            self.detections.retain(GraspDetection::is_accepted);
+        }
+        if args.json {
+            let line = ImageLine {
+                image: path.display().to_string(),
+                width: self.size.0,
+                height: self.size.1,
+                seconds: self.seconds,
+                detections: self.detections.iter().map(DetectionRecord::from).collect(),
+            };
+            writeln!(out, "{}", serde_json::to_string(&line)?)?;
+            return Ok(());
+        }
+        if let Some(refused) = &best_refused {
+            writeln!(out, "{}: nothing to grasp{}", path.display(), almost(refused))?;
+        } else if self.detections.is_empty() {
+            writeln!(out, "{}: nothing to grasp", path.display())?;
+        }
+        self.detections.iter().try_for_each(|detection| write_text(out, path, detection))
     }
+}
+
+/// What was nearly found, and the photo that would help.
+fn almost(refused: &GraspDetection) -> String {
+    /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
+    const MIN_SCORE: f64 = 0.1;
+    let Some(why) = refused.refused().filter(|_| refused.score >= MIN_SCORE) else { return String::new() };
+    let grasp = refused.grasp;
+    let advice = refused.advice().map(|advice| format!("; {advice}")).unwrap_or_default();
+    format!("; at ({:.0}, {:.0}) something like it, score {:.2}: {why}{advice}", grasp.x, grasp.y, refused.score)
+}
+
+fn write_text(out: &mut impl Write, path: &Path, detection: &GraspDetection) -> Result<()> {
+    let grasp = detection.grasp;
+    let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
+    let refused = detection.refused().map(|why| format!("; refused: {why}")).unwrap_or_default();
+    writeln!(
+        out,
+        "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
+        path.display(),
+        grasp.x,
+        grasp.y,
+        grasp.angle.degrees(),
+        grasp.width,
+        detection.score,
+        detection.network_score,
+        detection.turn_source.name(),
+    )?;
     Ok(())
 }
 
@@ -89,14 +152,9 @@ struct ImageLine {
     detections: Vec<DetectionRecord>,
 }
 
-impl ImageLine {
-    fn new(path: &Path, image: &RgbImage, seconds: f64, detections: &[GraspDetection]) -> Self {
-        Self {
-            image: path.display().to_string(),
-            width: image.width(),
-            height: image.height(),
-            seconds,
-            detections: detections.iter().map(DetectionRecord::from).collect(),
-        }
-    }
+/// A line of `--json` for an image that cannot be used.
+#[derive(Serialize)]
+struct ErrorLine {
+    image: String,
+    error: String,
 }

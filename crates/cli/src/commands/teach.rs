@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Ending, GraspError, Taught, TeachOptions, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::json;
@@ -27,6 +27,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         kind: parse("--model", &args.model)?,
         preset: parse("--preset", &args.preset)?,
         symmetry: args.symmetry,
+        size_tolerance: args.size_tolerance.range(),
         time_budget: args.time_budget.map(Duration::from_secs_f64),
         steps: args.steps.map(|steps| steps as usize),
         device: devices::open(&args.compute)?,
@@ -74,6 +75,8 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("{line}");
     } else {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
+        let tolerance = taught.model.size_tolerance();
+        println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
         if let Some(path) = page {
             println!("report: {}", path.display());
@@ -96,6 +99,9 @@ fn command(args: &TeachArgs) -> String {
         RotationalSymmetry::Fold(count) => option("symmetry", count.to_string()),
         RotationalSymmetry::Full => option("symmetry", "full".to_owned()),
         _ => {}
+    }
+    if args.size_tolerance.range() != CheckConfig::DEFAULT_SIZE_TOLERANCE {
+        option("size-tolerance", format!("{}-{}", args.size_tolerance.low, args.size_tolerance.high));
     }
     if let Some(weights) = &args.base_weights {
         option("base-weights", weights.display().to_string());

@@ -1,7 +1,7 @@
 //! One model on one part: its name, and what the store has of it.
 
 use anyhow::{Context, Result, anyhow};
-use sdg_grasp::{Device, GraspModel, ModelKind, Verification};
+use sdg_grasp::{CheckConfig, Device, GraspModel, ModelKind, Verification};
 use serde::Serialize;
 
 use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
@@ -83,6 +83,12 @@ impl Cell<'_> {
         let path = store.path(&self.model_file(marks));
         let model = files::read_model(&path, &Device::flex())?.read_as(self.model);
         Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
+    }
+
+    /// The same for a camera that is always as high as it was for the photo: the paper's protocol.
+    pub(super) fn read_model_at_fixed_height(self, store: &Store) -> Result<Option<GraspModel>> {
+        let at_fixed_height = |model: GraspModel| model.with_size_tolerance(CheckConfig::FIXED_HEIGHT_TOLERANCE);
+        Ok(self.read_model(Marks::Shipped, store)?.map(at_fixed_height).transpose()?)
     }
 }
 

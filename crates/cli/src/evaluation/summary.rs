@@ -307,6 +307,7 @@ mod tests {
         let facts = TeachingFacts {
             seed: 1,
             symmetry: RotationalSymmetry::None,
+            size_tolerance: None,
             samples: 100,
             steps: 10,
             seconds: 60.0,

@@ -185,7 +185,7 @@ impl Evaluation<'_> {
         let mut looks = Vec::new();
         for cell in self.cells(object) {
             if cell.look(self.store)?.is_none()
-                && let Some(model) = cell.read_model(Marks::Shipped, self.store)?
+                && let Some(model) = cell.read_model_at_fixed_height(self.store)?
             {
                 looks.push((cell, model, LookRecord::default(), None));
             }
@@ -236,7 +236,7 @@ impl Evaluation<'_> {
         is_interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Option<String>> {
         let settings = self.store.settings();
-        let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
+        let Some(model) = cell.read_model_at_fixed_height(self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
         let seed = part_seed(settings.seed, object);
         let rehearsal = Rehearsal {
             model: &model,

@@ -310,6 +310,8 @@ mod tests {
             score,
             network_score: score,
             agreement: None,
+            evidence: None,
+            light: 1.0,
             bbox: BoundingBox { x1: x - 5.0, y1: 45.0, x2: x + 5.0, y2: 55.0 },
             keypoints: Vec::new(),
             outline: None,

@@ -1,16 +1,20 @@
 //! How wrong the decisions of a configuration are.
 
 use super::observation::{PartObservations, PictureObservations};
-use crate::calibration::Calibration;
-use crate::check_config::{CheckConfig, SizePenalty};
+use crate::check_config::ScoreConfig;
+use crate::verdict::judge_picture;
 
 /// Scores are kept this far from 0 and 1: one decision can cost −ln 0.01 = 4.6 at most.
 const MIN_SCORE: f64 = 0.01;
 
+/// A wrong part accepted costs as much as so many right ones refused: after a refusal a robot looks again, a wrong part it
+/// grasps. Chosen by that reasoning and so that the paper's protocol stays without false alarms.
+pub(super) const COST_OF_WRONG: f64 = 3.0;
+
 /// How wrong decisions were; see [`crate::fitting`] for the definition.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Loss {
-    /// The sum of the two parts.
+    /// The right poses' part, and three times the wrong ones'.
     pub total: f64,
     /// Of right poses: mean of −ln p.
     pub right: f64,
@@ -23,15 +27,14 @@ pub struct Loss {
 }
 
 /// The loss of each part.
-pub(super) fn losses(parts: &[PartObservations], config: &CheckConfig) -> Vec<Loss> {
+pub(super) fn losses(parts: &[PartObservations], config: &ScoreConfig) -> Vec<Loss> {
     parts.iter().map(|part| part_loss(part, config)).collect()
 }
 
-fn part_loss(part: &PartObservations, config: &CheckConfig) -> Loss {
-    let calibration = config.threshold.calibration(&part.negatives);
+fn part_loss(part: &PartObservations, config: &ScoreConfig) -> Loss {
     let (mut right, mut wrong) = (Vec::new(), Vec::new());
     for picture in &part.pictures {
-        let (rights, worst) = scores(picture, &calibration, &config.size);
+        let (rights, worst) = scores(picture, config);
         right.extend(rights);
         wrong.push(worst);
     }
@@ -40,7 +43,7 @@ fn part_loss(part: &PartObservations, config: &CheckConfig) -> Loss {
     let wrong_loss = mean(wrong.iter().map(|&q| -(1.0 - clipped(q)).ln()));
     let accepted = |scores: &[f64]| [scores.iter().filter(|&&score| score >= 0.5).count(), scores.len()];
     Loss {
-        total: right_loss + wrong_loss,
+        total: right_loss + COST_OF_WRONG * wrong_loss,
         right: right_loss,
         wrong: wrong_loss,
         accepted: accepted(&right),
@@ -49,11 +52,10 @@ fn part_loss(part: &PartObservations, config: &CheckConfig) -> Loss {
 }
 
 /// The best score of a right pose of each instance, and the best of a wrong pose.
-fn scores(picture: &PictureObservations, calibration: &Calibration, size: &SizePenalty) -> (Vec<f64>, f64) {
+fn scores(picture: &PictureObservations, config: &ScoreConfig) -> (Vec<f64>, f64) {
     let mut rights = vec![0.0f64; picture.num_instances];
     let mut worst = 0.0f64;
-    for pose in &picture.poses {
-        let score = calibration.apply(size.apply(pose.agreement_at_any_size, pose.scale));
+    for (pose, (score, _)) in picture.poses.iter().zip(judge_picture(&picture.clues(), config)) {
         let best = pose.instance_idx.map_or(&mut worst, |idx| &mut rights[idx]);
         *best = best.max(score);
     }
@@ -105,40 +107,56 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 mod tests {
     use super::super::observation::PoseObservation;
     use super::*;
+    use crate::check_config::Term;
+    use crate::verdict::Clues;
+    use sdg_shape::Evidence;
 
-    fn pose(agreement: f64, scale: f64, instance_idx: Option<usize>) -> PoseObservation {
-        PoseObservation { agreement_at_any_size: agreement, scale, instance_idx }
+    /// A score of the edges alone: 10 for each unit above 0.5.
+    fn edges_alone() -> ScoreConfig {
+        let none = Term { weight: 0.0, neutral: 0.0, range: [0.0, 1.0] };
+        ScoreConfig {
+            bias: 0.0,
+            edges: Term { weight: 10.0, neutral: 0.5, range: [0.0, 1.0] },
+            surface: none,
+            hue: none,
+            weakest_region: none,
+            visible: none,
+            size: none,
+            outside: none,
+            resemblance: none,
+            network: none,
+        }
     }
 
-    /// The negatives' mean is 0.3: the threshold stands at 0.5, the slope is 25.
-    fn part() -> PartObservations {
-        let pictures = vec![
-            PictureObservations {
-                num_instances: 2,
-                poses: vec![pose(0.5, 1.0, Some(0)), pose(0.45, 1.0, Some(0)), pose(0.5, 1.0, None)],
-            },
-            PictureObservations { num_instances: 0, poses: vec![pose(0.6, 0.1f64.exp(), None)] },
-        ];
-        PartObservations { negatives: vec![0.2, 0.3, 0.4], pictures }
+    fn pose(edges: f64, instance_idx: Option<usize>) -> PoseObservation {
+        let evidence =
+            Evidence { edges, surface: Some(0.0), hue_shift: 0.0, weakest_region: 0.0, visible: 0.0, outside: 0.0 };
+        PoseObservation { clues: Clues { evidence, log_size: 0.0, network: None, resemblance: 0.3 }, instance_idx }
     }
 
     #[test]
     fn the_loss_is_what_a_hand_computes() {
-        let loss = part_loss(&part(), &CheckConfig::DEFAULT);
-        // p: one instance at the threshold, 0.5, and one never found, 0.01. q: 0.5 at the threshold; the other picture's wrong
-        // pose is 0.1 of ln scale too large: 0.6 − 2 · 0.07 = 0.46, a score of 1 / (1 + e^1) = 0.268941.
+        let pictures = vec![
+            PictureObservations {
+                num_instances: 2,
+                poses: vec![pose(0.5, Some(0)), pose(0.45, Some(0)), pose(0.5, None)],
+            },
+            PictureObservations { num_instances: 0, poses: vec![pose(0.4, None)] },
+        ];
+        let loss = part_loss(&PartObservations { pictures }, &edges_alone());
+        // p: one instance at 0.5, and one never found, 0.01. q: 0.5; in the other picture 1 / (1 + e^1) = 0.268941.
         let right = -(0.5f64.ln() + 0.01f64.ln()) / 2.0;
         let wrong = -(0.5f64.ln() + (1.0 - 0.268_941_421f64).ln()) / 2.0;
         assert!((loss.right - right).abs() < 1e-6 && (loss.wrong - wrong).abs() < 1e-6, "{loss:?}");
-        assert!((loss.total - right - wrong).abs() < 1e-6);
+        assert!((loss.total - right - 3.0 * wrong).abs() < 1e-6);
         assert_eq!((loss.accepted, loss.false_alarms), ([1, 2], [1, 2]));
     }
 
     #[test]
     fn a_perfect_check_loses_as_little_as_can_be() {
-        let pictures = vec![PictureObservations { num_instances: 1, poses: vec![pose(1.0, 1.0, Some(0))] }];
-        let loss = part_loss(&PartObservations { negatives: vec![0.3; 3], pictures }, &CheckConfig::DEFAULT);
-        assert!((loss.total - 2.0 * -(0.99f64.ln())).abs() < 1e-9, "{loss:?}");
+        let pictures = vec![PictureObservations { num_instances: 1, poses: vec![pose(1.0, Some(0))] }];
+        let loss = part_loss(&PartObservations { pictures }, &edges_alone());
+        assert!((loss.right + 0.99f64.ln()).abs() < 4e-3 && (loss.wrong + 0.99f64.ln()).abs() < 1e-9, "{loss:?}");
         assert_eq!((loss.accepted, loss.false_alarms), ([1, 1], [0, 1]));
     }
 

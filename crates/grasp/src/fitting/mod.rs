@@ -1,21 +1,20 @@
 //! The constants of [`CheckConfig`] fitted on pictures with truth, for whoever maintains them.
 //!
 //! ```text
-//! parts with pictures ─ observe: search, agreements of right and wrong poses, of negatives ─┐
-//! constant × grid ──────────────────────────────────────────────────────────────────────────┼─ loss on the training half
-//!                                                                 best value of each ───────┴─ loss on the held-out half
+//! parts with pictures ─ observe: search, evidence for right and wrong poses ─┬─ score: logistic regression ─┐
+//! constant × grid ─ observe again ─ regression again ────────────────────────┴─ loss on the training half ──┤
+//!                                                       best value of each ─── loss on the held-out half ───┘
 //! ```
-//! Each constant is fitted alone, the others at today's values: first those of size and threshold, for which no picture is
-//! searched again, then those of [`CheckConfig::search`], for which every one is. The threshold's margin above the
-//! negatives depends on how large agreements are, so that it is fitted again for every value of the latter, today's
-//! included. Size and threshold are fitted together, too, by coordinate descent.
+//! First the weights of the score are fitted, for which no picture is searched again, then each constant of
+//! [`CheckConfig::search`] alone, the others at today's values: every picture is searched again for each value, and the
+//! weights are fitted again, too, today's included, because evidence changes with the constants that it rests on.
 //!
-//! **Loss** ([`Loss`]). A picture's detections are scored as in use: agreement, less the size penalty, through the
-//! logistic at the part's own threshold. Let p be the best score of a right pose of an instance (0 where there is none) and
-//! q the best score of a wrong pose in a picture (likewise); both are kept within 0.01 and 0.99. A part's loss is the mean of
-//! −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss of several parts is their mean.
-//! 0.02 is the least, 0.69 is one coin toss. A right pose lies within 4 % of the part's size and 10° of an instance, turns
-//! that its symmetry hides not counted.
+//! **Loss** ([`Loss`]). A picture's detections are scored as in use. Let p be the best score of a right pose of an instance
+//! (0 where there is none) and q the best score of a wrong pose in a picture (likewise); both are kept within 0.01 and 0.99. A
+//! part's loss is the mean of −ln p over the instances plus three times the mean of −ln (1 − q) over the pictures; the loss
+//! of several parts is their mean. 0.04 is the least. A right pose lies within 4 % of the part's size and 10° of an instance, turns
+//! that its symmetry hides not counted. Poses on a part that differs in size alone count neither way: without a camera it
+//! is the part.
 //!
 //! **Intervals.** Parts are independent, pictures of one part are not: a difference between two values is taken part by
 //! part, and its interval is the mean ± 1.96 standard errors of those differences.
@@ -26,9 +25,10 @@ mod constants;
 mod loss;
 mod observation;
 mod pictures;
+mod regression;
 mod report;
 
-use crate::check_config::CheckConfig;
+use crate::check_config::{CheckConfig, ScoreConfig};
 use crate::error::{GraspError, Result};
 
 use self::constants::{CONSTANTS, Constant};
@@ -36,20 +36,24 @@ pub use self::loss::{Difference, Loss};
 use self::loss::{losses, mean_loss};
 use self::observation::{PartObservations, PreparedPart};
 pub use self::pictures::{FitInstance, FitPart, FitPicture};
-pub use self::report::{ConstantReport, FitReport, JointReport, Trial};
+use self::regression::fit_score;
+pub use self::report::{ConstantReport, FitReport, ScoreReport, Trial};
 
 /// What is fitted.
 #[derive(Debug, Clone, Default)]
 pub struct FitOptions {
     /// Decides the negatives that are composed for each part.
     pub seed: u64,
-    /// Names of the constants to fit, as [`constant_names`] lists them; all where empty.
+    /// Names of the constants to fit, as [`constant_names`] lists them; all where empty. The score's weights are always fitted.
     pub only: Vec<String>,
 }
 
-/// The names of all constants that can be fitted.
+/// The score's weights, which are always fitted, as a name among those of the constants: alone it asks for nothing else.
+const SCORE: &str = "score";
+
+/// The names of all that can be fitted.
 pub fn constant_names() -> Vec<&'static str> {
-    CONSTANTS.iter().map(|constant| constant.name).collect()
+    std::iter::once(SCORE).chain(CONSTANTS.iter().map(|constant| constant.name)).collect()
 }
 
 /// What a fit is doing: it takes minutes to hours.
@@ -63,8 +67,8 @@ pub enum FitEvent<'a> {
         /// The value.
         value: f64,
     },
-    /// Size and threshold are fitted together.
-    Joint(&'a JointReport),
+    /// The score's weights are fitted.
+    Score(&'a ScoreReport),
     /// A constant is fitted.
     Fitted(&'a ConstantReport),
 }
@@ -93,26 +97,22 @@ pub fn fit(
     let sides = Sides { training: prepare(training)?, held_out: prepare(held_out)? };
     let today = CheckConfig::DEFAULT;
     let observed = sides.observed(&today)?;
-    let joint = fit_jointly(&observed);
-    observe(&FitEvent::Joint(&joint));
+    let score = report_score(&observed);
+    observe(&FitEvent::Score(&score));
 
     let mut constants = Vec::new();
     for constant in chosen {
-        let report = if constant.needs_search {
-            fit_of_search(constant, &sides, &observed, observe)?
-        } else {
-            fit_of_check(constant, &observed)
-        };
+        let report = fit_constant(constant, &sides, &observed, observe)?;
         observe(&FitEvent::Fitted(&report));
         constants.push(report);
     }
     Ok(FitReport {
         num_training: training.len(),
         num_held_out: held_out.len(),
-        today: mean_loss(&losses(&observed.held_out, &today)),
-        today_training: mean_loss(&losses(&observed.training, &today)),
+        today: mean_loss(&losses(&observed.held_out, &today.score)),
+        today_training: mean_loss(&losses(&observed.training, &today.score)),
         constants,
-        joint,
+        score,
     })
 }
 
@@ -121,6 +121,7 @@ fn chosen_constants(only: &[String]) -> Result<Vec<&'static Constant>> {
         return Ok(CONSTANTS.iter().collect());
     }
     only.iter()
+        .filter(|name| *name != SCORE)
         .map(|name| {
             CONSTANTS
                 .iter()
@@ -151,8 +152,8 @@ impl Sides<'_> {
     }
 }
 
-/// A constant of the search: every picture is searched again, and the margin above the negatives fitted again.
-fn fit_of_search(
+/// Every picture is searched again for each value, and the score's weights are fitted again.
+fn fit_constant(
     constant: &Constant,
     sides: &Sides<'_>,
     today: &Observed,
@@ -173,7 +174,8 @@ fn fit_of_search(
             again = PreparedPart::observe_all(&sides.training, &config)?;
             &again
         };
-        let loss = fit_margin(&mut config, observed);
+        config.score = fit_score(observed, &config.score);
+        let loss = mean_loss(&losses(observed, &config.score)).total;
         trials.push(Trial { value, loss });
         if value == value_today {
             config_today = config.clone();
@@ -183,16 +185,15 @@ fn fit_of_search(
         }
     }
     let config = best.map_or_else(|| config_today.clone(), |(_, config)| config);
-    let before = losses(&today.held_out, &config_today);
+    let before = losses(&today.held_out, &config_today.score);
     let after = if constant.get(&config) == value_today {
         before.clone()
     } else {
-        losses(&PreparedPart::observe_all(&sides.held_out, &config)?, &config)
+        losses(&PreparedPart::observe_all(&sides.held_out, &config)?, &config.score)
     };
     Ok(ConstantReport {
         name: constant.name,
         file: constant.file,
-        is_margin_fitted: true,
         today: value_today,
         fitted: constant.get(&config),
         trials,
@@ -202,56 +203,16 @@ fn fit_of_search(
     })
 }
 
-/// Sets the margin of the threshold that suits `observed` best; the loss there.
-fn fit_margin(config: &mut CheckConfig, observed: &[PartObservations]) -> f64 {
-    constants::MARGIN.descend(config, &mut |config| mean_loss(&losses(observed, config)).total)
-}
-
-/// A constant of size or threshold: the observations stay.
-fn fit_of_check(constant: &Constant, observed: &Observed) -> ConstantReport {
-    let today = CheckConfig::DEFAULT;
-    let mut config = today.clone();
-    let mut trials = Vec::new();
-    constant.descend(&mut config, &mut |config| {
-        let loss = mean_loss(&losses(&observed.training, config)).total;
-        trials.push(Trial { value: constant.get(config), loss });
-        loss
-    });
-    let [before, after] = [&today, &config].map(|config| losses(&observed.held_out, config));
-    ConstantReport {
-        name: constant.name,
-        file: constant.file,
-        is_margin_fitted: false,
-        today: constant.get(&today),
-        fitted: constant.get(&config),
-        trials,
-        before: mean_loss(&before),
-        after: mean_loss(&after),
-        difference: Difference::between(&before, &after),
-    }
-}
-
-/// Size and threshold together, by coordinate descent until a round changes nothing.
-fn fit_jointly(observed: &Observed) -> JointReport {
-    const MAX_ROUNDS: usize = 10;
-    let today = CheckConfig::DEFAULT;
-    let mut config = today.clone();
-    for _ in 0..MAX_ROUNDS {
-        let before = config.clone();
-        for constant in CONSTANTS.iter().filter(|constant| !constant.needs_search) {
-            constant.descend(&mut config, &mut |config| mean_loss(&losses(&observed.training, config)).total);
-        }
-        if config == before {
-            break;
-        }
-    }
-    let [before, after] = [&today, &config].map(|config| losses(&observed.held_out, config));
-    JointReport {
-        values: CONSTANTS
-            .iter()
-            .filter(|constant| !constant.needs_search)
-            .map(|constant| (constant.name, constant.get(&today), constant.get(&config)))
-            .collect(),
+/// The score's weights: fitted on the training half and measured on the held-out half, and fitted on all parts, which are
+/// those to take over.
+fn report_score(observed: &Observed) -> ScoreReport {
+    let today = ScoreConfig::DEFAULT;
+    let fitted = fit_score(&observed.training, &today);
+    let all: Vec<PartObservations> = observed.training.iter().chain(&observed.held_out).cloned().collect();
+    let [before, after] = [&today, &fitted].map(|score| losses(&observed.held_out, score));
+    ScoreReport {
+        fitted,
+        on_all: fit_score(&all, &today),
         before: mean_loss(&before),
         after: mean_loss(&after),
         difference: Difference::between(&before, &after),

@@ -1,16 +1,16 @@
-//! What the search sees of a part: agreements of right poses, of wrong ones, and of negatives.
+//! What the search sees of a part: evidence for right poses, for wrong ones, and how much other things resemble it.
 
 use sdg_geometry::{Angle, PlanarGrasp};
 
 use super::pictures::{FitInstance, FitPart, FitPicture};
 use crate::check_config::CheckConfig;
 use crate::error::Result;
-use crate::models::instant;
 use crate::taught::TaughtDemonstration;
 use crate::teach::STRANGERS_INSTANT;
 use crate::teach::strangers::Strangers;
 use crate::teach::symmetry::HiddenTurns;
-use crate::verification::{Overlay, Scene};
+use crate::verdict::Clues;
+use crate::verification::{Overlay, Scene, search};
 
 /// How far a right pose's grasp may lie from the true one, as a share of the diagonal of the demonstration's box, in the
 /// picture's size; and how far it may be turned. The tolerances of `sdg evaluate --pictures`.
@@ -20,10 +20,7 @@ const RIGHT_DEGREES: f64 = 10.0;
 /// A pose that the search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PoseObservation {
-    /// Before anything is taken off for another size.
-    pub(super) agreement_at_any_size: f64,
-    /// Over the usual one.
-    pub(super) scale: f64,
+    pub(super) clues: Clues,
     /// The instance that it is a right pose of.
     pub(super) instance_idx: Option<usize>,
 }
@@ -31,14 +28,35 @@ pub(super) struct PoseObservation {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PictureObservations {
     pub(super) num_instances: usize,
+    /// In no order that matters; those that can be called neither right nor wrong are left out.
     pub(super) poses: Vec<PoseObservation>,
+}
+
+impl PictureObservations {
+    /// Everything that is known of the poses, as a picture is judged.
+    pub(super) fn clues(&self) -> Vec<Clues> {
+        self.poses.iter().map(|pose| pose.clues).collect()
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PartObservations {
-    /// The highest agreement in each composed picture without the part.
-    pub(super) negatives: Vec<f64>,
     pub(super) pictures: Vec<PictureObservations>,
+}
+
+impl PartObservations {
+    /// The share of the instances that have a right pose.
+    pub(super) fn coverage(&self) -> f64 {
+        let all: usize = self.pictures.iter().map(|picture| picture.num_instances).sum();
+        let is_covered =
+            |picture: &PictureObservations, idx| picture.poses.iter().any(|pose| pose.instance_idx == Some(idx));
+        let covered: usize = self
+            .pictures
+            .iter()
+            .map(|picture| (0..picture.num_instances).filter(|&idx| is_covered(picture, idx)).count())
+            .sum();
+        covered as f64 / (all as f64).max(1.0)
+    }
 }
 
 /// A part with what does not depend on the configuration.
@@ -75,28 +93,36 @@ impl<'a> PreparedPart<'a> {
 
     fn observe(&self, config: &CheckConfig) -> Result<PartObservations> {
         let taught = [self.taught.clone().with_check(config.clone())?];
-        let negatives = self.negatives.agreements(None, &taught)?;
-        let pictures = self.part.pictures.iter().map(|picture| self.observe_picture(picture, &taught)).collect();
-        Ok(PartObservations { negatives, pictures })
+        let resemblance = self.negatives.observe(None, &taught)?.resemblance();
+        let observe = |picture| self.observe_picture(picture, &taught, resemblance);
+        Ok(PartObservations { pictures: self.part.pictures.iter().map(observe).collect() })
     }
 
-    fn observe_picture(&self, picture: &FitPicture, taught: &[TaughtDemonstration]) -> PictureObservations {
-        let scene = Scene::new(&picture.image, taught);
-        let (width, height) = picture.image.dimensions();
-        let poses = instant::search(taught, &scene)
-            .iter()
-            .map(|overlay| PoseObservation {
-                agreement_at_any_size: overlay.agreement_at_any_size,
-                scale: overlay.image_from_cutout.scale / overlay.demonstration.usual_scale(width, height),
-                instance_idx: picture.instances.iter().position(|instance| self.is_right(overlay, instance)),
-            })
-            .collect();
+    fn observe_picture(
+        &self,
+        picture: &FitPicture,
+        taught: &[TaughtDemonstration],
+        resemblance: f64,
+    ) -> PictureObservations {
+        let mut poses = Vec::new();
+        for overlay in search(&Scene::new(&picture.image, taught)) {
+            let instance_idx = picture.instances.iter().position(|instance| self.is_right(&overlay, instance));
+            let middle = overlay.demonstration.outline(&overlay.image_from_cutout).bounds().center();
+            if instance_idx.is_none() && picture.undecided.iter().any(|bbox| bbox.contains(&middle)) {
+                continue;
+            }
+            let Overlay { evidence, log_size, .. } = overlay;
+            poses.push(PoseObservation {
+                clues: Clues { evidence, log_size, network: None, resemblance },
+                instance_idx,
+            });
+        }
         PictureObservations { num_instances: picture.instances.len(), poses }
     }
 
     fn is_right(&self, overlay: &Overlay<'_>, instance: &FitInstance) -> bool {
         let truth = PlanarGrasp::from_line(&instance.grasp, 0.0);
-        let found = overlay.demonstration.grasp(&overlay.image_from_cutout);
+        let found = overlay.demonstration.grasp(&overlay.image_from_marks);
         let found = self.turns.nearest(&found, truth.angle, 0, &instance.image_from_demonstration);
         let bbox = &self.part.demonstration.annotation.bbox;
         let diagonal = bbox.width().hypot(bbox.height()) * instance.image_from_demonstration.scale;

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 use sdg_demonstration::Demonstration;
-use sdg_geometry::{GraspLine, PlanarSimilarity, RotationalSymmetry};
+use sdg_geometry::{BoundingBox, GraspLine, PlanarSimilarity, RotationalSymmetry};
 
 /// One part, taught from one photo, and pictures to find it in.
 #[derive(Debug, Clone)]
@@ -22,6 +22,8 @@ pub struct FitPicture {
     pub image: RgbImage,
     /// Every one of the part in it.
     pub instances: Vec<FitInstance>,
+    /// Boxes of parts that differ in size alone: what is found on them is neither right nor wrong.
+    pub undecided: Vec<BoundingBox>,
 }
 
 /// Where a part lies.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::loss::{Difference, Loss};
+use crate::check_config::ScoreConfig;
 
 /// A value that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +21,6 @@ pub struct ConstantReport {
     pub name: &'static str,
     /// Where its value stands.
     pub file: &'static str,
-    /// Whether the threshold's margin was fitted again for each value, today's included.
-    pub is_margin_fitted: bool,
     /// Today's value.
     pub today: f64,
     /// The value with the least loss on the training half.
@@ -36,14 +35,16 @@ pub struct ConstantReport {
     pub difference: Difference,
 }
 
-/// What was found about size and threshold, fitted together.
+/// What was found about the score's weights.
 #[derive(Debug, Clone, PartialEq)]
-pub struct JointReport {
-    /// Name, today's and fitted value of each.
-    pub values: Vec<(&'static str, f64, f64)>,
-    /// On the held-out half, with today's values.
+pub struct ScoreReport {
+    /// Fitted on the training half.
+    pub fitted: ScoreConfig,
+    /// Fitted on both halves: what is to be taken over.
+    pub on_all: ScoreConfig,
+    /// On the held-out half, with today's weights.
     pub before: Loss,
-    /// On the held-out half, with the fitted values.
+    /// On the held-out half, with those of the training half.
     pub after: Loss,
     /// From before to after.
     pub difference: Difference,
@@ -62,8 +63,8 @@ pub struct FitReport {
     pub today_training: Loss,
     /// Each constant alone.
     pub constants: Vec<ConstantReport>,
-    /// Size and threshold together.
-    pub joint: JointReport,
+    /// The score's weights.
+    pub score: ScoreReport,
 }
 
 impl fmt::Display for FitReport {
@@ -84,9 +85,10 @@ impl fmt::Display for FitReport {
         }
         writeln!(
             f,
-            "\nEach constant alone, the others as today. Loss, right accepted and false alarms on the held-out half; (m): the"
+            "\n{}\nEach constant alone, the others as today, the score's weights fitted again for every value, today's included.",
+            self.score
         )?;
-        writeln!(f, "threshold's margin fitted again for every value, today's included.\n")?;
+        writeln!(f, "Loss, right accepted and false alarms on the held-out half.\n")?;
         writeln!(
             f,
             "| constant | today | fitted | loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |"
@@ -95,8 +97,7 @@ impl fmt::Display for FitReport {
         for constant in &self.constants {
             writeln!(f, "{constant}")?;
         }
-        writeln!(f, "\n{}", self.joint)?;
-        writeln!(f, "Loss on the training half of every value that was tried:\n")?;
+        writeln!(f, "\nLoss on the training half of every value that was tried:\n")?;
         for constant in &self.constants {
             writeln!(f, "- `{}`: {}", constant.name, constant.tried())?;
         }
@@ -107,8 +108,7 @@ impl fmt::Display for FitReport {
 /// A row of the table.
 impl fmt::Display for ConstantReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let margin = if self.is_margin_fitted { " (m)" } else { "" };
-        write!(f, "| `{}`{margin} | {} | {} |", self.name, Short(self.today), Short(self.fitted))?;
+        write!(f, "| `{}` | {} | {} |", self.name, Short(self.today), Short(self.fitted))?;
         change(f, &self.before, &self.after, &self.difference)?;
         write!(f, " {} |", verdict(self.today != self.fitted, &self.difference))
     }
@@ -124,17 +124,26 @@ impl ConstantReport {
     }
 }
 
-impl fmt::Display for JointReport {
+impl fmt::Display for ScoreReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Size and threshold together:\n")?;
-        for (name, today, fitted) in &self.values {
-            writeln!(f, "- `{name}`: {} → {}", Short(*today), Short(*fitted))?;
+        writeln!(f, "The score, each term's weight (neutral value):\n")?;
+        writeln!(f, "| term | today | fitted on the training half | on both halves |")?;
+        writeln!(f, "|---|--:|--:|--:|")?;
+        let columns = [&ScoreConfig::DEFAULT, &self.fitted, &self.on_all];
+        for (k, (name, _)) in ScoreConfig::DEFAULT.terms().iter().enumerate() {
+            write!(f, "| {name} |")?;
+            for config in columns {
+                let (_, term) = config.terms()[k];
+                write!(f, " {} ({}) |", Short(term.weight), Short(term.neutral))?;
+            }
+            writeln!(f)?;
         }
+        let [today, fitted, on_all] = columns.map(|config| Short(config.bias));
+        writeln!(f, "| bias | {today} | {fitted} | {on_all} |")?;
         writeln!(f, "\n| loss: today → fitted | difference, 95 % | right accepted | false alarms | changes |")?;
         write!(f, "|---|---|---|---|---|\n|")?;
         change(f, &self.before, &self.after, &self.difference)?;
-        let is_other = self.values.iter().any(|(_, today, fitted)| today != fitted);
-        writeln!(f, " {} |", verdict(is_other, &self.difference))
+        writeln!(f, " {} |", verdict(self.fitted != ScoreConfig::DEFAULT, &self.difference))
     }
 }
 

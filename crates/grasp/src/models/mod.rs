@@ -6,9 +6,8 @@
 //! | B ([`keypoints`]) | Keypoint R-CNN | box ([`placing`]) | line through the keypoints |
 //! | C ([`keypoints`]) | Keypoint R-CNN | keypoints | keypoints |
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
-//! | S ([`instant`]) | none | the demonstration looked for in the whole image | likewise |
+//! | S | none | the demonstration looked for in the whole image | likewise |
 
-pub(crate) mod instant;
 mod keypoints;
 pub(crate) mod mask;
 mod orientation;
@@ -34,9 +33,9 @@ use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TurnSource};
 use crate::taught::TaughtDemonstration;
 
-/// Candidates looked at in one image. The network rarely has more than two; verification costs time for each.
-/// Chosen by hand; how often there are more is not recorded.
-const MOST_CANDIDATES: usize = 4;
+/// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
+/// Chosen by hand, not measured.
+const MAX_CANDIDATES: usize = 16;
 /// Below this the network itself does not believe it. Detectron2's own threshold at test time.
 const LEAST_NETWORK_SCORE: f64 = 0.05;
 
@@ -167,7 +166,7 @@ impl Network {
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
         let mut candidates = Vec::new();
         for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= LEAST_NETWORK_SCORE) {
-            if i == MOST_CANDIDATES {
+            if i == MAX_CANDIDATES {
                 break;
             }
             candidates.extend(self.read(image, &detections, i, demonstrations).await?);

@@ -7,9 +7,11 @@ use sdg_training::{Outcome, median};
 use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
-use crate::models::{Network, instant};
+use crate::facts::TurnSource;
+use crate::models::Network;
+use crate::sighting::{Sighting, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Overlay, Scene, verify};
+use crate::verification::Scene;
 
 /// Samples that no network is trained on.
 pub(super) struct HeldBack<'a> {
@@ -24,6 +26,10 @@ pub(super) struct Calibrated {
     /// Samples with the part, and of those the ones in which a proposal of the network led the demonstration to it.
     pub(super) positives: usize,
     pub(super) hits: usize,
+    /// The network's scores on the part wherever anything found it, and on what looks most like it in samples without it; 0 where
+    /// it proposes nothing.
+    pub(super) on_part: Vec<f64>,
+    pub(super) elsewhere: Vec<f64>,
     pub(super) error_px: f64,
     pub(super) error_degrees: f64,
 }
@@ -55,40 +61,35 @@ impl HeldBack<'_> {
         /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
         let (mut right_scores, mut wrong_scores) = (Vec::new(), Vec::new());
+        let (mut on_part, mut elsewhere) = (Vec::new(), Vec::new());
         let mut positives = 0;
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
         for sample in self.samples {
-            let scene = Scene::new(&sample.image, demonstrations);
-            // The highest score of a candidate that ended beside the part, and of one on it.
-            let (mut beside, mut on_part) = (0.0f64, 0.0f64);
-            let mut is_on_part = |overlay: &Overlay| {
-                let grasp = overlay.demonstration.grasp(&overlay.image_from_cutout);
-                let outcome = sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0));
-                match outcome {
-                    Some(found @ Outcome::Found { error_px, error_degrees, .. }) if found.is_hit() => {
-                        errors_px.push(error_px);
-                        errors_degrees.push(error_degrees);
-                        true
-                    }
-                    _ => false,
-                }
+            let candidates = network.candidates(&sample.image, demonstrations)?;
+            let sightings = sightings(&candidates, &Scene::new(&sample.image, demonstrations));
+            let hit = |sighting: &Sighting| {
+                let grasp = sighting.overlay.demonstration.grasp(&sighting.overlay.image_from_marks);
+                sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)
             };
-            for candidate in network.candidates(&sample.image, demonstrations)? {
-                let overlay = verify(&demonstrations[candidate.demonstration_idx], &candidate, &scene);
-                let best = if is_on_part(&overlay) { &mut on_part } else { &mut beside };
-                *best = best.max(candidate.network_score);
-            }
-            if on_part == 0.0 {
-                // The second opinion is no merit of the network, but its errors are the model's.
-                for overlay in instant::search(demonstrations, &scene) {
-                    is_on_part(&overlay);
+            let highest = |right: bool, proposed: bool| {
+                let of_kind = sightings
+                    .iter()
+                    .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
+                of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
+            };
+            // What the search finds is no merit of the network, but its errors are the model's.
+            for outcome in sightings.iter().filter_map(hit) {
+                if let Outcome::Found { error_px, error_degrees, .. } = outcome {
+                    errors_px.push(error_px);
+                    errors_degrees.push(error_degrees);
                 }
             }
-            if on_part > 0.0 {
-                right_scores.push(on_part);
-            }
+            right_scores.extend(highest(true, true));
+            on_part.extend(highest(true, false));
             if sample.objects.is_empty() {
-                wrong_scores.push(beside);
+                wrong_scores.push(highest(false, true).unwrap_or(0.0));
+                let best = sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement));
+                elsewhere.extend(best.map(|sighting| sighting.network_score));
             } else {
                 positives += 1;
             }
@@ -97,6 +98,8 @@ impl HeldBack<'_> {
             positives,
             hits: right_scores.len(),
             network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG).unwrap_or(Calibration::NEUTRAL),
+            on_part,
+            elsewhere,
             error_px: median(&mut errors_px).unwrap_or(f64::INFINITY),
             error_degrees: median(&mut errors_degrees).unwrap_or(f64::INFINITY),
         })

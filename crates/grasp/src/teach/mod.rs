@@ -22,17 +22,18 @@ pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::time::{Duration, Instant};
 
 use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
-use sdg_geometry::RotationalSymmetry;
+use sdg_geometry::{GraspLine, RotationalSymmetry};
 use sdg_training::{History, SampleSource, Trained, TrainingError, train};
 
 use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
+use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
@@ -40,6 +41,7 @@ use crate::model::GraspModel;
 use crate::model_file::Calibrations;
 use crate::models::mask::MaskMatcher;
 use crate::models::{self, Network, Reading};
+use crate::network_evidence::NetworkEvidence;
 use crate::taught::TaughtDemonstration;
 
 pub use event::Event;
@@ -64,6 +66,8 @@ pub struct TeachOptions {
     pub steps: Option<usize>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
+    /// Sizes over the usual one at which the part is looked for.
+    pub size_tolerance: RangeInclusive<f64>,
     /// Weights that the detector starts from; `None` to start from nothing.
     pub base_weights: Option<BaseWeights>,
     /// Where to compute; without gradients.
@@ -80,6 +84,7 @@ impl TeachOptions {
             time_budget: None,
             steps: None,
             symmetry: RotationalSymmetry::None,
+            size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             base_weights: None,
             device: Device::flex(),
         }
@@ -142,15 +147,49 @@ pub fn teach(
     teach_network(demonstrations, &plan, options, observe, start)
 }
 
-/// Every model needs the grasp line; model D is taught what lies inside the outline, too.
+/// Smallest extent of a part in its photo: with less, whatever has two edges looks like it. Chosen by hand, not measured.
+const MIN_PART_PX: f64 = 20.0;
+
+/// Every model needs the grasp line and a part to look at; model D is taught what lies inside the outline, too.
 fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> {
     if demonstrations.is_empty() {
         return Err(GraspError::NoDemonstration);
     }
     for Demonstration { annotation, .. } in demonstrations {
         annotation.require_grasp()?;
+        let (width, height) = (annotation.bbox.width(), annotation.bbox.height());
+        if width.max(height) < MIN_PART_PX {
+            return Err(GraspError::PartTooSmall { least: MIN_PART_PX, width, height });
+        }
         if kind == ModelKind::D {
             annotation.require_outline()?;
+        }
+    }
+    check_agreement(demonstrations)
+}
+
+/// Several demonstrations must be of one part, and one photo must not be marked in two ways.
+fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
+    let contradiction = |expected: String, found: String| GraspError::ContradictingDemonstrations { expected, found };
+    let first = &demonstrations[0].annotation.label;
+    for (idx, demonstration) in demonstrations.iter().enumerate() {
+        let label = &demonstration.annotation.label;
+        if label != first {
+            return Err(contradiction(
+                format!("the first is labelled \"{first}\""),
+                format!("number {} labelled \"{label}\"", idx + 1),
+            ));
+        }
+        let same_photo = demonstrations[..idx].iter().position(|other| other.image == demonstration.image);
+        let Some(other_idx) = same_photo else { continue };
+        let grasp = |idx: usize| demonstrations[idx].annotation.require_grasp().copied();
+        let (one, other) = (grasp(other_idx)?, grasp(idx)?);
+        if one != other {
+            let at = |line: GraspLine| format!("({:.0}, {:.0})", line.center().x, line.center().y);
+            return Err(contradiction(
+                format!("the photo of number {} is grasped at {}", other_idx + 1, at(one)),
+                format!("the same photo as number {}, grasped at {}", idx + 1, at(other)),
+            ));
         }
     }
     Ok(())
@@ -161,19 +200,41 @@ fn check_marks(demonstrations: &[Demonstration], kind: ModelKind) -> Result<()> 
 const STRANGERS: u64 = 24;
 pub(crate) const STRANGERS_INSTANT: u64 = 8;
 
+/// The demonstrations as the model keeps them.
+fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<TaughtDemonstration>> {
+    let with_tolerance = |demonstration| {
+        let taught = TaughtDemonstration::new(demonstration)?;
+        let mut check = taught.check().clone();
+        check.search.scales = options.size_tolerance.clone();
+        if check == *taught.check() { Ok(taught) } else { taught.with_check(check) }
+    };
+    demonstrations.iter().map(with_tolerance).collect()
+}
+
+/// The same with the default tolerance, in which the scenes are made that teaching measures on.
+fn measured(taught: &[TaughtDemonstration]) -> Result<Vec<TaughtDemonstration>> {
+    let with_default = |taught: &TaughtDemonstration| {
+        let mut check = taught.check().clone();
+        check.search.scales = CheckConfig::DEFAULT_SIZE_TOLERANCE;
+        if check == *taught.check() { Ok(taught.clone()) } else { taught.clone().with_check(check) }
+    };
+    taught.iter().map(with_default).collect()
+}
+
 /// Model S: the demonstrations alone.
 fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
     let strangers = Strangers::new(demonstrations, options.seed, STRANGERS_INSTANT)?;
-    let demonstrations = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
-    let agreement = strangers.calibrate(None, &demonstrations)?;
+    let demonstrations = taught(demonstrations, options)?;
+    let resemblance = strangers.observe(None, &measured(&demonstrations)?)?.resemblance();
     let model = GraspModel {
         preset: options.preset.name().to_owned(),
         network: None,
         demonstrations,
-        calibrations: Calibrations { network: Calibration::NEUTRAL, agreement },
+        calibrations: Calibrations::new(Calibration::NEUTRAL, None, resemblance),
         facts: TeachingFacts {
             seed: options.seed,
             symmetry: options.symmetry,
+            size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
             samples: 0,
             steps: 0,
             seconds: decimal(start.elapsed().as_secs_f64()),
@@ -194,7 +255,7 @@ pub(crate) fn teach_network(
     start: Instant,
 ) -> Result<Taught> {
     let plan = options.steps.map_or_else(|| plan.clone(), |steps| plan.clone().with_steps(steps));
-    let taught = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
+    let taught = taught(demonstrations, options)?;
     // First, because what is wrong with base weights should not come out after minutes.
     let detector = options.initial_detector(&plan.network)?;
     let mut orientation_facts = None;
@@ -238,16 +299,20 @@ pub(crate) fn teach_network(
     let detector = state_dict::import(own, &state_dict::export(&detector)).0;
     // Calibrated and handed out is what a file will give back.
     let network = Network { detector, reading }.rounded();
-    let calibrated = held_back.calibrate(&network, &taught)?;
+    let measured = measured(&taught)?;
+    let calibrated = held_back.calibrate(&network, &measured)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.least_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
     let strangers = Strangers::new(demonstrations, options.seed, STRANGERS)?;
-    let agreement = strangers.calibrate(Some(&network), &taught)?;
+    let others = strangers.observe(Some(&network), &measured)?;
+    let elsewhere: Vec<f64> = calibrated.elsewhere.iter().copied().chain(others.network_scores()).collect();
+    let evidence = NetworkEvidence::new(&calibrated.on_part, &elsewhere, &calibrated.network);
     let facts = TeachingFacts {
         seed: options.seed,
         symmetry: options.symmetry,
+        size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
         samples: history.steps.iter().map(|step| step.samples).sum(),
         steps: history.steps.len(),
         seconds: decimal(start.elapsed().as_secs_f64()),
@@ -263,7 +328,7 @@ pub(crate) fn teach_network(
         preset: options.preset.name().to_owned(),
         network: Some(network),
         demonstrations: taught,
-        calibrations: Calibrations { network: calibrated.network, agreement },
+        calibrations: Calibrations::new(calibrated.network, Some(evidence), others.resemblance()),
         facts,
     };
     Ok(Taught { model, history: Some(history) })

@@ -225,3 +225,83 @@ fn an_interrupt_before_there_is_a_network_leaves_nothing() {
         assert!(refused.to_string().contains(reason), "{refused}");
     }
 }
+
+fn instant(demonstrations: &[Demonstration]) -> crate::error::Result<GraspModel> {
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).map(|taught| taught.model)
+}
+
+/// The demonstration with so many times the pixels.
+fn resized(factor: f64) -> Demonstration {
+    let mut demonstration = demonstration();
+    let [width, height] =
+        [demonstration.image.width(), demonstration.image.height()].map(|side| (f64::from(side) * factor) as u32);
+    demonstration.image =
+        image::imageops::resize(&demonstration.image, width, height, image::imageops::FilterType::Triangle);
+    let Annotation { bbox, grasp, outline, .. } = &mut demonstration.annotation;
+    *bbox = bbox.scaled(factor, factor);
+    *outline = outline.as_ref().map(|o| o.scaled(factor, factor));
+    *grasp = grasp.map(|line| GraspLine::new(line.start * factor, line.end * factor));
+    demonstration
+}
+
+#[test]
+fn a_photo_with_another_number_of_pixels_teaches_as_well() {
+    let picture = demonstration().image;
+    let truth = demonstration().annotation.grasp.unwrap();
+    for factor in [0.5, 0.75, 1.5, 3.0] {
+        let model = instant(&[resized(factor)]).unwrap();
+        let best = &model.detect(&picture, Verification::ByShape).unwrap()[0];
+        assert!(best.is_accepted() && (best.grasp.center() - truth.center()).norm() < 1.5, "{factor}: {best:?}");
+        assert!(best.grasp.angle.distance(truth.angle()) < 0.03, "{factor}: {best:?}");
+        // And the other way round: the photo as it was, the picture with more or fewer pixels.
+        let model = instant(&[demonstration()]).unwrap();
+        let best = &model.detect(&resized(factor).image, Verification::ByShape).unwrap()[0];
+        let scaled = truth.center() * factor;
+        assert!(
+            best.is_accepted() && (best.grasp.center() - scaled).norm() < 1.5 * factor.max(1.0),
+            "{factor}: {best:?}"
+        );
+    }
+}
+
+#[test]
+fn a_narrower_size_tolerance_refuses_other_sizes_and_is_kept_in_the_file() {
+    let options = TeachOptions { kind: ModelKind::S, size_tolerance: 0.95..=1.05, ..TeachOptions::new(1) };
+    let taught = teach(&[demonstration()], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+    let read = GraspModel::from_bytes(&taught.to_bytes().unwrap(), &Device::flex()).unwrap();
+    assert_eq!((read.size_tolerance(), read.lacks()), (0.95..=1.05, Vec::new()));
+    // Larger by a fifth in a picture of the photo's size.
+    let larger = resized(1.2).image;
+    let picture = image::imageops::crop_imm(&larger, 0, 0, PHOTO[0], PHOTO[1]).to_image();
+    let accepts = |model: &GraspModel| {
+        model.detect(&picture, Verification::ByShape).unwrap().first().is_some_and(|best| best.is_accepted())
+    };
+    assert!(!accepts(&read));
+    assert!(accepts(&read.with_size_tolerance(0.75..=1.35).unwrap()));
+}
+
+#[test]
+fn at_most_so_many_are_found_and_none_is_no_number() {
+    let model = instant(&[demonstration()]).unwrap();
+    let photo = demonstration().image;
+    assert_eq!(model.clone().with_max_detections(1).unwrap().detect(&photo, Verification::ByShape).unwrap().len(), 1);
+    let refused = model.with_max_detections(0).unwrap_err().to_string();
+    assert_eq!(refused, "expected most detections at least 1, found 0");
+}
+
+#[test]
+fn what_cannot_be_taught_from_is_refused_with_what_was_found() {
+    let refused = |demonstrations: &[Demonstration]| instant(demonstrations).unwrap_err().to_string();
+    let bbox = demonstration().annotation.bbox;
+    let tiny = resized(15.0 / bbox.width().max(bbox.height()));
+    assert!(refused(&[tiny]).contains("at least 20 pixels in its photo, found 15 × 15"));
+
+    let mut other_label = demonstration();
+    other_label.annotation.label = "nut".to_owned();
+    assert!(refused(&[demonstration(), other_label]).contains("found number 2 labelled \"nut\""));
+    let mut other_grasp = demonstration();
+    let grasp = other_grasp.annotation.grasp.as_mut().unwrap();
+    *grasp = GraspLine::new(grasp.start + nalgebra::Vector2::new(5.0, 0.0), grasp.end);
+    assert!(refused(&[demonstration(), other_grasp]).contains("found the same photo as number 2"));
+}

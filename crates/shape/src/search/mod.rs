@@ -6,9 +6,10 @@
 //!                                           │
 //!                    sweep: every place × every variant ─ local maxima: starts
 //!                                           │
-//!          climb the agreement at a coarse level, keep the best; climb and snap them level by level
+//!          climb the agreement at a coarse level; climb and snap the best level by level, eight at a time, as long as
+//!          the last eight have found something
 //!                                           │
-//!          edges and surface ─ agreement ─ overlapping ones suppressed ─ poor ones refined again ─ Match
+//!          edges and surface ─ agreement ─ overlapping ones suppressed ─ poor ones refined again ─ Match, Evidence
 //! ```
 
 mod bank;
@@ -21,7 +22,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use crate::comparison::{Agreement, Comparison};
+use crate::comparison::{Agreement, Comparison, Evidence};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
@@ -31,7 +32,8 @@ use crate::pose::Pose;
 use crate::refinement::CaptureRange;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
-use crate::search::sweep::sweep;
+use crate::search::sweep::{Start, sweep};
+use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
 
@@ -49,6 +51,9 @@ pub struct SearchConfig {
     /// it. The default was chosen by hand, not measured. Beyond the 128 points that are read at the swept level, points
     /// only repeat.
     pub num_points: usize,
+    /// Most starts of the sweep that are climbed at the coarsest level of the template, 8 to 4096, best first. Where one
+    /// part is there, 64 of them are; more take time only where more parts are found.
+    pub max_starts: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
 }
@@ -56,6 +61,9 @@ pub struct SearchConfig {
 impl SearchConfig {
     /// What [`Default`] gives for [`num_points`](Self::num_points).
     pub const DEFAULT_NUM_POINTS: usize = 64;
+    /// What [`Default`] gives for [`max_starts`](Self::max_starts). With 64, 62 of the 74 parts on the photographs by others
+    /// were reached, with 256 all but five; chosen on those pictures and on time.
+    pub const DEFAULT_MAX_STARTS: usize = 256;
 }
 
 impl Default for SearchConfig {
@@ -65,6 +73,7 @@ impl Default for SearchConfig {
             least_agreement: 0.5,
             max_matches: 16,
             num_points: Self::DEFAULT_NUM_POINTS,
+            max_starts: Self::DEFAULT_MAX_STARTS,
             shape: ShapeConfig::default(),
         }
     }
@@ -77,10 +86,15 @@ pub struct Match {
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
-    /// [`ShapeTemplate::agreement`] alone.
-    pub edges: f64,
-    /// [`Surface::agreement`] alone.
-    pub surface: f64,
+    /// Everything that the image says of that place.
+    pub evidence: Evidence,
+}
+
+/// A place that was followed to the full size.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    pose: PlanarSimilarity,
+    agreement: f64,
 }
 
 /// The level that is swept shows the part at least this large, in level pixels. Chosen by hand, not measured; the
@@ -93,22 +107,27 @@ const LEAST_SWEEP_POINTS: usize = 32;
 /// Bounds of [`SearchConfig::num_points`]: fewer points tell no pose from another, and the responses of 1024 points add up
 /// within the sweep's 16 bits. The upper bound is derived, the lower one chosen by hand.
 const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
+/// Bounds of [`SearchConfig::max_starts`]. Chosen by hand.
+const MAX_STARTS_BOUNDS: (usize, usize) = (8, 4096);
 /// Bounds of the scales that may be looked for: beyond, the swept level shows too little or too much. Chosen by
 /// hand, not measured.
 const SCALE_BOUNDS: (f64, f64) = (0.5, 2.0);
-/// Starts that are climbed at the coarsest level of the template. Chosen by hand, not measured: more cost time.
-const NUM_STARTS: usize = 64;
-/// Of those, how many are followed to the full size. Chosen by hand, not measured: more cost time.
-const NUM_FOLLOWED: usize = 8;
+/// Starts that are climbed at once, and climbed ones that are followed to the full size at once. Chosen by hand for time.
+const STARTS_AT_ONCE: usize = 64;
+const FOLLOWED_AT_ONCE: usize = 8;
+/// Further starts are followed as long as one of the last agrees so well that it may be a part. Chosen by hand, below every
+/// right pose but the poorest twentieth on generated parts.
+const WORTH_MORE: f64 = 0.4;
 /// A start that responds less is not worth a climb. Chosen by hand, not measured.
 const LEAST_RESPONSE: f64 = 0.2;
 /// How far a climb may go from its start: in places, and in steps of angle and scale. A little more than to the
 /// next start. Chosen by that reasoning, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
-/// How many of the best matches are refined again, where they agree less than surely. Chosen by hand, not
-/// measured: more cost time.
-const NUM_POLISHED: usize = 3;
+/// How many matches that agree less than surely are refined again: of those that may be a part, and of all. Chosen by hand,
+/// not measured: more cost time.
+const MAX_POLISHED: usize = 16;
+const MIN_POLISHED: usize = 3;
 /// A match that agrees less than this is nothing, and not made something by refining it. Chosen by hand,
 /// not measured.
 const LEAST_POLISHED: f64 = 0.25;
@@ -124,6 +143,7 @@ pub struct InstantSearch {
     config: SearchConfig,
     template: ShapeTemplate,
     surface: Surface,
+    structure: Structure,
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
@@ -147,6 +167,7 @@ impl InstantSearch {
         Ok(Self {
             config: config.clone(),
             surface: Surface::new(image, outline, &config.shape.surface),
+            structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
@@ -168,58 +189,88 @@ impl InstantSearch {
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
-        let starts = sweep(&responses, &self.bank, NUM_STARTS, LEAST_RESPONSE);
-        let poses: Vec<Pose> = starts
-            .iter()
-            .map(|start| {
-                let variant = &self.bank.variants[start.variant_idx];
-                let pitch = self.place_pitch();
-                let [x, y] = start.place.map(|place| (place as f64 + 0.5) * pitch);
-                Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
-            })
-            .collect();
-        let followed = parallel::map(&self.best_climbs(image, field, &poses), |&pose| {
-            self.template.follow(field, &self.range_about(pose), pose)
-        });
-        let matches = followed.iter().map(|pose| self.matched(image, field, pose.to_similarity(self.template.center)));
-        let best = self.apart(matches.collect());
-        let polished = parallel::map(&best[..best.len().min(NUM_POLISHED)], |found| self.polished(image, field, found));
-        let rest = best.into_iter().skip(NUM_POLISHED);
-        let mut matches = self.apart(polished.into_iter().chain(rest).collect());
+        let starts = sweep(&responses, &self.bank, self.config.max_starts, LEAST_RESPONSE);
+        let best = self.apart(self.follow_best(image, field, &starts));
+        let polished = self.polish(image, field, best);
+        let mut matches = self.apart(polished);
         matches.retain(|found| found.agreement >= self.config.least_agreement);
         matches.truncate(self.config.max_matches);
-        matches
+        let comparison = self.comparison(image, field);
+        parallel::map(&matches, |found| Match {
+            image_from_demonstration: found.pose,
+            agreement: found.agreement,
+            evidence: comparison.evidence(&found.pose),
+        })
     }
 
-    fn matched(&self, image: &RgbImage, field: &GradientField, image_from_demonstration: PlanarSimilarity) -> Match {
-        let seen = self.comparison(image, field).agreement(&image_from_demonstration);
-        let Agreement { edges, surface, .. } = seen;
-        Match { image_from_demonstration, agreement: seen.both(), edges, surface }
-    }
-
-    fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
-        Comparison { template: &self.template, surface: &self.surface, image, field }
-    }
-
-    /// Refined from all around, where the match is poor: its start may have been on the wrong side of a shadow.
-    fn polished(&self, image: &RgbImage, field: &GradientField, found: &Match) -> Match {
-        if found.agreement >= self.config.shape.settling.sure_agreement || found.agreement < LEAST_POLISHED {
-            return *found;
+    /// Follows starts, the best first, as long as that finds something.
+    fn follow_best(&self, image: &RgbImage, field: &GradientField, starts: &[Start]) -> Vec<Found> {
+        let mut climbed_before: Vec<Pose> = Vec::new();
+        let mut found = Vec::new();
+        for some in starts.chunks(STARTS_AT_ONCE) {
+            let climbed = self.climb_starts(image, field, some, &climbed_before);
+            for few in climbed.chunks(FOLLOWED_AT_ONCE) {
+                let followed = parallel::map(few, |&pose| {
+                    let pose = self.template.follow(field, &self.range_about(pose), pose);
+                    self.found(image, field, pose.to_similarity(self.template.center))
+                });
+                let is_worth_more = followed.iter().any(|found| found.agreement >= WORTH_MORE);
+                found.extend(followed);
+                if !is_worth_more {
+                    return found;
+                }
+            }
+            climbed_before.extend(climbed);
         }
-        let (comparison, start) = (self.comparison(image, field), &found.image_from_demonstration);
-        let settled = comparison.settled(start, comparison.refined_by_edges(start), &self.config.scales);
-        let settled = self.matched(image, field, settled);
-        let is_in_range = self.config.scales.contains(&settled.image_from_demonstration.scale);
+        found
+    }
+
+    fn found(&self, image: &RgbImage, field: &GradientField, pose: PlanarSimilarity) -> Found {
+        Found { pose, agreement: self.comparison(image, field).agreement(&pose).both() }
+    }
+
+    /// Mean brightness of the part at a pose over that of the demonstration; 1 where it lies outside the image.
+    pub fn brightness(&self, image: &RgbImage, image_from_demonstration: &PlanarSimilarity) -> f64 {
+        self.surface.brightness(image, image_from_demonstration)
+    }
+
+    /// The scales that are looked for.
+    pub fn scales(&self) -> &RangeInclusive<f64> {
+        &self.config.scales
+    }
+
+    /// The demonstration over an image, whose gradients are `field`.
+    pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
+        Comparison { template: &self.template, surface: &self.surface, structure: &self.structure, image, field }
+    }
+
+    /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
+    fn polish(&self, image: &RgbImage, field: &GradientField, found: Vec<Found>) -> Vec<Found> {
+        let sure = self.config.shape.settling.sure_agreement;
+        let (poor, mut others): (Vec<Found>, Vec<Found>) =
+            found.into_iter().partition(|found| (LEAST_POLISHED..sure).contains(&found.agreement));
+        let count = poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_POLISHED, MAX_POLISHED);
+        let (first, rest) = poor.split_at(count.min(poor.len()));
+        others.extend(parallel::map(first, |found| self.polished(image, field, found)));
+        others.extend(rest);
+        others
+    }
+
+    fn polished(&self, image: &RgbImage, field: &GradientField, found: &Found) -> Found {
+        let comparison = self.comparison(image, field);
+        let settled = comparison.settled(&found.pose, comparison.refined_by_edges(&found.pose), &self.config.scales);
+        let settled = self.found(image, field, settled);
+        let is_in_range = self.config.scales.contains(&settled.pose.scale);
         if is_in_range && settled.agreement > found.agreement { settled } else { *found }
     }
 
     /// The best first; of those that claim the same area, the best alone.
-    fn apart(&self, mut matches: Vec<Match>) -> Vec<Match> {
-        matches.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
-        let mut kept: Vec<Match> = Vec::new();
-        for found in matches {
-            if kept.iter().all(|better| self.are_apart(better, &found)) {
-                kept.push(found);
+    fn apart(&self, mut found: Vec<Found>) -> Vec<Found> {
+        found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+        let mut kept: Vec<Found> = Vec::new();
+        for next in found {
+            if kept.iter().all(|better| self.are_apart(&better.pose, &next.pose)) {
+                kept.push(next);
             }
         }
         kept
@@ -235,9 +286,11 @@ impl InstantSearch {
         CaptureRange::around(Pose { log_scale: 0.5 * (low + high), ..pose }, [shift, shift, turn, 0.5 * (high - low)])
     }
 
-    /// Climbs from every start at the template's coarsest level; the best by edges and surface, no two alike.
-    fn best_climbs(&self, image: &RgbImage, field: &GradientField, poses: &[Pose]) -> Vec<Pose> {
-        let mut climbed = parallel::map(poses, |&pose| {
+    /// Climbs from every start at the template's coarsest level; the best by edges and surface first, no two alike and none
+    /// like those before.
+    fn climb_starts(&self, image: &RgbImage, field: &GradientField, starts: &[Start], before: &[Pose]) -> Vec<Pose> {
+        let mut climbed = parallel::map(starts, |start| {
+            let pose = self.pose_of(start);
             let (pose, edges) = self.template.climb_coarsest(field, &self.range_about(pose), pose);
             let surface = self.surface.agreement(image, &pose.to_similarity(self.template.center));
             (pose, Agreement::new(edges, surface, &self.config.shape.agreement).both())
@@ -247,11 +300,18 @@ impl InstantSearch {
         let near = [pitch, pitch, 0.5 * self.bank.angle_step_rad, f64::INFINITY];
         let mut kept: Vec<Pose> = Vec::new();
         for (pose, _) in climbed {
-            if kept.len() < NUM_FOLLOWED && kept.iter().all(|other| !pose.is_near(other, near)) {
+            if kept.iter().chain(before).all(|other| !pose.is_near(other, near)) {
                 kept.push(pose);
             }
         }
         kept
+    }
+
+    fn pose_of(&self, start: &Start) -> Pose {
+        let variant = &self.bank.variants[start.variant_idx];
+        let pitch = self.place_pitch();
+        let [x, y] = start.place.map(|place| (place as f64 + 0.5) * pitch);
+        Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
     }
 
     /// Image pixels from one place to the next.
@@ -260,8 +320,8 @@ impl InstantSearch {
     }
 
     /// Whether two matches can both be there: parts do not lie in each other.
-    fn are_apart(&self, one: &Match, other: &Match) -> bool {
-        let one_from_other = one.image_from_demonstration.inverse().compose(&other.image_from_demonstration);
+    fn are_apart(&self, one: &PlanarSimilarity, other: &PlanarSimilarity) -> bool {
+        let one_from_other = one.inverse().compose(other);
         self.surface.share_inside(&self.outline, &one_from_other) <= MAX_OVERLAP
     }
 }
@@ -306,6 +366,12 @@ fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
             "from 8 to 1024",
             config.num_points as f64,
             (NUM_POINTS_BOUNDS.0..=NUM_POINTS_BOUNDS.1).contains(&config.num_points),
+        ),
+        (
+            "max_starts",
+            "from 8 to 4096",
+            config.max_starts as f64,
+            (MAX_STARTS_BOUNDS.0..=MAX_STARTS_BOUNDS.1).contains(&config.max_starts),
         ),
     ];
     for (name, expected, found, ok) in checks {

@@ -120,6 +120,8 @@ mod tests {
             score,
             network_score: score,
             agreement: None,
+            evidence: None,
+            light: 1.0,
             bbox: BoundingBox { x1: 0.0, y1: 0.0, x2: 1.0, y2: 1.0 },
             keypoints: Vec::new(),
             outline: None,

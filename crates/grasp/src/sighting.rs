@@ -1,0 +1,43 @@
+//! Places where the part may be: as the network proposes, and as the search finds.
+
+use crate::facts::TurnSource;
+use crate::models::Candidate;
+use crate::verification::{Overlay, Scene, search, verify};
+
+/// Boxes that overlap so much are taken for the same part's. Chosen by hand, not measured.
+pub(crate) const SAME_PART_IOU: f64 = 0.5;
+
+/// A place where the part may be, before it is scored.
+pub(crate) struct Sighting<'a> {
+    pub(crate) overlay: Overlay<'a>,
+    /// 0 where the network proposes nothing.
+    pub(crate) network_score: f64,
+    /// The network's scores of the keypoints; empty where the search found the place.
+    pub(crate) keypoint_scores: Vec<f64>,
+    pub(crate) turn_source: TurnSource,
+}
+
+/// All such places in an image, in which a network proposes `candidates`: first theirs, then the search's. A place may come
+/// twice.
+pub(crate) fn sightings<'a>(candidates: &[Candidate], scene: &Scene<'a>) -> Vec<Sighting<'a>> {
+    let proposed = candidates.iter().filter_map(|candidate| {
+        Some(Sighting {
+            overlay: verify(candidate, scene)?,
+            network_score: candidate.network_score,
+            keypoint_scores: candidate.keypoints.iter().map(|(_, score)| *score).collect(),
+            turn_source: candidate.turn_source,
+        })
+    });
+    let mut sightings: Vec<Sighting> = proposed.collect();
+    for overlay in search(scene) {
+        let bounds = overlay.demonstration.outline(&overlay.image_from_cutout).bounds();
+        let proposed = candidates.iter().filter(|candidate| candidate.bbox.iou(&bounds) >= SAME_PART_IOU);
+        sightings.push(Sighting {
+            overlay,
+            network_score: proposed.map(|candidate| candidate.network_score).fold(0.0, f64::max),
+            keypoint_scores: Vec::new(),
+            turn_source: TurnSource::Search,
+        });
+    }
+    sightings
+}

@@ -1,0 +1,100 @@
+//! How large a part may be in a picture whose camera is not known.
+//!
+//! A photo and a picture may have other numbers of pixels because one was resized, or because one was cropped. Which, the
+//! files do not say, so both are tried: **same pixels**, a part covers as many pixels as in its photo, and **same frame**,
+//! it covers the same share of the picture. About each, sizes are free within the model's tolerance.
+
+use std::ops::RangeInclusive;
+
+/// Sizes that are looked for at once, in pixels of the picture per pixel of the demonstration's photo.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SizeRange {
+    pub(crate) scales: RangeInclusive<f64>,
+    /// The hypotheses in it, one or both.
+    nominal: Vec<f64>,
+}
+
+/// Hypotheses this near to each other are one. Chosen by hand, not measured.
+const SAME_LOG: f64 = 0.03;
+/// Ranges that overlap are searched at once if the largest size is at most so many times the smallest: the search's time
+/// grows with the range, and one template serves no more. Chosen by hand, not measured.
+const MAX_RATIO: f64 = 3.0;
+
+impl SizeRange {
+    /// The ranges to look in, none of them overlapping another where one search can do for both; `photo` and `picture` are
+    /// width and height.
+    pub(crate) fn all(photo: Option<[u32; 2]>, picture: [u32; 2], tolerance: &RangeInclusive<f64>) -> Vec<Self> {
+        let shorter = |[width, height]: [u32; 2]| f64::from(width.min(height));
+        let same_frame = photo.map_or(1.0, |photo| shorter(picture) / shorter(photo));
+        let about = |nominal: f64| nominal * tolerance.start()..=nominal * tolerance.end();
+        let same_pixels = Self { scales: about(1.0), nominal: vec![1.0] };
+        if same_frame.ln().abs() < SAME_LOG {
+            return vec![same_pixels];
+        }
+        let low = tolerance.start() * same_frame.min(1.0);
+        let high = tolerance.end() * same_frame.max(1.0);
+        let overlap = same_frame.ln().abs() < (tolerance.end() / tolerance.start()).ln();
+        if overlap && high / low <= MAX_RATIO {
+            return vec![Self { scales: low..=high, nominal: vec![1.0, same_frame] }];
+        }
+        vec![same_pixels, Self { scales: about(same_frame), nominal: vec![same_frame] }]
+    }
+
+    /// The middle of the range, by ratio.
+    pub(crate) fn middle(&self) -> f64 {
+        (self.scales.start() * self.scales.end()).sqrt()
+    }
+
+    /// ln of a size over the nearest hypothesis.
+    pub(crate) fn log_size(&self, scale: f64) -> f64 {
+        self.nominal
+            .iter()
+            .map(|nominal| (scale / nominal).ln())
+            .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+            .unwrap_or_else(|| scale.ln())
+    }
+
+    /// How far a scale lies outside, as a difference of ln; 0 inside.
+    pub(crate) fn distance(&self, scale: f64) -> f64 {
+        (self.scales.start() / scale).ln().max((scale / self.scales.end()).ln()).max(0.0)
+    }
+
+    pub(crate) fn clamp(&self, scale: f64) -> f64 {
+        scale.clamp(*self.scales.start(), *self.scales.end())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
+
+    #[test]
+    fn a_picture_like_the_photo_is_searched_once_about_its_size() {
+        for photo in [None, Some([640, 480]), Some([480, 640])] {
+            let ranges = SizeRange::all(photo, [640, 480], &TOLERANCE);
+            assert_eq!(ranges, [SizeRange { scales: 0.75..=1.35, nominal: vec![1.0] }]);
+        }
+    }
+
+    #[test]
+    fn another_number_of_pixels_is_another_size_or_another_crop() {
+        // 1.5 times the pixels: from 0.75 to 1.5 · 1.35 in one search.
+        let [range] = &SizeRange::all(Some([640, 480]), [960, 720], &TOLERANCE)[..] else { panic!("one range") };
+        assert!((range.scales.start() - 0.75).abs() < 1e-12 && (range.scales.end() - 2.025).abs() < 1e-12);
+        assert!(range.log_size(1.0) == 0.0 && range.log_size(1.5) == 0.0);
+        assert!((range.log_size(1.65) - 1.1f64.ln()).abs() < 1e-12);
+
+        // A third of the pixels: too far for one search.
+        let [pixels, frame] = &SizeRange::all(Some([960, 720]), [320, 240], &TOLERANCE)[..] else {
+            panic!("two ranges")
+        };
+        assert_eq!(pixels.scales, TOLERANCE);
+        assert!(
+            (frame.scales.start() - 0.25).abs() < 1e-12 && (frame.middle() - (0.25f64 * 0.45).sqrt()).abs() < 1e-12
+        );
+        assert!(frame.distance(0.3) == 0.0 && (frame.distance(0.5) - (0.5f64 / 0.45).ln()).abs() < 1e-12);
+        assert!((frame.clamp(0.9) - 0.45).abs() < 1e-12);
+    }
+}

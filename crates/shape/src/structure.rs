@@ -1,0 +1,234 @@
+//! Edge directions compared in both directions: what the demonstration has and the image lacks, and the other way round.
+//!
+//! [`crate::ShapeTemplate`] asks of the image what stands at the demonstration's edges, and nothing else: a plate without
+//! the holes agrees with every plate that has holes beside. Here directions are compared at a grid of points over the
+//! whole part, whether the demonstration has an edge there or not.
+//!
+//! ```text
+//! outline ─ grid ─ direction at each point, demonstration and image ─ correlation by region ─┬─ the worst quarter ─ weakest
+//!                                                                                            └─ those that agree ─ visible
+//! ```
+//! Legend: a direction is `(cos 2φ, sin 2φ)` times a length from 0 (no edge) to 1 (a clear edge), as
+//! [`GradientField`] keeps it; the correlation of two fields is `Σ a·b / √(Σ a² Σ b²)`. Unlike the colours' it does not
+//! depend on what lies under light or shadow, only on where edges run.
+
+use nalgebra::Point2;
+use sdg_geometry::{PlanarSimilarity, Polygon};
+
+use crate::config::{AgreementConfig, StructureConfig};
+use crate::gradient_field::GradientField;
+
+/// How well the edges of an image agree with the demonstration's, both ways.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StructureAgreement {
+    /// Mean correlation of the regions that agree least, a quarter of the edges together, in `[-1, 1]`.
+    pub weakest: f64,
+    /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: what is
+    /// neither covered nor another part's.
+    pub visible: f64,
+    /// The share of the part that lies outside the image, in `[0, 1]`; it counts in nothing else.
+    pub outside: f64,
+}
+
+/// The edge directions of a demonstration at a grid of points.
+#[derive(Debug, Clone)]
+pub struct Structure {
+    points: Vec<GridPoint>,
+    num_regions: usize,
+    /// Demonstration pixels per pixel of the level that is compared.
+    pixel_size: f64,
+    config: StructureConfig,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct GridPoint {
+    /// In demonstration pixels.
+    at: Point2<f64>,
+    direction: [f32; 2],
+    region: usize,
+}
+
+/// The share of all edges that the weakest regions make up. Chosen by hand, not measured.
+const WEAKEST_SHARE: f64 = 0.25;
+
+impl Structure {
+    /// Reads the directions out of `field`, the gradients of the demonstration; `outline` in its pixels.
+    pub fn new(
+        field: &GradientField,
+        outline: &Polygon,
+        config: &StructureConfig,
+        agreement: &AgreementConfig,
+    ) -> Self {
+        let bounds = outline.bounds();
+        let extent = bounds.width().max(bounds.height());
+        let level_idx = ((extent / agreement.extent).log2().floor().max(0.0) as usize).min(field.num_levels() - 1);
+        let (level, pixel_size) = (field.level(level_idx), f64::from(1u32 << level_idx));
+        let step = (outline.area() / config.num_points).sqrt().max(0.5);
+        let region_side = (outline.area() / config.num_regions).sqrt().max(1.0);
+        // The outline's own edge stands up to a level pixel outside.
+        let margin = pixel_size;
+        let [width, height] = [bounds.width(), bounds.height()].map(|side| side + 2.0 * margin);
+        let (columns, rows) = ((width / step) as usize, (height / step) as usize);
+        let regions_across = (width / region_side) as usize + 1;
+        let mut points = Vec::new();
+        for i in 0..rows * columns {
+            let [right, down] = [i % columns, i / columns].map(|k| (k as f64 + 0.5) * step);
+            let at = Point2::new(bounds.x1 - margin + right, bounds.y1 - margin + down);
+            if !outline.contains(&at) && outline.distance_to_edge(&at) > margin {
+                continue;
+            }
+            let [x, y] = [at.x, at.y].map(|coordinate| (coordinate / pixel_size) as f32);
+            if let Some([dx, dy, _]) = level.bilinear(x, y) {
+                let region = (down / region_side) as usize * regions_across + (right / region_side) as usize;
+                points.push(GridPoint { at, direction: [dx, dy], region });
+            }
+        }
+        let num_regions = points.iter().map(|point| point.region + 1).max().unwrap_or(0);
+        Self { points, num_regions, pixel_size, config: *config }
+    }
+
+    /// Compares an image, whose gradients are `field`, with the demonstration at a pose.
+    ///
+    /// # Units and frames
+    /// The pose maps demonstration pixels to pixels of the image.
+    pub fn agreement(&self, field: &GradientField, image_from_demonstration: &PlanarSimilarity) -> StructureAgreement {
+        let level_idx = field.level_idx_for(self.pixel_size * image_from_demonstration.scale);
+        let (level, pixel_size) = (field.level(level_idx), f64::from(1u32 << level_idx));
+        let (sin, cos) = (2.0 * image_from_demonstration.angle.radians()).sin_cos();
+        let (sin, cos) = (sin as f32, cos as f32);
+        let mut regions = vec![Correlation::default(); self.num_regions];
+        let mut num_outside = 0usize;
+        for point in &self.points {
+            let at = image_from_demonstration.apply(&point.at);
+            let [x, y] = [at.x, at.y].map(|coordinate| (coordinate / pixel_size) as f32);
+            let Some([seen_x, seen_y, _]) = level.bilinear(x, y) else {
+                num_outside += 1;
+                continue;
+            };
+            let [dx, dy] = point.direction;
+            regions[point.region].add([cos * dx - sin * dy, sin * dx + cos * dy], [seen_x, seen_y]);
+        }
+        let (weakest, visible) = self.by_region(&regions);
+        StructureAgreement { weakest, visible, outside: num_outside as f64 / (self.points.len() as f64).max(1.0) }
+    }
+
+    /// The weakest quarter's mean, and the share that agrees. A region counts by the edges of demonstration or image,
+    /// whichever has more: what is there in one alone counts.
+    fn by_region(&self, regions: &[Correlation]) -> (f64, f64) {
+        let mut values: Vec<(f64, f64)> = regions
+            .iter()
+            .filter(|region| region.count > 0)
+            .map(|region| (region.value(self.config.noise), f64::from(region.taught.max(region.seen))))
+            .collect();
+        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all: f64 = values.iter().map(|(_, weight)| weight).sum();
+        let (mut sum, mut taken, mut visible) = (0.0, 0.0, 0.0);
+        for (value, weight) in values {
+            let share = weight.min(WEAKEST_SHARE * all - taken).max(0.0);
+            sum += share * value;
+            taken += share;
+            visible += if value >= self.config.visible_from { weight } else { 0.0 };
+        }
+        if all > 0.0 { (sum / taken, visible / all) } else { (0.0, 0.0) }
+    }
+}
+
+/// Sums over pairs of a taught and a seen direction.
+#[derive(Debug, Clone, Copy, Default)]
+struct Correlation {
+    count: usize,
+    taught: f32,
+    seen: f32,
+    products: f32,
+}
+
+impl Correlation {
+    fn add(&mut self, taught: [f32; 2], seen: [f32; 2]) {
+        self.count += 1;
+        self.taught += taught[0] * taught[0] + taught[1] * taught[1];
+        self.seen += seen[0] * seen[0] + seen[1] * seen[1];
+        self.products += taught[0] * seen[0] + taught[1] * seen[1];
+    }
+
+    /// Two empty areas agree: `noise` is the energy that every point is taken to share.
+    fn value(&self, noise: f64) -> f64 {
+        let shared = noise * self.count as f64;
+        let [taught, seen, products] = [self.taught, self.seen, self.products].map(|sum| f64::from(sum) + shared);
+        if self.count == 0 { 0.0 } else { products / (taught * seen).sqrt().max(f64::MIN_POSITIVE) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{Rgb, RgbImage};
+    use sdg_geometry::{Angle, BoundingBox};
+
+    /// A dark plate with a hole of radius 8 at `hole`, on a light ground, everything moved right by `shift`.
+    fn plate(hole: Option<[f64; 2]>, shift: f64) -> RgbImage {
+        RgbImage::from_fn(200, 140, |x, y| {
+            let (x, y) = (f64::from(x) - shift, f64::from(y));
+            let on_plate = (30.0..150.0).contains(&x) && (30.0..110.0).contains(&y);
+            let in_hole = hole.is_some_and(|[u, v]| (x - u).hypot(y - v) < 8.0);
+            Rgb([if on_plate && !in_hole { 60 } else { 200 }; 3])
+        })
+    }
+
+    const HOLE: [f64; 2] = [60.0, 70.0];
+
+    fn structure() -> Structure {
+        let outline = Polygon::from_box(&BoundingBox { x1: 30.0, y1: 30.0, x2: 150.0, y2: 110.0 });
+        let field = GradientField::new(&plate(Some(HOLE), 0.0));
+        Structure::new(&field, &outline, &StructureConfig::DEFAULT, &AgreementConfig::DEFAULT)
+    }
+
+    fn agreement(image: &RgbImage, pose: &PlanarSimilarity) -> StructureAgreement {
+        structure().agreement(&GradientField::new(image), pose)
+    }
+
+    #[test]
+    fn the_part_itself_agrees_everywhere() {
+        let same = agreement(&plate(Some(HOLE), 0.0), &PlanarSimilarity::IDENTITY);
+        assert!(same.weakest > 0.999 && same.visible > 0.999 && same.outside == 0.0, "{same:?}");
+        let moved = PlanarSimilarity { tx: 20.0, ..PlanarSimilarity::IDENTITY };
+        let moved = agreement(&plate(Some(HOLE), 20.0), &moved);
+        assert!(moved.weakest > 0.98, "{moved:?}");
+    }
+
+    #[test]
+    fn a_hole_that_is_missing_or_elsewhere_shows_in_the_weakest_regions() {
+        for hole in [None, Some([95.0, 70.0])] {
+            let other = agreement(&plate(hole, 0.0), &PlanarSimilarity::IDENTITY);
+            assert!(other.weakest < 0.75 && other.visible > 0.5, "{hole:?}: {other:?}");
+        }
+    }
+
+    #[test]
+    fn edges_that_the_demonstration_has_not_count_too() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 30.0, y1: 30.0, x2: 150.0, y2: 110.0 });
+        let without_hole = GradientField::new(&plate(None, 0.0));
+        let taught = Structure::new(&without_hole, &outline, &StructureConfig::DEFAULT, &AgreementConfig::DEFAULT);
+        let seen = taught.agreement(&GradientField::new(&plate(Some(HOLE), 0.0)), &PlanarSimilarity::IDENTITY);
+        assert!(seen.weakest < 0.75, "{seen:?}");
+    }
+
+    #[test]
+    fn what_lies_outside_is_counted_and_nothing_else_changes() {
+        // The plate's right half is beyond the border: 140 of its 200 columns are kept.
+        let cropped = image::imageops::crop_imm(&plate(Some(HOLE), 50.0), 0, 0, 140, 140).to_image();
+        let pose = PlanarSimilarity { tx: 50.0, ..PlanarSimilarity::IDENTITY };
+        let seen = agreement(&cropped, &pose);
+        assert!((seen.outside - 0.5).abs() < 0.05 && seen.visible > 0.95, "{seen:?}");
+        let away = agreement(&cropped, &PlanarSimilarity { tx: 900.0, ..PlanarSimilarity::IDENTITY });
+        assert_eq!(away, StructureAgreement { weakest: 0.0, visible: 0.0, outside: 1.0 });
+    }
+
+    #[test]
+    fn directions_turn_with_the_pose() {
+        let turned = image::imageops::rotate90(&plate(Some(HOLE), 0.0));
+        let center = Point2::new(100.0, 70.0);
+        let pose = PlanarSimilarity::about(center, Point2::new(70.0, 100.0), Angle::from_degrees(90.0), 1.0);
+        let seen = agreement(&turned, &pose);
+        assert!(seen.weakest > 0.95, "{seen:?}");
+    }
+}
