@@ -151,7 +151,7 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 }
 
 const SCORE: ScoreConfig = ScoreConfig {
-    bias: 0.05,
+    bias: 0.1,
     edges: term(4.39, 0.6, 0.3, 0.95),
     surface: term(1.94, 0.29, 0.0, 0.7),
     hue: term(-8.0, 0.1, 0.1, 0.35),
@@ -160,5 +160,5 @@ const SCORE: ScoreConfig = ScoreConfig {
     size: term(-98.0, 0.0, 0.0, 0.029),
     outside: term(-8.36, 0.0, 0.0, 0.34),
     resemblance: term(-5.85, 0.33, 0.2, 0.45),
-    network: term(0.8, 0.0, -1.5, 0.0),
+    network: term(0.8, 0.0, -1.0, 0.0),
 };

@@ -18,7 +18,7 @@ use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::model_file::Calibrations;
-use crate::models::{Candidate, Network};
+use crate::models::{Candidate, Network, Proposals};
 use crate::sighting::{SAME_PART_IOU, Sighting, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture};
@@ -219,17 +219,18 @@ impl GraspModel {
         }
         let mut found: Vec<GraspDetection> = match (&self.network, verification) {
             (Some(network), Verification::Off) => network
-                .candidates_async(image, &self.demonstrations)
+                .proposals_async(image, &self.demonstrations)
                 .await?
+                .candidates
                 .iter()
                 .map(|c| self.unverified(c))
                 .collect(),
             (Some(network), Verification::ByShape) => {
                 let scene = Scene::new(image, &self.demonstrations);
-                let candidates = network.candidates_async(image, &self.demonstrations).await?;
-                self.judged(sightings(&candidates, &scene))
+                let proposals = network.proposals_async(image, &self.demonstrations).await?;
+                self.judged(sightings(&proposals, &scene))
             }
-            (None, _) => self.judged(sightings(&[], &Scene::new(image, &self.demonstrations))),
+            (None, _) => self.judged(sightings(&Proposals::default(), &Scene::new(image, &self.demonstrations))),
         };
         let (width, height) = (f64::from(width), f64::from(height));
         found.iter_mut().for_each(|detection| detection.bbox = detection.bbox.clip(width, height));

@@ -1,7 +1,7 @@
 //! Places where the part may be: as the network proposes, and as the search finds.
 
 use crate::facts::TurnSource;
-use crate::models::Candidate;
+use crate::models::Proposals;
 use crate::verification::{Overlay, Scene, search, verify};
 
 /// Boxes that overlap so much are taken for the same part's. Chosen by hand, not measured.
@@ -17,10 +17,9 @@ pub(crate) struct Sighting<'a> {
     pub(crate) turn_source: TurnSource,
 }
 
-/// All such places in an image, in which a network proposes `candidates`: first theirs, then the search's. A place may come
-/// twice.
-pub(crate) fn sightings<'a>(candidates: &[Candidate], scene: &Scene<'a>) -> Vec<Sighting<'a>> {
-    let proposed = candidates.iter().filter_map(|candidate| {
+/// All such places in an image: first those that a network proposes, then those that the search finds. A place may come twice.
+pub(crate) fn sightings<'a>(proposals: &Proposals, scene: &Scene<'a>) -> Vec<Sighting<'a>> {
+    let proposed = proposals.candidates.iter().filter_map(|candidate| {
         Some(Sighting {
             overlay: verify(candidate, scene)?,
             network_score: candidate.network_score,
@@ -31,10 +30,9 @@ pub(crate) fn sightings<'a>(candidates: &[Candidate], scene: &Scene<'a>) -> Vec<
     let mut sightings: Vec<Sighting> = proposed.collect();
     for overlay in search(scene) {
         let bounds = overlay.demonstration.outline(&overlay.image_from_cutout).bounds();
-        let proposed = candidates.iter().filter(|candidate| candidate.bbox.iou(&bounds) >= SAME_PART_IOU);
         sightings.push(Sighting {
             overlay,
-            network_score: proposed.map(|candidate| candidate.network_score).fold(0.0, f64::max),
+            network_score: proposals.score_at(&bounds),
             keypoint_scores: Vec::new(),
             turn_source: TurnSource::Search,
         });

@@ -31,6 +31,7 @@ use self::mask::MaskMatcher;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TurnSource};
+use crate::sighting::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
@@ -57,6 +58,23 @@ pub(crate) enum Reading {
     Keypoints,
     /// Model D.
     Mask(MaskMatcher),
+}
+
+/// What a network says of an image.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Proposals {
+    /// Best first, those that cannot be read as a pose left out.
+    pub(crate) candidates: Vec<Candidate>,
+    /// Every box with its score, beyond the candidates, too.
+    boxes: Vec<(BoundingBox, f64)>,
+}
+
+impl Proposals {
+    /// The highest score of a box about the same part as `bbox`; 0 where there is none.
+    pub(crate) fn score_at(&self, bbox: &BoundingBox) -> f64 {
+        let about_it = self.boxes.iter().filter(|(proposed, _)| proposed.iou(bbox) >= SAME_PART_IOU);
+        about_it.map(|(_, score)| *score).fold(0.0, f64::max)
+    }
 }
 
 /// A detection with the model's reading of it, not yet verified.
@@ -145,33 +163,29 @@ impl Network {
     /// # Errors
     /// An image that the network refuses.
     #[cfg(feature = "teach")]
-    pub(crate) fn candidates(
-        &self,
-        image: &RgbImage,
-        demonstrations: &[TaughtDemonstration],
-    ) -> Result<Vec<Candidate>> {
-        read_sync(self.candidates_async(image, demonstrations))
+    pub(crate) fn proposals(&self, image: &RgbImage, demonstrations: &[TaughtDemonstration]) -> Result<Proposals> {
+        read_sync(self.proposals_async(image, demonstrations))
     }
 
-    /// [`Self::candidates`], awaited.
+    /// [`Self::proposals`], awaited.
     ///
     /// # Errors
     /// As there.
-    pub(crate) async fn candidates_async(
+    pub(crate) async fn proposals_async(
         &self,
         image: &RgbImage,
         demonstrations: &[TaughtDemonstration],
-    ) -> Result<Vec<Candidate>> {
+    ) -> Result<Proposals> {
         let transformed = self.detector.image_transform().apply(image)?;
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
-        let mut candidates = Vec::new();
+        let mut proposals = Proposals::default();
         for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= LEAST_NETWORK_SCORE) {
-            if i == MAX_CANDIDATES {
-                break;
+            proposals.boxes.push((detections.boxes[i], detections.scores[i]));
+            if i < MAX_CANDIDATES {
+                proposals.candidates.extend(self.read(image, &detections, i, demonstrations).await?);
             }
-            candidates.extend(self.read(image, &detections, i, demonstrations).await?);
         }
-        Ok(candidates)
+        Ok(proposals)
     }
 
     async fn read(

@@ -43,7 +43,7 @@ impl HeldBack<'_> {
         self.samples
             .iter()
             .map(|sample| {
-                let best = network.candidates(&sample.image, demonstrations)?.into_iter().next();
+                let best = network.proposals(&sample.image, demonstrations)?.candidates.into_iter().next();
                 Ok(match (best, sample.objects.first()) {
                     (Some(candidate), Some(object)) => self.outcome(&candidate.grasp, object, candidate.network_score),
                     (None, Some(_)) => Outcome::Missed,
@@ -65,8 +65,8 @@ impl HeldBack<'_> {
         let mut positives = 0;
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
         for sample in self.samples {
-            let candidates = network.candidates(&sample.image, demonstrations)?;
-            let sightings = sightings(&candidates, &Scene::new(&sample.image, demonstrations));
+            let proposals = network.proposals(&sample.image, demonstrations)?;
+            let sightings = sightings(&proposals, &Scene::new(&sample.image, demonstrations));
             let hit = |sighting: &Sighting| {
                 let grasp = sighting.overlay.demonstration.grasp(&sighting.overlay.image_from_marks);
                 sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)

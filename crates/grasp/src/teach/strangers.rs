@@ -10,7 +10,7 @@ use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demons
 use crate::check_config::ScoreConfig;
 use crate::decimal::decimal;
 use crate::error::Result;
-use crate::models::Network;
+use crate::models::{Network, Proposals};
 use crate::sighting::sightings;
 use crate::taught::TaughtDemonstration;
 use crate::verification::Scene;
@@ -48,8 +48,8 @@ impl Strangers {
         let mut most_alike = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
             let scene = Scene::new(&sample.image, demonstrations);
-            let candidates = network.map_or(Ok(Vec::new()), |n| n.candidates(&sample.image, demonstrations))?;
-            let sightings = sightings(&candidates, &scene);
+            let proposals = network.map_or(Ok(Proposals::default()), |n| n.proposals(&sample.image, demonstrations))?;
+            let sightings = sightings(&proposals, &scene);
             let best = sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement));
             most_alike.extend(best.map(|best| (best.overlay.agreement, best.network_score)));
         }
