@@ -26,14 +26,14 @@ fn wrong_files_are_told_apart() {
     let newer = made.path("newer.sdg");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let mut bytes = std::fs::read(&model).unwrap();
-    let version = br#""format_version":"1""#;
+    let version = br#""format_version":"2""#;
     let at = bytes.windows(version.len()).position(|window| window == version).unwrap() + version.len() - 2;
     bytes[at] = b'9';
     assert!(text(&bytes).contains(r#""format_version":"9""#));
     std::fs::write(&newer, &bytes).unwrap();
     choose(&browser, "#model-file", &[newer]);
     let said = complaint(&browser);
-    assert!(said.contains("newer.sdg: expected a grasp model of format version 1, found version 9"), "{said}");
+    assert!(said.contains("newer.sdg: expected a grasp model of format version 2, found version 9"), "{said}");
 
     choose(&browser, "#model-file", &[demonstration()]);
     let wait = "return document.getElementById('alert').textContent.startsWith('image.png')";
