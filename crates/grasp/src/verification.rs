@@ -77,7 +77,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The mean of 2×2 pixels; an odd last row or column is left out, so that places are exactly halved.
-fn halved(image: &RgbImage) -> RgbImage {
+pub(crate) fn halved(image: &RgbImage) -> RgbImage {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let stride = 3 * image.width() as usize;
     let mut out = Vec::with_capacity(3 * (width * height) as usize);

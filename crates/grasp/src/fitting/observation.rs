@@ -93,7 +93,7 @@ impl<'a> PreparedPart<'a> {
 
     fn observe(&self, config: &CheckConfig) -> Result<PartObservations> {
         let taught = [self.taught.clone().with_check(config.clone())?];
-        let resemblance = self.negatives.observe(None, &taught)?.resemblance();
+        let resemblance = self.negatives.observe_as(config)?.resemblance();
         let observe = |picture| self.observe_picture(picture, &taught, resemblance);
         Ok(PartObservations { pictures: self.part.pictures.iter().map(observe).collect() })
     }

@@ -211,21 +211,10 @@ fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Ve
     demonstrations.iter().map(with_tolerance).collect()
 }
 
-/// The same with the default tolerance, in which the scenes are made that teaching measures on.
-fn measured(taught: &[TaughtDemonstration]) -> Result<Vec<TaughtDemonstration>> {
-    let with_default = |taught: &TaughtDemonstration| {
-        let mut check = taught.check().clone();
-        check.search.scales = CheckConfig::DEFAULT_SIZE_TOLERANCE;
-        if check == *taught.check() { Ok(taught.clone()) } else { taught.clone().with_check(check) }
-    };
-    taught.iter().map(with_default).collect()
-}
-
 /// Model S: the demonstrations alone.
 fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
-    let strangers = Strangers::new(demonstrations, options.seed, STRANGERS_INSTANT)?;
+    let resemblance = Strangers::new(demonstrations, options.seed, STRANGERS_INSTANT)?.observe(None)?.resemblance();
     let demonstrations = taught(demonstrations, options)?;
-    let resemblance = strangers.observe(None, &measured(&demonstrations)?)?.resemblance();
     let model = GraspModel {
         preset: options.preset.name().to_owned(),
         network: None,
@@ -299,14 +288,16 @@ pub(crate) fn teach_network(
     let detector = state_dict::import(own, &state_dict::export(&detector)).0;
     // Calibrated and handed out is what a file will give back.
     let network = Network { detector, reading }.rounded();
-    let measured = measured(&taught)?;
-    let calibrated = held_back.calibrate(&network, &measured)?;
+    // The samples show the part at other sizes than those that may be looked for later.
+    let of_any_size: Vec<TaughtDemonstration> =
+        demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
+    let calibrated = held_back.calibrate(&network, &of_any_size)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.least_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
     let strangers = Strangers::new(demonstrations, options.seed, STRANGERS)?;
-    let others = strangers.observe(Some(&network), &measured)?;
+    let others = strangers.observe(Some(&network))?;
     let elsewhere: Vec<f64> = calibrated.elsewhere.iter().copied().chain(others.network_scores()).collect();
     let evidence = NetworkEvidence::new(&calibrated.on_part, &elsewhere, &calibrated.network);
     let facts = TeachingFacts {

@@ -5,23 +5,30 @@
 //! agreement varies with the seed more than parts differ, and was no guide; their mean is one: over the eight shipped
 //! parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
 
-use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
+use sdg_demonstration::{
+    Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
+};
 
-use crate::check_config::ScoreConfig;
+use crate::check_config::{CheckConfig, ScoreConfig};
 use crate::decimal::decimal;
 use crate::error::Result;
 use crate::models::{Network, Proposals};
+use crate::prepared::scaling;
 use crate::sighting::sightings;
 use crate::taught::TaughtDemonstration;
-use crate::verification::Scene;
+use crate::verification::{Scene, halved};
 
 /// With fewer scenes in which anything agrees at all there is no mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
 
-/// Scenes without the part.
+/// Scenes without the part, and the part as it is looked for in them: at the default tolerance, whatever the model's own is.
 pub(crate) struct Strangers {
     scenes: Vec<Sample>,
+    demonstrations: Vec<TaughtDemonstration>,
 }
+
+/// Photos of more pixels are halved before scenes are composed of them. Chosen for time: model S is to be taught in a second.
+const MAX_PIXELS: u64 = 2_000_000;
 
 impl Strangers {
     /// Composes `count` scenes of the demonstrations' size.
@@ -32,19 +39,31 @@ impl Strangers {
         // Pieces of the part itself agree with it, and lie on no table.
         let style = SceneStyle { positive_share: 0.0, mutant_share: 0.0, ..SceneStyle::default() };
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
-        let augmenter = Augmenter::new(demonstrations, config, seed)?;
-        Ok(Self { scenes: (0..count).map(|i| augmenter.held_out(i)).collect() })
+        let demonstrations: Vec<Demonstration> = demonstrations.iter().map(shrunk).collect();
+        let augmenter = Augmenter::new(&demonstrations, config, seed)?;
+        let scenes = (0..count).map(|i| augmenter.held_out(i)).collect();
+        let demonstrations = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
+        Ok(Self { scenes, demonstrations })
     }
 
     /// What looks most like the part in each scene, as the network proposes and as it is searched for.
     ///
     /// # Errors
     /// An image that the network refuses.
-    pub(crate) fn observe(
-        &self,
-        network: Option<&Network>,
-        demonstrations: &[TaughtDemonstration],
-    ) -> Result<Resemblances> {
+    pub(crate) fn observe(&self, network: Option<&Network>) -> Result<Resemblances> {
+        self.observe_with(network, &self.demonstrations)
+    }
+
+    /// The same, compared in another way.
+    ///
+    /// # Errors
+    /// As [`Self::observe`]; a configuration out of range.
+    pub(crate) fn observe_as(&self, check: &CheckConfig) -> Result<Resemblances> {
+        let changed = |demonstration: &TaughtDemonstration| demonstration.clone().with_check(check.clone());
+        self.observe_with(None, &self.demonstrations.iter().map(changed).collect::<Result<Vec<_>>>()?)
+    }
+
+    fn observe_with(&self, network: Option<&Network>, demonstrations: &[TaughtDemonstration]) -> Result<Resemblances> {
         let mut most_alike = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
             let scene = Scene::new(&sample.image, demonstrations);
@@ -55,6 +74,26 @@ impl Strangers {
         }
         Ok(Resemblances { most_alike })
     }
+}
+
+/// The demonstration, halved until its photo is small enough.
+fn shrunk(demonstration: &Demonstration) -> Demonstration {
+    let mut shrunk = demonstration.clone();
+    while u64::from(shrunk.image.width()) * u64::from(shrunk.image.height()) > MAX_PIXELS {
+        let half = scaling(0.5);
+        let Annotation { label, bbox, grasp, jaw_width, outline } = shrunk.annotation;
+        shrunk = Demonstration {
+            image: halved(&shrunk.image),
+            annotation: Annotation {
+                label,
+                bbox: bbox.scaled(0.5, 0.5),
+                grasp: grasp.map(|grasp| grasp.transformed(&half)),
+                jaw_width: jaw_width.map(|width| 0.5 * width),
+                outline: outline.map(|outline| outline.transformed(&half)),
+            },
+        };
+    }
+    shrunk
 }
 
 /// What looked most like the part in each scene in which anything agrees at all: its agreement and the network's score there.
@@ -88,7 +127,7 @@ mod tests {
         let demonstrations = [demonstration()];
         let taught = [TaughtDemonstration::new(&demonstrations[0]).unwrap()];
         let strangers = Strangers::new(&demonstrations, 3, 12).unwrap();
-        let resemblance = strangers.observe(None, &taught).unwrap().resemblance();
+        let resemblance = strangers.observe(None).unwrap().resemblance();
         let best =
             |image| search(&Scene::new(image, &taught)).iter().map(|overlay| overlay.agreement).fold(0.0, f64::max);
         let agreements: Vec<f64> = strangers.scenes.iter().map(|sample| best(&sample.image)).collect();
