@@ -60,6 +60,7 @@ pub(crate) struct Calibrations {
 }
 
 impl Calibrations {
+    #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(network: Calibration, evidence: Option<NetworkEvidence>, resemblance: f64) -> Self {
         Self { network, evidence, resemblance: Some(resemblance), agreement: None }
     }

@@ -31,6 +31,7 @@ fn class(score: f64, calibration: &Calibration) -> usize {
 
 impl NetworkEvidence {
     /// From the network's scores on the part and on other things, 0 where it proposes nothing.
+    #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &Calibration) -> Self {
         let count = |scores: &[f64]| {
             let mut counts = [0; 3];
