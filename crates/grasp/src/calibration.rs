@@ -1,13 +1,9 @@
-//! Scores on which 0.5 is the place to decide.
+//! The network's score, so that 0.5 is the place to decide where nothing verifies it (`--no-verify`).
 //!
 //! ```text
-//! agreement     ─ logistic ─ score of a verified detection
-//! network score ─ logistic ─ score of an unverified one (`--no-verify`)
+//! network score ─ logistic, fitted on held-back augmentations ─ score of an unverified detection
 //! ```
-//!
-//! Each is calibrated alone, on held-back augmentations. A verified detection is scored by the demonstration only:
-//! taking the lower of both was tried and refused six of ten right detections, because a network taught for two
-//! minutes is unsure of parts that the demonstration recognises.
+//! A verified detection is scored by all evidence ([`crate::verdict`]).
 
 use serde::{Deserialize, Serialize};
 

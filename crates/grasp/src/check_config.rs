@@ -92,10 +92,8 @@ pub struct Term {
 /// Fitted on 122 generated parts, none on a shipped part or a photograph; `fit_constants --parts 160 --size 640x480,320x240
 /// --seed 11 --only score` finds nothing better on others (docs/decisions/score.md). The ranges were set by hand: regions that
 /// agree are neutral and others speak against the part, because concentric rings agree everywhere with any other ring; and so
-/// that no term rejects alone. The network's term was chosen by reasoning, not fitted: a network also proposes parts that
-/// resemble its own, so its word supports and does not carry, and that it proposes nothing counts neither way, since
-/// networks miss many parts. The bias is a quarter below the fitted one: the simulator's levers that were made to resemble
-/// the pendulum are then refused at a fixed height.
+/// that no term rejects alone. Hue was chosen by hand. The network's weight was fitted on models C of ten generated parts: only
+/// its silence counts, because a network proposes look-alikes as well as the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoreConfig {
     /// Log-odds where all evidence is neutral.

@@ -158,7 +158,7 @@ impl GraspModel {
     /// The same model that finds at most so many parts in a picture; 100 otherwise.
     ///
     /// # Errors
-    /// None at all.
+    /// [`GraspError::InvalidConfig`] for 0.
     pub fn with_max_detections(self, max_detections: usize) -> Result<Self> {
         if max_detections == 0 {
             return Err(GraspError::InvalidConfig { name: "most detections", expected: "at least 1", found: 0.0 });
@@ -261,8 +261,7 @@ impl GraspModel {
         let clues: Vec<Clues> = sightings
             .iter()
             .map(|sighting| {
-                let network =
-                    self.network.as_ref().and_then(|_| self.calibrations.log_likelihood_ratio(sighting.network_score));
+                let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
                 let Overlay { evidence, log_size, .. } = sighting.overlay;
                 Clues { evidence, log_size, network, resemblance }
             })

@@ -17,6 +17,12 @@ pub(crate) struct Sighting<'a> {
     pub(crate) turn_source: TurnSource,
 }
 
+/// The one that agrees best, whatever its score.
+#[cfg(feature = "teach")]
+pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'s Sighting<'a>> {
+    sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement))
+}
+
 /// All such places in an image: first those that a network proposes, then those that the search finds. A place may come twice.
 pub(crate) fn sightings<'a>(proposals: &Proposals, scene: &Scene<'a>) -> Vec<Sighting<'a>> {
     let proposed = proposals.candidates.iter().filter_map(|candidate| {

@@ -57,9 +57,14 @@ impl Contributions {
         ])
     }
 
+    /// What speaks most against the part, or least for it.
+    fn weakest(&self) -> Option<(&'static str, f64)> {
+        self.named().min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// What speaks most against the part, in words; `None` where nothing does.
     pub fn strongest_objection(&self) -> Option<&'static str> {
-        let (name, log_odds) = self.named().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (name, log_odds) = self.weakest()?;
         let words = match name {
             "network" => "the network does not see the part there",
             "edges" => "too few of the part's edges are there",
@@ -82,7 +87,7 @@ impl Contributions {
         // Beyond these the light is another one. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
-        let (worst, log_odds) = self.named().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let (worst, log_odds) = self.weakest()?;
         match worst {
             _ if log_odds >= 0.0 => None,
             "size" => Some("if its size is right, widen --size-tolerance"),

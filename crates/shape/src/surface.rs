@@ -102,17 +102,12 @@ impl Surface {
     }
 
     /// How far the hue lies from the demonstration's: the median over cells of the distance between the shares of red, green
-    /// and blue, colours paler or stronger than taught not counted, which highlights and shadows are; 0 where none of it is in the image. The light's strength does not count,
-    /// its tint does, and what covers less than half does not.
+    /// and blue; 0 where none of it is in the image. Highlights make a colour paler and shadows make it stronger, which does not
+    /// count, nor does what covers less than half; the light's tint does.
     pub(crate) fn hue_shift(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
         let mut shifts = Vec::with_capacity(self.cells.len());
         for cell in &self.cells {
-            let mut sums = Correlation::default();
-            for (point, taught) in cell {
-                if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
-                    sums.add(taught, &seen);
-                }
-            }
+            let sums = Correlation::of(cell, image, image_from_cutout);
             if sums.count >= LEAST_IN_CELL {
                 let mean = |sum: [f64; 3]| sum.map(|channel| channel / sums.count as f64);
                 shifts.push((hue_distance(&mean(sums.taught), &mean(sums.seen)), sums.count));
@@ -128,12 +123,7 @@ impl Surface {
         let mut whole = Correlation::default();
         let (mut cells, mut weights) = (0.0, 0.0);
         for cell in &self.cells {
-            let mut local = Correlation::default();
-            for (point, taught) in cell {
-                if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
-                    local.add(taught, &seen);
-                }
-            }
+            let local = Correlation::of(cell, image, image_from_cutout);
             if local.count >= LEAST_IN_CELL {
                 let weight = local.count as f64 * local.contrast_taught(noise_in_cell);
                 cells += weight * local.value(noise_in_cell);
@@ -161,6 +151,17 @@ struct Correlation {
 }
 
 impl Correlation {
+    /// Of a cell and what an image shows of it at a pose.
+    fn of(cell: &[(Point2<f64>, [f64; 3])], image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Self {
+        let mut sums = Self::default();
+        for (point, taught) in cell {
+            if let Some(seen) = color_at(image, &image_from_cutout.apply(point)) {
+                sums.add(taught, &seen);
+            }
+        }
+        sums
+    }
+
     fn add(&mut self, taught: &[f64; 3], seen: &[f64; 3]) {
         self.count += 1;
         for channel in 0..3 {

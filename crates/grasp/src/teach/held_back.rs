@@ -9,7 +9,7 @@ use crate::calibration::Calibration;
 use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::models::Network;
-use crate::sighting::{Sighting, sightings};
+use crate::sighting::{Sighting, best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verification::Scene;
 
@@ -88,8 +88,7 @@ impl HeldBack<'_> {
             on_part.extend(highest(true, false));
             if sample.objects.is_empty() {
                 wrong_scores.push(highest(false, true).unwrap_or(0.0));
-                let best = sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement));
-                elsewhere.extend(best.map(|sighting| sighting.network_score));
+                elsewhere.extend(best_agreement(&sightings).map(|sighting| sighting.network_score));
             } else {
                 positives += 1;
             }

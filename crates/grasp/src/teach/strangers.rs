@@ -14,7 +14,7 @@ use crate::decimal::decimal;
 use crate::error::Result;
 use crate::models::{Network, Proposals};
 use crate::prepared::scaling;
-use crate::sighting::sightings;
+use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verification::{Scene, halved};
 
@@ -64,15 +64,14 @@ impl Strangers {
     }
 
     fn observe_with(&self, network: Option<&Network>, demonstrations: &[TaughtDemonstration]) -> Result<Resemblances> {
-        let mut most_alike = Vec::with_capacity(self.scenes.len());
+        let mut highest = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
             let scene = Scene::new(&sample.image, demonstrations);
             let proposals = network.map_or(Ok(Proposals::default()), |n| n.proposals(&sample.image, demonstrations))?;
             let sightings = sightings(&proposals, &scene);
-            let best = sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement));
-            most_alike.extend(best.map(|best| (best.overlay.agreement, best.network_score)));
+            highest.extend(best_agreement(&sightings).map(|best| (best.overlay.agreement, best.network_score)));
         }
-        Ok(Resemblances { most_alike })
+        Ok(Resemblances { highest })
     }
 }
 
@@ -98,21 +97,21 @@ fn shrunk(demonstration: &Demonstration) -> Demonstration {
 
 /// What looked most like the part in each scene in which anything agrees at all: its agreement and the network's score there.
 pub(crate) struct Resemblances {
-    most_alike: Vec<(f64, f64)>,
+    highest: Vec<(f64, f64)>,
 }
 
 impl Resemblances {
     /// How much other things resemble the part: the mean of the agreements.
     pub(crate) fn resemblance(&self) -> f64 {
-        if self.most_alike.len() < MIN_SCENES {
+        if self.highest.len() < MIN_SCENES {
             return ScoreConfig::DEFAULT.resemblance.neutral;
         }
-        decimal(self.most_alike.iter().map(|(agreement, _)| agreement).sum::<f64>() / self.most_alike.len() as f64)
+        decimal(self.highest.iter().map(|(agreement, _)| agreement).sum::<f64>() / self.highest.len() as f64)
     }
 
     /// The network's scores.
     pub(crate) fn network_scores(&self) -> impl Iterator<Item = f64> {
-        self.most_alike.iter().map(|(_, network_score)| *network_score)
+        self.highest.iter().map(|(_, network_score)| *network_score)
     }
 }
 
