@@ -10,6 +10,7 @@ import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 const DEGREE = Math.PI / 180;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const help = document.getElementById("help");
+const overlay = document.getElementById("overlay");
 
 /** The chosen mark without a pointer: in the middle of what is in view, to be moved from there. */
 function putInTheMiddle() {
@@ -39,11 +40,17 @@ export function fitOrPart() {
   else fit();
 }
 
+/** Chosen by its key, a mark is made by keys: Enter is for the photo, whatever button was pressed before. */
+function choose(tool) {
+  setTool(tool);
+  if (!document.activeElement?.closest("#stage")) overlay.focus({ preventScroll: true });
+}
+
 const MARKING = {
-  v: () => setTool("select"),
-  b: () => setTool("box"),
-  g: () => setTool("grasp"),
-  o: () => setTool("outline"),
+  v: () => choose("select"),
+  b: () => choose("box"),
+  g: () => choose("grasp"),
+  o: () => choose("outline"),
   p: () => proposeOutline(),
   "[": () => adjustGripper({ turn: -DEGREE }),
   "]": () => adjustGripper({ turn: DEGREE }),

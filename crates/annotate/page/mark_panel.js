@@ -29,7 +29,11 @@ for (const button of document.querySelectorAll("[data-draw]")) {
   });
 }
 for (const button of document.querySelectorAll("[data-clear]")) {
-  button.addEventListener("click", () => clear(button.dataset.clear));
+  button.addEventListener("click", () => {
+    clear(button.dataset.clear);
+    // The button goes with the mark; left alone, the focus would stay on it until the next frame, and take Enter.
+    by("overlay").focus({ preventScroll: true });
+  });
 }
 for (const kind of ["box", "grasp", "outline"]) {
   // The way to a mark that lies under another one.
