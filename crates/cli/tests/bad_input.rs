@@ -231,3 +231,21 @@ fn augment_writes_pictures_and_their_list() {
     names.sort();
     assert_eq!(names, ["000000.png", "000001.png", "000002.png", "000003.png", "annotations.json"]);
 }
+
+#[test]
+fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
+    let folder = tempfile::tempdir().unwrap();
+    let (model, picture) = (folder.path().join("model.sdg"), folder.path().join("table.png"));
+    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let taught = sdg(&["teach", "--model", "S", "--demo", &demonstration, "--out", model.to_str().unwrap()]);
+    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    for (size, advised) in [([320, 200], true), ([640, 480], false), ([480, 640], false)] {
+        image::RgbImage::from_pixel(size[0], size[1], image::Rgb([120; 3])).save(&picture).unwrap();
+        let output = sdg(&["detect", "--grasp-model", model.to_str().unwrap(), picture.to_str().unwrap()]);
+        let stdout = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{stdout}");
+        assert!(stdout.contains("nothing to grasp"), "{stdout}");
+        let advice = "it has 320x200 pixels and the photo had 640x480";
+        assert_eq!(stdout.contains(advice) && stdout.contains("--size-tolerance"), advised, "{stdout}");
+    }
+}

@@ -7,15 +7,14 @@
 //! under each of the generator's conditions and four without the part: two with look-alikes, two cluttered. The objective
 //! and the intervals are those of [`sdg_grasp::fitting`]. The same arguments give the same output.
 
+mod drawn;
+
 use std::time::Instant;
 
-use sdg_grasp::TaughtDemonstration;
-use sdg_grasp::fitting::{FitEvent, FitInstance, FitOptions, FitPart, FitPicture, constant_names, fit};
-use sdg_part_generator::{
-    Condition, LookAlike, OtherKind, OtherObject, Part, PhotoConfig, SceneConfig, Scenes, demonstration,
-};
+use sdg_grasp::fitting::{FitEvent, FitOptions, constant_names, fit};
+use sdg_part_generator::{Condition, SceneConfig};
 
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+use crate::drawn::{Result, absent, draw_parts};
 
 struct Arguments {
     parts: usize,
@@ -63,8 +62,14 @@ fn main() -> Result<()> {
     let start = Instant::now();
     // Every other part is held out, so that both halves have all sizes.
     let (mut parts, mut held_out) = (Vec::new(), Vec::new());
+    let kinds = Condition::ALL
+        .map(|condition| (SceneConfig::only(condition), arguments.rounds))
+        .into_iter()
+        .chain([Condition::LookAlikes, Condition::Clutter].map(|condition| (absent(condition), 2 * arguments.rounds)));
+    let kinds: Vec<_> = kinds.collect();
     for (idx, size) in arguments.sizes.iter().enumerate() {
-        for part in draw_parts(&arguments, *size, idx as u64)? {
+        let seed = arguments.seed.wrapping_mul(10).wrapping_add(idx as u64);
+        for part in draw_parts(arguments.parts / arguments.sizes.len(), *size, &kinds, seed)? {
             let side = if parts.len() <= held_out.len() { &mut parts } else { &mut held_out };
             side.push(part);
         }
@@ -85,55 +90,4 @@ fn main() -> Result<()> {
     })?;
     println!("{report}");
     Ok(())
-}
-
-/// Parts that can be taught, each with its pictures.
-fn draw_parts(arguments: &Arguments, [width, height]: [u32; 2], size_idx: u64) -> Result<Vec<FitPart>> {
-    let seed = arguments.seed.wrapping_mul(10).wrapping_add(size_idx);
-    let count = arguments.parts / arguments.sizes.len();
-    let photo = PhotoConfig { width, height, ..PhotoConfig::default() };
-    // The same photo as the scenes' truth refers to.
-    let photo_seed = SceneConfig::default().photo_seed;
-    let mut generated = Vec::new();
-    let mut parts = Vec::new();
-    for seed in (0u64..).map(|i| seed.wrapping_mul(1_000_000).wrapping_add(i)) {
-        let part = Part::generate(seed);
-        let demonstration = demonstration(&part, &photo, photo_seed);
-        match TaughtDemonstration::new(&demonstration) {
-            Ok(_) => {
-                parts.push(FitPart { demonstration, symmetry: part.symmetry(), pictures: Vec::new() });
-                generated.push(part);
-            }
-            Err(error) => eprintln!("part {seed} is left out: {error}"),
-        }
-        if parts.len() == count {
-            break;
-        }
-    }
-    let absent = |condition| SceneConfig { absent_share: 1.0, ..SceneConfig::only(condition) };
-    let kinds = Condition::ALL
-        .map(|condition| (SceneConfig::only(condition), 1))
-        .into_iter()
-        .chain([(absent(Condition::LookAlikes), 2), (absent(Condition::Clutter), 2)]);
-    for (kind_idx, (config, a_round)) in kinds.enumerate() {
-        // As in use: the camera's distance is not known, and parts may lie a little outside.
-        let config =
-            SceneConfig { width, height, photo, photo_seed, distance: [0.75, 1.3], min_inside_share: 0.8, ..config };
-        let scenes = Scenes::new(&generated, config, seed.wrapping_mul(100).wrapping_add(kind_idx as u64))?;
-        for index in 0..parts.len() as u64 * a_round * arguments.rounds {
-            let sample = scenes.sample(index);
-            let instances = sample.instances.iter().map(|instance| FitInstance {
-                grasp: instance.grasp,
-                image_from_demonstration: instance.image_from_demonstration,
-            });
-            let is_of_other_size =
-                |other: &&OtherObject| matches!(other.kind, OtherKind::LookAlike(LookAlike::Scaled(_)));
-            parts[sample.part_idx].pictures.push(FitPicture {
-                instances: instances.collect(),
-                undecided: sample.others.iter().filter(is_of_other_size).map(|other| other.bbox).collect(),
-                image: sample.image,
-            });
-        }
-    }
-    Ok(parts)
 }

@@ -104,8 +104,6 @@ pub struct ScoreConfig {
     pub surface: Term,
     /// Of [`sdg_shape::Evidence::hue_shift`].
     pub hue: Term,
-    /// Of [`sdg_shape::Evidence::weakest_region`].
-    pub weakest_region: Term,
     /// Of [`sdg_shape::Evidence::visible`].
     pub visible: Term,
     /// Of the squared difference of ln sizes between a detection and the picture's surest.
@@ -114,6 +112,8 @@ pub struct ScoreConfig {
     pub outside: Term,
     /// Of the mean agreement of other things with the part.
     pub resemblance: Term,
+    /// Of [`sdg_shape::Evidence::likeness`].
+    pub likeness: Term,
     /// Of ln of how much likelier the network's score is on the part than elsewhere.
     pub network: Term,
 }
@@ -129,11 +129,11 @@ impl ScoreConfig {
             ("edges", self.edges),
             ("surface", self.surface),
             ("hue", self.hue),
-            ("weakest_region", self.weakest_region),
             ("visible", self.visible),
             ("size", self.size),
             ("outside", self.outside),
             ("resemblance", self.resemblance),
+            ("likeness", self.likeness),
         ]
     }
 }
@@ -149,14 +149,14 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 }
 
 const SCORE: ScoreConfig = ScoreConfig {
-    bias: 0.1,
-    edges: term(4.39, 0.6, 0.3, 0.95),
-    surface: term(1.94, 0.29, 0.0, 0.7),
+    bias: -0.7,
+    edges: term(2.62, 0.62, 0.3, 0.95),
+    surface: term(0.93, 0.33, 0.0, 0.7),
     hue: term(-8.0, 0.1, 0.1, 0.35),
-    weakest_region: term(4.15, 0.34, -0.3, 0.34),
-    visible: term(5.72, 0.77, 0.27, 0.77),
+    visible: term(6.79, 0.67, 0.27, 0.77),
     size: term(-98.0, 0.0, 0.0, 0.029),
-    outside: term(-8.36, 0.0, 0.0, 0.34),
-    resemblance: term(-5.85, 0.33, 0.2, 0.45),
+    outside: term(-2.4, 0.0, 0.0, 0.34),
+    resemblance: term(-2.1, 0.36, 0.2, 0.45),
+    likeness: term(0.706, -0.1, -2.0, 6.0),
     network: term(0.8, 0.0, -1.0, 0.0),
 };

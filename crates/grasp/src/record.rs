@@ -100,11 +100,11 @@ mod tests {
             edges: 1.5,
             surface: 0.5,
             hue: 0.0,
-            weakest_region: 0.0,
             visible: -2.5,
             size: 0.0,
             outside: -0.25,
             resemblance: 0.0,
+            likeness: 0.0,
         };
         let refused = GraspDetection { evidence: Some(evidence), score: 0.25, ..verified };
         let json = serde_json::to_string(&DetectionRecord::from(&refused)).unwrap();

@@ -3,7 +3,7 @@
 //! ```text
 //! network score ────────────────┐
 //! edges, surface, hue ──────────┤
-//! visible share, weakest region ─┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
+//! visible share, likeness ───────┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
 //! size, share outside ──────────┤
 //! resemblance ──────────────────┘  how much other things look like this part: known from teaching
 //! ```
@@ -28,9 +28,6 @@ pub struct Contributions {
     pub surface: f64,
     /// How near the hue is to the demonstration's.
     pub hue: f64,
-    /// How well edges agree in the regions that agree least: what the demonstration has and the image lacks, and the other way
-    /// round.
-    pub weakest_region: f64,
     /// The share of the part in regions that agree.
     pub visible: f64,
     /// How far its size is from that of the surest detection in the picture.
@@ -39,6 +36,8 @@ pub struct Contributions {
     pub outside: f64,
     /// How much other things resemble this part.
     pub resemblance: f64,
+    /// What the small network says that sees photo and picture laid over each other.
+    pub likeness: f64,
 }
 
 impl Contributions {
@@ -49,11 +48,11 @@ impl Contributions {
             ("edges", self.edges),
             ("surface", self.surface),
             ("hue", self.hue),
-            ("weakest_region", self.weakest_region),
             ("visible", self.visible),
             ("size", self.size),
             ("outside", self.outside),
             ("resemblance", self.resemblance),
+            ("likeness", self.likeness),
         ])
     }
 
@@ -70,9 +69,9 @@ impl Contributions {
             "edges" => "too few of the part's edges are there",
             "surface" => "the surface looks different: another side, print or light",
             "hue" => "it has another colour: another part, or other light",
-            "weakest_region" => "one region of it looks like another part",
             "visible" => "too little of it is visible",
             "size" => "its size is not that of the others in the picture",
+            "likeness" => "photo and picture, laid over each other, do not show the same part",
             "outside" => "too much of it lies outside the picture",
             _ => "other things look much like this part",
         };
@@ -135,11 +134,11 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         edges: config.edges.log_odds(seen.edges),
         surface: seen.surface.map_or(0.0, |surface| config.surface.log_odds(surface)),
         hue: config.hue.log_odds(seen.hue_shift),
-        weakest_region: config.weakest_region.log_odds(seen.weakest_region),
         visible: config.visible.log_odds(seen.visible),
         size: config.size.log_odds(off_size),
         outside: config.outside.log_odds(seen.outside),
         resemblance: config.resemblance.log_odds(clues.resemblance),
+        likeness: config.likeness.log_odds(seen.likeness),
     };
     let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
@@ -158,14 +157,8 @@ mod tests {
 
     /// A clear view of the part: what right poses have in the median on generated parts.
     fn clear() -> Clues {
-        let evidence = Evidence {
-            edges: 0.79,
-            surface: Some(0.46),
-            hue_shift: 0.05,
-            weakest_region: 0.65,
-            visible: 1.0,
-            outside: 0.0,
-        };
+        let evidence =
+            Evidence { edges: 0.79, surface: Some(0.46), hue_shift: 0.05, visible: 1.0, outside: 0.0, likeness: 2.0 };
         Clues { evidence, log_size: 0.0, network: None, resemblance: 0.34 }
     }
 
@@ -176,14 +169,8 @@ mod tests {
     #[test]
     fn a_clear_view_is_accepted_and_another_part_is_not() {
         assert!(score(clear()) > 0.7, "{}", score(clear()));
-        let other = Evidence {
-            edges: 0.41,
-            surface: Some(0.11),
-            hue_shift: 0.3,
-            weakest_region: 0.03,
-            visible: 0.52,
-            outside: 0.0,
-        };
+        let other =
+            Evidence { edges: 0.41, surface: Some(0.11), hue_shift: 0.3, visible: 0.52, outside: 0.0, likeness: 2.0 };
         assert!(score(Clues { evidence: other, ..clear() }) < 0.1);
     }
 
@@ -212,7 +199,7 @@ mod tests {
         assert!(changed(|c| c.evidence.edges = 0.9) > 0.0 && changed(|c| c.evidence.edges = 0.4) < 0.0);
         assert!(changed(|c| c.evidence.surface = Some(0.7)) > 0.0);
         assert!(changed(|c| c.evidence.hue_shift = 0.8) < 0.0);
-        assert!(changed(|c| c.evidence.weakest_region = 0.0) < 0.0 && changed(|c| c.evidence.visible = 0.6) < 0.0);
+        assert!(changed(|c| c.evidence.likeness = -2.0) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
         assert!(changed(|c| c.evidence.outside = 0.3) < 0.0 && changed(|c| c.resemblance = 0.45) < 0.0);
         assert!(changed(|c| c.network = Some(-0.9)) < 0.0);
         // Networks propose look-alikes as well as the part.

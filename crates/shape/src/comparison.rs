@@ -21,6 +21,7 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 
 use crate::config::{AgreementConfig, SettlingConfig};
 use crate::gradient_field::GradientField;
+use crate::likeness::Likeness;
 use crate::structure::Structure;
 use crate::surface::Surface;
 use crate::template::ShapeTemplate;
@@ -45,6 +46,8 @@ pub struct Comparison<'a> {
     pub surface: &'a Surface,
     /// Its edges over the whole area, compared both ways.
     pub structure: &'a Structure,
+    /// What the comparing network sees of it.
+    pub likeness: &'a Likeness,
     /// The image.
     pub image: &'a RgbImage,
     /// The image's gradients.
@@ -81,12 +84,12 @@ pub struct Evidence {
     pub surface: Option<f64>,
     /// How far the hue lies from the demonstration's, in shares of red, green and blue: 0.1 a little tinted, 0.5 another paint.
     pub hue_shift: f64,
-    /// [`crate::StructureAgreement::weakest`], in `[-1, 1]`.
-    pub weakest_region: f64,
     /// [`crate::StructureAgreement::visible`], in `[0, 1]`.
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
+    /// [`Likeness::log_odds`].
+    pub likeness: f64,
 }
 
 impl Comparison<'_> {
@@ -98,9 +101,9 @@ impl Comparison<'_> {
             edges,
             surface: (!self.surface.is_plain()).then_some(surface),
             hue_shift: self.surface.hue_shift(self.image, image_from_demonstration),
-            weakest_region: structure.weakest,
             visible: structure.visible,
             outside: structure.outside,
+            likeness: self.likeness.log_odds(self.image, image_from_demonstration),
         }
     }
 

@@ -36,6 +36,9 @@ pub enum ShapeError {
         /// Edge points found.
         found: usize,
     },
+    /// A file of weights does not hold those of the network that compares photo and picture.
+    #[error("weights of the comparing network: {0}")]
+    Weights(String),
     /// A configuration value lies outside its range.
     #[error("expected {name} {expected}, found {found}")]
     InvalidConfig {

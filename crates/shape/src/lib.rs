@@ -60,6 +60,7 @@ mod consensus;
 mod edge_points;
 mod error;
 mod gradient_field;
+mod likeness;
 mod parallel;
 mod pose;
 mod refinement;
@@ -74,6 +75,7 @@ pub use config::{
 };
 pub use error::ShapeError;
 pub use gradient_field::GradientField;
+pub use likeness::{LAYERS, Layer, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
 pub use refinement::Refinement;
 pub use search::{InstantSearch, Match, SearchConfig};
 pub use structure::{Structure, StructureAgreement};

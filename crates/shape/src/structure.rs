@@ -5,8 +5,7 @@
 //! whole part, whether the demonstration has an edge there or not.
 //!
 //! ```text
-//! outline ─ grid ─ direction at each point, demonstration and image ─ correlation by region ─┬─ the worst quarter ─ weakest
-//!                                                                                            └─ those that agree ─ visible
+//! outline ─ grid ─ direction at each point, demonstration and image ─ correlation by region ─ those that agree ─ visible
 //! ```
 //! Legend: a direction is `(cos 2φ, sin 2φ)` times a length from 0 (no edge) to 1 (a clear edge), as
 //! [`GradientField`] keeps it; the correlation of two fields is `Σ a·b / √(Σ a² Σ b²)`. Unlike the colours' it does not
@@ -21,8 +20,6 @@ use crate::gradient_field::GradientField;
 /// How well the edges of an image agree with the demonstration's, both ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureAgreement {
-    /// Mean correlation of the regions that agree least, a quarter of the edges together, in `[-1, 1]`.
-    pub weakest: f64,
     /// The share of the edges in regions that agree by [`StructureConfig::visible_from`] or more, in `[0, 1]`: what is
     /// neither covered nor another part's.
     pub visible: f64,
@@ -47,9 +44,6 @@ struct GridPoint {
     direction: [f32; 2],
     region: usize,
 }
-
-/// The share of all edges that the weakest regions make up. Chosen by hand, not measured.
-const WEAKEST_SHARE: f64 = 0.25;
 
 impl Structure {
     /// Reads the directions out of `field`, the gradients of the demonstration; `outline` in its pixels.
@@ -108,28 +102,22 @@ impl Structure {
             let [dx, dy] = point.direction;
             regions[point.region].add([cos * dx - sin * dy, sin * dx + cos * dy], [seen_x, seen_y]);
         }
-        let (weakest, visible) = self.by_region(&regions);
-        StructureAgreement { weakest, visible, outside: num_outside as f64 / (self.points.len() as f64).max(1.0) }
+        StructureAgreement {
+            visible: self.visible(&regions),
+            outside: num_outside as f64 / (self.points.len() as f64).max(1.0),
+        }
     }
 
-    /// The weakest quarter's mean, and the share that agrees. A region counts by the edges of demonstration or image,
-    /// whichever has more: what is there in one alone counts.
-    fn by_region(&self, regions: &[Correlation]) -> (f64, f64) {
-        let mut values: Vec<(f64, f64)> = regions
-            .iter()
-            .filter(|region| region.count > 0)
-            .map(|region| (region.value(self.config.noise), f64::from(region.taught.max(region.seen))))
-            .collect();
-        values.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all: f64 = values.iter().map(|(_, weight)| weight).sum();
-        let (mut sum, mut taken, mut visible) = (0.0, 0.0, 0.0);
-        for (value, weight) in values {
-            let share = weight.min(WEAKEST_SHARE * all - taken).max(0.0);
-            sum += share * value;
-            taken += share;
-            visible += if value >= self.config.visible_from { weight } else { 0.0 };
+    /// The share of the edges in regions that agree. A region counts by the edges of demonstration or image, whichever has
+    /// more: what is there in one alone counts.
+    fn visible(&self, regions: &[Correlation]) -> f64 {
+        let (mut all, mut visible) = (0.0, 0.0);
+        for region in regions.iter().filter(|region| region.count > 0) {
+            let weight = f64::from(region.taught.max(region.seen));
+            all += weight;
+            visible += if region.value(self.config.noise) >= self.config.visible_from { weight } else { 0.0 };
         }
-        if all > 0.0 { (sum / taken, visible / all) } else { (0.0, 0.0) }
+        if all > 0.0 { visible / all } else { 0.0 }
     }
 }
 

@@ -4,22 +4,14 @@
 
 mod scenes;
 
-use image::RgbImage;
 use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_shape::{
-    AgreementConfig, Comparison, GradientField, ShapeConfig, ShapeTemplate, Structure, StructureConfig, Surface,
-    SurfaceConfig,
-};
+use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_shape::{GradientField, InstantSearch, SearchConfig};
 
 /// Farther than this beside the part, in pixels, nothing is grasped.
 const BESIDE_PX: f64 = 3.0;
-
-fn structure(image: &RgbImage, outline: &Polygon) -> Structure {
-    Structure::new(&GradientField::new(image), outline, &StructureConfig::default(), &AgreementConfig::default())
-}
 
 /// What came of a start some pixels and degrees off.
 struct Settled {
@@ -36,9 +28,7 @@ fn settled(part_idx: usize, seed: u64) -> Settled {
     let part = &parts[part_idx];
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let (image, outline, demonstration_from_part) = scenes::demonstration(part, 1, 0.05);
-    let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let surface = Surface::new(&image, &outline, &SurfaceConfig::default());
-    let structure = structure(&image, &outline);
+    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
     let image_from_part = scenes::pose(
         rng.random_range(150.0..490.0),
         rng.random_range(130.0..350.0),
@@ -49,8 +39,7 @@ fn settled(part_idx: usize, seed: u64) -> Settled {
     scene.place(part, image_from_part);
     let image = scene.render();
     let field = GradientField::new(&image);
-    let comparison =
-        Comparison { template: &template, surface: &surface, structure: &structure, image: &image, field: &field };
+    let comparison = taught.comparison(&image, &field);
 
     let pivot = outline.bounds().center();
     let truth = scenes::truth(&image_from_part, &demonstration_from_part);
@@ -90,11 +79,9 @@ fn nothing_agrees_less_for_being_settled_and_fewer_lie_beside() {
 fn what_is_sure_is_left_where_the_edges_put_it() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
-    let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let (surface, field) = (Surface::new(&image, &outline, &SurfaceConfig::default()), GradientField::new(&image));
-    let structure = structure(&image, &outline);
-    let comparison =
-        Comparison { template: &template, surface: &surface, structure: &structure, image: &image, field: &field };
+    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
+    let field = GradientField::new(&image);
+    let comparison = taught.comparison(&image, &field);
     let start = PlanarSimilarity { tx: 3.0, ..PlanarSimilarity::IDENTITY };
     let refined = comparison.refined_by_edges(&start);
     assert_eq!(comparison.settled(&start, refined, &(0.8..=1.25)), refined);
@@ -104,15 +91,12 @@ fn what_is_sure_is_left_where_the_edges_put_it() {
 fn scales_stay_in_range() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
-    let template = ShapeTemplate::new(&image, &outline, &ShapeConfig::default()).unwrap();
-    let surface = Surface::new(&image, &outline, &SurfaceConfig::default());
-    let structure = structure(&image, &outline);
+    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
     // Seen from twice as far, the part is half as large, and that is not allowed.
     let pivot = outline.bounds().center();
     let shrunk = image::imageops::resize(&image, 320, 240, image::imageops::FilterType::Triangle);
     let field = GradientField::new(&shrunk);
-    let comparison =
-        Comparison { template: &template, surface: &surface, structure: &structure, image: &shrunk, field: &field };
+    let comparison = taught.comparison(&shrunk, &field);
     let half = PlanarSimilarity::about(pivot, Point2::from(pivot.coords * 0.5), Angle::ZERO, 0.56);
     let refined = comparison.refined_by_edges(&half);
     let narrow = comparison.settled(&half, half, &(0.55..=0.6));

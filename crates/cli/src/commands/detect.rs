@@ -37,7 +37,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         match detect(args, &model, path) {
             Ok(seen) => {
                 found_any |= seen.detections.iter().any(GraspDetection::is_accepted);
-                seen.write(&mut stdout, args, path)?;
+                seen.write(&mut stdout, args, &model, path)?;
             }
             Err(error) => {
                 failed += 1;
@@ -79,7 +79,7 @@ fn detect(args: &DetectArgs, model: &GraspModel, path: &Path) -> Result<Seen> {
 }
 
 impl Seen {
-    fn write(mut self, out: &mut impl Write, args: &DetectArgs, path: &Path) -> Result<()> {
+    fn write(mut self, out: &mut impl Write, args: &DetectArgs, model: &GraspModel, path: &Path) -> Result<()> {
         let best_refused = self.detections.first().filter(|best| !best.is_accepted()).cloned();
         if !args.all {
             self.detections.retain(GraspDetection::is_accepted);
@@ -95,23 +95,38 @@ impl Seen {
             writeln!(out, "{}", serde_json::to_string(&line)?)?;
             return Ok(());
         }
-        if let Some(refused) = &best_refused {
-            writeln!(out, "{}: nothing to grasp{}", path.display(), almost(refused))?;
-        } else if self.detections.is_empty() {
-            writeln!(out, "{}: nothing to grasp", path.display())?;
+        if best_refused.is_some() || self.detections.is_empty() {
+            let almost = best_refused.and_then(|refused| almost(&refused));
+            let advice = almost.or_else(|| of_other_size(model, self.size)).unwrap_or_default();
+            writeln!(out, "{}: nothing to grasp{advice}", path.display())?;
         }
         self.detections.iter().try_for_each(|detection| write_text(out, path, detection))
     }
 }
 
 /// What was nearly found, and the photo that would help.
-fn almost(refused: &GraspDetection) -> String {
+fn almost(refused: &GraspDetection) -> Option<String> {
     /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
     const MIN_SCORE: f64 = 0.1;
-    let Some(why) = refused.refused().filter(|_| refused.score >= MIN_SCORE) else { return String::new() };
+    let why = refused.refused().filter(|_| refused.score >= MIN_SCORE)?;
     let grasp = refused.grasp;
     let advice = refused.advice().map(|advice| format!("; {advice}")).unwrap_or_default();
-    format!("; at ({:.0}, {:.0}) something like it, score {:.2}: {why}{advice}", grasp.x, grasp.y, refused.score)
+    Some(format!("; at ({:.0}, {:.0}) something like it, score {:.2}: {why}{advice}", grasp.x, grasp.y, refused.score))
+}
+
+/// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
+fn of_other_size(model: &GraspModel, (width, height): (u32, u32)) -> Option<String> {
+    let photo = model.demonstrations().iter().find_map(|demonstration| demonstration.marks.photo_size)?;
+    (photo != [width, height] && photo != [height, width]).then(|| {
+        let [photo_width, photo_height] = photo;
+        let tolerance = model.size_tolerance();
+        format!(
+            "; it has {width}x{height} pixels and the photo had {photo_width}x{photo_height}: if one of them is cropped and \
+             resized, a wider --size-tolerance than {}-{} may help",
+            tolerance.start(),
+            tolerance.end()
+        )
+    })
 }
 
 fn write_text(out: &mut impl Write, path: &Path, detection: &GraspDetection) -> Result<()> {

@@ -119,18 +119,18 @@ mod tests {
             edges: Term { weight: 10.0, neutral: 0.5, range: [0.0, 1.0] },
             surface: none,
             hue: none,
-            weakest_region: none,
             visible: none,
             size: none,
             outside: none,
             resemblance: none,
+            likeness: none,
             network: none,
         }
     }
 
     fn pose(edges: f64, instance_idx: Option<usize>) -> PoseObservation {
         let evidence =
-            Evidence { edges, surface: Some(0.0), hue_shift: 0.0, weakest_region: 0.0, visible: 0.0, outside: 0.0 };
+            Evidence { edges, surface: Some(0.0), hue_shift: 0.0, visible: 0.0, outside: 0.0, likeness: 0.0 };
         PoseObservation { clues: Clues { evidence, log_size: 0.0, network: None, resemblance: 0.3 }, instance_idx }
     }
 

@@ -22,6 +22,7 @@
 //! Nothing here changes a constant. Deterministic, whatever the number of threads.
 
 mod constants;
+mod likeness;
 mod loss;
 mod observation;
 mod pictures;
@@ -32,6 +33,7 @@ use crate::check_config::{CheckConfig, ScoreConfig};
 use crate::error::{GraspError, Result};
 
 use self::constants::{CONSTANTS, Constant};
+pub use self::likeness::{LikenessExample, likeness_examples};
 pub use self::loss::{Difference, Loss};
 use self::loss::{losses, mean_loss};
 use self::observation::{PartObservations, PreparedPart};

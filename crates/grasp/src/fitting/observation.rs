@@ -106,9 +106,9 @@ impl<'a> PreparedPart<'a> {
     ) -> PictureObservations {
         let mut poses = Vec::new();
         for overlay in search(&Scene::new(&picture.image, taught)) {
-            let instance_idx = picture.instances.iter().position(|instance| self.is_right(&overlay, instance));
-            let middle = overlay.demonstration.outline(&overlay.image_from_cutout).bounds().center();
-            if instance_idx.is_none() && picture.undecided.iter().any(|bbox| bbox.contains(&middle)) {
+            let instance_idx =
+                picture.instances.iter().position(|instance| is_right(&overlay, instance, self.part, &self.turns));
+            if instance_idx.is_none() && picture.is_undecided(&overlay) {
                 continue;
             }
             let Overlay { evidence, log_size, .. } = overlay;
@@ -119,14 +119,23 @@ impl<'a> PreparedPart<'a> {
         }
         PictureObservations { num_instances: picture.instances.len(), poses }
     }
+}
 
-    fn is_right(&self, overlay: &Overlay<'_>, instance: &FitInstance) -> bool {
-        let truth = PlanarGrasp::from_line(&instance.grasp, 0.0);
-        let found = overlay.demonstration.grasp(&overlay.image_from_marks);
-        let found = self.turns.nearest(&found, truth.angle, 0, &instance.image_from_demonstration);
-        let bbox = &self.part.demonstration.annotation.bbox;
-        let diagonal = bbox.width().hypot(bbox.height()) * instance.image_from_demonstration.scale;
-        (found.center() - truth.center()).norm() <= RIGHT_SHARE * diagonal
-            && found.angle.distance(truth.angle) <= Angle::from_degrees(RIGHT_DEGREES).radians()
+/// Whether a pose is that of an instance, turns that look the same not counted.
+pub(super) fn is_right(overlay: &Overlay<'_>, instance: &FitInstance, part: &FitPart, turns: &HiddenTurns) -> bool {
+    let truth = PlanarGrasp::from_line(&instance.grasp, 0.0);
+    let found = overlay.demonstration.grasp(&overlay.image_from_marks);
+    let found = turns.nearest(&found, truth.angle, 0, &instance.image_from_demonstration);
+    let bbox = &part.demonstration.annotation.bbox;
+    let diagonal = bbox.width().hypot(bbox.height()) * instance.image_from_demonstration.scale;
+    (found.center() - truth.center()).norm() <= RIGHT_SHARE * diagonal
+        && found.angle.distance(truth.angle) <= Angle::from_degrees(RIGHT_DEGREES).radians()
+}
+
+impl FitPicture {
+    /// Whether a pose lies on a part of which it is not decided whether it is the part.
+    pub(super) fn is_undecided(&self, overlay: &Overlay<'_>) -> bool {
+        let middle = overlay.demonstration.outline(&overlay.image_from_cutout).bounds().center();
+        self.undecided.iter().any(|bbox| bbox.contains(&middle))
     }
 }

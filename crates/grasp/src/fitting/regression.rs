@@ -88,10 +88,11 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
         .iter()
         .zip(judged)
         .map(|(clues, (_, contributions))| {
-            let Evidence { edges, surface, hue_shift, weakest_region, visible, outside } = clues.evidence;
+            let Evidence { edges, surface, hue_shift, visible, outside, likeness } = clues.evidence;
             let off_size = if config.size.weight == 0.0 { 0.0 } else { contributions.size / config.size.weight };
             let surface = surface.unwrap_or(config.surface.neutral);
-            let raw = [edges, surface, hue_shift, weakest_region, visible, off_size, outside, clues.resemblance];
+            let resemblance = clues.resemblance;
+            let raw = [edges, surface, hue_shift, visible, off_size, outside, resemblance, likeness];
             let terms = terms(config);
             SVector::from_fn(|k, _| raw[k].clamp(terms[k].range[0], terms[k].range[1]))
         })
@@ -100,13 +101,13 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
 
 /// The fitted terms, in the order of [`values`].
 fn terms(config: &ScoreConfig) -> [Term; NUM_TERMS] {
-    let ScoreConfig { edges, surface, hue, weakest_region, visible, size, outside, resemblance, .. } = *config;
-    [edges, surface, hue, weakest_region, visible, size, outside, resemblance]
+    let ScoreConfig { edges, surface, hue, visible, size, outside, resemblance, likeness, .. } = *config;
+    [edges, surface, hue, visible, size, outside, resemblance, likeness]
 }
 
 fn terms_mut(config: &mut ScoreConfig) -> [&mut Term; NUM_TERMS] {
-    let ScoreConfig { edges, surface, hue, weakest_region, visible, size, outside, resemblance, .. } = config;
-    [edges, surface, hue, weakest_region, visible, size, outside, resemblance]
+    let ScoreConfig { edges, surface, hue, visible, size, outside, resemblance, likeness, .. } = config;
+    [edges, surface, hue, visible, size, outside, resemblance, likeness]
 }
 
 /// Weights, and the bias as if every neutral value were 0.
@@ -184,8 +185,8 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
     let mut made = *config;
     for (k, term) in terms_mut(&mut made).into_iter().enumerate() {
         term.neutral = match k {
-            0..=4 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
-            7 => median(k, None),
+            0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
+            6 => median(k, None),
             _ => 0.0,
         };
         term.neutral = (term.neutral * 100.0).round() / 100.0;
@@ -209,9 +210,9 @@ mod tests {
                 edges: edges + noise(),
                 surface: Some(0.4 + noise()),
                 hue_shift: 0.0,
-                weakest_region: 0.4 + noise(),
                 visible: 0.8 + noise(),
                 outside: 0.0,
+                likeness: 2.0,
             };
             let clues = Clues { evidence, log_size: 0.0, network: None, resemblance: 0.33 };
             PoseObservation { clues, instance_idx }
@@ -230,9 +231,9 @@ mod tests {
         let rng = &mut Pcg64Mcg::seed_from_u64(3);
         let parts = [part(rng), part(rng)];
         let fitted = fit_score(&parts, &ScoreConfig::DEFAULT);
-        let [edges, surface, _, weakest, visible, ..] = terms(&fitted).map(|term| term.weight);
+        let [edges, surface, _, visible, ..] = terms(&fitted).map(|term| term.weight);
         assert!(edges > 5.0, "{fitted:?}");
-        assert!([surface, weakest, visible].iter().all(|weight| weight.abs() < 0.4 * edges), "{fitted:?}");
+        assert!([surface, visible].iter().all(|weight| weight.abs() < 0.4 * edges), "{fitted:?}");
         assert!((fitted.edges.neutral - 0.52).abs() < 0.06, "{fitted:?}");
         assert_eq!(fit_score(&parts, &ScoreConfig::DEFAULT), fitted);
     }

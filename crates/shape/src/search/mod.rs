@@ -27,6 +27,7 @@ use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
 use crate::gradient_field::GradientField;
+use crate::likeness::Likeness;
 use crate::parallel;
 use crate::pose::Pose;
 use crate::refinement::CaptureRange;
@@ -144,6 +145,7 @@ pub struct InstantSearch {
     template: ShapeTemplate,
     surface: Surface,
     structure: Structure,
+    likeness: Likeness,
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
@@ -168,6 +170,7 @@ impl InstantSearch {
             config: config.clone(),
             surface: Surface::new(image, outline, &config.shape.surface),
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
+            likeness: Likeness::new(image, outline),
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
@@ -241,7 +244,8 @@ impl InstantSearch {
 
     /// The demonstration over an image, whose gradients are `field`.
     pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
-        Comparison { template: &self.template, surface: &self.surface, structure: &self.structure, image, field }
+        let Self { template, surface, structure, likeness, .. } = self;
+        Comparison { template, surface, structure, likeness, image, field }
     }
 
     /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.

@@ -1,0 +1,205 @@
+//! Photo and picture laid over each other, many times: drawn, kept, and changed at random for training.
+
+use std::io::{BufWriter, Read, Write};
+use std::path::Path;
+
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+use sdg_grasp::fitting::likeness_examples;
+use sdg_part_generator::{Condition, SceneConfig};
+use sdg_shape::{Pair, SIDE};
+
+use crate::drawn::{Result, absent, draw_parts};
+
+/// Pixels of a pair.
+const AREA: usize = SIDE * SIDE;
+/// Bytes of an example: stream, whether right, index of the part in two bytes, photo, picture, flags.
+const RECORD: usize = 4 + 7 * AREA;
+/// Bits of a flag.
+const INSIDE: u8 = 1;
+const PHOTO: u8 = 2;
+const PICTURE: u8 = 4;
+/// Parts drawn at once: all of them are in memory with their pictures.
+const PARTS_AT_ONCE: usize = 20;
+/// Picture sizes, in turn.
+const SIZES: [[u32; 2]; 2] = [[640, 480], [320, 240]];
+
+/// What an example is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stream {
+    Training,
+    HeldOut,
+}
+
+/// Examples as bytes, one after the other.
+pub struct Pairs {
+    bytes: Vec<u8>,
+}
+
+/// Ranges of the changes, as standard deviations or half ranges of what they are named after. Chosen by hand.
+const EXPOSURE: f32 = 0.5;
+const GAMMA: f32 = 0.4;
+const TINT: f32 = 0.1;
+const NOISE: f32 = 0.02;
+
+impl Pairs {
+    /// Draws parts and looks for them; the held-out ones are of another seed.
+    pub fn draw(parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
+        let once = |condition| (SceneConfig::only(condition), 1);
+        let kinds: Vec<(SceneConfig, u64)> = Condition::ALL
+            .map(once)
+            .into_iter()
+            .chain([Condition::Cover, Condition::LookAlikes].map(once))
+            .chain([(absent(Condition::LookAlikes), 2), (absent(Condition::Clutter), 1), (SceneConfig::default(), 3)])
+            .collect();
+        let mut bytes = Vec::new();
+        for (stream, count) in [(Stream::Training, parts), (Stream::HeldOut, held_out)] {
+            for begin in (0..count).step_by(PARTS_AT_ONCE) {
+                let chunk_idx = begin / PARTS_AT_ONCE;
+                let seed = seed.wrapping_mul(1000).wrapping_add(500 * stream as u64 + chunk_idx as u64);
+                let drawn = draw_parts(PARTS_AT_ONCE.min(count - begin), SIZES[chunk_idx % SIZES.len()], &kinds, seed)?;
+                for (i, part) in drawn.iter().enumerate() {
+                    for example in likeness_examples(part)? {
+                        append(&mut bytes, stream, begin + i, example.is_right, &example.pair);
+                    }
+                }
+                say(format!("{stream:?}: {} parts, {} examples", begin + drawn.len(), bytes.len() / RECORD));
+            }
+        }
+        Ok(Self { bytes })
+    }
+
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut bytes = Vec::new();
+        std::fs::File::open(path)?.read_to_end(&mut bytes)?;
+        if bytes.is_empty() || bytes.len() % RECORD != 0 {
+            return Err(format!("{}: expected records of {RECORD} bytes, found {}", path.display(), bytes.len()).into());
+        }
+        Ok(Self { bytes })
+    }
+
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut file = BufWriter::new(std::fs::File::create(path)?);
+        file.write_all(&self.bytes)?;
+        Ok(file.flush()?)
+    }
+
+    /// Indices of the examples for training, or of those held out.
+    pub fn of(&self, stream: Stream) -> Vec<usize> {
+        (0..self.bytes.len() / RECORD).filter(|&idx| self.record(idx)[0] == stream as u8).collect()
+    }
+
+    /// Right and wrong ones.
+    pub fn counts(&self, stream: Stream) -> (usize, usize) {
+        let of_it = self.of(stream);
+        let right = of_it.iter().filter(|&&idx| self.is_right(idx)).count();
+        (right, of_it.len() - right)
+    }
+
+    pub fn is_right(&self, idx: usize) -> bool {
+        self.record(idx)[1] == 1
+    }
+
+    fn record(&self, idx: usize) -> &[u8] {
+        &self.bytes[idx * RECORD..][..RECORD]
+    }
+
+    /// As it was found.
+    pub fn pair(&self, idx: usize) -> Pair {
+        let record = &self.record(idx)[4..];
+        let flags = &record[6 * AREA..];
+        let colors = |from: usize, bit: u8| {
+            let color = |i: usize| {
+                let value = |c: usize| f32::from(record[from + 3 * i + c]) / 255.0;
+                (flags[i] & bit != 0).then(|| [value(0), value(1), value(2)])
+            };
+            (0..AREA).map(color).collect()
+        };
+        Pair {
+            photo: colors(0, PHOTO),
+            picture: colors(3 * AREA, PICTURE),
+            inside: flags.iter().map(|flag| flag & INSIDE != 0).collect(),
+        }
+    }
+
+    /// Turned and mirrored together, and each in another light.
+    pub fn changed_pair(&self, idx: usize, rng: &mut Pcg64Mcg) -> Pair {
+        let pair = turned(&self.pair(idx), rng);
+        Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
+    }
+}
+
+fn append(bytes: &mut Vec<u8>, stream: Stream, part_idx: usize, is_right: bool, pair: &Pair) {
+    bytes.extend([stream as u8, u8::from(is_right)]);
+    bytes.extend((part_idx as u16).to_le_bytes());
+    for colors in [&pair.photo, &pair.picture] {
+        for color in colors {
+            bytes.extend(color.unwrap_or_default().map(|value| (255.0 * value).round() as u8));
+        }
+    }
+    for ((photo, picture), inside) in pair.photo.iter().zip(&pair.picture).zip(&pair.inside) {
+        let flag = |is: bool, bit| if is { bit } else { 0 };
+        bytes.push(flag(*inside, INSIDE) | flag(photo.is_some(), PHOTO) | flag(picture.is_some(), PICTURE));
+    }
+}
+
+/// Both turned by the same angle about the middle, and mirrored or not.
+fn turned(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
+    let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
+    let mirror = if rng.random_bool(0.5) { -1.0 } else { 1.0 };
+    let middle = 0.5 * (SIDE as f32 - 1.0);
+    let places: Vec<[f32; 2]> = (0..AREA)
+        .map(|i| {
+            let [x, y] = [i % SIDE, i / SIDE].map(|k| k as f32 - middle);
+            [mirror * (cos * x - sin * y) + middle, sin * x + cos * y + middle]
+        })
+        .collect();
+    let inside = |at: &[f32; 2]| {
+        let [x, y] = at.map(|k| k.round());
+        let limit = SIDE as f32;
+        (x >= 0.0 && y >= 0.0 && x < limit && y < limit) && pair.inside[y as usize * SIDE + x as usize]
+    };
+    Pair {
+        photo: places.iter().map(|at| between(&pair.photo, at)).collect(),
+        picture: places.iter().map(|at| between(&pair.picture, at)).collect(),
+        inside: places.iter().map(inside).collect(),
+    }
+}
+
+/// The colour between four pixels; `None` where the nearest has none.
+fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3]> {
+    let at = |x: f32, y: f32| {
+        let is_inside = x >= 0.0 && y >= 0.0 && x < SIDE as f32 && y < SIDE as f32;
+        if is_inside { colors[y as usize * SIDE + x as usize] } else { None }
+    };
+    let nearest = at(x.round(), y.round())?;
+    let (left, top) = (x.floor(), y.floor());
+    let (along, below) = (x - left, y - top);
+    let corner = |dx: f32, dy: f32| at(left + dx, top + dy).unwrap_or(nearest);
+    let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
+    let weights = [(1.0 - along) * (1.0 - below), along * (1.0 - below), (1.0 - along) * below, along * below];
+    Some(std::array::from_fn(|c| corners.iter().zip(weights).map(|(corner, weight)| weight * corner[c]).sum()))
+}
+
+/// Another exposure, gamma, tint and noise; `strength` scales all of them.
+fn in_other_light(colors: &[Option<[f32; 3]>], strength: f32, rng: &mut Pcg64Mcg) -> Vec<Option<[f32; 3]>> {
+    let mut range = |most: f32| rng.random_range(-most..most) * strength;
+    let (gain, gamma) = (range(EXPOSURE).exp(), range(GAMMA).exp());
+    let tint = [range(TINT), range(TINT), range(TINT)].map(f32::exp);
+    let noise = rng.random_range(0.0..NOISE);
+    colors
+        .iter()
+        .map(|color| {
+            color.map(|color| {
+                let mut channel = 0;
+                color.map(|value| {
+                    let lit = (value.max(1e-3).powf(gamma) * gain * tint[channel]).min(1.0);
+                    channel += 1;
+                    // Three uniform numbers are nearly normal, with a standard deviation of 1.
+                    let normal: f32 = (0..3).map(|_| rng.random_range(-1.0f32..1.0)).sum();
+                    lit + noise * normal
+                })
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,63 @@
+//! What the network that compares photo and picture is trained on: the poses that the search finds.
+
+use sdg_shape::{Likeness, Pair};
+
+use super::observation::is_right;
+use super::pictures::{FitPart, FitPicture};
+use crate::error::Result;
+use crate::taught::TaughtDemonstration;
+use crate::teach::symmetry::HiddenTurns;
+use crate::verification::{Overlay, Scene, search};
+
+/// Wrong poses of a picture that count: those that agree best.
+const WRONG_A_PICTURE: usize = 3;
+
+/// Photo and picture laid over each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LikenessExample {
+    /// Index of the picture among the part's.
+    pub picture_idx: usize,
+    /// What the network sees.
+    pub pair: Pair,
+    /// Whether the picture shows the part there.
+    pub is_right: bool,
+}
+
+/// For every instance its best right pose, for every picture its three best wrong ones, as they agree.
+///
+/// # Errors
+/// A part that cannot be taught.
+pub fn likeness_examples(part: &FitPart) -> Result<Vec<LikenessExample>> {
+    let taught = TaughtDemonstration::new(&part.demonstration)?;
+    let likeness = Likeness::new(&taught.cutout, &taught.marks.region());
+    let turns = HiddenTurns::new(std::slice::from_ref(&part.demonstration), part.symmetry);
+    let mut examples = Vec::new();
+    for (picture_idx, picture) in part.pictures.iter().enumerate() {
+        let mut example = |overlay: &Overlay<'_>, is_right| {
+            let pair = likeness.pair(&picture.image, &overlay.image_from_cutout);
+            examples.push(LikenessExample { picture_idx, pair, is_right });
+        };
+        let mut found = search(&Scene::new(&picture.image, std::slice::from_ref(&taught)));
+        found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+        let mut is_instance_seen = vec![false; picture.instances.len()];
+        let mut num_wrong = 0;
+        for overlay in &found {
+            match instance_of(overlay, picture, part, &turns) {
+                Some(idx) if !is_instance_seen[idx] => {
+                    is_instance_seen[idx] = true;
+                    example(overlay, true);
+                }
+                None if num_wrong < WRONG_A_PICTURE && !picture.is_undecided(overlay) => {
+                    num_wrong += 1;
+                    example(overlay, false);
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(examples)
+}
+
+fn instance_of(overlay: &Overlay<'_>, picture: &FitPicture, part: &FitPart, turns: &HiddenTurns) -> Option<usize> {
+    picture.instances.iter().position(|instance| is_right(overlay, instance, part, turns))
+}

@@ -1,0 +1,195 @@
+//! Photo and picture side by side, in the frame of the photo, as the network sees them.
+
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{PlanarSimilarity, Polygon};
+
+/// Rows and columns of what the network sees.
+pub const SIDE: usize = 64;
+/// Values of a pixel: the photo's colour, the picture's, whether it lies in the outline, whether it lies in the picture.
+pub const NUM_CHANNELS: usize = 8;
+/// The part's longer side in it: what surrounds the part tells whether its outline is there.
+const PART_SIDE: f64 = SIDE as f64 / 1.2;
+/// Mean brightness of the part, in photo and picture, once exposure is taken out; brighter than four times that is as white.
+const MEAN: f32 = 0.5;
+const MAX: f32 = 2.0;
+/// Keeps a black part from being brightened without bounds.
+const DARK: f32 = 0.02;
+
+/// A photo's colours, and which of them count.
+#[derive(Debug, Clone)]
+pub(super) struct Photo {
+    /// Pixels of the cut-out for one of the network's.
+    step: f64,
+    center: Point2<f64>,
+    colors: Vec<Option<[f32; 3]>>,
+    inside: Vec<bool>,
+}
+
+/// What the network sees of a pose: colours from 0 to 1, row by row; `None` where there is no picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// The photo's.
+    pub photo: Vec<Option<[f32; 3]>>,
+    /// The picture's, at the pose.
+    pub picture: Vec<Option<[f32; 3]>>,
+    /// Whether a pixel lies in the outline.
+    pub inside: Vec<bool>,
+}
+
+impl Photo {
+    pub(super) fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
+        let bounds = outline.bounds();
+        let step = bounds.width().max(bounds.height()) / PART_SIDE;
+        let mut made = Self { step, center: bounds.center(), colors: Vec::new(), inside: Vec::new() };
+        made.colors = made.sampled(cutout, &PlanarSimilarity::IDENTITY);
+        made.inside = pixels().map(|at| outline.contains(&made.place(at))).collect();
+        made
+    }
+
+    pub(super) fn beside(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Pair {
+        let picture = self.sampled(image, image_from_cutout);
+        Pair { photo: self.colors.clone(), picture, inside: self.inside.clone() }
+    }
+
+    /// Where a point of what the network sees lies in the cut-out.
+    fn place(&self, at: [f64; 2]) -> Point2<f64> {
+        self.center + self.step * Vector2::from(at.map(|coordinate| coordinate - 0.5 * SIDE as f64))
+    }
+
+    /// Mean colours over the network's pixels.
+    fn sampled(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Option<[f32; 3]>> {
+        // So many samples a side that no pixel is skipped.
+        let num = (self.step * image_from_cutout.scale).ceil().max(1.0) as usize;
+        let origin = image_from_cutout.apply(&self.place([0.5 / num as f64; 2]));
+        let across = image_from_cutout.apply(&self.place([1.0 + 0.5 / num as f64, 0.5 / num as f64])) - origin;
+        let down = Vector2::new(-across.y, across.x);
+        let one_more = 1.0 / num as f64;
+        pixels()
+            .map(|[x, y]| {
+                let corner = origin + (x - 0.5) * across + (y - 0.5) * down;
+                let (mut sum, mut count) = ([0.0; 3], 0);
+                for i in 0..num * num {
+                    let [right, below] = [i % num, i / num].map(|k| k as f64 * one_more);
+                    if let Some(color) = color_at(image, &(corner + right * across + below * down)) {
+                        count += 1;
+                        (0..3).for_each(|c| sum[c] += color[c]);
+                    }
+                }
+                (count > 0).then(|| sum.map(|value| value / (255.0 * count as f32)))
+            })
+            .collect()
+    }
+}
+
+/// Middles of the network's pixels, row by row.
+fn pixels() -> impl Iterator<Item = [f64; 2]> {
+    (0..SIDE * SIDE).map(|i| [i % SIDE, i / SIDE].map(|k| k as f64 + 0.5))
+}
+
+impl Pair {
+    /// What the network is given: [`NUM_CHANNELS`] values a pixel, row by row. Exposure is taken out: the part is equally bright
+    /// in both. Its hue is not.
+    pub fn values(&self) -> Vec<f32> {
+        let [of_photo, of_picture] = [&self.photo, &self.picture].map(|colors| gain(colors, &self.inside));
+        let mut values = Vec::with_capacity(NUM_CHANNELS * self.inside.len());
+        for ((photo, picture), inside) in self.photo.iter().zip(&self.picture).zip(&self.inside) {
+            values.extend(exposed(photo, of_photo));
+            values.extend(exposed(picture, of_picture));
+            values.extend([*inside, picture.is_some()].map(|is| f32::from(u8::from(is))));
+        }
+        values
+    }
+}
+
+/// What brings the mean colour inside to [`MEAN`].
+fn gain(colors: &[Option<[f32; 3]>], inside: &[bool]) -> f32 {
+    let (mut sum, mut count) = (0.0, 0);
+    for color in colors.iter().zip(inside).filter(|(_, inside)| **inside).filter_map(|(color, _)| *color) {
+        sum += color.iter().sum::<f32>();
+        count += 3;
+    }
+    MEAN / (sum / (count as f32).max(1.0) + DARK)
+}
+
+fn exposed(color: &Option<[f32; 3]>, gain: f32) -> [f32; 3] {
+    color.map_or([0.0; 3], |color| color.map(|value| ((value + DARK) * gain).min(MAX)))
+}
+
+/// The colour at a point between pixel centres, by bilinear interpolation; `None` outside the image.
+fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f32; 3]> {
+    let (x, y) = (point.x - 0.5, point.y - 0.5);
+    let (left, top) = (x.floor(), y.floor());
+    let [width, height] = [image.width(), image.height()];
+    if !(left >= 0.0 && top >= 0.0 && left + 1.0 < f64::from(width) && top + 1.0 < f64::from(height)) {
+        return None;
+    }
+    let (along, below) = ((x - left) as f32, (y - top) as f32);
+    let at = 3 * (top as usize * width as usize + left as usize);
+    let raw = image.as_raw();
+    let (upper, lower) = (&raw[at..][..6], &raw[at + 3 * width as usize..][..6]);
+    Some(std::array::from_fn(|c| {
+        let row = |row: &[u8]| (1.0 - along) * f32::from(row[c]) + along * f32::from(row[c + 3]);
+        (1.0 - below) * row(upper) + below * row(lower)
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+    use sdg_geometry::{Angle, BoundingBox};
+
+    /// A plate with a bright corner on a table.
+    fn photo(light: f32) -> RgbImage {
+        RgbImage::from_fn(160, 120, |x, y| {
+            let color = match (x, y) {
+                (40..=60, 30..=45) => [220.0, 210.0, 60.0],
+                (40..120, 30..90) => [90.0, 60.0, 40.0],
+                _ => [150.0, 150.0, 155.0],
+            };
+            Rgb(color.map(|value: f32| (value * light) as u8))
+        })
+    }
+
+    fn taught() -> Photo {
+        let outline = Polygon::from_box(&BoundingBox { x1: 40.0, y1: 30.0, x2: 120.0, y2: 90.0 });
+        Photo::new(&photo(1.0), &outline)
+    }
+
+    /// Mean difference of photo and picture inside the outline, as the network is given them.
+    fn difference(pair: &Pair) -> f32 {
+        let values = pair.values();
+        let inside: Vec<_> = values.chunks_exact(NUM_CHANNELS).filter(|pixel| pixel[6] == 1.0).collect();
+        let of_pixel = |pixel: &&[f32]| (0..3).map(|c| (pixel[c] - pixel[c + 3]).abs()).sum::<f32>();
+        inside.iter().map(of_pixel).sum::<f32>() / inside.len() as f32
+    }
+
+    #[test]
+    fn the_same_part_looks_the_same_however_it_lies_and_is_lit() {
+        assert_eq!(difference(&taught().beside(&photo(1.0), &PlanarSimilarity::IDENTITY)), 0.0);
+        assert!(difference(&taught().beside(&photo(0.6), &PlanarSimilarity::IDENTITY)) < 0.05);
+        // The picture turned by a quarter, and the pose with it.
+        let turned = image::imageops::rotate90(&photo(1.0));
+        let pose =
+            PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: f64::from(turned.width()), ty: 0.0 };
+        let pair = taught().beside(&turned, &pose);
+        assert!(difference(&pair) < 0.02, "{}", difference(&pair));
+        // Half a turn further the corner is elsewhere.
+        let center = Point2::new(80.0, 60.0);
+        let wrong = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
+        assert!(difference(&taught().beside(&photo(1.0), &wrong)) > 0.1);
+    }
+
+    #[test]
+    fn the_part_fills_five_sixths_and_what_is_outside_the_picture_is_missing() {
+        let pair = taught().beside(&photo(1.0), &PlanarSimilarity { tx: 60.0, ..PlanarSimilarity::IDENTITY });
+        let middle_row = &pair.inside[SIDE / 2 * SIDE..][..SIDE];
+        let count = middle_row.iter().filter(|inside| **inside).count();
+        assert!((52..=54).contains(&count), "{count}");
+        // 20 of its 80 pixels lie outside.
+        let missing = (0..SIDE).filter(|&x| middle_row[x] && pair.picture[SIDE / 2 * SIDE + x].is_none()).count();
+        assert!((12..=15).contains(&missing), "{missing}");
+        assert!(pair.values().iter().all(|value| (0.0..=MAX).contains(value)));
+    }
+}
