@@ -149,14 +149,14 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 }
 
 const SCORE: ScoreConfig = ScoreConfig {
-    bias: -0.7,
-    edges: term(2.62, 0.62, 0.3, 0.95),
-    surface: term(0.93, 0.33, 0.0, 0.7),
+    bias: 0.3,
+    edges: term(2.64, 0.62, 0.3, 0.95),
+    surface: term(0.87, 0.33, 0.0, 0.7),
     hue: term(-8.0, 0.1, 0.1, 0.35),
-    visible: term(6.79, 0.67, 0.27, 0.77),
+    visible: term(6.73, 0.66, 0.27, 0.77),
     size: term(-98.0, 0.0, 0.0, 0.029),
-    outside: term(-2.4, 0.0, 0.0, 0.34),
-    resemblance: term(-2.1, 0.36, 0.2, 0.45),
-    likeness: term(0.706, -0.1, -2.0, 6.0),
+    outside: term(-2.15, 0.0, 0.0, 0.34),
+    resemblance: term(-2.74, 0.36, 0.2, 0.45),
+    likeness: term(0.777, -0.1, -2.0, 6.0),
     network: term(0.8, 0.0, -1.0, 0.0),
 };

@@ -11,8 +11,8 @@
 //!
 //! **Loss** ([`Loss`]). A picture's detections are scored as in use. Let p be the best score of a right pose of an instance
 //! (0 where there is none) and q the best score of a wrong pose in a picture (likewise); both are kept within 0.01 and 0.99. A
-//! part's loss is the mean of −ln p over the instances plus three times the mean of −ln (1 − q) over the pictures; the loss
-//! of several parts is their mean. 0.04 is the least. A right pose lies within 4 % of the part's size and 10° of an instance, turns
+//! part's loss is the mean of −ln p over the instances plus the mean of −ln (1 − q) over the pictures; the loss
+//! of several parts is their mean. 0.02 is the least. A right pose lies within 4 % of the part's size and 10° of an instance, turns
 //! that its symmetry hides not counted. Poses on a part that differs in size alone count neither way: without a camera it
 //! is the part.
 //!
