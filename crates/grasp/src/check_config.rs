@@ -89,11 +89,10 @@ pub struct Term {
 
 /// What the evidence is worth; see [`crate::Contributions`] for what each term is.
 ///
-/// Fitted on 122 generated parts, none on a shipped part or a photograph; `fit_constants --parts 160 --size 640x480,320x240
-/// --seed 11 --only score` finds nothing better on others (docs/decisions/score.md). The ranges were set by hand: regions that
-/// agree are neutral and others speak against the part, because concentric rings agree everywhere with any other ring; and so
-/// that no term rejects alone. Hue was chosen by hand. The network's weight was fitted on models C of ten generated parts: only
-/// its silence counts, because a network proposes look-alikes as well as the part.
+/// Fitted on 160 generated parts, none a shipped part, a photograph or one that the likeness was trained on: `fit_constants
+/// --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/score.md). Ranges, hue, size and bias were set by
+/// hand; the ranges so that no term rejects alone. The network's weight was fitted on models C of ten generated parts: only its
+/// silence counts, because a network proposes look-alikes as well as the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoreConfig {
     /// Log-odds where all evidence is neutral.

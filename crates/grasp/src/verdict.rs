@@ -170,7 +170,7 @@ mod tests {
     fn a_clear_view_is_accepted_and_another_part_is_not() {
         assert!(score(clear()) > 0.7, "{}", score(clear()));
         let other =
-            Evidence { edges: 0.41, surface: Some(0.11), hue_shift: 0.3, visible: 0.52, outside: 0.0, likeness: 2.0 };
+            Evidence { edges: 0.41, surface: Some(0.11), hue_shift: 0.3, visible: 0.52, outside: 0.0, likeness: -2.6 };
         assert!(score(Clues { evidence: other, ..clear() }) < 0.1);
     }
 

@@ -177,27 +177,22 @@ mod tests {
     #[test]
     fn the_part_itself_agrees_everywhere() {
         let same = agreement(&plate(Some(HOLE), 0.0), &PlanarSimilarity::IDENTITY);
-        assert!(same.weakest > 0.999 && same.visible > 0.999 && same.outside == 0.0, "{same:?}");
+        assert!(same.visible > 0.999 && same.outside == 0.0, "{same:?}");
         let moved = PlanarSimilarity { tx: 20.0, ..PlanarSimilarity::IDENTITY };
         let moved = agreement(&plate(Some(HOLE), 20.0), &moved);
-        assert!(moved.weakest > 0.98, "{moved:?}");
+        assert!(moved.visible > 0.98, "{moved:?}");
     }
 
     #[test]
-    fn a_hole_that_is_missing_or_elsewhere_shows_in_the_weakest_regions() {
-        for hole in [None, Some([95.0, 70.0])] {
-            let other = agreement(&plate(hole, 0.0), &PlanarSimilarity::IDENTITY);
-            assert!(other.weakest < 0.75 && other.visible > 0.5, "{hole:?}: {other:?}");
-        }
-    }
-
-    #[test]
-    fn edges_that_the_demonstration_has_not_count_too() {
-        let outline = Polygon::from_box(&BoundingBox { x1: 30.0, y1: 30.0, x2: 150.0, y2: 110.0 });
-        let without_hole = GradientField::new(&plate(None, 0.0));
-        let taught = Structure::new(&without_hole, &outline, &StructureConfig::DEFAULT, &AgreementConfig::DEFAULT);
-        let seen = taught.agreement(&GradientField::new(&plate(Some(HOLE), 0.0)), &PlanarSimilarity::IDENTITY);
-        assert!(seen.weakest < 0.75, "{seen:?}");
+    fn what_covers_a_part_of_it_is_not_visible() {
+        // A bright sheet with a dark line across it lies over the right half.
+        let covered = RgbImage::from_fn(200, 140, |x, y| match (x, y) {
+            (90.., _) if (x + 2 * y) % 40 < 20 => Rgb([230; 3]),
+            (90.., _) => Rgb([30; 3]),
+            _ => *plate(Some(HOLE), 0.0).get_pixel(x, y),
+        });
+        let seen = agreement(&covered, &PlanarSimilarity::IDENTITY);
+        assert!((0.05..0.75).contains(&seen.visible) && seen.outside == 0.0, "{seen:?}");
     }
 
     #[test]
@@ -208,7 +203,7 @@ mod tests {
         let seen = agreement(&cropped, &pose);
         assert!((seen.outside - 0.5).abs() < 0.05 && seen.visible > 0.95, "{seen:?}");
         let away = agreement(&cropped, &PlanarSimilarity { tx: 900.0, ..PlanarSimilarity::IDENTITY });
-        assert_eq!(away, StructureAgreement { weakest: 0.0, visible: 0.0, outside: 1.0 });
+        assert_eq!(away, StructureAgreement { visible: 0.0, outside: 1.0 });
     }
 
     #[test]
@@ -217,6 +212,6 @@ mod tests {
         let center = Point2::new(100.0, 70.0);
         let pose = PlanarSimilarity::about(center, Point2::new(70.0, 100.0), Angle::from_degrees(90.0), 1.0);
         let seen = agreement(&turned, &pose);
-        assert!(seen.weakest > 0.95, "{seen:?}");
+        assert!(seen.visible > 0.95, "{seen:?}");
     }
 }
