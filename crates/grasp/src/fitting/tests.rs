@@ -114,3 +114,17 @@ fn todays_values_are_on_every_grid_and_a_value_that_is_set_is_there() {
         assert_eq!(config, CheckConfig::DEFAULT, "{}", constant.name);
     }
 }
+
+#[test]
+fn examples_for_the_comparing_network_are_the_best_of_each_kind() {
+    let part = part(0);
+    let examples = likeness_examples(&part).unwrap();
+    assert_eq!(likeness_examples(&part).unwrap(), examples);
+    let num_instances: usize = part.pictures.iter().map(|picture| picture.instances.len()).sum();
+    let right = examples.iter().filter(|example| example.is_right).count();
+    assert!(right > 0 && right <= num_instances, "{right} of {num_instances}");
+    for picture_idx in 0..part.pictures.len() {
+        let wrong = examples.iter().filter(|example| !example.is_right && example.picture_idx == picture_idx).count();
+        assert!(wrong <= 3, "{wrong} in picture {picture_idx}");
+    }
+}
