@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use crate::drawn::Result;
-use crate::pairs::{Pairs, Stream};
+use crate::pairs::{Pairs, Stream, write_whole};
 
 struct Arguments {
     parts: usize,
@@ -79,7 +79,7 @@ fn main() -> Result<()> {
     let bytes = network::train(&pairs, arguments.epochs, arguments.seed, &mut |text| {
         eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
     })?;
-    std::fs::write(&arguments.out, bytes)?;
+    write_whole(&arguments.out, &bytes)?;
     println!("{}", arguments.out.display());
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Photo and picture laid over each other, many times: drawn, kept, and changed at random for training.
 
-use std::io::{BufWriter, Read, Write};
+use std::io::{Read, Write};
 use std::path::Path;
 
 use rand::Rng;
@@ -79,9 +79,7 @@ impl Pairs {
     }
 
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut file = BufWriter::new(std::fs::File::create(path)?);
-        file.write_all(&self.bytes)?;
-        Ok(file.flush()?)
+        write_whole(path, &self.bytes)
     }
 
     /// Indices of the examples for training, or of those held out.
@@ -127,6 +125,15 @@ impl Pairs {
         let pair = turned(&self.pair(idx), rng);
         Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
     }
+}
+
+/// Under another name first, so that a file is whole or not there.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let unfinished = path.with_extension("unfinished");
+    let mut file = std::fs::File::create(&unfinished)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    Ok(std::fs::rename(&unfinished, path)?)
 }
 
 fn append(bytes: &mut Vec<u8>, stream: Stream, part_idx: usize, is_right: bool, pair: &Pair) {
