@@ -3,7 +3,7 @@
 //! `cargo run --release -p sdg-grasp --example train_likeness -- [--parts N] [--held-out N] [--epochs N] [--seed S] [--pairs
 //! FILE] [--out FILE]`
 //!
-//! Draws N parts (800) and others (80) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
+//! Draws N parts (700) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
 //! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: where it exists
 //! already, nothing is drawn. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
 
@@ -16,8 +16,10 @@ mod pairs;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use sdg_report::write_atomically;
+
 use crate::drawn::Result;
-use crate::pairs::{Pairs, Stream, write_whole};
+use crate::pairs::{Pairs, Stream};
 
 struct Arguments {
     parts: usize,
@@ -31,8 +33,8 @@ struct Arguments {
 impl Arguments {
     fn read(arguments: impl Iterator<Item = String>) -> Result<Self> {
         let mut read = Self {
-            parts: 800,
-            held_out: 80,
+            parts: 700,
+            held_out: 100,
             epochs: 40,
             seed: 31,
             pairs: None,
@@ -79,7 +81,7 @@ fn main() -> Result<()> {
     let bytes = network::train(&pairs, arguments.epochs, arguments.seed, &mut |text| {
         eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
     })?;
-    write_whole(&arguments.out, &bytes)?;
+    write_atomically(&arguments.out, &bytes)?;
     println!("{}", arguments.out.display());
     Ok(())
 }

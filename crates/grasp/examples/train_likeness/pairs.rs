@@ -1,12 +1,12 @@
 //! Photo and picture laid over each other, many times: drawn, kept, and changed at random for training.
 
-use std::io::{Read, Write};
 use std::path::Path;
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use sdg_grasp::fitting::likeness_examples;
 use sdg_part_generator::{Condition, SceneConfig};
+use sdg_report::write_atomically;
 use sdg_shape::{Pair, SIDE};
 
 use crate::drawn::{Result, absent, draw_parts};
@@ -70,8 +70,7 @@ impl Pairs {
     }
 
     pub fn read(path: &Path) -> Result<Self> {
-        let mut bytes = Vec::new();
-        std::fs::File::open(path)?.read_to_end(&mut bytes)?;
+        let bytes = std::fs::read(path)?;
         if bytes.is_empty() || bytes.len() % RECORD != 0 {
             return Err(format!("{}: expected records of {RECORD} bytes, found {}", path.display(), bytes.len()).into());
         }
@@ -79,7 +78,7 @@ impl Pairs {
     }
 
     pub fn write(&self, path: &Path) -> Result<()> {
-        write_whole(path, &self.bytes)
+        Ok(write_atomically(path, &self.bytes)?)
     }
 
     /// Indices of the examples for training, or of those held out.
@@ -125,15 +124,6 @@ impl Pairs {
         let pair = turned(&self.pair(idx), rng);
         Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
     }
-}
-
-/// Under another name first, so that a file is whole or not there.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let unfinished = path.with_extension("unfinished");
-    let mut file = std::fs::File::create(&unfinished)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
-    Ok(std::fs::rename(&unfinished, path)?)
 }
 
 fn append(bytes: &mut Vec<u8>, stream: Stream, part_idx: usize, is_right: bool, pair: &Pair) {

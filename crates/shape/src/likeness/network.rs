@@ -1,4 +1,4 @@
-//! The network's weights and what it makes of a pair. No machine learning library is needed for that: eleven million
+//! The network's weights and what it makes of a pair. No machine learning library is needed for that: nine million
 //! multiplications in plain loops.
 
 use std::sync::LazyLock;
