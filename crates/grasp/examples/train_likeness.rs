@@ -4,8 +4,8 @@
 //! FILE] [--out FILE]`
 //!
 //! Draws N parts (700) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
-//! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: where it exists
-//! already, nothing is drawn. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
+//! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: parts
+//! that it holds already are not drawn again. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
 
 mod drawn;
 #[path = "train_likeness/network.rs"]
@@ -63,17 +63,16 @@ impl Arguments {
 fn main() -> Result<()> {
     let arguments = Arguments::read(std::env::args().skip(1))?;
     let start = Instant::now();
-    let pairs = match &arguments.pairs {
+    let mut say = |text: String| eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
+    let kept = match &arguments.pairs {
         Some(path) if path.exists() => Pairs::read(path)?,
-        kept => {
-            let mut say = |text: String| eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
-            let pairs = Pairs::draw(arguments.parts, arguments.held_out, arguments.seed, &mut say)?;
-            if let Some(path) = kept {
-                pairs.write(path)?;
-            }
-            pairs
-        }
+        _ => Pairs::EMPTY,
     };
+    let num_kept = kept.len();
+    let pairs = kept.drawn_up_to(arguments.parts, arguments.held_out, arguments.seed, &mut say)?;
+    if let Some(path) = arguments.pairs.as_ref().filter(|_| pairs.len() > num_kept) {
+        pairs.write(path)?;
+    }
     for stream in [Stream::Training, Stream::HeldOut] {
         let (right, wrong) = pairs.counts(stream);
         eprintln!("{:6.0} s  {stream:?}: {right} right, {wrong} wrong", start.elapsed().as_secs_f64());

@@ -36,7 +36,8 @@ pub struct Contributions {
     pub outside: f64,
     /// How much other things resemble this part.
     pub resemblance: f64,
-    /// What the small network says that sees photo and picture laid over each other.
+    /// What the small network says that sees photo and picture laid over each other; its least where edges and surface agree
+    /// too little for it to be asked.
     pub likeness: f64,
 }
 
@@ -138,7 +139,7 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         size: config.size.log_odds(off_size),
         outside: config.outside.log_odds(seen.outside),
         resemblance: config.resemblance.log_odds(clues.resemblance),
-        likeness: config.likeness.log_odds(seen.likeness),
+        likeness: config.likeness.log_odds(seen.likeness.unwrap_or(f64::NEG_INFINITY)),
     };
     let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
@@ -157,8 +158,14 @@ mod tests {
 
     /// A clear view of the part: what right poses have in the median on generated parts.
     fn clear() -> Clues {
-        let evidence =
-            Evidence { edges: 0.79, surface: Some(0.46), hue_shift: 0.05, visible: 1.0, outside: 0.0, likeness: 2.0 };
+        let evidence = Evidence {
+            edges: 0.79,
+            surface: Some(0.46),
+            hue_shift: 0.05,
+            visible: 1.0,
+            outside: 0.0,
+            likeness: Some(2.0),
+        };
         Clues { evidence, log_size: 0.0, network: None, resemblance: 0.34 }
     }
 
@@ -169,8 +176,14 @@ mod tests {
     #[test]
     fn a_clear_view_is_accepted_and_another_part_is_not() {
         assert!(score(clear()) > 0.7, "{}", score(clear()));
-        let other =
-            Evidence { edges: 0.41, surface: Some(0.11), hue_shift: 0.3, visible: 0.52, outside: 0.0, likeness: -2.6 };
+        let other = Evidence {
+            edges: 0.41,
+            surface: Some(0.11),
+            hue_shift: 0.3,
+            visible: 0.52,
+            outside: 0.0,
+            likeness: Some(-2.6),
+        };
         assert!(score(Clues { evidence: other, ..clear() }) < 0.1);
     }
 
@@ -199,7 +212,7 @@ mod tests {
         assert!(changed(|c| c.evidence.edges = 0.9) > 0.0 && changed(|c| c.evidence.edges = 0.4) < 0.0);
         assert!(changed(|c| c.evidence.surface = Some(0.7)) > 0.0);
         assert!(changed(|c| c.evidence.hue_shift = 0.8) < 0.0);
-        assert!(changed(|c| c.evidence.likeness = -2.0) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
+        assert!(changed(|c| c.evidence.likeness = Some(-2.0)) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
         assert!(changed(|c| c.evidence.outside = 0.3) < 0.0 && changed(|c| c.resemblance = 0.45) < 0.0);
         assert!(changed(|c| c.network = Some(-0.9)) < 0.0);
         // Networks propose look-alikes as well as the part.

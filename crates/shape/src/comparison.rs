@@ -48,6 +48,8 @@ pub struct Comparison<'a> {
     pub structure: &'a Structure,
     /// What the comparing network sees of it.
     pub likeness: &'a Likeness,
+    /// Poses that agree by less are not worth that network's time.
+    pub min_agreement: f64,
     /// The image.
     pub image: &'a RgbImage,
     /// The image's gradients.
@@ -88,14 +90,15 @@ pub struct Evidence {
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
-    /// [`Likeness::log_odds`].
-    pub likeness: f64,
+    /// [`Likeness::log_odds`]; `None` where edges and surface agree by less than [`crate::SearchConfig::least_agreement`].
+    pub likeness: Option<f64>,
 }
 
 impl Comparison<'_> {
     /// Everything that the image says of a pose. Slower than [`Self::agreement`], which suffices to climb.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
-        let Agreement { edges, surface, .. } = self.agreement(image_from_demonstration);
+        let agreement = self.agreement(image_from_demonstration);
+        let Agreement { edges, surface, .. } = agreement;
         let structure = self.structure.agreement(self.field, image_from_demonstration);
         Evidence {
             edges,
@@ -103,7 +106,8 @@ impl Comparison<'_> {
             hue_shift: self.surface.hue_shift(self.image, image_from_demonstration),
             visible: structure.visible,
             outside: structure.outside,
-            likeness: self.likeness.log_odds(self.image, image_from_demonstration),
+            likeness: (agreement.both() >= self.min_agreement)
+                .then(|| self.likeness.log_odds(self.image, image_from_demonstration)),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Photo and picture laid over each other, many times: drawn, kept, and changed at random for training.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use rand::Rng;
@@ -43,8 +44,11 @@ const TINT: f32 = 0.1;
 const NOISE: f32 = 0.02;
 
 impl Pairs {
-    /// Draws parts and looks for them; the held-out ones are of another seed.
-    pub fn draw(parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
+    /// Nothing yet.
+    pub const EMPTY: Self = Self { bytes: Vec::new() };
+
+    /// Draws the parts that are lacking and looks for them; the held-out ones are of another seed.
+    pub fn drawn_up_to(self, parts: usize, held_out: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Self> {
         let once = |condition| (SceneConfig::only(condition), 1);
         let kinds: Vec<(SceneConfig, u64)> = Condition::ALL
             .map(once)
@@ -52,10 +56,14 @@ impl Pairs {
             .chain([Condition::Cover, Condition::LookAlikes].map(once))
             .chain([(absent(Condition::LookAlikes), 2), (absent(Condition::Clutter), 1), (SceneConfig::default(), 3)])
             .collect();
-        let mut bytes = Vec::new();
+        let kept = self.chunks();
+        let mut bytes = self.bytes;
         for (stream, count) in [(Stream::Training, parts), (Stream::HeldOut, held_out)] {
             for begin in (0..count).step_by(PARTS_AT_ONCE) {
                 let chunk_idx = begin / PARTS_AT_ONCE;
+                if kept.contains(&(stream as u8, chunk_idx)) {
+                    continue;
+                }
                 let seed = seed.wrapping_mul(1000).wrapping_add(500 * stream as u64 + chunk_idx as u64);
                 let drawn = draw_parts(PARTS_AT_ONCE.min(count - begin), SIZES[chunk_idx % SIZES.len()], &kinds, seed)?;
                 for (i, part) in drawn.iter().enumerate() {
@@ -66,7 +74,20 @@ impl Pairs {
                 say(format!("{stream:?}: {} parts, {} examples", begin + drawn.len(), bytes.len() / RECORD));
             }
         }
-        Ok(Self { bytes })
+        Ok(Self { bytes }.sorted())
+    }
+
+    /// Which parts are there, by stream, [`PARTS_AT_ONCE`] together.
+    fn chunks(&self) -> BTreeSet<(u8, usize)> {
+        let chunk = |record: &[u8]| (record[0], part_idx(record) / PARTS_AT_ONCE);
+        self.bytes.chunks_exact(RECORD).map(chunk).collect()
+    }
+
+    /// In the order in which they are drawn at once.
+    fn sorted(self) -> Self {
+        let mut records: Vec<&[u8]> = self.bytes.chunks_exact(RECORD).collect();
+        records.sort_by_key(|record| (record[0], part_idx(record)));
+        Self { bytes: records.concat() }
     }
 
     pub fn read(path: &Path) -> Result<Self> {
@@ -81,9 +102,14 @@ impl Pairs {
         Ok(write_atomically(path, &self.bytes)?)
     }
 
+    /// All examples.
+    pub fn len(&self) -> usize {
+        self.bytes.len() / RECORD
+    }
+
     /// Indices of the examples for training, or of those held out.
     pub fn of(&self, stream: Stream) -> Vec<usize> {
-        (0..self.bytes.len() / RECORD).filter(|&idx| self.record(idx)[0] == stream as u8).collect()
+        (0..self.len()).filter(|&idx| self.record(idx)[0] == stream as u8).collect()
     }
 
     /// Right and wrong ones.
@@ -124,6 +150,10 @@ impl Pairs {
         let pair = turned(&self.pair(idx), rng);
         Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
     }
+}
+
+fn part_idx(record: &[u8]) -> usize {
+    usize::from(u16::from_le_bytes([record[2], record[3]]))
 }
 
 fn append(bytes: &mut Vec<u8>, stream: Stream, part_idx: usize, is_right: bool, pair: &Pair) {

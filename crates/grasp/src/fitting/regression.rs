@@ -91,7 +91,7 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
             let Evidence { edges, surface, hue_shift, visible, outside, likeness } = clues.evidence;
             let off_size = if config.size.weight == 0.0 { 0.0 } else { contributions.size / config.size.weight };
             let surface = surface.unwrap_or(config.surface.neutral);
-            let resemblance = clues.resemblance;
+            let (resemblance, likeness) = (clues.resemblance, likeness.unwrap_or(f64::NEG_INFINITY));
             let raw = [edges, surface, hue_shift, visible, off_size, outside, resemblance, likeness];
             let terms = terms(config);
             SVector::from_fn(|k, _| raw[k].clamp(terms[k].range[0], terms[k].range[1]))
@@ -212,7 +212,7 @@ mod tests {
                 hue_shift: 0.0,
                 visible: 0.8 + noise(),
                 outside: 0.0,
-                likeness: 2.0,
+                likeness: Some(2.0),
             };
             let clues = Clues { evidence, log_size: 0.0, network: None, resemblance: 0.33 };
             PoseObservation { clues, instance_idx }

@@ -8,6 +8,7 @@ use sdg_detection::verification::{record, verify};
 
 use super::tests::{demonstration, small_plan, taught};
 use super::*;
+use crate::check_config::CheckConfig;
 use crate::device::ComputeBackend;
 use crate::model::{GraspDetection, Verification};
 
@@ -78,9 +79,17 @@ fn every_stage_of_every_network_agrees() {
     }
 }
 
+/// Those on something. Where the part is not, nothing draws a pose to one place: it ends where its start leads, which the
+/// last bits decide.
+fn placed(detections: &[GraspDetection]) -> Vec<&GraspDetection> {
+    let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.least_agreement;
+    detections.iter().filter(|detection| detection.agreement.is_none_or(is_placed)).collect()
+}
+
 fn assert_same(found: &[GraspDetection], expected: &[GraspDetection], about: &str) {
+    let [found, expected] = [found, expected].map(placed);
     assert_eq!(found.len(), expected.len(), "{about}: {found:#?}\n{expected:#?}");
-    for (found, expected) in found.iter().zip(expected) {
+    for (found, expected) in found.iter().zip(&expected) {
         let (a, b) = (&found.bbox, &expected.bbox);
         let place = [a.x1 - b.x1, a.y1 - b.y1, a.x2 - b.x2, a.y2 - b.y2]
             .into_iter()
@@ -104,6 +113,8 @@ fn every_model_detects_the_same() {
             for verification in [Verification::Off, Verification::ByShape] {
                 let expected = model.detect(&photo, verification).unwrap();
                 let found = there.detect(&photo, verification).unwrap();
+                // The mask of so few steps may find nothing; the check finds the part in its own photo.
+                assert!(verification == Verification::Off || expected[0].is_accepted(), "{kind}: {expected:?}");
                 assert_same(&found, &expected, &format!("{kind} on {backend}, {verification:?}"));
             }
         }

@@ -39,6 +39,6 @@ impl Likeness {
     /// ln of how much likelier the image shows the part at the pose than anything else that looks like it, as the network was
     /// trained: with three wrong poses for a right one.
     pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
-        f64::from(LikenessNetwork::shipped().log_odds(&self.pair(image, image_from_cutout).values()))
+        f64::from(LikenessNetwork::shipped().log_odds(&self.photo.values_beside(image, image_from_cutout)))
     }
 }

@@ -47,6 +47,11 @@ impl Photo {
         made
     }
 
+    /// [`Pair::values`] of [`Self::beside`].
+    pub(super) fn values_beside(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<f32> {
+        values(&self.colors, &self.sampled(image, image_from_cutout), &self.inside)
+    }
+
     pub(super) fn beside(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Pair {
         let picture = self.sampled(image, image_from_cutout);
         Pair { photo: self.colors.clone(), picture, inside: self.inside.clone() }
@@ -91,15 +96,19 @@ impl Pair {
     /// What the network is given: [`NUM_CHANNELS`] values a pixel, row by row. Exposure is taken out: the part is equally bright
     /// in both. Its hue is not.
     pub fn values(&self) -> Vec<f32> {
-        let [of_photo, of_picture] = [&self.photo, &self.picture].map(|colors| gain(colors, &self.inside));
-        let mut values = Vec::with_capacity(NUM_CHANNELS * self.inside.len());
-        for ((photo, picture), inside) in self.photo.iter().zip(&self.picture).zip(&self.inside) {
-            values.extend(exposed(photo, of_photo));
-            values.extend(exposed(picture, of_picture));
-            values.extend([*inside, picture.is_some()].map(|is| f32::from(u8::from(is))));
-        }
-        values
+        values(&self.photo, &self.picture, &self.inside)
     }
+}
+
+fn values(photo: &[Option<[f32; 3]>], picture: &[Option<[f32; 3]>], inside: &[bool]) -> Vec<f32> {
+    let [of_photo, of_picture] = [photo, picture].map(|colors| gain(colors, inside));
+    let mut values = Vec::with_capacity(NUM_CHANNELS * inside.len());
+    for ((photo, picture), inside) in photo.iter().zip(picture).zip(inside) {
+        values.extend(exposed(photo, of_photo));
+        values.extend(exposed(picture, of_picture));
+        values.extend([*inside, picture.is_some()].map(|is| f32::from(u8::from(is))));
+    }
+    values
 }
 
 /// What brings the mean colour inside to [`MEAN`].

@@ -245,7 +245,8 @@ impl InstantSearch {
     /// The demonstration over an image, whose gradients are `field`.
     pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
         let Self { template, surface, structure, likeness, .. } = self;
-        Comparison { template, surface, structure, likeness, image, field }
+        let min_agreement = self.config.least_agreement;
+        Comparison { template, surface, structure, likeness, min_agreement, image, field }
     }
 
     /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
