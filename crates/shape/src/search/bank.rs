@@ -29,6 +29,8 @@ struct Look {
 #[derive(Debug, Clone)]
 pub(crate) struct Bank {
     pub(crate) variants: Vec<Variant>,
+    /// Scales of every angle.
+    pub(crate) num_scales: usize,
     /// From one angle to the next.
     pub(crate) angle_step_rad: f64,
     /// How far looks reach from the part's place, in places.
@@ -63,7 +65,7 @@ impl Bank {
             }
         }
         let reach = variants.iter().flat_map(|v| &v.looks).map(|l| l.dx.unsigned_abs().max(l.dy.unsigned_abs())).max();
-        Self { variants, angle_step_rad, reach: usize::from(reach.unwrap_or(0)), num_points: sampled.len() }
+        Self { variants, num_scales, angle_step_rad, reach: usize::from(reach.unwrap_or(0)), num_points: sampled.len() }
     }
 }
 

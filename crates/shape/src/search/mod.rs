@@ -4,10 +4,10 @@
 //! demonstration ─ edge points of a coarse level ─ Bank: every turn and scale as shifts into tables
 //! image ─ GradientField ─ coarse level ─ Responses: a look-up table a direction
 //!                                           │
-//!                    sweep: every place × every variant ─ local maxima: starts
+//!                    sweep: every place × every variant ─ local maxima of every scale: starts
 //!                                           │
-//!          climb the agreement at a coarse level; climb and snap the best level by level, eight at a time, as long as
-//!          the last eight have found something
+//!          climb the agreement at a coarse level, 64 at a time; climb and snap the best level by level, eight at a time, as
+//!          long as the last eight have found something; then further starts that resemble those
 //!                                           │
 //!          edges and surface ─ agreement ─ overlapping ones suppressed ─ poor ones refined again ─ Match, Evidence
 //! ```
@@ -52,8 +52,8 @@ pub struct SearchConfig {
     /// it. The default was chosen by hand, not measured. Beyond the 128 points that are read at the swept level, points
     /// only repeat.
     pub num_points: usize,
-    /// Most starts of the sweep that are climbed at the coarsest level of the template, 8 to 4096, best first. Where one
-    /// part is there, 64 of them are; more take time only where more parts are found.
+    /// Most starts of the sweep that are climbed at the coarsest level of the template, 8 to 4096, the best of every scale
+    /// first. 64 of them always are; more only where parts are found and further starts resemble theirs.
     pub max_starts: usize,
     /// How the edges are read.
     pub shape: ShapeConfig,
@@ -62,9 +62,8 @@ pub struct SearchConfig {
 impl SearchConfig {
     /// What [`Default`] gives for [`num_points`](Self::num_points).
     pub const DEFAULT_NUM_POINTS: usize = 64;
-    /// What [`Default`] gives for [`max_starts`](Self::max_starts). With 64, 62 of the 74 parts on the photographs by others
-    /// were reached, with 256 all but five; chosen on those pictures and on time.
-    pub const DEFAULT_MAX_STARTS: usize = 256;
+    /// What [`Default`] gives for [`max_starts`](Self::max_starts): about a hundred of each scale. Chosen by hand.
+    pub const DEFAULT_MAX_STARTS: usize = 1024;
 }
 
 impl Default for SearchConfig {
@@ -98,6 +97,12 @@ struct Found {
     agreement: f64,
 }
 
+impl Found {
+    fn is_worth_more(&self) -> bool {
+        self.agreement >= WORTH_MORE
+    }
+}
+
 /// The level that is swept shows the part at least this large, in level pixels. Chosen by hand, not measured; the
 /// sweep's time grows with its fourth power.
 const SWEEP_EXTENT: f64 = 50.0;
@@ -119,6 +124,10 @@ const FOLLOWED_AT_ONCE: usize = 8;
 /// Further starts are followed as long as one of the last agrees so well that it may be a part. Chosen by hand, below every
 /// right pose but the poorest twentieth on generated parts.
 const WORTH_MORE: f64 = 0.4;
+/// Parts of one picture: their ln sizes differ by at most the one, two steps of scale, and their responses by at most the other
+/// factor. Chosen by hand, for time: of ten photographed clips in a picture all are found.
+const SAME_SIZE: f64 = 0.2;
+const SAME_RESPONSE: f64 = 0.85;
 /// A start that responds less is not worth a climb. Chosen by hand, not measured.
 const LEAST_RESPONSE: f64 = 0.2;
 /// How far a climb may go from its start: in places, and in steps of angle and scale. A little more than to the
@@ -193,7 +202,7 @@ impl InstantSearch {
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
         let starts = sweep(&responses, &self.bank, self.config.max_starts, LEAST_RESPONSE);
-        let best = self.apart(self.follow_best(image, field, &starts));
+        let best = self.apart(self.follow_best(image, field, starts));
         let polished = self.polish(image, field, best);
         let mut matches = self.apart(polished);
         matches.retain(|found| found.agreement >= self.config.least_agreement);
@@ -206,26 +215,49 @@ impl InstantSearch {
         })
     }
 
-    /// Follows starts, the best first, as long as that finds something.
-    fn follow_best(&self, image: &RgbImage, field: &GradientField, starts: &[Start]) -> Vec<Found> {
+    /// Follows starts, the best first; once parts are found, further starts that resemble theirs, and else none.
+    fn follow_best(&self, image: &RgbImage, field: &GradientField, mut starts: Vec<Start>) -> Vec<Found> {
         let mut climbed_before: Vec<Pose> = Vec::new();
-        let mut found = Vec::new();
-        for some in starts.chunks(STARTS_AT_ONCE) {
-            let climbed = self.climb_starts(image, field, some, &climbed_before);
-            for few in climbed.chunks(FOLLOWED_AT_ONCE) {
-                let followed = parallel::map(few, |&pose| {
-                    let pose = self.template.follow(field, &self.range_about(pose), pose);
-                    self.found(image, field, pose.to_similarity(self.template.center))
-                });
-                let is_worth_more = followed.iter().any(|found| found.agreement >= WORTH_MORE);
-                found.extend(followed);
-                if !is_worth_more {
-                    return found;
-                }
-            }
+        let mut all = Vec::new();
+        while !starts.is_empty() {
+            let later = starts.split_off(starts.len().min(STARTS_AT_ONCE));
+            let climbed = self.climb_starts(image, field, &starts, &climbed_before);
+            let found = self.follow(image, field, &climbed);
+            starts = self.resembling(later, &starts, &found);
+            all.extend(found);
             climbed_before.extend(climbed);
         }
-        found
+        all
+    }
+
+    /// Those of `later` that have the size of a part found and respond about as well as the best of `before` that has it.
+    fn resembling(&self, mut later: Vec<Start>, before: &[Start], found: &[Found]) -> Vec<Start> {
+        let parts = found.iter().filter(|found| found.is_worth_more());
+        let log_scales: Vec<f64> = parts.map(|found| found.pose.scale.ln()).collect();
+        let has_size = |start: &Start| {
+            let log_scale = self.pose_of(start).log_scale;
+            log_scales.iter().any(|found| (found - log_scale).abs() <= SAME_SIZE)
+        };
+        let best = before.iter().filter(|start| has_size(start)).map(|start| start.response).fold(0.0, f64::max);
+        later.retain(|start| start.response >= SAME_RESPONSE * best && has_size(start));
+        later
+    }
+
+    /// Follows climbed starts to the full size, as long as that finds something.
+    fn follow(&self, image: &RgbImage, field: &GradientField, climbed: &[Pose]) -> Vec<Found> {
+        let mut all = Vec::new();
+        for few in climbed.chunks(FOLLOWED_AT_ONCE) {
+            let found = parallel::map(few, |&pose| {
+                let pose = self.template.follow(field, &self.range_about(pose), pose);
+                self.found(image, field, pose.to_similarity(self.template.center))
+            });
+            let is_worth_more = found.iter().any(Found::is_worth_more);
+            all.extend(found);
+            if !is_worth_more {
+                break;
+            }
+        }
+        all
     }
 
     fn found(&self, image: &RgbImage, field: &GradientField, pose: PlanarSimilarity) -> Found {

@@ -1,11 +1,12 @@
 //! All poses of a bank tried at all places of an image.
 //!
 //! ```text
-//! tables ─ per stretch of places, per variant: add a shifted table row per point ─ best variant of each place and sector
-//!        ─ local maxima ─ starts, the best first
+//! tables ─ per stretch of places, per variant: add a shifted table row per point ─ best variant of each place and group
+//!        ─ local maxima ─ starts, the best of each scale in turn
 //! ```
-//! A place keeps its best variant for each quarter of the turn, so that a part which looks much the same turned by
-//! half a turn keeps both for the finer levels to decide.
+//! A group is one scale within one quarter of the turn, and a place keeps the best variant of each: a part that looks much the
+//! same turned by half a turn keeps both for the finer levels to decide, and so does a part in clutter or noise, where the
+//! smallest scale agrees best almost everywhere, because its points lie closest together.
 
 use pulp::{Arch, Simd, WithSimd};
 
@@ -17,11 +18,11 @@ use crate::search::responses::{BLOCK, FULL, Responses};
 const STRETCH: usize = 1024;
 /// Looks added up in bytes before they are carried over into 16 bits. Derived.
 const LOOKS_PER_BYTE: usize = 255 / FULL as usize;
-/// Parts of the turn that each keep their own best. Two would be enough for half a turn; four were chosen by hand, not
+/// Parts of the turn that each keep their own best of every scale. Two would be enough for half a turn; four were chosen by hand, not
 /// measured.
 const NUM_SECTORS: usize = 4;
 /// A start is the best within this many places. Chosen by hand, not measured.
-const PEAK_RADIUS: isize = 2;
+const PEAK_RADIUS: usize = 2;
 
 /// A place, a variant, and how well they agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +34,7 @@ pub(crate) struct Start {
     pub(crate) response: f64,
 }
 
-/// The best `count` local maxima, best first, none below `least_response`.
+/// The `count` best local maxima, none below `least_response`: first the best of each scale, then the second of each.
 pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_response: f64) -> Vec<Start> {
     let (width, height) = (responses.width, responses.height);
     if width == 0 || height == 0 || bank.num_points == 0 {
@@ -42,66 +43,112 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     let first = responses.idx_of(0, 0);
     let end = responses.idx_of(width - 1, height - 1) + 1;
     let shifts: Vec<Vec<(usize, isize)>> = bank.variants.iter().map(|v| v.shifts(responses.stride())).collect();
+    let groups = Groups::of(bank);
     let stretches: Vec<usize> = (first..end).step_by(STRETCH).collect();
     let arch = Arch::new();
     let swept = parallel::map(&stretches, |&at| {
-        arch.dispatch(SweepStretch { responses, shifts: &shifts, at, len: STRETCH.min(end - at) })
+        arch.dispatch(SweepStretch { responses, shifts: &shifts, groups: &groups, at, len: STRETCH.min(end - at) })
     });
 
     let full = f64::from(FULL) * bank.num_points as f64;
     let least = (least_response * full).ceil() as i16;
-    let mut starts: Vec<Start> = Vec::new();
-    for sector in 0..NUM_SECTORS {
-        let best = |x: isize, y: isize| -> i16 {
-            if x < 0 || y < 0 || x >= width as isize || y >= height as isize {
-                return -1;
+    let of_groups: Vec<usize> = (0..groups.count).collect();
+    let mut starts = parallel::map(&of_groups, |&group| {
+        let field = PeakField::new(responses, |offset| swept[offset / STRETCH].sums[group][offset % STRETCH]);
+        let start = |(place, sum): ([usize; 2], i16)| {
+            let offset = responses.idx_of(place[0], place[1]) - first;
+            Start {
+                place,
+                variant_idx: usize::from(swept[offset / STRETCH].variants[group][offset % STRETCH]),
+                response: f64::from(sum) / full,
             }
-            let offset = responses.idx_of(x as usize, y as usize) - first;
-            swept[offset / STRETCH].sums[sector][offset % STRETCH]
         };
-        for y in 0..height as isize {
-            for x in 0..width as isize {
-                let here = best(x, y);
-                if here >= least && is_peak(&best, x, y, here) {
-                    let offset = responses.idx_of(x as usize, y as usize) - first;
-                    starts.push(Start {
-                        place: [x as usize, y as usize],
-                        variant_idx: usize::from(swept[offset / STRETCH].variants[sector][offset % STRETCH]),
-                        response: f64::from(here) / full,
-                    });
-                }
-            }
-        }
-    }
-    // A stable sort: equal ones stay in the order of sectors and rows, whatever the threads did.
+        field.peaks(least).map(start).collect::<Vec<_>>()
+    })
+    .concat();
+    // Stable sorts: equal ones stay in the order of groups and rows, whatever the threads did.
     starts.sort_by(|a, b| b.response.total_cmp(&a.response));
-    starts.truncate(count);
-    starts
+    let mut of_scale = vec![0; bank.num_scales];
+    let ranks = starts.iter().map(|start| {
+        let rank = &mut of_scale[start.variant_idx % bank.num_scales];
+        *rank += 1;
+        *rank
+    });
+    let mut ranked: Vec<(usize, Start)> = ranks.collect::<Vec<_>>().into_iter().zip(starts).collect();
+    ranked.sort_by_key(|(rank, _)| *rank);
+    ranked.truncate(count);
+    ranked.into_iter().map(|(_, start)| start).collect()
 }
 
-fn is_peak(best: &impl Fn(isize, isize) -> i16, x: isize, y: isize, here: i16) -> bool {
-    for dy in -PEAK_RADIUS..=PEAK_RADIUS {
-        for dx in -PEAK_RADIUS..=PEAK_RADIUS {
-            let there = best(x + dx, y + dy);
-            // Of equal neighbours the first is kept.
-            if there > here || (there == here && (dy, dx) < (0, 0)) {
-                return false;
+/// Which variants compete with each other at a place.
+struct Groups {
+    count: usize,
+    /// Of every variant.
+    idxs: Vec<usize>,
+}
+
+impl Groups {
+    fn of(bank: &Bank) -> Self {
+        let (num_variants, num_scales) = (bank.variants.len(), bank.num_scales);
+        let group = |idx: usize| idx * NUM_SECTORS / num_variants * num_scales + idx % num_scales;
+        Self { count: NUM_SECTORS * num_scales, idxs: (0..num_variants).map(group).collect() }
+    }
+}
+
+/// The sums of one group at all places, with a border that no peak is lower than.
+struct PeakField {
+    width: usize,
+    height: usize,
+    sums: Vec<i16>,
+}
+
+impl PeakField {
+    /// `sum` by the offset from the first place's.
+    fn new(responses: &Responses, sum: impl Fn(usize) -> i16) -> Self {
+        let (width, height) = (responses.width, responses.height);
+        let stride = width + 2 * PEAK_RADIUS;
+        let mut sums = vec![-1; stride * (height + 2 * PEAK_RADIUS)];
+        let first = responses.idx_of(0, 0);
+        for (y, row) in sums.chunks_exact_mut(stride).skip(PEAK_RADIUS).take(height).enumerate() {
+            let begin = responses.idx_of(0, y) - first;
+            for (x, value) in row[PEAK_RADIUS..][..width].iter_mut().enumerate() {
+                *value = sum(begin + x);
             }
         }
+        Self { width, height, sums }
     }
-    true
+
+    /// Places, row by row, whose sum is at least `least` and the most within [`PEAK_RADIUS`].
+    fn peaks(&self, least: i16) -> impl Iterator<Item = ([usize; 2], i16)> {
+        let stride = self.width + 2 * PEAK_RADIUS;
+        (0..self.width * self.height).filter_map(move |i| {
+            let (x, y) = (i % self.width, i / self.width);
+            let here = self.sums[(y + PEAK_RADIUS) * stride + x + PEAK_RADIUS];
+            (here >= least && self.is_peak(x, y, here)).then_some(([x, y], here))
+        })
+    }
+
+    fn is_peak(&self, x: usize, y: usize, here: i16) -> bool {
+        let side = 2 * PEAK_RADIUS + 1;
+        let row = |dy: usize| &self.sums[(y + dy) * (self.width + 2 * PEAK_RADIUS) + x..][..side];
+        let is_before = |dy: usize, dx: usize| (dy, dx) < (PEAK_RADIUS, PEAK_RADIUS);
+        // Of equal neighbours the first is kept.
+        let is_beaten = |dy: usize, dx: usize, there: i16| there > here || (there == here && is_before(dy, dx));
+        !(0..side).any(|dy| row(dy).iter().enumerate().any(|(dx, &there)| is_beaten(dy, dx, there)))
+    }
 }
 
-/// The best of each place of a stretch, per sector.
+/// The best of each place of a stretch, per group.
 struct Swept {
-    sums: [Vec<i16>; NUM_SECTORS],
-    variants: [Vec<u16>; NUM_SECTORS],
+    sums: Vec<Vec<i16>>,
+    variants: Vec<Vec<u16>>,
 }
 
 /// All variants at the places from `at` on.
 struct SweepStretch<'a> {
     responses: &'a Responses,
     shifts: &'a [Vec<(usize, isize)>],
+    groups: &'a Groups,
     at: usize,
     len: usize,
 }
@@ -112,10 +159,10 @@ impl WithSimd for SweepStretch<'_> {
     /// Plain loops over blocks that stay in registers; compiled for the widest instructions that the machine has.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Swept {
-        let Self { responses, shifts, at, len } = self;
+        let Self { responses, shifts, groups, at, len } = self;
         let mut swept = Swept {
-            sums: [(); NUM_SECTORS].map(|()| vec![-1; len.next_multiple_of(BLOCK)]),
-            variants: [(); NUM_SECTORS].map(|()| vec![0; len.next_multiple_of(BLOCK)]),
+            sums: vec![vec![-1; len.next_multiple_of(BLOCK)]; groups.count],
+            variants: vec![vec![0; len.next_multiple_of(BLOCK)]; groups.count],
         };
         // Neighbouring variants look at nearly the same bytes: block by block, those stay in the first-level cache.
         for start in (0..len).step_by(BLOCK) {
@@ -134,9 +181,9 @@ impl WithSimd for SweepStretch<'_> {
                         *sum += i16::from(byte);
                     }
                 }
-                let sector = variant_idx * NUM_SECTORS / shifts.len();
-                let best = &mut swept.sums[sector][start..][..BLOCK];
-                let variants = &mut swept.variants[sector][start..][..BLOCK];
+                let group = groups.idxs[variant_idx];
+                let best = &mut swept.sums[group][start..][..BLOCK];
+                let variants = &mut swept.variants[group][start..][..BLOCK];
                 for ((best, variant), &sum) in best.iter_mut().zip(variants).zip(&sums) {
                     let is_better = sum > *best;
                     *best = if is_better { sum } else { *best };
@@ -199,12 +246,15 @@ mod tests {
         let responses = Responses::new(field.level(0), bank.reach);
         let starts = sweep(&responses, &bank, 1000, 0.0);
         let full = f64::from(FULL) * bank.num_points as f64;
-        let in_sector = |idx: usize| idx * NUM_SECTORS / bank.variants.len();
+        let groups = Groups::of(&bank);
+        assert!(bank.num_scales > 1, "one scale tells no groups apart");
         for start in &starts {
             let [x, y] = start.place;
             let here = |idx: usize| naive(&responses, &bank, x, y, idx);
-            let best =
-                (0..bank.variants.len()).filter(|&idx| in_sector(idx) == in_sector(start.variant_idx)).map(here).max();
+            let best = (0..bank.variants.len())
+                .filter(|&idx| groups.idxs[idx] == groups.idxs[start.variant_idx])
+                .map(here)
+                .max();
             assert_eq!(Some((start.response * full).round() as u32), best);
             assert_eq!(Some(here(start.variant_idx)), best);
         }
