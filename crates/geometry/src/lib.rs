@@ -38,7 +38,7 @@ mod rotational_symmetry;
 
 pub use angle::Angle;
 pub use bounding_box::BoundingBox;
-pub use camera::{PinholeCamera, PosedCamera, Ray};
+pub use camera::{PinholeCamera, PlanView, PlanViewError, PlumbBob, PosedCamera, Ray, Workspace};
 pub use error::GeometryError;
 pub use keypoint::{GraspLine, Keypoint, Visibility};
 pub use mask::{Mask, RunLengthMask};

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use image::RgbImage;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 
 use crate::data::Data;
 use crate::error::Result;
@@ -49,6 +49,7 @@ pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> Pos
             fy: focal_px,
             cx: 0.5 * f64::from(width),
             cy: 0.5 * f64::from(height),
+            lens: PlumbBob::NONE,
         },
         world_from_camera: data.world_from_mujoco_camera(camera) * mujoco_camera_from_optical(),
     }

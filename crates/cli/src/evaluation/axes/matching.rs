@@ -139,14 +139,7 @@ mod tests {
     fn a_detection_on_each_of_three_instances_finds_three() {
         let object = ObjectSpec::by_name("pendulum").unwrap();
         let camera = PosedCamera {
-            intrinsics: sdg_geometry::PinholeCamera {
-                width: 640,
-                height: 480,
-                fx: 550.0,
-                fy: 550.0,
-                cx: 320.0,
-                cy: 240.0,
-            },
+            intrinsics: sdg_geometry::PinholeCamera::WRIST,
             world_from_camera: camera_looking_down(0.5, 0.0, 0.58, 0.0),
         };
         let instances = [(0.42, -0.1, 0.3), (0.5, 0.1, 2.0), (0.56, 0.0, -1.0)]

@@ -1,63 +1,8 @@
-//! The pinhole camera: pixel ↔ ray ↔ point on a plane.
+//! A camera at its place: pixel ↔ ray ↔ point on a plane.
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
-use serde::{Deserialize, Serialize};
 
-use crate::GeometryError;
-
-/// A pinhole camera without distortion, in pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PinholeCamera {
-    /// Image width.
-    pub width: u32,
-    /// Image height.
-    pub height: u32,
-    /// Horizontal focal length.
-    pub fx: f64,
-    /// Vertical focal length.
-    pub fy: f64,
-    /// The optical axis's x; the middle of a 640-pixel image is 320.
-    pub cx: f64,
-    /// The optical axis's y.
-    pub cy: f64,
-}
-
-impl PinholeCamera {
-    /// The paper's wrist camera: 640 × 480, f = 550 px, axis in the middle.
-    pub const WRIST: Self = Self { width: 640, height: 480, fx: 550.0, fy: 550.0, cx: 320.0, cy: 240.0 };
-
-    /// A camera from its intrinsics.
-    ///
-    /// # Errors
-    /// A focal length that is not positive and finite, an empty image, or a centre that is not finite.
-    pub fn new(width: u32, height: u32, fx: f64, fy: f64, cx: f64, cy: f64) -> Result<Self, GeometryError> {
-        let focal = |f: f64| f.is_finite() && f > 0.0;
-        if !(focal(fx) && focal(fy)) || width == 0 || height == 0 {
-            return Err(GeometryError::BadIntrinsics { fx, fy, width, height });
-        }
-        for value in [cx, cy] {
-            if !value.is_finite() {
-                return Err(GeometryError::NotFinite { what: "the camera's centre", value });
-            }
-        }
-        Ok(Self { width, height, fx, fy, cx, cy })
-    }
-
-    /// Where a point in the camera's frame appears; `None` at or behind the camera.
-    pub fn project(&self, p_in_camera: &Point3<f64>) -> Option<Point2<f64>> {
-        (p_in_camera.z > 0.0).then(|| {
-            Point2::new(
-                self.fx * p_in_camera.x / p_in_camera.z + self.cx,
-                self.fy * p_in_camera.y / p_in_camera.z + self.cy,
-            )
-        })
-    }
-
-    /// The point at depth 1 m that appears at `pixel`.
-    pub fn unproject(&self, pixel: &Point2<f64>) -> Point3<f64> {
-        Point3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
-    }
-}
+use super::pinhole::PinholeCamera;
 
 /// A half-line in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,15 +36,18 @@ impl PosedCamera {
         self.intrinsics.project(&self.world_from_camera.inverse_transform_point(p_in_world))
     }
 
-    /// The ray through a pixel.
-    pub fn ray(&self, pixel: &Point2<f64>) -> Ray {
-        let direction = self.world_from_camera * self.intrinsics.unproject(pixel).coords;
-        Ray { origin: self.world_from_camera.translation.vector.into(), direction: Unit::new_normalize(direction) }
+    /// The ray through a pixel; `None` where the lens shows nothing.
+    pub fn ray(&self, pixel: &Point2<f64>) -> Option<Ray> {
+        let direction = self.world_from_camera * self.intrinsics.unproject(pixel)?.coords;
+        Some(Ray {
+            origin: self.world_from_camera.translation.vector.into(),
+            direction: Unit::new_normalize(direction),
+        })
     }
 
     /// The point of the plane z = `height_m` that appears at `pixel`; `None` when the ray misses the plane.
     pub fn at_height(&self, pixel: &Point2<f64>, height_m: f64) -> Option<Point3<f64>> {
-        self.ray(pixel).at_height(height_m)
+        self.ray(pixel)?.at_height(height_m)
     }
 
     /// Metres on the plane z = `height_m` for one pixel near `pixel` (the mean of both axes); `None` off the plane.
@@ -143,11 +91,6 @@ mod tests {
         camera.world_from_camera.rotation = UnitQuaternion::identity();
         assert_eq!(camera.at_height(&Point2::new(320.0, 240.0), 0.0), None);
         assert_eq!(camera.project(&Point3::new(0.4, 0.0, 0.0)), None);
-    }
-
-    #[test]
-    fn refuses_a_focal_length_of_zero() {
-        assert!(matches!(PinholeCamera::new(640, 480, 0.0, 550.0, 0.0, 0.0), Err(GeometryError::BadIntrinsics { .. })));
     }
 
     proptest! {
