@@ -133,6 +133,16 @@ pub struct TeachArgs {
     /// cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
+    /// The calibrated camera that took the photos, as ROS's camera_info YAML with the camera's pose over the table: the model
+    /// then knows the part's size and works with every calibrated camera
+    #[arg(long, value_name = "FILE", requires = "mark_height_mm")]
+    pub camera: Option<PathBuf>,
+    /// Height of the marks over the table: of the surface that they lie on, not of the table
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub mark_height_mm: Option<f64>,
+    /// Height over the table at which the gripper closes; without it, half of the marks' height
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub grasp_height_mm: Option<f64>,
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
@@ -171,6 +181,10 @@ pub struct DetectArgs {
     /// Smallest and largest size of the part over its size in the photo, instead of what it was taught with
     #[arg(long, value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: Option<SizeTolerance>,
+    /// The calibrated camera that took the pictures: grasps in metres, and parts of another size refused. For models taught
+    /// with a camera, this or another one
+    #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
+    pub camera: Option<PathBuf>,
     /// Also list detections scored below 0.5, with what speaks against them
     #[arg(long)]
     pub all: bool,
@@ -554,6 +568,15 @@ impl SizeTolerance {
     /// As a range.
     pub fn range(self) -> std::ops::RangeInclusive<f64> {
         self.low..=self.high
+    }
+}
+
+/// A height over the table. A part higher than half a metre was given in another unit.
+fn height_mm(text: &str) -> Result<f64, String> {
+    const MAX_MM: f64 = 500.0;
+    match text.parse::<f64>() {
+        Ok(height) if (0.0..=MAX_MM).contains(&height) => Ok(height),
+        _ => Err(format!("expected a height of 0 to {MAX_MM} millimetres, found {text}")),
     }
 }
 

@@ -24,6 +24,7 @@ pub mod against_truth;
 mod annotation_files;
 pub mod args;
 pub mod base_weights;
+mod camera_files;
 mod commands;
 mod demonstrations;
 pub mod detector_config;

@@ -91,6 +91,14 @@ pub enum GraspError {
         /// Height of the plane, in metres.
         height_m: f64,
     },
+    /// No plan view.
+    #[error(transparent)]
+    PlanView(#[from] sdg_geometry::PlanViewError),
+    /// A model that knows no lengths.
+    #[error(
+        "expected a model taught with a camera, found one without: teach it again with --camera and --mark-height-mm"
+    )]
+    NoLengths,
     /// A part that the gripper cannot take.
     #[error(
         "the part is {:.0} mm wide where it is to be grasped, and the gripper opens {:.0} mm",

@@ -7,6 +7,7 @@ use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
 use crate::GraspError;
+use crate::plan::Lengths;
 
 /// The grasp models, by their letters: four of the paper, and one without a network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -114,6 +115,9 @@ pub struct TeachingFacts {
     /// Smallest and largest size over the usual one at which the part is looked for; files of older versions do not tell.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
+    /// What it knows of lengths; `None` for a model taught without a camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lengths: Option<Lengths>,
     /// Samples that the network saw.
     pub samples: usize,
     /// Optimiser steps.

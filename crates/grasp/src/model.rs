@@ -166,6 +166,17 @@ impl GraspModel {
         self.with_check(|check| check.search.max_matches = max_detections)
     }
 
+    /// The same model for plan views as fine as its demonstrations.
+    pub(crate) fn of_known_size(self) -> Result<Self> {
+        let mut model = self.with_check(|check| {
+            check.search.scales = CheckConfig::KNOWN_SIZE_TOLERANCE;
+            check.score = check.score.of_known_size();
+        })?;
+        // A plan view has as many pixels a metre, however many it has.
+        model.demonstrations.iter_mut().for_each(|demonstration| demonstration.marks.photo_size = None);
+        Ok(model)
+    }
+
     /// Bounds of a part's size over the usual one, within which it is looked for.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()

@@ -164,6 +164,9 @@ impl GraspModel {
             });
         }
         let facts: TeachingFacts = metadata.json("teaching")?;
+        if let Some(lengths) = facts.lengths {
+            lengths.check()?;
+        }
         let demonstrations = marks
             .into_iter()
             .enumerate()
@@ -380,6 +383,7 @@ mod tests {
                 seed: 3,
                 symmetry: RotationalSymmetry::None,
                 size_tolerance: Some([0.75, 1.35]),
+                lengths: None,
                 samples: 0,
                 steps: 0,
                 seconds: 0.5,

@@ -30,7 +30,7 @@ pub struct Contributions {
     pub hue: f64,
     /// The share of the part in regions that agree.
     pub visible: f64,
-    /// How far its size is from that of the surest detection in the picture.
+    /// How far its size is from that of the surest detection in the picture, or from the part's where that is known.
     pub size: f64,
     /// The share of the part outside the picture.
     pub outside: f64,
@@ -71,7 +71,7 @@ impl Contributions {
             "surface" => "the surface looks different: another side, print or light",
             "hue" => "it has another colour: another part, or other light",
             "visible" => "too little of it is visible",
-            "size" => "its size is not that of the others in the picture",
+            "size" => "it has another size",
             "likeness" => "photo and picture, laid over each other, do not show the same part",
             "outside" => "too much of it lies outside the picture",
             _ => "other things look much like this part",
@@ -118,6 +118,9 @@ const MIN_REFERENCE_SCORE: f64 = 0.3;
 /// The scores of all detections in one picture and where they come from: first each is judged alone, then by the size of
 /// the surest among them, since the parts of one picture are equally far from the camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
+    if config.is_size_known {
+        return clues.iter().map(|clues| judge(clues, Some(0.0), config)).collect();
+    }
     let reference = clues
         .iter()
         .map(|clues| (judge(clues, None, config).0, clues.log_size))

@@ -6,11 +6,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image::{ImageFormat, RgbImage};
-use sdg_grasp::{CheckConfig, DetectionRecord, GraspDetection, GraspModel, Verification};
+use sdg_calibration::Frame;
+use sdg_grasp::{
+    CheckConfig, DetectionRecord, GraspDetection, GraspModel, PlanDetection, PlanDetector, PlanarPose, Verification,
+};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::args::DetectArgs;
+use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::{Outcome, one_line};
 use crate::files;
@@ -31,13 +35,14 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }
+    let looking = Looking::new(args, model)?;
     let mut stdout = std::io::stdout().lock();
     let (mut found_any, mut failed) = (false, 0);
     for path in &args.images {
-        match detect(args, &model, path) {
+        match detect(args, &looking, path) {
             Ok(seen) => {
-                found_any |= seen.detections.iter().any(GraspDetection::is_accepted);
-                seen.write(&mut stdout, args, &model, path)?;
+                found_any |= seen.detections.iter().any(|found| found.detection.is_accepted());
+                seen.write(&mut stdout, args, &looking, path)?;
             }
             Err(error) => {
                 failed += 1;
@@ -59,30 +64,86 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
 }
 
+/// A model, and the camera that it looks through.
+enum Looking {
+    /// At pictures of any camera.
+    Anyhow(Box<GraspModel>),
+    /// At those of a calibrated one.
+    Through(Box<CameraFile>, Box<PlanDetector>),
+}
+
+/// A detection, in metres as well where the camera is known.
+struct Found {
+    detection: GraspDetection,
+    pose: Option<PlanarPose>,
+}
+
+impl Looking {
+    fn new(args: &DetectArgs, model: GraspModel) -> Result<Self> {
+        let Some(path) = &args.camera else { return Ok(Self::Anyhow(Box::new(model))) };
+        let camera = CameraFile::read(path)?;
+        let detector =
+            PlanDetector::new(model, &camera.over_table).with_context(|| args.grasp_model.display().to_string())?;
+        Ok(Self::Through(Box::new(camera), Box::new(detector)))
+    }
+
+    fn detect(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
+        match self {
+            Self::Anyhow(model) => {
+                let found = model.detect(image, verification)?;
+                Ok(found.into_iter().map(|detection| Found { detection, pose: None }).collect())
+            }
+            Self::Through(camera, detector) => {
+                camera.check_picture(image)?;
+                let found = detector.detect(image, verification)?;
+                let metric = |PlanDetection { detection, pose }| Found { detection, pose: Some(pose) };
+                Ok(found.into_iter().map(metric).collect())
+            }
+        }
+    }
+
+    /// What is said where nothing was found, besides what was nearly found.
+    fn advice(&self, size: (u32, u32)) -> Option<String> {
+        match self {
+            Self::Anyhow(model) => of_other_size(model, size),
+            Self::Through(..) => None,
+        }
+    }
+
+    fn frame(&self) -> Option<Frame> {
+        match self {
+            Self::Anyhow(_) => None,
+            Self::Through(camera, _) => Some(camera.frame),
+        }
+    }
+}
+
 /// An image and everything that was detected in it.
 struct Seen {
     size: (u32, u32),
     seconds: f64,
-    detections: Vec<GraspDetection>,
+    detections: Vec<Found>,
 }
 
-fn detect(args: &DetectArgs, model: &GraspModel, path: &Path) -> Result<Seen> {
+fn detect(args: &DetectArgs, looking: &Looking, path: &Path) -> Result<Seen> {
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let image = files::read_image(path)?;
     let start = Instant::now();
-    let detections = model.detect(&image, verification).with_context(|| path.display().to_string())?;
+    let detections = looking.detect(&image, verification).with_context(|| path.display().to_string())?;
     let seconds = start.elapsed().as_secs_f64();
     if let Some(folder) = &args.draw {
-        draw(folder, path, &image, &detections)?;
+        let drawn: Vec<GraspDetection> = detections.iter().map(|found| found.detection.clone()).collect();
+        draw(folder, path, &image, &drawn)?;
     }
     Ok(Seen { size: image.dimensions(), seconds, detections })
 }
 
 impl Seen {
-    fn write(mut self, out: &mut impl Write, args: &DetectArgs, model: &GraspModel, path: &Path) -> Result<()> {
-        let best_refused = self.detections.first().filter(|best| !best.is_accepted()).cloned();
+    fn write(mut self, out: &mut impl Write, args: &DetectArgs, looking: &Looking, path: &Path) -> Result<()> {
+        let best = self.detections.first().map(|best| best.detection.clone());
+        let best_refused = best.filter(|best| !best.is_accepted());
         if !args.all {
-            self.detections.retain(GraspDetection::is_accepted);
+            self.detections.retain(|found| found.detection.is_accepted());
         }
         if args.json {
             let line = ImageLine {
@@ -90,17 +151,29 @@ impl Seen {
                 width: self.size.0,
                 height: self.size.1,
                 seconds: self.seconds,
-                detections: self.detections.iter().map(DetectionRecord::from).collect(),
+                detections: self.detections.iter().map(|found| found.record(looking.frame())).collect(),
             };
             writeln!(out, "{}", serde_json::to_string(&line)?)?;
             return Ok(());
         }
         if best_refused.is_some() || self.detections.is_empty() {
             let almost = best_refused.and_then(|refused| almost(&refused));
-            let advice = almost.or_else(|| of_other_size(model, self.size)).unwrap_or_default();
+            let advice = almost.or_else(|| looking.advice(self.size)).unwrap_or_default();
             writeln!(out, "{}: nothing to grasp{advice}", path.display())?;
         }
-        self.detections.iter().try_for_each(|detection| write_text(out, path, detection))
+        self.detections.iter().try_for_each(|found| write_text(out, path, found, looking.frame()))
+    }
+}
+
+impl Found {
+    fn record(&self, frame: Option<Frame>) -> FoundRecord {
+        let pose = self.pose.zip(frame).map(|(pose, frame)| PoseRecord {
+            frame,
+            p_m: pose.position_m.coords.into(),
+            yaw_deg: pose.yaw.degrees(),
+            opening_m: pose.opening_m,
+        });
+        FoundRecord { detection: DetectionRecord::from(&self.detection), pose }
     }
 }
 
@@ -129,13 +202,27 @@ fn of_other_size(model: &GraspModel, (width, height): (u32, u32)) -> Option<Stri
     })
 }
 
-fn write_text(out: &mut impl Write, path: &Path, detection: &GraspDetection) -> Result<()> {
+fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Frame>) -> Result<()> {
+    let Found { detection, pose } = found;
     let grasp = detection.grasp;
+    let metric = pose.zip(frame).map(|(pose, frame)| {
+        let name = match frame {
+            Frame::Table => "table",
+            Frame::Base => "base",
+        };
+        let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
+        format!(
+            " = {name} ({x:.1}, {y:.1}, {z:.1}) mm, yaw {:.1}°, open {:.1} mm",
+            pose.yaw.degrees(),
+            1e3 * pose.opening_m
+        )
+    });
+    let metric = metric.unwrap_or_default();
     let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
     let refused = detection.refused().map(|why| format!("; refused: {why}")).unwrap_or_default();
     writeln!(
         out,
-        "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
+        "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
         path.display(),
         grasp.x,
         grasp.y,
@@ -164,7 +251,25 @@ struct ImageLine {
     width: u32,
     height: u32,
     seconds: f64,
-    detections: Vec<DetectionRecord>,
+    detections: Vec<FoundRecord>,
+}
+
+/// A detection and, with a camera, its pose.
+#[derive(Serialize)]
+struct FoundRecord {
+    #[serde(flatten)]
+    detection: DetectionRecord,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pose: Option<PoseRecord>,
+}
+
+/// Where the gripper is to close; metres and degrees, the turn about the frame's z.
+#[derive(Serialize)]
+struct PoseRecord {
+    frame: Frame,
+    p_m: [f64; 3],
+    yaw_deg: f64,
+    opening_m: f64,
 }
 
 /// A line of `--json` for an image that cannot be used.

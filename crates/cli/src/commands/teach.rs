@@ -4,15 +4,16 @@ use std::io::Write;
 use std::str::FromStr;
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, seen_from_above, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::json;
 
 use crate::args::TeachArgs;
 use crate::base_weights;
+use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
@@ -33,7 +34,17 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         device: devices::open(&args.compute)?,
         ..TeachOptions::new(args.seed)
     };
-    let demonstrations = demonstrations::read_all(&args.demonstrations)?;
+    let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
+    if let Some(path) = &args.camera {
+        let camera = CameraFile::read(path)?;
+        for (demonstration, argument) in demonstrations.iter().zip(&args.demonstrations) {
+            camera.check_picture(&demonstration.image).with_context(|| argument.clone())?;
+        }
+        let [mark, grasp] = heights_m(args);
+        let (seen, lengths) = seen_from_above(&demonstrations, &camera.over_table, mark, grasp)?;
+        demonstrations = seen;
+        options.lengths = Some(lengths);
+    }
     files::check_writable(&args.out)?;
     if let Some(folder) = &args.report {
         files::prepare_folder(folder)?;
@@ -77,12 +88,26 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
+        if let Some(lengths) = facts.lengths {
+            println!(
+                "knows its size: marks {:.1} mm above the table, {:.3} mm a pixel; grasped {:.1} mm above the table",
+                1e3 * lengths.mark_height_m,
+                1e3 / lengths.pixels_per_m,
+                1e3 * lengths.grasp_height_m
+            );
+        }
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
         if let Some(path) = page {
             println!("report: {}", path.display());
         }
     }
     Ok(Outcome::Done)
+}
+
+/// Heights over the table of the marks and of the grasp, in metres.
+fn heights_m(args: &TeachArgs) -> [f64; 2] {
+    let mark = args.mark_height_mm.unwrap_or_default();
+    [mark, args.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
 }
 
 /// The command that makes the same model again.
@@ -102,6 +127,12 @@ fn command(args: &TeachArgs) -> String {
     }
     if args.size_tolerance.range() != CheckConfig::DEFAULT_SIZE_TOLERANCE {
         option("size-tolerance", format!("{}-{}", args.size_tolerance.low, args.size_tolerance.high));
+    }
+    if let Some(camera) = &args.camera {
+        let [mark, grasp] = heights_m(args).map(|height| (1e3 * height).to_string());
+        option("camera", camera.display().to_string());
+        option("mark-height-mm", mark);
+        option("grasp-height-mm", grasp);
     }
     if let Some(weights) = &args.base_weights {
         option("base-weights", weights.display().to_string());

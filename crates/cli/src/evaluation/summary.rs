@@ -308,6 +308,7 @@ mod tests {
             seed: 1,
             symmetry: RotationalSymmetry::None,
             size_tolerance: None,
+            lengths: None,
             samples: 100,
             steps: 10,
             seconds: 60.0,

@@ -100,7 +100,9 @@ impl PlanView {
                 seen.intersection(workspace).ok_or(PlanViewError::OutsideWorkspace { workspace: *workspace, seen })?
             }
         };
-        let [width, height] = [shown.x_m, shown.y_m].map(|[low, high]| ((high - low) * pixels_per_m).ceil().max(1.0));
+        // A rounding error makes no further pixel.
+        let side = |[low, high]: [f64; 2]| ((high - low) * pixels_per_m - 1e-6).ceil().max(1.0);
+        let [width, height] = [shown.x_m, shown.y_m].map(side);
         let found = (width * height) as u64;
         if found > max_pixels {
             return Err(PlanViewError::TooLarge { max: max_pixels, found });

@@ -115,6 +115,7 @@ mod tests {
     fn edges_alone() -> ScoreConfig {
         let none = Term { weight: 0.0, neutral: 0.0, range: [0.0, 1.0] };
         ScoreConfig {
+            is_size_known: false,
             bias: 0.0,
             edges: Term { weight: 10.0, neutral: 0.5, range: [0.0, 1.0] },
             surface: none,

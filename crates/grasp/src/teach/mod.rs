@@ -42,6 +42,7 @@ use crate::model_file::Calibrations;
 use crate::models::mask::MaskMatcher;
 use crate::models::{self, Network, Reading};
 use crate::network_evidence::NetworkEvidence;
+use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
 pub use event::Event;
@@ -68,6 +69,8 @@ pub struct TeachOptions {
     pub symmetry: RotationalSymmetry,
     /// Sizes over the usual one at which the part is looked for.
     pub size_tolerance: RangeInclusive<f64>,
+    /// What [`crate::seen_from_above`] says where the demonstrations come from there.
+    pub lengths: Option<Lengths>,
     /// Weights that the detector starts from; `None` to start from nothing.
     pub base_weights: Option<BaseWeights>,
     /// Where to compute; without gradients.
@@ -85,6 +88,7 @@ impl TeachOptions {
             steps: None,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
+            lengths: None,
             base_weights: None,
             device: Device::flex(),
         }
@@ -224,6 +228,7 @@ fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Inst
             seed: options.seed,
             symmetry: options.symmetry,
             size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
+            lengths: options.lengths,
             samples: 0,
             steps: 0,
             seconds: decimal(start.elapsed().as_secs_f64()),
@@ -304,6 +309,7 @@ pub(crate) fn teach_network(
         seed: options.seed,
         symmetry: options.symmetry,
         size_tolerance: Some([*options.size_tolerance.start(), *options.size_tolerance.end()]),
+        lengths: options.lengths,
         samples: history.steps.iter().map(|step| step.samples).sum(),
         steps: history.steps.len(),
         seconds: decimal(start.elapsed().as_secs_f64()),

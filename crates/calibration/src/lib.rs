@@ -1,0 +1,17 @@
+//! Calibrated cameras: where they are and what their lenses do, as files.
+//!
+//! ```text
+//! camera_info YAML of ROS ─┐
+//!                          ├─ CalibratedCamera ─ PosedCamera, table, workspace ─ plan view
+//! `table:` beside it ──────┘
+//! ```
+//! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added when
+//! such a file is read and taken away when it is written. Lengths in metres, `z` up from the table.
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod camera_file;
+mod error;
+
+pub use camera_file::{CalibratedCamera, Frame, TablePose};
+pub use error::CameraFileError;

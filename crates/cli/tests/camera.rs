@@ -1,0 +1,131 @@
+//! `--camera` on the command line: a part taught with one camera, found in metres, and camera files that are none.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
+const CAMERA: &str = "\
+image_width: 640
+image_height: 480
+camera_name: wrist
+camera_matrix: {rows: 3, cols: 3, data: [550.0, 0.0, 319.5, 0.0, 550.0, 239.5, 0.0, 0.0, 1.0]}
+distortion_model: plumb_bob
+distortion_coefficients: {rows: 1, cols: 5, data: [0.0, 0.0, 0.0, 0.0, 0.0]}
+table:
+  frame: base
+  frame_from_camera:
+    translation_m: [0.48, 0.0, 0.58]
+    rotation_xyzw: [0.7071067811865475, -0.7071067811865476, 0.0, 0.0]
+";
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
+}
+
+/// A folder with a camera file.
+struct Folder {
+    folder: tempfile::TempDir,
+}
+
+impl Folder {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    fn camera(&self, name: &str, text: &str) -> String {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    fn teach(&self, out: &str, further: &[&str]) -> Output {
+        let demonstration = format!("{}:{}", shipped("image.png").display(), shipped("annotation.json").display());
+        let out = self.path(out);
+        sdg(&[&["teach", "--model", "S", "--demo", &demonstration, "--out", &out], further].concat())
+    }
+}
+
+/// Exit code, and one line on standard error that contains every part.
+fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+    }
+}
+
+#[test]
+fn a_part_taught_with_a_camera_is_found_in_metres() {
+    let files = Folder::new();
+    let camera = files.camera("wrist.yaml", CAMERA);
+    let taught = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    let told = String::from_utf8_lossy(&taught.stdout).into_owned();
+    assert!(told.contains("marks 16.0 mm above the table"), "{told}");
+
+    let (model, photo) = (files.path("part.sdg"), shipped("image.png"));
+    let detect = |json: &[&str]| {
+        let common = ["detect", "--grasp-model", &model, "--camera", &camera];
+        let found = sdg(&[&common, json, &[photo.to_str().unwrap()]].concat());
+        assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+        String::from_utf8(found.stdout).unwrap()
+    };
+    let line: Value = serde_json::from_str(&detect(&["--json"])).unwrap();
+    let found = &line["detections"][0];
+    // By hand from the marks on the photo, which lies straight above: 550 pixels of focal length, 0.564 m above the marks.
+    let number = |value: &Value| value.as_f64().unwrap();
+    let [x, y] = ["x", "y"].map(|axis| number(&found["grasp"][axis]));
+    let pose = &found["pose"];
+    assert_eq!(pose["frame"], "base");
+    assert!((number(&pose["p_m"][0]) - (0.48 - (y - 240.0) * 0.564 / 550.0)).abs() < 1e-6, "{pose}");
+    assert!((number(&pose["p_m"][1]) - -(x - 320.0) * 0.564 / 550.0).abs() < 1e-6, "{pose}");
+    assert!((number(&pose["p_m"][2]) - 0.009).abs() < 1e-12, "{pose}");
+    // Right in the picture is -y of the base, down is -x: an angle a of the picture is a yaw of -90° - a.
+    let turn = number(&pose["yaw_deg"]) + 90.0 + number(&found["grasp"]["angle_deg"]);
+    assert!((turn + 180.0).rem_euclid(360.0) - 180.0 < 1e-6, "{found}");
+    let width = number(&found["grasp"]["width_px"]) * 0.564 / 550.0;
+    assert!((number(&pose["opening_m"]) - width).abs() < 1e-6, "{found}");
+    let told = detect(&[]);
+    assert!(told.contains(" = base (") && told.contains("mm, yaw "), "{told}");
+}
+
+#[test]
+fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
+    let files = Folder::new();
+    let teach = |name: &str, from: &str, to: &str| {
+        assert!(CAMERA.contains(from), "{from}");
+        let camera = files.camera(name, &CAMERA.replace(from, to));
+        let output = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16"]);
+        assert!(!Path::new(&files.path("part.sdg")).exists());
+        output
+    };
+    assert_refused(&teach("mm.yaml", "0.58]", "580.0]"), 1, &["mm.yaml", "580", "millimetres given as metres?"]);
+    assert_refused(&teach("size.yaml", "image_width: 640", "image_width: 1280"), 1, &["1280", "640 × 480"]);
+    let up = teach("up.yaml", "[0.7071067811865475, -0.7071067811865476, 0.0, 0.0]", "[0.0, 0.0, 0.0, 1.0]");
+    assert_refused(&up, 1, &["does not meet the plane", "0.016 m"]);
+    assert_refused(&teach("text.yaml", "image_width: 640", "no camera"), 1, &["text.yaml", "camera_calibration"]);
+    let table = CAMERA.find("table:").unwrap();
+    let alone = teach("alone.yaml", &CAMERA[table..], "");
+    assert_refused(&alone, 1, &["alone.yaml", "pose over the table"]);
+
+    let camera = files.camera("wrist.yaml", CAMERA);
+    assert_refused(&files.teach("part.sdg", &["--camera", &camera]), 2, &["--mark-height-mm"]);
+    let metres = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "1600"]);
+    assert_refused(&metres, 2, &["0 to 500 millimetres", "1600"]);
+
+    assert!(files.teach("no_camera.sdg", &[]).status.success());
+    let (model, photo) = (files.path("no_camera.sdg"), shipped("image.png"));
+    let found = sdg(&["detect", "--grasp-model", &model, "--camera", &camera, photo.to_str().unwrap()]);
+    assert_refused(&found, 1, &["no_camera.sdg", "taught with a camera", "--mark-height-mm"]);
+}

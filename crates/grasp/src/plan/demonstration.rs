@@ -1,0 +1,75 @@
+//! A demonstration as the plan view shows it.
+
+use nalgebra::Point2;
+use sdg_demonstration::{Annotation, Demonstration};
+use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
+
+use super::picture::PlanMap;
+use super::{CameraOverTable, Lengths, plan_view};
+use crate::error::{GraspError, Result};
+
+/// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
+///
+/// Heights in metres over the table.
+///
+/// # Errors
+/// A camera that does not see the plane, and marks outside what it sees.
+pub fn seen_from_above(
+    demonstrations: &[Demonstration],
+    over_table: &CameraOverTable,
+    mark_height_m: f64,
+    grasp_height_m: f64,
+) -> Result<(Vec<Demonstration>, Lengths)> {
+    let first = demonstrations.first().ok_or(GraspError::NoDemonstration)?;
+    let center = first.annotation.bbox.center();
+    let height_m = over_table.table_height_m + mark_height_m;
+    let off_plane = || GraspError::OffPlane { x: center.x, y: center.y, height_m };
+    let length = over_table.camera.metres_per_pixel(&center, height_m).ok_or_else(off_plane)?;
+    let lengths = Lengths { pixels_per_m: 1.0 / length, mark_height_m, grasp_height_m };
+    let view = plan_view(over_table, &lengths)?;
+    let map = PlanMap::new(&over_table.camera, &view);
+    let made = demonstrations
+        .iter()
+        .map(|demonstration| {
+            let annotation = annotation(&demonstration.annotation, &over_table.camera, &view)?;
+            let made = Demonstration { image: map.resample(&demonstration.image), annotation };
+            made.check()?;
+            Ok(made)
+        })
+        .collect::<Result<_>>()?;
+    Ok((made, lengths))
+}
+
+fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Result<Annotation> {
+    let shown = |point: &Point2<f64>| {
+        let off_plane = || GraspError::OffPlane { x: point.x, y: point.y, height_m: view.height_m };
+        view.from_picture(camera, point).ok_or_else(off_plane)
+    };
+    let outline = match &marked.outline {
+        Some(outline) => Some(Polygon { vertices: outline.vertices.iter().map(shown).collect::<Result<_>>()? }),
+        None => None,
+    };
+    let corners = marked.bbox.corners().iter().map(shown).collect::<Result<Vec<_>>>()?;
+    let bbox = match &outline {
+        Some(outline) => outline.bounds(),
+        None => BoundingBox::around(corners).unwrap_or(marked.bbox),
+    };
+    let grasp = match &marked.grasp {
+        Some(line) => Some(GraspLine::new(shown(&line.start)?, shown(&line.end)?)),
+        None => None,
+    };
+    // As much larger as the marks about it.
+    let jaw_width = match (marked.jaw_width, &marked.grasp, &grasp) {
+        (Some(width), Some(before), Some(after)) => {
+            Some(width * (after.end - after.start).norm() / (before.end - before.start).norm())
+        }
+        (width, ..) => width,
+    };
+    Ok(Annotation {
+        label: marked.label.clone(),
+        bbox: bbox.clip(f64::from(view.width), f64::from(view.height)),
+        grasp,
+        jaw_width,
+        outline,
+    })
+}

@@ -1,0 +1,188 @@
+//! With a calibrated camera: teaching and detecting in the plan view of the marks' plane, and grasps in metres.
+//!
+//! ```text
+//! photo ─ plan view of the marks' plane ─ Demonstration in it ─ teach ─ model with Lengths
+//! picture ─ plan view, as many pixels a metre ─ detect, the size known ─┬─ back into the picture's pixels ─ GraspDetection
+//!                                                                       └─ PlanarPose in metres
+//! ```
+//! In the plan view lens, slant, height and resolution no longer matter for what lies in the plane, so a model taught with one
+//! camera serves any other.
+
+mod demonstration;
+mod picture;
+
+use image::RgbImage;
+use nalgebra::{Point2, Point3, Vector2};
+use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
+use serde::{Deserialize, Serialize};
+
+pub use self::demonstration::seen_from_above;
+use self::picture::PlanMap;
+use crate::error::{GraspError, Result};
+use crate::model::{GraspDetection, GraspModel, Verification};
+
+/// What a model that was taught with a camera knows of lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Lengths {
+    /// Pixels of the demonstrations for a metre.
+    pub pixels_per_m: f64,
+    /// Height of the marks' plane over the table, in metres.
+    pub mark_height_m: f64,
+    /// Height over the table at which the gripper closes, in metres.
+    pub grasp_height_m: f64,
+}
+
+impl Lengths {
+    /// # Errors
+    /// [`GraspError::Damaged`] for what no camera and no part has.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self { pixels_per_m, mark_height_m, grasp_height_m } = *self;
+        let is_height = |height: f64| (0.0..MAX_HEIGHT_M).contains(&height);
+        if (1.0..MAX_PIXELS_PER_M).contains(&pixels_per_m) && is_height(mark_height_m) && is_height(grasp_height_m) {
+            return Ok(());
+        }
+        Err(GraspError::Damaged {
+            expected: format!("1 to {MAX_PIXELS_PER_M} pixels a metre and heights of 0 to {MAX_HEIGHT_M} m"),
+            found: format!("{self:?}"),
+        })
+    }
+}
+
+/// A table and a camera over it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraOverTable {
+    /// The camera; its world's z points up.
+    pub camera: PosedCamera,
+    /// The table's z.
+    pub table_height_m: f64,
+    /// Where parts may lie; all that the camera sees where `None`.
+    pub workspace: Option<Workspace>,
+}
+
+/// Where the gripper is to close, in the camera's world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanarPose {
+    /// The gripper's centre point, in metres.
+    pub position_m: Point3<f64>,
+    /// Turn about z, right-handed, of the direction from the first marked point to the second.
+    pub yaw: Angle,
+    /// The part's width between the jaws, in metres.
+    pub opening_m: f64,
+}
+
+/// A grasp in the picture's pixels and in metres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanDetection {
+    /// In pixels of the picture as given.
+    pub detection: GraspDetection,
+    /// In the camera's world.
+    pub pose: PlanarPose,
+}
+
+/// A micrometre for a pixel, and a part as high as a person. Chosen by hand.
+const MAX_PIXELS_PER_M: f64 = 1e6;
+const MAX_HEIGHT_M: f64 = 2.0;
+/// More pixels than a search is quick in. Chosen by hand.
+const MAX_PLAN_PIXELS: u64 = 6_000_000;
+
+/// A model that looks through a camera.
+#[derive(Debug, Clone)]
+pub struct PlanDetector {
+    model: GraspModel,
+    over_table: CameraOverTable,
+    lengths: Lengths,
+    view: PlanView,
+    map: PlanMap,
+}
+
+impl PlanDetector {
+    /// Makes everything ready that is the same in every picture of the camera.
+    ///
+    /// # Errors
+    /// A model that was taught without a camera; a camera that does not see the plane.
+    pub fn new(model: GraspModel, over_table: &CameraOverTable) -> Result<Self> {
+        let lengths = model.facts().lengths.ok_or(GraspError::NoLengths)?;
+        let view = plan_view(over_table, &lengths)?;
+        let map = PlanMap::new(&over_table.camera, &view);
+        Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map })
+    }
+
+    /// What part of the plane is looked at.
+    pub fn view(&self) -> &PlanView {
+        &self.view
+    }
+
+    /// The model that looks at plan views.
+    pub fn model(&self) -> &GraspModel {
+        &self.model
+    }
+
+    /// Finds the part in a picture of the camera, best score first, as [`GraspModel::detect`] does.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanDetection>> {
+        let found = self.model.detect(&self.map.resample(picture), verification)?;
+        Ok(found.into_iter().filter_map(|detection| self.placed(detection)).collect())
+    }
+
+    /// `None` where the camera does not show it.
+    fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
+        let grasp = detection.grasp;
+        let center = grasp.center();
+        self.view.in_picture(&self.over_table.camera, &center)?;
+        let above = self.over_table.table_height_m + self.lengths.grasp_height_m;
+        let on_plane = self.view.point(&center);
+        let pose = PlanarPose {
+            position_m: Point3::new(on_plane.x, on_plane.y, above),
+            // The plan view's y points against the world's.
+            yaw: Angle::from_radians(-grasp.angle.radians()),
+            opening_m: grasp.width / self.view.pixels_per_m,
+        };
+        Some(PlanDetection { detection: self.in_picture(detection)?, pose })
+    }
+
+    /// The same detection in pixels of the picture.
+    fn in_picture(&self, detection: GraspDetection) -> Option<GraspDetection> {
+        let shown = |point: &Point2<f64>| self.over_table.camera.project(&self.view.point(point));
+        let outline = match &detection.outline {
+            Some(outline) => {
+                Some(Polygon { vertices: outline.vertices.iter().map(shown).collect::<Option<Vec<_>>>()? })
+            }
+            None => None,
+        };
+        let corners = detection.bbox.corners().iter().map(shown).collect::<Option<Vec<_>>>()?;
+        let bbox = outline.as_ref().map_or_else(|| BoundingBox::around(corners), |outline| Some(outline.bounds()))?;
+        let keypoints = detection.keypoints.iter().map(|(point, score)| Some((shown(point)?, *score)));
+        let intrinsics = self.over_table.camera.intrinsics;
+        let picture = [intrinsics.width, intrinsics.height].map(f64::from);
+        Some(GraspDetection {
+            bbox: bbox.clip(picture[0], picture[1]),
+            keypoints: keypoints.collect::<Option<Vec<_>>>()?,
+            outline,
+            grasp: self.grasp_in_picture(&detection.grasp)?,
+            ..detection
+        })
+    }
+
+    fn grasp_in_picture(&self, grasp: &PlanarGrasp) -> Option<PlanarGrasp> {
+        let shown = |point: &Point2<f64>| self.over_table.camera.project(&self.view.point(point));
+        let (sin, cos) = grasp.angle.radians().sin_cos();
+        let center = shown(&grasp.center())?;
+        let along = shown(&(grasp.center() + Vector2::new(cos, sin)))? - center;
+        let [one, other] = grasp.jaws();
+        Some(PlanarGrasp {
+            x: center.x,
+            y: center.y,
+            angle: Angle::from_radians(along.y.atan2(along.x)),
+            width: (shown(&one)? - shown(&other)?).norm(),
+        })
+    }
+}
+
+/// What the camera sees of the marks' plane, as fine as the model's demonstrations.
+pub(crate) fn plan_view(over_table: &CameraOverTable, lengths: &Lengths) -> Result<PlanView> {
+    let CameraOverTable { camera, table_height_m, workspace } = over_table;
+    let height = table_height_m + lengths.mark_height_m;
+    Ok(PlanView::of(camera, height, lengths.pixels_per_m, workspace.as_ref(), MAX_PLAN_PIXELS)?)
+}
