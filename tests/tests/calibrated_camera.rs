@@ -121,5 +121,6 @@ fn parts_of_another_size_are_refused() {
             }
         }
     }
+    println!("{tried} pictures of parts of another size");
     assert!(tried >= 20, "{tried}");
 }
