@@ -3,8 +3,8 @@
 //! `cargo run --release -p sdg-grasp --example train_likeness -- [--parts N] [--held-out N] [--epochs N] [--seed S] [--pairs
 //! FILE] [--out FILE]`
 //!
-//! Draws N parts (1500) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
-//! pictures, and trains on what the search finds, right and wrong, for 22 epochs. FILE of `--pairs` keeps what was found: parts
+//! Draws N parts (700) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
+//! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: parts
 //! that it holds already are not drawn again. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
 
 mod drawn;
@@ -33,9 +33,9 @@ struct Arguments {
 impl Arguments {
     fn read(arguments: impl Iterator<Item = String>) -> Result<Self> {
         let mut read = Self {
-            parts: 1500,
+            parts: 700,
             held_out: 100,
-            epochs: 22,
+            epochs: 40,
             seed: 31,
             pairs: None,
             out: PathBuf::from("likeness.safetensors"),

@@ -109,6 +109,11 @@ pub(crate) struct Overlay<'a> {
     pub(crate) light: f64,
 }
 
+/// How near to an end of the sizes, in ln, a pose may have been kept from going on, and by how much it must then agree better beyond.
+/// Chosen by hand.
+const AT_END: f64 = 0.02;
+const BETTER_BEYOND: f64 = 0.05;
+
 impl<'a> SizedDemonstration<'a> {
     /// The pose in which the halved picture shows the resized cut-out, and back.
     fn view_from_working(&self, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
@@ -118,6 +123,19 @@ impl<'a> SizedDemonstration<'a> {
 
     fn image_from_cutout(&self, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
         scaling(self.working.shrink()).compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+    }
+
+    /// Whether what was found at an end of the sizes that are looked for agrees better beyond it: then it is another part.
+    fn is_of_other_size(&self, view: &View<'_>, view_from_working: &PlanarSimilarity, agreement: f64) -> bool {
+        let scales = self.prepared.search.scales();
+        let from_end =
+            (scales.end() / view_from_working.scale).ln().min((view_from_working.scale / scales.start()).ln());
+        if from_end > AT_END {
+            return false;
+        }
+        let comparison = self.prepared.search.comparison(&view.image, &view.field);
+        let refined = comparison.refined_by_edges(view_from_working);
+        !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + BETTER_BEYOND
     }
 
     fn overlay(
@@ -148,6 +166,9 @@ pub(crate) fn search<'a>(scene: &Scene<'a>) -> Vec<Overlay<'a>> {
         let view = &scene.views[sized.view_idx];
         for found_there in sized.prepared.search.search_field(&view.image, &view.field) {
             let pose = &found_there.image_from_demonstration;
+            if sized.is_of_other_size(view, pose, found_there.agreement) {
+                continue;
+            }
             found.push(sized.overlay(view, pose, found_there.agreement, found_there.evidence));
         }
     }

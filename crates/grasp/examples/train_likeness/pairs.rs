@@ -42,12 +42,6 @@ const EXPOSURE: f32 = 0.5;
 const GAMMA: f32 = 0.4;
 const TINT: f32 = 0.1;
 const NOISE: f32 = 0.02;
-/// Shares of the examples that are covered and blurred, how much of the part may be covered, and how far it may have moved, in
-/// pixels of a pair. Chosen by hand.
-const COVERED_SHARE: f64 = 0.25;
-const MAX_COVER: f64 = 0.45;
-const BLURRED_SHARE: f64 = 0.2;
-const MOTION: f32 = 10.0;
 
 impl Pairs {
     /// Nothing yet.
@@ -151,17 +145,9 @@ impl Pairs {
         }
     }
 
-    /// Turned and mirrored together, the picture now and then covered by something of another picture or blurred by motion, and
-    /// each in another light.
+    /// Turned and mirrored together, and each in another light.
     pub fn changed_pair(&self, idx: usize, rng: &mut Pcg64Mcg) -> Pair {
-        let mut pair = turned(&self.pair(idx), rng);
-        if rng.random_bool(COVERED_SHARE) {
-            let other = self.pair(rng.random_range(0..self.len()));
-            cover(&mut pair, &other.picture, rng);
-        }
-        if rng.random_bool(BLURRED_SHARE) {
-            pair.picture = blurred(&pair.picture, rng);
-        }
+        let pair = turned(&self.pair(idx), rng);
         Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
     }
 }
@@ -220,47 +206,6 @@ fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3]> {
     let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
     let weights = [(1.0 - along) * (1.0 - below), along * (1.0 - below), (1.0 - along) * below, along * below];
     Some(std::array::from_fn(|c| corners.iter().zip(weights).map(|(corner, weight)| weight * corner[c]).sum()))
-}
-
-/// A rectangle of `other` laid over the picture, where that leaves enough of the part to be seen.
-fn cover(pair: &mut Pair, other: &[Option<[f32; 3]>], rng: &mut Pcg64Mcg) {
-    let side = SIDE as f32;
-    let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
-    let center = [(); 2].map(|()| rng.random_range(0.1..0.9) * side);
-    let half = [rng.random_range(0.05..0.25), rng.random_range(0.1..0.5)].map(|share: f32| share * side);
-    let is_under = |i: usize| {
-        let [x, y] = [(i % SIDE) as f32 - center[0], (i / SIDE) as f32 - center[1]];
-        (cos * x + sin * y).abs() < half[0] && (cos * y - sin * x).abs() < half[1]
-    };
-    let inside = pair.inside.iter().filter(|inside| **inside).count();
-    let hidden = (0..AREA).filter(|&i| pair.inside[i] && is_under(i)).count();
-    if hidden as f64 <= MAX_COVER * inside as f64 {
-        for i in (0..AREA).filter(|&i| is_under(i) && pair.picture[i].is_some()).collect::<Vec<_>>() {
-            pair.picture[i] = other[i].or(pair.picture[i]);
-        }
-    }
-}
-
-/// The mean along a line.
-fn blurred(picture: &[Option<[f32; 3]>], rng: &mut Pcg64Mcg) -> Vec<Option<[f32; 3]>> {
-    let length = rng.random_range(1.0..MOTION);
-    let (sin, cos) = rng.random_range(0.0..std::f32::consts::TAU).sin_cos();
-    let count = length.ceil() as usize + 1;
-    (0..AREA)
-        .map(|i| {
-            picture[i]?;
-            let (mut sum, mut num) = ([0.0; 3], 0);
-            for k in 0..count {
-                let along = length * (k as f32 / (count - 1) as f32 - 0.5);
-                let at = [(i % SIDE) as f32 + along * cos, (i / SIDE) as f32 + along * sin];
-                if let Some(color) = between(picture, &at) {
-                    num += 1;
-                    (0..3).for_each(|c| sum[c] += color[c]);
-                }
-            }
-            Some(sum.map(|value| value / num.max(1) as f32))
-        })
-        .collect()
 }
 
 /// Another exposure, gamma, tint and noise; `strength` scales all of them.
