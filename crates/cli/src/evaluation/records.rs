@@ -17,7 +17,7 @@ pub enum TeachingRecord {
     /// There is a model.
     Taught {
         /// What it says of itself.
-        facts: TeachingFacts,
+        facts: Box<TeachingFacts>,
         /// Size of its file.
         bytes: usize,
         /// How many units ran side by side meanwhile.

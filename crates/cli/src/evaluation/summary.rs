@@ -316,7 +316,8 @@ mod tests {
             orientation: None,
             base_weights_sha256: None,
         };
-        let taught = TeachingRecord::Taught { facts, bytes: 9_000_000, jobs: 2, losses: vec![3.0, 1.0] };
+        let taught =
+            TeachingRecord::Taught { facts: Box::new(facts), bytes: 9_000_000, jobs: 2, losses: vec![3.0, 1.0] };
         store.write("cells/C-pendulum.teaching.json", &taught).unwrap();
         let failed = TeachingRecord::Failed { why: "nothing learnt".into() };
         store.write("cells/C-rod_end.teaching.json", &failed).unwrap();

@@ -70,7 +70,7 @@ impl Teaching<'_> {
                     format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
                 });
                 let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
-                (TeachingRecord::Taught { facts, bytes: bytes.len(), jobs: self.jobs, losses }, said)
+                (TeachingRecord::Taught { facts: Box::new(facts), bytes: bytes.len(), jobs: self.jobs, losses }, said)
             }
             Err(error) => {
                 self.store.remove(&cell.model_file(marks))?;
