@@ -34,6 +34,16 @@ pub enum Frame {
     Base,
 }
 
+impl Frame {
+    /// The name, as files have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table => "table",
+            Self::Base => "base",
+        }
+    }
+}
+
 /// A camera over a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedCamera {
@@ -112,8 +122,12 @@ impl CalibratedCamera {
     /// # Errors
     /// Anything but a `camera_info` of a `plumb_bob` lens, and a pose that no camera over a table has.
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
-        let file: File = serde_saphyr::from_str(text)
-            .map_err(|error| CameraFileError::Unreadable { found: error.to_string().trim().to_owned() })?;
+        let file: File = serde_saphyr::from_str(text).map_err(|error| {
+            // The lines below it show the place in the file once more.
+            let said = error.to_string();
+            let first = said.lines().next().unwrap_or_default();
+            CameraFileError::Unreadable { found: first.trim_start_matches("error: ").to_owned() }
+        })?;
         Ok(Self {
             intrinsics: intrinsics(&file)?,
             table: file.table.map(TablePose::read).transpose()?,
@@ -226,10 +240,7 @@ impl TablePose {
         let Isometry3 { rotation, translation } = self.frame_from_camera;
         let [x, y, z]: [f64; 3] = translation.vector.into();
         let [i, j, k, w]: [f64; 4] = rotation.coords.into();
-        let frame = match self.frame {
-            Frame::Table => "table",
-            Frame::Base => "base",
-        };
+        let frame = self.frame.name();
         // Writing to a string cannot fail.
         let _ = write!(
             text,

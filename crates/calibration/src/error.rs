@@ -48,7 +48,7 @@ pub enum CameraFileError {
     #[error("expected the camera's pose over the table (`table:`), found none; `sdg camera table` measures it")]
     NoPose,
     /// A camera that hangs where none does.
-    #[error("expected the camera 0.05 to 20 m above the table, found {height} m{hint}")]
+    #[error("expected the camera 0.05 to 20 m above the table, found {height:.2} m{hint}")]
     Height {
         /// Metres over the table.
         height: f64,

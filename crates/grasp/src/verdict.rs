@@ -90,7 +90,9 @@ impl Contributions {
         let (worst, log_odds) = self.weakest()?;
         match worst {
             _ if log_odds >= 0.0 => None,
-            "size" => Some("if its size is right, widen --size-tolerance"),
+            "size" => Some(
+                "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm",
+            ),
             "outside" | "network" | "resemblance" => None,
             _ if light < DARKER => Some("if it is the part, a second --demo in darker light would help"),
             _ if light > BRIGHTER => Some("if it is the part, a second --demo in brighter light would help"),

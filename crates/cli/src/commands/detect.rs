@@ -206,10 +206,7 @@ fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Fr
     let Found { detection, pose } = found;
     let grasp = detection.grasp;
     let metric = pose.zip(frame).map(|(pose, frame)| {
-        let name = match frame {
-            Frame::Table => "table",
-            Frame::Base => "base",
-        };
+        let name = frame.name();
         let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
         format!(
             " = {name} ({x:.1}, {y:.1}, {z:.1}) mm, yaw {:.1}°, open {:.1} mm",

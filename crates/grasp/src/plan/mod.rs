@@ -107,16 +107,6 @@ impl PlanDetector {
         Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map })
     }
 
-    /// What part of the plane is looked at.
-    pub fn view(&self) -> &PlanView {
-        &self.view
-    }
-
-    /// The model that looks at plan views.
-    pub fn model(&self) -> &GraspModel {
-        &self.model
-    }
-
     /// Finds the part in a picture of the camera, best score first, as [`GraspModel::detect`] does.
     ///
     /// # Errors
@@ -142,9 +132,14 @@ impl PlanDetector {
         Some(PlanDetection { detection: self.in_picture(detection)?, pose })
     }
 
+    /// Where the picture shows a point of the plan view, be it beyond the picture's border.
+    fn shown(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
+        self.over_table.camera.project(&self.view.point(point))
+    }
+
     /// The same detection in pixels of the picture.
     fn in_picture(&self, detection: GraspDetection) -> Option<GraspDetection> {
-        let shown = |point: &Point2<f64>| self.over_table.camera.project(&self.view.point(point));
+        let shown = |point: &Point2<f64>| self.shown(point);
         let outline = match &detection.outline {
             Some(outline) => {
                 Some(Polygon { vertices: outline.vertices.iter().map(shown).collect::<Option<Vec<_>>>()? })
@@ -166,16 +161,15 @@ impl PlanDetector {
     }
 
     fn grasp_in_picture(&self, grasp: &PlanarGrasp) -> Option<PlanarGrasp> {
-        let shown = |point: &Point2<f64>| self.over_table.camera.project(&self.view.point(point));
         let (sin, cos) = grasp.angle.radians().sin_cos();
-        let center = shown(&grasp.center())?;
-        let along = shown(&(grasp.center() + Vector2::new(cos, sin)))? - center;
+        let center = self.shown(&grasp.center())?;
+        let along = self.shown(&(grasp.center() + Vector2::new(cos, sin)))? - center;
         let [one, other] = grasp.jaws();
         Some(PlanarGrasp {
             x: center.x,
             y: center.y,
             angle: Angle::from_radians(along.y.atan2(along.x)),
-            width: (shown(&one)? - shown(&other)?).norm(),
+            width: (self.shown(&one)? - self.shown(&other)?).norm(),
         })
     }
 }

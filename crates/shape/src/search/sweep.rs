@@ -69,12 +69,12 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     // Stable sorts: equal ones stay in the order of groups and rows, whatever the threads did.
     starts.sort_by(|a, b| b.response.total_cmp(&a.response));
     let mut of_scale = vec![0; bank.num_scales];
-    let ranks = starts.iter().map(|start| {
-        let rank = &mut of_scale[start.variant_idx % bank.num_scales];
+    let with_rank = |start: Start| {
+        let rank: &mut usize = &mut of_scale[start.variant_idx % bank.num_scales];
         *rank += 1;
-        *rank
-    });
-    let mut ranked: Vec<(usize, Start)> = ranks.collect::<Vec<_>>().into_iter().zip(starts).collect();
+        (*rank, start)
+    };
+    let mut ranked: Vec<(usize, Start)> = starts.into_iter().map(with_rank).collect();
     ranked.sort_by_key(|(rank, _)| *rank);
     ranked.truncate(count);
     ranked.into_iter().map(|(_, start)| start).collect()
