@@ -6,6 +6,8 @@ use clap::{Args as ClapArgs, Parser, Subcommand};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::ComputeBackend;
 
+use crate::commands::camera::CameraCommand;
+
 /// Teach a robot a grasp from one photo, on an ordinary computer.
 #[derive(Debug, Parser)]
 #[command(name = "sdg", version, propagate_version = true, arg_required_else_help = true)]
@@ -36,6 +38,9 @@ pub enum Command {
     Annotation(AnnotationArgs),
     /// Detectron2 and torchvision checkpoints: convert, inspect, verify
     Weights(WeightsArgs),
+    /// Cameras: calibrate them, and look through them
+    #[command(subcommand)]
+    Camera(CameraCommand),
     /// A completion script for your shell, on standard output
     Completions(CompletionsArgs),
     /// Manual pages

@@ -86,6 +86,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),
+        Command::Camera(camera) => commands::camera::run(camera),
         Command::Completions(completions) => commands::completions::run(completions),
         Command::Man(man) => commands::man::run(man),
         Command::Devices(devices) => commands::devices::run(devices),

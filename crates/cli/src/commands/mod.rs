@@ -4,6 +4,7 @@
 pub mod annotate;
 pub mod annotation;
 pub mod augment;
+pub mod camera;
 pub mod completions;
 #[cfg(feature = "simulation")]
 pub mod demo;
