@@ -50,6 +50,7 @@ fn model_s_finds_and_grasps_every_part() {
             seed: 1,
             verification: Verification::ByShape,
             errors: RehearsalErrors::default(),
+            camera: None,
         };
         let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
         println!(

@@ -42,6 +42,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
         seed: 1,
         verification: Verification::ByShape,
         errors: RehearsalErrors::default(),
+        camera: None,
     };
     let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
     println!("grasped in {} of 10, failures {:?}", rehearsed.successes(), rehearsed.failures());

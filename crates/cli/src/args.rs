@@ -99,12 +99,38 @@ pub struct AnnotateArgs {
     /// Network, training and augmentation
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
+    /// The calibrated camera that took the photos
+    #[command(flatten)]
+    pub camera: TaughtCameraArgs,
     /// Print the address and leave the browser to you
     #[arg(long)]
     pub no_browser: bool,
     /// Print the address as one JSON object
     #[arg(long)]
     pub json: bool,
+}
+
+/// The camera that took the photos to teach from.
+#[derive(Debug, ClapArgs)]
+pub struct TaughtCameraArgs {
+    /// The calibrated camera that took the photos, as ROS's camera_info YAML with the camera's pose over the table: the model
+    /// then knows the part's size and works with every calibrated camera
+    #[arg(id = "camera", long = "camera", value_name = "FILE", requires = "mark_height_mm")]
+    pub file: Option<PathBuf>,
+    /// Height of the marks over the table: of the surface that they lie on, not of the table
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub mark_height_mm: Option<f64>,
+    /// Height over the table at which the gripper closes; without it, half of the marks' height
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub grasp_height_mm: Option<f64>,
+}
+
+impl TaughtCameraArgs {
+    /// Heights over the table of the marks and of the grasp, in metres.
+    pub fn heights_m(&self) -> [f64; 2] {
+        let mark = self.mark_height_mm.unwrap_or_default();
+        [mark, self.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
+    }
 }
 
 /// `sdg teach`
@@ -138,16 +164,9 @@ pub struct TeachArgs {
     /// cropped and resized
     #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
     pub size_tolerance: SizeTolerance,
-    /// The calibrated camera that took the photos, as ROS's camera_info YAML with the camera's pose over the table: the model
-    /// then knows the part's size and works with every calibrated camera
-    #[arg(long, value_name = "FILE", requires = "mark_height_mm")]
-    pub camera: Option<PathBuf>,
-    /// Height of the marks over the table: of the surface that they lie on, not of the table
-    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
-    pub mark_height_mm: Option<f64>,
-    /// Height over the table at which the gripper closes; without it, half of the marks' height
-    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
-    pub grasp_height_mm: Option<f64>,
+    /// The calibrated camera that took the photos
+    #[command(flatten)]
+    pub camera: TaughtCameraArgs,
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
@@ -222,6 +241,10 @@ pub struct RehearseArgs {
     /// Where the network computes
     #[command(flatten)]
     pub compute: ComputeArgs,
+    /// The camera on the wrist: resolution, focal length and lens of this file, instead of 640x480 at 550 px without distortion;
+    /// where it is the arm tells. For models taught with a camera, which then look in the plan view
+    #[arg(long, value_name = "FILE")]
+    pub camera: Option<PathBuf>,
     /// Leave out the check against the demonstration
     #[arg(long)]
     pub no_verify: bool,
@@ -267,7 +290,7 @@ pub struct EvaluateArgs {
         requires = "grasp_model",
         conflicts_with_all = [
             "models", "objects", "attempts", "views", "scenes", "unverified", "preset", "steps", "seed", "jobs", "out",
-            "axes",
+            "axes", "cameras",
         ],
         help_heading = PICTURES
     )]
@@ -278,6 +301,9 @@ pub struct EvaluateArgs {
     /// Leave out the check against the demonstration: the network alone decides and places
     #[arg(long, requires = "pictures", help_heading = PICTURES)]
     pub no_verify: bool,
+    /// The calibrated camera that took the pictures, for a model taught with a camera: errors in millimetres, too
+    #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
+    pub camera: Option<PathBuf>,
     /// The least score that counts
     #[arg(
         long,
@@ -331,13 +357,24 @@ pub struct EvaluateArgs {
         help_heading = AXES
     )]
     pub axes: Option<Vec<String>>,
-    /// Pictures of each part and axis
+    /// Instead of the paper's protocol: parts taught in the plan view of one calibrated camera, on pictures of others (webcam,
+    /// phone, overhead), along the axes, and of parts of other sizes (other-sizes). Without names, everything, by models S and
+    /// C on all parts
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        num_args = 0..=1,
+        conflicts_with_all = ["unverified", "axes"],
+        help_heading = AXES
+    )]
+    pub cameras: Option<Vec<String>>,
+    /// Pictures of each part and axis, or of each part and camera
     #[arg(
         long,
         default_value_t = 20,
         value_name = "N",
         value_parser = clap::value_parser!(u32).range(1..=10_000),
-        requires = "axes",
         help_heading = AXES
     )]
     pub axis_views: u32,

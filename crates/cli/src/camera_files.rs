@@ -5,14 +5,25 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame};
-use sdg_grasp::CameraOverTable;
+use sdg_demonstration::Demonstration;
+use sdg_geometry::PinholeCamera;
+use sdg_grasp::{CameraOverTable, Lengths, seen_from_above};
 
 use crate::files;
 
 /// Larger camera files than any tool writes.
 const MAX_BYTES: u64 = 1 << 20;
 
+fn read(path: &Path) -> Result<CalibratedCamera> {
+    let bytes = files::read(path, MAX_BYTES)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        bail!("{}: expected YAML, found bytes that are no text", path.display());
+    };
+    CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())
+}
+
 /// A camera's file, read.
+#[derive(Debug, Clone)]
 pub struct CameraFile {
     camera: CalibratedCamera,
     /// What the camera's world is.
@@ -22,21 +33,45 @@ pub struct CameraFile {
 }
 
 impl CameraFile {
+    /// Reads the intrinsics of a file, with or without the camera's pose.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_intrinsics(path: &Path) -> Result<PinholeCamera> {
+        Ok(read(path)?.intrinsics)
+    }
+
     /// Reads a file that has the camera's pose.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has no pose.
     pub fn read(path: &Path) -> Result<Self> {
         let named = || path.display().to_string();
-        let bytes = files::read(path, MAX_BYTES)?;
-        let Ok(text) = String::from_utf8(bytes) else {
-            bail!("{}: expected YAML, found bytes that are no text", path.display());
-        };
-        let camera = CalibratedCamera::from_yaml(&text).with_context(named)?;
+        let camera = read(path)?;
         let (posed, table) = camera.posed().with_context(named)?;
         let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
         Ok(Self { frame: table.frame, over_table, camera })
     }
 
     /// Whether a picture can be this camera's.
+    ///
+    /// # Errors
+    /// A picture of another size.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         Ok(self.camera.check_picture(picture.dimensions())?)
+    }
+
+    /// Photos of this camera and their marks in the plan view of the marks' plane; heights over the table in metres.
+    ///
+    /// # Errors
+    /// A photo of another size, and marks outside what the camera sees of the plane.
+    pub fn seen_from_above(
+        &self,
+        photos: &[Demonstration],
+        mark_height_m: f64,
+        grasp_height_m: f64,
+    ) -> Result<(Vec<Demonstration>, Lengths)> {
+        photos.iter().try_for_each(|photo| self.check_picture(&photo.image))?;
+        Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
     }
 }

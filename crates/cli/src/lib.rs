@@ -24,7 +24,7 @@ pub mod against_truth;
 mod annotation_files;
 pub mod args;
 pub mod base_weights;
-mod camera_files;
+pub mod camera_files;
 mod commands;
 mod demonstrations;
 pub mod detector_config;
@@ -32,11 +32,13 @@ pub mod detector_config;
 pub mod evaluation;
 mod exit;
 mod files;
+mod found_record;
 mod interrupt;
 pub mod labelled_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
 mod page_teacher;
+pub mod picture_detector;
 mod pictures;
 mod progress;
 #[cfg(feature = "simulation")]

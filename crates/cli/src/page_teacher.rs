@@ -11,10 +11,15 @@ use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{Event, GraspDetection, GraspModel, ModelKind, Preset, TeachOptions, Verification, teach};
 
+use crate::camera_files::CameraFile;
+use crate::picture_detector::PictureDetector;
+
 /// Teaches with one preset.
 pub struct PageTeacher {
     /// Network, training and augmentation.
     pub preset: Preset,
+    /// The camera that takes the photos and the pictures to try, and the heights of marks and grasp over the table in metres.
+    pub camera: Option<(CameraFile, [f64; 2])>,
 }
 
 impl GraspTeacher for PageTeacher {
@@ -36,8 +41,18 @@ impl GraspTeacher for PageTeacher {
             steps: request.steps,
             ..TeachOptions::new(request.seed)
         };
-        let taught = teach(demonstrations, &options, &mut |event| observe(step(event)))?;
-        Ok(Box::new(PageModel(Mutex::new(taught.model))))
+        let mut taught_with = |demonstrations: &[Demonstration], options: &TeachOptions| {
+            teach(demonstrations, options, &mut |event| observe(step(event)))
+        };
+        let detector = match &self.camera {
+            None => PictureDetector::AnyCamera(Box::new(taught_with(demonstrations, &options)?.model)),
+            Some((camera, [mark, grasp])) => {
+                let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
+                let options = TeachOptions { lengths: Some(lengths), ..options };
+                PictureDetector::calibrated(taught_with(&seen, &options)?.model, camera.clone())?
+            }
+        };
+        Ok(Box::new(PageModel(Mutex::new(detector))))
     }
 }
 
@@ -59,17 +74,18 @@ fn step(event: &Event) -> TeachingStep {
 }
 
 /// One look at a time: each uses every core.
-struct PageModel(Mutex<GraspModel>);
+struct PageModel(Mutex<PictureDetector>);
 
 impl PageModel {
-    fn model(&self) -> MutexGuard<'_, GraspModel> {
+    fn detector(&self) -> MutexGuard<'_, PictureDetector> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl TaughtModel for PageModel {
     fn summary(&self) -> TaughtSummary {
-        let model = self.model();
+        let detector = self.detector();
+        let model = detector.model();
         let facts = model.facts();
         TaughtSummary {
             model: match model.kind() {
@@ -88,13 +104,13 @@ impl TaughtModel for PageModel {
     }
 
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
-        Ok(self.model().to_bytes()?)
+        Ok(self.detector().model().to_bytes()?)
     }
 
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
-        let model = self.model();
-        let found = model.detect(image, Verification::ByShape)?;
-        Ok(found.iter().map(|detection| found_grasp(&model, detection)).collect())
+        let detector = self.detector();
+        let found = detector.detect(image, Verification::ByShape)?;
+        Ok(found.iter().map(|found| found_grasp(detector.model(), &found.detection)).collect())
     }
 }
 

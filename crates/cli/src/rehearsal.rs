@@ -6,7 +6,8 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Isometry3;
-use sdg_grasp::{GraspModel, GraspPose, Verification};
+use sdg_geometry::PinholeCamera;
+use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
 use sdg_report::{Attempt, Step};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -36,6 +37,8 @@ pub struct Rehearsal<'a> {
     pub verification: Verification,
     /// What the robot is told wrong, or has wrong.
     pub errors: RehearsalErrors,
+    /// The wrist camera, where it is not the paper's; the model then looks in the plan view.
+    pub camera: Option<PinholeCamera>,
 }
 
 /// Errors of a rehearsal; by default there is none.
@@ -142,7 +145,8 @@ impl Rehearsal<'_> {
         let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
-        let mut workcell = Workcell::new(&WorkcellConfig { errors, ..WorkcellConfig::new(scene) })?;
+        let mut workcell =
+            Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
         let mut perception = ModelPerception { rehearsal: self, told: self.told(number), last: None };
         let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
         let started = Instant::now();
@@ -226,13 +230,25 @@ struct ModelPerception<'a> {
     last: Option<RgbImage>,
 }
 
+impl ModelPerception<'_> {
+    /// What the model finds, in pixels of the picture.
+    fn detect(&self, view: &CameraView) -> std::result::Result<Vec<GraspDetection>, GraspError> {
+        let Rehearsal { model, verification, camera, .. } = self.rehearsal;
+        if camera.is_none() {
+            return model.detect(&view.image, *verification);
+        }
+        let over_table = CameraOverTable { camera: view.camera, table_height_m: 0.0, workspace: None };
+        let found = PlanDetector::new((*model).clone(), &over_table)?.detect(&view.image, *verification)?;
+        Ok(found.into_iter().map(|found| found.detection).collect())
+    }
+}
+
 impl Perception for ModelPerception<'_> {
     fn perceive(
         &mut self,
         view: &CameraView,
     ) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>> {
-        let Rehearsal { model, verification, .. } = self.rehearsal;
-        let detections = model.detect(&view.image, *verification)?;
+        let detections = self.detect(view)?;
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
         let Some(best) = detections.into_iter().next() else { return Ok(None) };
         let target = |pose: GraspPose| GraspTarget {

@@ -5,7 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use serde_json::Value;
+use image::RgbImage;
+use sdg_calibration::{CalibratedCamera, Frame, TablePose};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{OnTable, TABLE_CAMERAS, table_view};
+use serde_json::{Value, json};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
 const CAMERA: &str = "\
@@ -96,6 +100,9 @@ fn a_part_taught_with_a_camera_is_found_in_metres() {
     assert!((turn + 180.0).rem_euclid(360.0) - 180.0 < 1e-6, "{found}");
     let width = number(&found["grasp"]["width_px"]) * 0.564 / 550.0;
     assert!((number(&pose["opening_m"]) - width).abs() < 1e-6, "{found}");
+    // The photo that taught it, from straight above: within a pixel, 1.03 mm.
+    assert!((0.01..1.03).contains(&number(&pose["sigma_mm"])), "{pose}");
+    assert!((0.01..2.0).contains(&number(&pose["sigma_deg"])), "{pose}");
     let told = detect(&[]);
     assert!(told.contains(" = base (") && told.contains("mm, yaw "), "{told}");
 }
@@ -128,4 +135,122 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     let (model, photo) = (files.path("no_camera.sdg"), shipped("image.png"));
     let found = sdg(&["detect", "--grasp-model", &model, "--camera", &camera, photo.to_str().unwrap()]);
     assert_refused(&found, 1, &["no_camera.sdg", "taught with a camera", "--mark-height-mm"]);
+}
+
+/// A second camera, with a lens and a place of its own, and a picture that it took of the pendulum.
+struct SecondCamera {
+    file: String,
+    picture: RgbImage,
+    /// The marks, in pixels.
+    marks: [[f64; 2]; 2],
+}
+
+fn second_camera(files: &Folder) -> SecondCamera {
+    let part = ObjectSpec::by_name("pendulum").unwrap();
+    let shown = table_view(&part, OnTable::Part, &TABLE_CAMERAS[0], (5, 20), 31).unwrap();
+    let posed = shown.view.camera;
+    let table =
+        TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: posed.world_from_camera, workspace: None };
+    let camera = CalibratedCamera { name: "webcam".into(), intrinsics: posed.intrinsics, table: Some(table) };
+    let line = shown.truth.unwrap().line;
+    SecondCamera {
+        file: files.camera("webcam.yaml", &camera.to_yaml()),
+        picture: shown.view.image,
+        marks: [line.start, line.end].map(|mark| [mark.x, mark.y]),
+    }
+}
+
+/// What LabelMe writes: a box and the two points of the grasp.
+fn labelled(marks: [[f64; 2]; 2], file: &str, [width, height]: [u32; 2]) -> Value {
+    let [[x1, y1], [x2, y2]] = marks;
+    let [left, right, top, bottom] = [x1.min(x2) - 30.0, x1.max(x2) + 30.0, y1.min(y2) - 30.0, y1.max(y2) + 30.0];
+    let shape = |label: &str, kind: &str, points: Value| json!({"label": label, "group_id": 1, "shape_type": kind, "points": points, "flags": {}});
+    json!({
+        "version": "5.0.1", "flags": {}, "imagePath": file, "imageData": null, "imageWidth": width, "imageHeight": height,
+        "shapes": [
+            shape("pendulum", "rectangle", json!([[left, top], [right, bottom]])),
+            shape("grasp_start", "point", json!([[x1, y1]])),
+            shape("grasp_end", "point", json!([[x2, y2]])),
+        ],
+    })
+}
+
+#[test]
+fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
+    let files = Folder::new();
+    let first = files.camera("wrist.yaml", CAMERA);
+    let taught = files.teach("part.sdg", &["--camera", &first, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+    assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
+    let model = files.path("part.sdg");
+    let second = second_camera(&files);
+
+    let folder = files.folder.path().join("pictures");
+    fs::create_dir(&folder).unwrap();
+    second.picture.save(folder.join("a.png")).unwrap();
+    fs::write(folder.join("a.json"), labelled(second.marks, "a.png", [640, 480]).to_string()).unwrap();
+    let (folder, report) = (folder.to_str().unwrap().to_owned(), files.path("report"));
+    let evaluate = |camera: &str| {
+        sdg(&[
+            "evaluate",
+            "--pictures",
+            &folder,
+            "--grasp-model",
+            &model,
+            "--camera",
+            camera,
+            "--report",
+            &report,
+            "--json",
+        ])
+    };
+    let tested = evaluate(&second.file);
+    assert!(tested.status.success(), "{}", String::from_utf8_lossy(&tested.stderr));
+    let told: Value = serde_json::from_slice(&tested.stdout).unwrap();
+    assert_eq!((&told["found"], &told["wrong"]), (&json!(1), &json!(0)), "{told}");
+    let off = told["errors"]["median_mm"].as_f64().unwrap();
+    assert!(off < 3.0, "{off} mm");
+
+    // The photo that it was taught from is no test, in the plan view neither.
+    for (from, to) in [("image.png", "image.png"), ("annotation.json", "image.json")] {
+        fs::copy(shipped(from), Path::new(&folder).join(to)).unwrap();
+    }
+    for name in ["a.png", "a.json"] {
+        fs::remove_file(Path::new(&folder).join(name)).unwrap();
+    }
+    assert_refused(&evaluate(&first), 1, &["was not taught from", "image.png"]);
+
+    let rehearse = |camera: &str| {
+        sdg(&[
+            "rehearse",
+            "--grasp-model",
+            &model,
+            "--object",
+            "pendulum",
+            "--attempts",
+            "2",
+            "--camera",
+            camera,
+            "--out",
+            &report,
+            "--json",
+        ])
+    };
+    let rehearsed = rehearse(&second.file);
+    assert!(rehearsed.status.success(), "{}", String::from_utf8_lossy(&rehearsed.stderr));
+    let told: Value = serde_json::from_slice(&rehearsed.stdout).unwrap();
+    assert_eq!(told["successes"], 2, "{told}");
+    assert!(files.teach("no_camera.sdg", &[]).status.success());
+    let without = files.path("no_camera.sdg");
+    let refused = sdg(&[
+        "rehearse",
+        "--grasp-model",
+        &without,
+        "--object",
+        "pendulum",
+        "--camera",
+        &second.file,
+        "--out",
+        &report,
+    ]);
+    assert_refused(&refused, 1, &["no_camera.sdg", "taught with a camera"]);
 }

@@ -70,7 +70,10 @@ pub use error::{GraspError, Result};
 pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
-pub use plan::{CameraOverTable, Lengths, PlanDetection, PlanDetector, PlanarPose, seen_from_above};
+pub use plan::{
+    CameraOverTable, Circumstances, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty, UncertaintyConfig,
+    seen_from_above,
+};
 pub use pose::{GraspPlane, GraspPose};
 pub use record::{DetectionRecord, GraspRecord};
 pub use sdg_demonstration::{ImageLimits, NUM_KEYPOINTS, decode_image};

@@ -37,6 +37,7 @@ mod error;
 mod extent;
 mod gripper;
 mod guard;
+mod lens;
 mod model;
 pub mod objects;
 mod oracle;

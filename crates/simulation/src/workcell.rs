@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_kinematics::{IkOptions, Panda, Trajectory, ready_pose};
 
 use crate::attempt_errors::AttemptErrors;
@@ -13,8 +14,9 @@ use crate::data::Data;
 use crate::error::{Result, SimulationError};
 use crate::extent::lowest_point_m;
 use crate::gripper::Gripper;
+use crate::lens::Frustum;
 use crate::model::{Body, Camera, Id, Joint, Model};
-use crate::panda::{PANDA_FILE, PandaIds, panda_asset, panda_asset_with_pads};
+use crate::panda::{PANDA_FILE, PandaIds, changed_panda_asset};
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
 use crate::scene::SceneVariation;
@@ -34,12 +36,14 @@ pub struct WorkcellConfig {
     pub wrist_render: RenderConfig,
     /// What is wrong in attempts.
     pub errors: AttemptErrors,
+    /// The wrist camera, where it is not [`PinholeCamera::WRIST`].
+    pub wrist_camera: Option<PinholeCamera>,
 }
 
 impl WorkcellConfig {
     /// A scene with the wrist camera's usual pictures, without errors.
     pub fn new(scene: SceneVariation) -> Self {
-        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default() }
+        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default(), wrist_camera: None }
     }
 }
 
@@ -82,23 +86,18 @@ impl Workcell {
     /// `Model` where MuJoCo refuses the scene, `Rendering` without OpenGL, `Library` for the wrong
     /// libmujoco.
     pub fn new(config: &WorkcellConfig) -> Result<Self> {
-        let fragment = config.scene.fragment();
-        let xml = include_str!("../assets/workcell.xml")
-            .replace("PANDA_FILE", PANDA_FILE)
-            .replace("<!-- SCENE -->", &fragment.sections);
-        let mut assets = fragment.files;
-        assets.push(match config.errors.pad_friction {
-            Some(friction) => panda_asset_with_pads(friction),
-            None => panda_asset(),
-        });
-        let model = Arc::new(Model::from_xml(&xml, &assets)?);
+        let model = build_model(config, "")?;
 
         let panda_ids = PandaIds::find(&model)?;
         let part = match config.scene.object {
             Some(_) => Some(PartIds { body: model.id("object")?, joint: model.id("object_joint")? }),
             None => None,
         };
-        let wrist_renderer = Renderer::new(&model, config.wrist_render)?;
+        let wrist_render = match &config.wrist_camera {
+            Some(camera) => Frustum::around(camera)?.render_config(&config.wrist_render),
+            None => config.wrist_render,
+        };
+        let wrist_renderer = Renderer::new(&model, wrist_render)?;
         let scene_camera = model.id("scene")?;
         let mut data = Data::new(model)?;
         panda_ids.set_position(&mut data, &ready_pose());
@@ -210,7 +209,14 @@ impl Workcell {
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // A step leaves positions one period behind the joints.
         self.data.forward()?;
-        CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.panda_ids.wrist_camera)
+        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.panda_ids.wrist_camera)?;
+        match self.config.wrist_camera {
+            None => Ok(drawn),
+            Some(intrinsics) => Ok(CameraView {
+                image: Frustum::around(&intrinsics)?.resample(&drawn.image, &intrinsics),
+                camera: PosedCamera { intrinsics, ..drawn.camera },
+            }),
+        }
     }
 
     /// Which geom each pixel of the wrist camera's picture shows now.
@@ -340,6 +346,21 @@ impl Workcell {
         touching.dedup();
         if touching.is_empty() { "the motors were too weak".into() } else { touching.join(", ") }
     }
+}
+
+/// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
+pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
+    let fragment = config.scene.fragment();
+    let xml = include_str!("../assets/workcell.xml")
+        .replace("PANDA_FILE", PANDA_FILE)
+        .replace("<!-- SCENE -->", &(fragment.sections + sections));
+    let mut assets = fragment.files;
+    let fovy_deg = match &config.wrist_camera {
+        Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
+        None => None,
+    };
+    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg));
+    Ok(Arc::new(Model::from_xml(&xml, &assets)?))
 }
 
 fn is_arm(body: &str) -> bool {

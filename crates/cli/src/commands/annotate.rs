@@ -9,6 +9,7 @@ use sdg_annotate::{Server, Session, SessionOptions};
 use serde_json::json;
 
 use crate::args::AnnotateArgs;
+use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
@@ -18,6 +19,8 @@ use crate::page_teacher::PageTeacher;
 /// Serves the page until Ctrl-C.
 pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
+    let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
+    let camera = camera.map(|camera| (camera, args.camera.heights_m()));
     let images: Vec<(PathBuf, Option<PathBuf>)> = args.images.iter().map(|argument| split(argument)).collect();
     // Marks are made for minutes before the first is written.
     files::check_writable(&images[0].0.with_extension("json"))?;
@@ -25,7 +28,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         files::check_writable(out)?;
     }
     let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone() };
-    let session = Session::open(&options, Arc::new(PageTeacher { preset }))?;
+    let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;
     let url = server.url();
     if args.json {

@@ -7,17 +7,16 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use image::{ImageFormat, RgbImage};
 use sdg_calibration::Frame;
-use sdg_grasp::{
-    CheckConfig, DetectionRecord, GraspDetection, GraspModel, PlanDetection, PlanDetector, PlanarPose, Verification,
-};
+use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::args::DetectArgs;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::{Outcome, one_line};
 use crate::files;
+use crate::found_record::FoundRecord;
+use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
@@ -35,14 +34,15 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }
-    let looking = Looking::new(args, model)?;
+    let detector =
+        PictureDetector::new(model, args.camera.as_deref()).with_context(|| args.grasp_model.display().to_string())?;
     let mut stdout = std::io::stdout().lock();
     let (mut found_any, mut failed) = (false, 0);
     for path in &args.images {
-        match detect(args, &looking, path) {
+        match detect(args, &detector, path) {
             Ok(seen) => {
                 found_any |= seen.detections.iter().any(|found| found.detection.is_accepted());
-                seen.write(&mut stdout, args, &looking, path)?;
+                seen.write(&mut stdout, args, &detector, path)?;
             }
             Err(error) => {
                 failed += 1;
@@ -64,60 +64,6 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
 }
 
-/// A model, and the camera that it looks through.
-enum Looking {
-    /// At pictures of any camera.
-    Anyhow(Box<GraspModel>),
-    /// At those of a calibrated one.
-    Through(Box<CameraFile>, Box<PlanDetector>),
-}
-
-/// A detection, in metres as well where the camera is known.
-struct Found {
-    detection: GraspDetection,
-    pose: Option<PlanarPose>,
-}
-
-impl Looking {
-    fn new(args: &DetectArgs, model: GraspModel) -> Result<Self> {
-        let Some(path) = &args.camera else { return Ok(Self::Anyhow(Box::new(model))) };
-        let camera = CameraFile::read(path)?;
-        let detector =
-            PlanDetector::new(model, &camera.over_table).with_context(|| args.grasp_model.display().to_string())?;
-        Ok(Self::Through(Box::new(camera), Box::new(detector)))
-    }
-
-    fn detect(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
-        match self {
-            Self::Anyhow(model) => {
-                let found = model.detect(image, verification)?;
-                Ok(found.into_iter().map(|detection| Found { detection, pose: None }).collect())
-            }
-            Self::Through(camera, detector) => {
-                camera.check_picture(image)?;
-                let found = detector.detect(image, verification)?;
-                let metric = |PlanDetection { detection, pose }| Found { detection, pose: Some(pose) };
-                Ok(found.into_iter().map(metric).collect())
-            }
-        }
-    }
-
-    /// What is said where nothing was found, besides what was nearly found.
-    fn advice(&self, size: (u32, u32)) -> Option<String> {
-        match self {
-            Self::Anyhow(model) => of_other_size(model, size),
-            Self::Through(..) => None,
-        }
-    }
-
-    fn frame(&self) -> Option<Frame> {
-        match self {
-            Self::Anyhow(_) => None,
-            Self::Through(camera, _) => Some(camera.frame),
-        }
-    }
-}
-
 /// An image and everything that was detected in it.
 struct Seen {
     size: (u32, u32),
@@ -125,11 +71,11 @@ struct Seen {
     detections: Vec<Found>,
 }
 
-fn detect(args: &DetectArgs, looking: &Looking, path: &Path) -> Result<Seen> {
+fn detect(args: &DetectArgs, detector: &PictureDetector, path: &Path) -> Result<Seen> {
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let image = files::read_image(path)?;
     let start = Instant::now();
-    let detections = looking.detect(&image, verification).with_context(|| path.display().to_string())?;
+    let detections = detector.detect(&image, verification).with_context(|| path.display().to_string())?;
     let seconds = start.elapsed().as_secs_f64();
     if let Some(folder) = &args.draw {
         let drawn: Vec<GraspDetection> = detections.iter().map(|found| found.detection.clone()).collect();
@@ -139,7 +85,7 @@ fn detect(args: &DetectArgs, looking: &Looking, path: &Path) -> Result<Seen> {
 }
 
 impl Seen {
-    fn write(mut self, out: &mut impl Write, args: &DetectArgs, looking: &Looking, path: &Path) -> Result<()> {
+    fn write(mut self, out: &mut impl Write, args: &DetectArgs, detector: &PictureDetector, path: &Path) -> Result<()> {
         let best = self.detections.first().map(|best| best.detection.clone());
         let best_refused = best.filter(|best| !best.is_accepted());
         if !args.all {
@@ -151,29 +97,17 @@ impl Seen {
                 width: self.size.0,
                 height: self.size.1,
                 seconds: self.seconds,
-                detections: self.detections.iter().map(|found| found.record(looking.frame())).collect(),
+                detections: self.detections.iter().map(|found| FoundRecord::new(found, detector.frame())).collect(),
             };
             writeln!(out, "{}", serde_json::to_string(&line)?)?;
             return Ok(());
         }
         if best_refused.is_some() || self.detections.is_empty() {
             let almost = best_refused.and_then(|refused| almost(&refused));
-            let advice = almost.or_else(|| looking.advice(self.size)).unwrap_or_default();
+            let advice = almost.or_else(|| of_other_size(detector, self.size)).unwrap_or_default();
             writeln!(out, "{}: nothing to grasp{advice}", path.display())?;
         }
-        self.detections.iter().try_for_each(|found| write_text(out, path, found, looking.frame()))
-    }
-}
-
-impl Found {
-    fn record(&self, frame: Option<Frame>) -> FoundRecord {
-        let pose = self.pose.zip(frame).map(|(pose, frame)| PoseRecord {
-            frame,
-            p_m: pose.position_m.coords.into(),
-            yaw_deg: pose.yaw.degrees(),
-            opening_m: pose.opening_m,
-        });
-        FoundRecord { detection: DetectionRecord::from(&self.detection), pose }
+        self.detections.iter().try_for_each(|found| write_text(out, path, found, detector.frame()))
     }
 }
 
@@ -188,7 +122,8 @@ fn almost(refused: &GraspDetection) -> Option<String> {
 }
 
 /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
-fn of_other_size(model: &GraspModel, (width, height): (u32, u32)) -> Option<String> {
+fn of_other_size(detector: &PictureDetector, (width, height): (u32, u32)) -> Option<String> {
+    let PictureDetector::AnyCamera(model) = detector else { return None };
     let photo = model.demonstrations().iter().find_map(|demonstration| demonstration.marks.photo_size)?;
     (photo != [width, height] && photo != [height, width]).then(|| {
         let [photo_width, photo_height] = photo;
@@ -209,8 +144,10 @@ fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Fr
         let name = frame.name();
         let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
         format!(
-            " = {name} ({x:.1}, {y:.1}, {z:.1}) mm, yaw {:.1}°, open {:.1} mm",
+            " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
+            1e3 * pose.uncertainty.position_m,
             pose.yaw.degrees(),
+            pose.uncertainty.yaw_rad.to_degrees(),
             1e3 * pose.opening_m
         )
     });
@@ -249,24 +186,6 @@ struct ImageLine {
     height: u32,
     seconds: f64,
     detections: Vec<FoundRecord>,
-}
-
-/// A detection and, with a camera, its pose.
-#[derive(Serialize)]
-struct FoundRecord {
-    #[serde(flatten)]
-    detection: DetectionRecord,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pose: Option<PoseRecord>,
-}
-
-/// Where the gripper is to close; metres and degrees, the turn about the frame's z.
-#[derive(Serialize)]
-struct PoseRecord {
-    frame: Frame,
-    p_m: [f64; 3],
-    yaw_deg: f64,
-    opening_m: f64,
 }
 
 /// A line of `--json` for an image that cannot be used.

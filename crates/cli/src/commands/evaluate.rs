@@ -42,6 +42,9 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     if let Some(names) = &args.axes {
         return super::evaluate_axes::run(args, names);
     }
+    if let Some(names) = &args.cameras {
+        return super::evaluate_cameras::run(args, names);
+    }
     let models = models(&args.models)?;
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let (preset, settings) = settings(args)?;

@@ -12,6 +12,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, Truth, in_words, judge, page, to_json};
+use crate::picture_detector::PictureDetector;
 use crate::progress::EvaluationProgress;
 
 /// Where the page goes unless `--report` says otherwise; not among the user's pictures.
@@ -25,7 +26,9 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         );
     };
     let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
-    let labelled = LabelledFolder::read(folder, &model, args.label.as_deref())?;
+    let detector = PictureDetector::new(model, args.camera.as_deref())?;
+    let model = detector.model();
+    let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
     files::prepare_folder(&report_folder)?;
 
@@ -37,9 +40,10 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     for picture in labelled.pictures {
         let image = files::read_image(&picture.path)?;
         let start = Instant::now();
-        let detections = model.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
+        let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
         let seconds = start.elapsed().as_secs_f64();
-        let truths = picture.instances.iter().map(|instance| Truth::new(instance, model.demonstrations())).collect();
+        let truths = picture.instances.iter().map(|instance| Truth::new(instance, &detector)).collect();
+        let detections = found.into_iter().map(|found| found.detection).collect();
         let of_picture = Tested { picture, truths, detections, seconds };
         let judged = judge(&of_picture, symmetry, args.min_score);
         progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
@@ -50,7 +54,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let evaluated = Evaluated {
         folder,
         model_file,
-        model: &model,
+        model,
         verification,
         min_score: args.min_score,
         tested,
@@ -94,12 +98,15 @@ fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
         line(format!("false alarms on {} pictures without the part", totals.false_alarms));
     }
     if let Some(errors) = totals.errors {
+        let mm = |mm: Option<f64>| mm.map(|mm| format!(" = {mm:.2} mm")).unwrap_or_default();
         line(format!(
-            "errors: median {:.2} px ({:.2} % of the diagonal), {:.2}°; 95 % within {:.2} px ({:.2} %), {:.2}°",
+            "errors: median {:.2} px{} ({:.2} % of the diagonal), {:.2}°; 95 % within {:.2} px{} ({:.2} %), {:.2}°",
             errors.median_px,
+            mm(errors.median_mm),
             errors.median_percent,
             errors.median_deg,
             errors.p95_px,
+            mm(errors.p95_mm),
             errors.p95_percent,
             errors.p95_deg
         ));
@@ -118,6 +125,9 @@ fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
     let mut command = format!("sdg evaluate --pictures {} --grasp-model {}", folder.display(), model_file.display());
     // Writing into a string cannot fail.
     let _ = write!(command, " --min-score {}", args.min_score);
+    if let Some(camera) = &args.camera {
+        let _ = write!(command, " --camera {}", camera.display());
+    }
     if let Some(label) = &args.label {
         let _ = write!(command, " --label {label}");
     }

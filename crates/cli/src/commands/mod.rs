@@ -14,6 +14,8 @@ pub mod devices;
 pub mod evaluate;
 #[cfg(feature = "simulation")]
 pub mod evaluate_axes;
+#[cfg(feature = "simulation")]
+pub mod evaluate_cameras;
 pub mod evaluate_pictures;
 pub mod man;
 #[cfg(feature = "simulation")]

@@ -2,13 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use anyhow::Result;
-use sdg_grasp::Verification;
+use anyhow::{Context, Result};
+use sdg_grasp::{GraspError, Verification};
 use sdg_report::Attempt;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use crate::args::RehearseArgs;
+use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
@@ -20,6 +21,10 @@ use crate::run_page::{self, RunPage};
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let object = ObjectSpec::by_name(&args.object)?;
     let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
+    if camera.is_some() && model.facts().lengths.is_none() {
+        return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
+    }
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal = Rehearsal {
@@ -29,16 +34,20 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         seed: args.seed,
         verification,
         errors: RehearsalErrors::default(),
+        camera,
     };
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
-    let command = format!(
+    let mut command = format!(
         "sdg rehearse --grasp-model {} --object {} --attempts {} --seed {}",
         args.grasp_model.display(),
         args.object,
         args.attempts,
         args.seed
     );
+    if let Some(camera) = &args.camera {
+        command += &format!(" --camera {}", camera.display());
+    }
     let page = RunPage { model: &model, object: &object, rehearsed: &rehearsed, command: &command };
     let report = run_page::rehearsal(&page)?.write(&args.out)?;
     finish(&page, None, &report, args.json)

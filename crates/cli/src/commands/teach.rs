@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, seen_from_above, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::json;
@@ -35,13 +35,13 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         ..TeachOptions::new(args.seed)
     };
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
-    if let Some(path) = &args.camera {
+    if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;
-        for (demonstration, argument) in demonstrations.iter().zip(&args.demonstrations) {
-            camera.check_picture(&demonstration.image).with_context(|| argument.clone())?;
+        for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
+            camera.check_picture(&photo.image).with_context(|| argument.clone())?;
         }
-        let [mark, grasp] = heights_m(args);
-        let (seen, lengths) = seen_from_above(&demonstrations, &camera.over_table, mark, grasp)?;
+        let [mark, grasp] = args.camera.heights_m();
+        let (seen, lengths) = camera.seen_from_above(&demonstrations, mark, grasp)?;
         demonstrations = seen;
         options.lengths = Some(lengths);
     }
@@ -104,12 +104,6 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// Heights over the table of the marks and of the grasp, in metres.
-fn heights_m(args: &TeachArgs) -> [f64; 2] {
-    let mark = args.mark_height_mm.unwrap_or_default();
-    [mark, args.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
-}
-
 /// The command that makes the same model again.
 fn command(args: &TeachArgs) -> String {
     let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
@@ -128,8 +122,8 @@ fn command(args: &TeachArgs) -> String {
     if args.size_tolerance.range() != CheckConfig::DEFAULT_SIZE_TOLERANCE {
         option("size-tolerance", format!("{}-{}", args.size_tolerance.low, args.size_tolerance.high));
     }
-    if let Some(camera) = &args.camera {
-        let [mark, grasp] = heights_m(args).map(|height| (1e3 * height).to_string());
+    if let Some(camera) = &args.camera.file {
+        let [mark, grasp] = args.camera.heights_m().map(|height| (1e3 * height).to_string());
         option("camera", camera.display().to_string());
         option("mark-height-mm", mark);
         option("grasp-height-mm", grasp);

@@ -105,6 +105,8 @@ pub enum Marks {
     Shipped,
     /// Those, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
     Jittered,
+    /// Those of the shipped demonstration, in the plan view of the camera that took it.
+    InPlanView,
 }
 
 impl Marks {
@@ -113,6 +115,7 @@ impl Marks {
         match self {
             Self::Shipped => "",
             Self::Jittered => "-jittered-marks",
+            Self::InPlanView => "-plan-view",
         }
     }
 }

@@ -17,6 +17,7 @@
 
 mod attempting;
 pub mod axes;
+pub mod cameras;
 mod cell;
 mod groups;
 mod looking;

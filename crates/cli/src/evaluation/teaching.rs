@@ -3,8 +3,10 @@
 use std::ops::ControlFlow;
 
 use anyhow::Result;
-use sdg_grasp::{Event, History, Preset, StepRecord, TeachOptions, teach};
+use sdg_demonstration::Demonstration;
+use sdg_grasp::{CameraOverTable, Event, History, Lengths, Preset, StepRecord, TeachOptions, seen_from_above, teach};
 use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::demonstration_view;
 
 use super::axes::{MARKS_JITTER_PX, with_jittered_marks};
 use super::cell::{Cell, Marks};
@@ -39,15 +41,22 @@ impl Teaching<'_> {
         let settings = self.store.settings();
         let object = ObjectSpec::by_name(cell.object)?;
         let shipped = shipped::demonstration(cell.object)?;
-        let demonstration = match marks {
-            Marks::Shipped => shipped,
-            Marks::Jittered => with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object)),
+        let (demonstration, lengths) = match marks {
+            Marks::Shipped => (shipped, None),
+            Marks::Jittered => {
+                (with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object)), None)
+            }
+            Marks::InPlanView => {
+                let (demonstration, lengths) = in_plan_view(&object, shipped)?;
+                (demonstration, Some(lengths))
+            }
         };
         let options = TeachOptions {
             kind: cell.network().model,
             preset: self.preset,
             symmetry: object.symmetry,
             steps: settings.steps.map(|steps| steps as usize),
+            lengths,
             ..TeachOptions::new(settings.seed)
         };
         // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
@@ -82,6 +91,14 @@ impl Teaching<'_> {
         self.store.write_made_with(&cell.teaching_file(marks), &settings.teaching(), &record)?;
         Ok(Some(said))
     }
+}
+
+/// The shipped demonstration in the plan view of the simulator's camera, which took it.
+fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstration, Lengths)> {
+    let camera = demonstration_view(object)?.view.camera;
+    let over_table = CameraOverTable { camera, table_height_m: 0.0, workspace: None };
+    let (mut seen, lengths) = seen_from_above(&[shipped], &over_table, object.mark_height_m, object.grasp_height_m)?;
+    Ok((seen.remove(0), lengths))
 }
 
 /// The curve of a teaching, coarse enough to keep.

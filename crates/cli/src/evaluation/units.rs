@@ -245,6 +245,7 @@ impl Evaluation<'_> {
             seed,
             verification,
             errors: RehearsalErrors::default(),
+            camera: None,
         };
         let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
         Ok(attempts.map(|attempts| {

@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use super::taught::taught_grasps;
 use crate::files;
+use crate::picture_detector::PictureDetector;
 
 /// Pictures by the ends of their names.
 const PICTURE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
@@ -82,15 +83,15 @@ impl LabelledFolder {
     /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
     /// marks of a picture of another size or outside the picture, two files that label one picture, an instance
     /// without a grasp that is not optional, and several labels out of which none is chosen.
-    pub fn read(folder: &Path, model: &GraspModel, label: Option<&str>) -> Result<Self> {
+    pub fn read(folder: &Path, detector: &PictureDetector, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let assigned = assign(folder, &mut left_out)?;
         let read = assigned.pictures.iter().map(|(picture, labels)| {
             let (path, file) = &assigned.label_files[*labels];
-            read_picture(picture, path, file, model)
+            read_picture(picture, path, file, detector)
         });
         let read = read.collect::<Result<Vec<_>>>()?;
-        let label = chosen_label(folder, &read, model, label)?;
+        let label = chosen_label(folder, &read, detector.model(), label)?;
         let mut pictures = Vec::new();
         let mut others = 0;
         for picture in read {
@@ -213,7 +214,7 @@ struct ReadPicture {
     taught: Vec<nalgebra::Point2<f64>>,
 }
 
-fn read_picture(path: &Path, labels: &Path, file: &LabelFile, model: &GraspModel) -> Result<ReadPicture> {
+fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &PictureDetector) -> Result<ReadPicture> {
     let image = files::read_image(path)?;
     let (width, height) = image.dimensions();
     let name = file_name(path);
@@ -224,7 +225,7 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, model: &GraspModel
         labels: labels.to_owned(),
         size: [width, height],
         instances,
-        taught: taught_grasps(&image, model.demonstrations()),
+        taught: detector.taught_grasps(&image, taught_grasps).with_context(|| path.display().to_string())?,
     })
 }
 

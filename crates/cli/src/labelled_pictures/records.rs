@@ -92,7 +92,7 @@ fn picture(tested: &Tested, judged: &Judged) -> Value {
         .iter()
         .enumerate()
         .map(|(instance_idx, truth)| {
-            let grasp = truth.grasp.map(|TrueGrasp { center, angle, diagonal_px }| {
+            let grasp = truth.grasp.map(|TrueGrasp { center, angle, diagonal_px, .. }| {
                 json!({"x": center.x, "y": center.y, "angle_deg": angle.degrees(), "diagonal_px": diagonal_px})
             });
             let BoundingBox { x1, y1, x2, y2 } = truth.bbox;

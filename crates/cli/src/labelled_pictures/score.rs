@@ -8,6 +8,7 @@ use sdg_grasp::{GraspDetection, TaughtDemonstration};
 use serde::Serialize;
 
 use super::folder::{Instance, LabelledPicture};
+use crate::picture_detector::PictureDetector;
 use crate::statistics::{Share, percentile};
 
 /// A hit lies at most so far from the instance's marks, in diagonals of the instance.
@@ -41,11 +42,14 @@ pub struct TrueGrasp {
     pub angle: Angle,
     /// The demonstration's box diagonal at this instance's size.
     pub diagonal_px: f64,
+    /// What a pixel covers there in the plane of the marks, in metres, where the camera is known.
+    pub pixel_m: Option<f64>,
 }
 
 impl Truth {
     /// An instance whose size is read off the length of its marks. With several demonstrations, their mean size counts.
-    pub fn new(instance: &Instance, demonstrations: &[TaughtDemonstration]) -> Self {
+    pub fn new(instance: &Instance, detector: &PictureDetector) -> Self {
+        let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
             let marks = &demonstration.marks;
             marks.bbox.width().hypot(marks.bbox.height()) / marks.grasp.length()
@@ -55,6 +59,7 @@ impl Truth {
             center: line.center(),
             angle: line.angle(),
             diagonal_px: mean * line.length(),
+            pixel_m: detector.metres_per_pixel(&line.center()),
         });
         Self { grasp, bbox: instance.bbox, optional: instance.optional }
     }
@@ -87,6 +92,9 @@ pub struct Hit {
 pub struct HitError {
     /// Between the middles of both grasps, in pixels.
     pub px: f64,
+    /// The same in millimetres of the plane of the marks, where the camera is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mm: Option<f64>,
     /// The same in percent of the instance's diagonal.
     pub percent: f64,
     /// The turn between both, in degrees, 180 at most.
@@ -198,13 +206,14 @@ pub fn judge(tested: &Tested, symmetry: RotationalSymmetry, min_score: f64) -> J
 fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp, symmetry: RotationalSymmetry) -> Option<Hit> {
     let mut nearest: Option<(usize, HitError)> = None;
     for (instance_idx, truth) in truths.iter().enumerate().filter(|(instance_idx, _)| !taken[*instance_idx]) {
-        let Some(TrueGrasp { center, angle, diagonal_px }) = truth.grasp else { continue };
+        let Some(TrueGrasp { center, angle, diagonal_px, pixel_m }) = truth.grasp else { continue };
         let px = (grasp.center() - center).norm();
         let percent = 100.0 * px / diagonal_px;
         let deg = symmetry.distance(grasp.angle, angle).to_degrees();
         let is_hit = percent <= 100.0 * MAX_DISTANCE_DIAGONALS && deg <= MAX_ANGLE_DEG;
         if is_hit && nearest.is_none_or(|(_, best)| px < best.px) {
-            nearest = Some((instance_idx, HitError { px, percent, deg }));
+            nearest =
+                Some((instance_idx, HitError { px, mm: pixel_m.map(|pixel_m| 1e3 * pixel_m * px), percent, deg }));
         }
     }
     nearest.map(|(instance_idx, error)| Hit { instance_idx, error: Some(error) })
@@ -243,9 +252,13 @@ pub struct Totals {
 #[allow(missing_docs, reason = "the names say it")]
 pub struct Errors {
     pub median_px: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub median_mm: Option<f64>,
     pub median_percent: f64,
     pub median_deg: f64,
     pub p95_px: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p95_mm: Option<f64>,
     pub p95_percent: f64,
     pub p95_deg: f64,
 }
@@ -272,11 +285,14 @@ impl Totals {
 impl Errors {
     fn of(errors: &[&HitError]) -> Option<Self> {
         let at = |percent: f64, read: fn(&HitError) -> f64| percentile(errors.iter().map(|error| read(error)), percent);
+        let mm = |percent: f64| percentile(errors.iter().filter_map(|error| error.mm), percent);
         Some(Self {
             median_px: at(50.0, |error| error.px)?,
+            median_mm: mm(50.0),
             median_percent: at(50.0, |error| error.percent)?,
             median_deg: at(50.0, |error| error.deg)?,
             p95_px: at(95.0, |error| error.px)?,
+            p95_mm: mm(95.0),
             p95_percent: at(95.0, |error| error.percent)?,
             p95_deg: at(95.0, |error| error.deg)?,
         })
@@ -301,7 +317,12 @@ mod tests {
 
     /// An instance of 100 pixels diagonal: hits lie within 4 pixels.
     fn truth(x: f64, degrees: f64, optional: bool) -> Truth {
-        let grasp = TrueGrasp { center: Point2::new(x, 50.0), angle: Angle::from_degrees(degrees), diagonal_px: 100.0 };
+        let grasp = TrueGrasp {
+            center: Point2::new(x, 50.0),
+            angle: Angle::from_degrees(degrees),
+            diagonal_px: 100.0,
+            pixel_m: None,
+        };
         Truth { grasp: Some(grasp), bbox: BoundingBox { x1: x - 5.0, y1: 45.0, x2: x + 5.0, y2: 55.0 }, optional }
     }
 

@@ -10,14 +10,16 @@
 
 mod demonstration;
 mod picture;
+mod uncertainty;
 
 use image::RgbImage;
-use nalgebra::{Point2, Point3, Vector2};
+use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
 use self::picture::PlanMap;
+pub use self::uncertainty::{Circumstances, Uncertainty, UncertaintyConfig};
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
 
@@ -68,6 +70,19 @@ pub struct PlanarPose {
     pub yaw: Angle,
     /// The part's width between the jaws, in metres.
     pub opening_m: f64,
+    /// How far position and yaw may be off.
+    pub uncertainty: Uncertainty,
+    /// What that was concluded from.
+    pub circumstances: Circumstances,
+}
+
+impl PlanarPose {
+    /// The gripper's pose: x along the marked line, y in which the jaws close, z down to the table.
+    pub fn frame_from_tcp(&self) -> Isometry3<f64> {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw.radians());
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Isometry3::from_parts(self.position_m.into(), turn * down)
+    }
 }
 
 /// A grasp in the picture's pixels and in metres.
@@ -107,12 +122,37 @@ impl PlanDetector {
         Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map })
     }
 
+    /// The same model behind another camera, or the same camera in another place.
+    ///
+    /// # Errors
+    /// A camera that does not see the plane.
+    pub fn moved_to(self, over_table: &CameraOverTable) -> Result<Self> {
+        let view = plan_view(over_table, &self.lengths)?;
+        let map = PlanMap::new(&over_table.camera, &view);
+        Ok(Self { over_table: *over_table, view, map, ..self })
+    }
+
+    /// The model.
+    pub fn model(&self) -> &GraspModel {
+        &self.model
+    }
+
+    /// A picture of the camera as the model is shown it.
+    pub fn plan_view_of(&self, picture: &RgbImage) -> RgbImage {
+        self.map.resample(picture)
+    }
+
+    /// What a pixel of the picture covers in the plane of the marks, in metres; `None` where it does not show the plane.
+    pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
+        self.over_table.camera.metres_per_pixel(pixel, self.view.height_m)
+    }
+
     /// Finds the part in a picture of the camera, best score first, as [`GraspModel::detect`] does.
     ///
     /// # Errors
     /// As there.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<PlanDetection>> {
-        let found = self.model.detect(&self.map.resample(picture), verification)?;
+        let found = self.model.detect(&self.plan_view_of(picture), verification)?;
         Ok(found.into_iter().filter_map(|detection| self.placed(detection)).collect())
     }
 
@@ -120,20 +160,44 @@ impl PlanDetector {
     fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
-        self.view.in_picture(&self.over_table.camera, &center)?;
+        let seen = self.view.in_picture(&self.over_table.camera, &center)?;
         let above = self.over_table.table_height_m + self.lengths.grasp_height_m;
         let on_plane = self.view.point(&center);
+        let circumstances = self.circumstances(&detection, &on_plane, &seen)?;
         let pose = PlanarPose {
             position_m: Point3::new(on_plane.x, on_plane.y, above),
             // The plan view's y points against the world's.
             yaw: Angle::from_radians(-grasp.angle.radians()),
             opening_m: grasp.width / self.view.pixels_per_m,
+            uncertainty: circumstances.uncertainty(&UncertaintyConfig::default()),
+            circumstances,
         };
         Some(PlanDetection { detection: self.in_picture(detection)?, pose })
     }
 
+    /// What the errors of a detection in the plan view depend on, whose grasp is at `on_plane` in the world and at `seen` in the
+    /// picture.
+    fn circumstances(
+        &self,
+        detection: &GraspDetection,
+        on_plane: &Point3<f64>,
+        seen: &Point2<f64>,
+    ) -> Option<Circumstances> {
+        let camera = &self.over_table.camera;
+        let sight = on_plane.coords - camera.world_from_camera.translation.vector;
+        let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
+        Some(Circumstances {
+            pixel_m: camera.metres_per_pixel(seen, self.view.height_m)?,
+            slant: sight.xy().norm() / sight.z.abs(),
+            mark_height_m: self.lengths.mark_height_m,
+            diagonal_m: (x2 - x1).hypot(y2 - y1) / self.view.pixels_per_m,
+            agreement: detection.agreement.unwrap_or(0.0),
+            visible: 1.0,
+        })
+    }
+
     /// Where the picture shows a point of the plan view, be it beyond the picture's border.
-    fn shown(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
+    pub fn shown(&self, point: &Point2<f64>) -> Option<Point2<f64>> {
         self.over_table.camera.project(&self.view.point(point))
     }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
-use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, outer_outline};
+use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, PosedCamera, outer_outline};
 
 use super::light::{LightStyle, Lighting};
 use super::placement::Placement;
@@ -48,6 +48,8 @@ pub struct DemonstrationPhoto {
     pub photo_from_part: PlanarSimilarity,
     /// The camera's distance from the table, in millimetres.
     pub distance_mm: f64,
+    /// The camera that took it, in metres over the table.
+    pub camera: PosedCamera,
 }
 
 /// A photo of a part as a user would take and mark it. Another seed gives another place, light and table.
@@ -98,7 +100,12 @@ impl DemonstrationPhoto {
             jaw_width: Some(f64::from(part.grasp.jaw_width_mm) * pose.scale),
             outline: outline.filter(|outline| outline.vertices.len() >= 3),
         };
-        Self { demonstration: Demonstration { image, annotation }, photo_from_part: pose, distance_mm: distance.into() }
+        Self {
+            demonstration: Demonstration { image, annotation },
+            photo_from_part: pose,
+            distance_mm: distance.into(),
+            camera: scene.view.camera(),
+        }
     }
 }
 

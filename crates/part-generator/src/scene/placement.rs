@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use crate::Part;
 use crate::relief::{BLOCK_CELLS, Level, Texel};
 use crate::tiles::floor;
@@ -66,6 +68,15 @@ impl Placement {
     pub fn to_table(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [sin, cos] = self.sin_cos;
         [self.at[0] + cos * x - sin * y, self.at[1] + sin * x + cos * y]
+    }
+
+    /// The marks in metres, y up as in [`View::camera`](super::view::View::camera)'s frame.
+    pub fn marks_m(&self) -> [Point3<f64>; 2] {
+        let z = self.base + self.part.grasp.height_mm;
+        [self.part.grasp.start, self.part.grasp.end].map(|mark| {
+            let [x, y] = self.to_table(mark);
+            Point3::new(f64::from(x), f64::from(-y), f64::from(z)) * 1e-3
+        })
     }
 
     /// A direction in the part's frame, in the table's.

@@ -1,7 +1,8 @@
 //! A picture and the truth about it.
 
 use image::RgbImage;
-use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon};
+use nalgebra::Point3;
+use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, PosedCamera};
 
 use super::photo::Silhouette;
 use crate::{LookAlike, PartKind};
@@ -11,6 +12,8 @@ use crate::{LookAlike, PartKind};
 pub struct Instance {
     /// The marks, in pixels of the picture.
     pub grasp: GraspLine,
+    /// The marks in the frame of [`Sample::camera`], in metres.
+    pub marks_m: [Point3<f64>; 2],
     /// Width of the part between the jaws, in pixels.
     pub jaw_width_px: f64,
     /// Takes the demonstration's pixels to the picture's.
@@ -90,6 +93,8 @@ pub struct Sample {
     pub others: Vec<OtherObject>,
     /// How it was taken.
     pub conditions: Conditions,
+    /// The camera that took it, in metres over the table; its frame's y is up as in a picture from straight above.
+    pub camera: PosedCamera,
     /// For each pixel the object that it shows: instances first, then others, [`Sample::TABLE`] for none.
     pub ids: Vec<u8>,
 }

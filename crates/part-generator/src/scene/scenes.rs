@@ -137,7 +137,7 @@ impl Scenes {
                 OtherObject { kind, bbox: BoundingBox { x1, y1, x2, y2 } }
             })
             .collect();
-        Sample { image, part_idx, instances, others, conditions, ids }
+        Sample { image, part_idx, instances, others, conditions, camera: scene.view.camera(), ids }
     }
 
     /// Draws camera, light, table, and what lies where: instances first, then others with their kinds.
@@ -283,6 +283,7 @@ fn instance(subject: &Subject, scene: &Scene, body: usize, footprint: &Footprint
     let visible = ids.iter().filter(|&&id| usize::from(id) == body).count();
     Instance {
         grasp: grasp_line(&subject.part, &picture_from_part),
+        marks_m: scene.bodies[body].marks_m(),
         jaw_width_px: f64::from(subject.part.grasp().jaw_width_mm) * picture_from_part.scale,
         image_from_demonstration,
         scale: image_from_demonstration.scale,

@@ -1,5 +1,8 @@
 //! The camera over the table.
 
+use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+
 /// A pinhole camera that looks down at the table.
 ///
 /// The table's frame, in millimetres: x right and y down as in a picture from straight above, z up. (It is left-handed,
@@ -126,6 +129,29 @@ impl View {
         (x * x + y * y + z * z).sqrt() / self.focal
     }
 
+    /// The camera in metres, in a right-handed frame: x right, y up as in a picture from straight above, z up.
+    pub fn camera(&self) -> PosedCamera {
+        let flipped = |[x, y, z]: [f32; 3]| Vector3::new(f64::from(x), -f64::from(y), f64::from(z));
+        let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&self.axes.map(flipped)));
+        let [width, height] = [self.width, self.height].map(|side| side as u32);
+        let focal = f64::from(self.focal);
+        PosedCamera {
+            intrinsics: PinholeCamera {
+                width,
+                height,
+                fx: focal,
+                fy: focal,
+                cx: 0.5 * f64::from(width),
+                cy: 0.5 * f64::from(height),
+                lens: PlumbBob::NONE,
+            },
+            world_from_camera: Isometry3::from_parts(
+                (flipped(self.position) * 1e-3).into(),
+                UnitQuaternion::from_rotation_matrix(&axes),
+            ),
+        }
+    }
+
     /// The box on the table that the picture shows: [min x, min y, max x, max y].
     pub fn ground(&self) -> [f32; 4] {
         let (w, h) = (self.width as f32, self.height as f32);
@@ -151,6 +177,10 @@ mod tests {
             let seen = view.project([x, y, z]).unwrap();
             assert!((seen[0] - px).abs() < 0.01 && (seen[1] - py).abs() < 0.01, "{seen:?}");
         }
+        // The camera as others know it: the same point in metres, y up.
+        let seen = view.camera().project(&nalgebra::Point3::new(0.031, 0.012, 0.02)).unwrap();
+        let expected = view.project([31.0, -12.0, 20.0]).unwrap().map(f64::from);
+        assert!((seen - nalgebra::Point2::from(expected)).norm() < 1e-3, "{seen} {expected:?}");
         let straight = View::new(320, 240, 275.0, 400.0, 0.0, 0.0);
         // 40 mm to the right at 400 mm are 27.5 pixels.
         assert!((straight.project([40.0, 0.0, 0.0]).unwrap()[0] - 187.5).abs() < 1e-3);

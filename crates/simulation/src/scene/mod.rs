@@ -16,6 +16,7 @@ mod light;
 pub mod mesh;
 pub mod solids;
 mod table;
+mod table_camera;
 pub mod texture;
 mod views;
 
@@ -32,6 +33,7 @@ pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
 pub use table::{Table, TableSurface};
+pub use table_camera::{OnTable, TABLE_CAMERAS, TableCamera, TableView, draw, table_view};
 pub use views::{
     DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
     in_picture, test_view, test_views,

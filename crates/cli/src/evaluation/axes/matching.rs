@@ -61,7 +61,10 @@ fn nearest(errors: &[Option<DetectionError>]) -> Option<DetectionError> {
 }
 
 /// The instance that each detection finds; `errors` of every detection, best first, to every instance.
-fn match_one_to_one(errors: &[Vec<Option<DetectionError>>], accepted: &[bool]) -> Vec<Option<usize>> {
+pub(in crate::evaluation) fn match_one_to_one(
+    errors: &[Vec<Option<DetectionError>>],
+    accepted: &[bool],
+) -> Vec<Option<usize>> {
     let mut is_taken = vec![false; errors.first().map_or(0, Vec::len)];
     errors
         .iter()

@@ -26,6 +26,7 @@ mod units;
 
 pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
 pub use jitter::{MARKS_JITTER_PX, with_jittered_marks};
+pub(super) use matching::match_one_to_one;
 pub use page::page;
 pub use paired::PairedCounts;
 pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
@@ -35,4 +36,5 @@ pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, Way, lowest,
 };
 pub use tables::{markdown, tables};
+pub(super) use units::draw;
 pub use units::{AxesEvaluation, GRASPING_MODELS, RunEnd};

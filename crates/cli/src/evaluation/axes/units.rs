@@ -261,6 +261,7 @@ impl AxesEvaluation<'_> {
             seed: part_seed(settings.seed, object),
             verification: Verification::ByShape,
             errors: errors_of(condition),
+            camera: None,
         };
         let attempts = if self.is_the_protocol_s(condition) {
             let file = cell.file(&attempts_of(Verification::ByShape));
@@ -341,6 +342,7 @@ impl std::fmt::Display for Unit<'_> {
         match self {
             Self::Teach(cell, Marks::Shipped) => write!(f, "teach {} {}", cell.model, cell.object),
             Self::Teach(cell, Marks::Jittered) => write!(f, "teach {} {} from jittered marks", cell.model, cell.object),
+            Self::Teach(cell, Marks::InPlanView) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
             Self::Pictures(object, axis) => write!(f, "{axis} {}", object.name),
             Self::Grasps(cell, _, condition) => write!(f, "grasp {} {}, {}", cell.model, cell.object, condition.name()),
         }
@@ -377,7 +379,7 @@ fn errors_of(condition: GraspCondition) -> RehearsalErrors {
 
 /// Draws a picture of an axis. Where a scene leaves no place for camera, cover or instances, the next picture of the same
 /// stratum is drawn.
-fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
+pub(in crate::evaluation) fn draw(object: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
     let mut impossible = None;
     for round in 0..MAX_DRAWINGS {
         match axis_view(object, axis, number + round * PICTURES_PER_AXIS * 1000, seed) {

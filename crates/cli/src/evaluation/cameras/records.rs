@@ -1,0 +1,44 @@
+//! What the pictures of a set leave behind.
+
+use serde::{Deserialize, Serialize};
+
+/// An accepted detection beside the instance of the part that it lies nearest to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MetricAnswer {
+    /// Its score.
+    pub score: f64,
+    /// Place beside the instance, in millimetres; `None` without an instance.
+    pub error_mm: Option<f64>,
+    /// Turn beside the instance, in degrees, modulo the part's symmetry.
+    pub error_deg: Option<f64>,
+    /// What the detection says of its own place: one standard deviation of each coordinate, in millimetres.
+    pub sigma_mm: f64,
+    /// What it says of its turn, in degrees.
+    pub sigma_deg: f64,
+    /// The instance that it found: within 10 mm and 10°, and found by no better detection.
+    pub found: Option<usize>,
+}
+
+/// A picture and what a model said of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraPicture {
+    /// Which of the set's pictures.
+    pub number: u64,
+    /// Height of the camera over the table, in metres.
+    pub height_m: f64,
+    /// Its tilt from straight down, in degrees.
+    pub tilt_deg: f64,
+    /// How many of the part are in the picture.
+    pub instances: usize,
+    /// Accepted detections, best first; where there is at most one instance, the best alone.
+    pub answers: Vec<MetricAnswer>,
+}
+
+/// What a model said of all pictures of a part and set.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CameraRecord {
+    /// One each.
+    pub pictures: Vec<CameraPicture>,
+    /// A worker's seconds.
+    pub seconds: f64,
+}

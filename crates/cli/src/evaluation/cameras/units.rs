@@ -1,0 +1,214 @@
+//! What there is to do, and the doing of it.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use anyhow::Result;
+use sdg_grasp::{CameraOverTable, ModelKind, PlanDetection, PlanDetector, Preset, Verification};
+use sdg_report::DetectionError;
+use sdg_simulation::objects::ObjectSpec;
+use serde::{Deserialize, Serialize};
+
+use super::records::{CameraPicture, CameraRecord, MetricAnswer};
+use super::sets::{PictureSet, Shown};
+use crate::against_truth::grasp_error;
+use crate::evaluation::EvaluationProgress;
+use crate::evaluation::axes::match_one_to_one;
+use crate::evaluation::cell::{Cell, Marks};
+use crate::evaluation::schedule::{Task, run_all};
+use crate::evaluation::settings::TeachingSettings;
+use crate::evaluation::store::Store;
+use crate::evaluation::teaching::Teaching;
+use crate::evaluation::units::{NO_MODEL, caught};
+
+/// What is kept or lost as a whole.
+#[derive(Debug, Clone, Copy)]
+enum Unit<'a> {
+    /// A network is taught on a part in the plan view.
+    Teach(Cell<'a>),
+    /// A model looks at a part's pictures of a set.
+    Pictures(Cell<'a>, &'a ObjectSpec, PictureSet),
+}
+
+/// Models, parts and sets of pictures, and the folder for what becomes of them.
+pub struct CamerasEvaluation<'a> {
+    /// The models.
+    pub models: &'a [ModelKind],
+    /// The parts.
+    pub objects: &'a [ObjectSpec],
+    /// The sets.
+    pub sets: &'a [PictureSet],
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    /// Teachings and results.
+    pub store: &'a Store,
+    /// Pictures of each part and set.
+    pub views: u32,
+    /// Units side by side.
+    pub jobs: usize,
+}
+
+/// Everything that the results of a set depend on, apart from set, model and part.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct CameraSettings {
+    /// How pictures are drawn and scored: raised when either changes.
+    cameras: u32,
+    #[serde(flatten)]
+    teaching: TeachingSettings,
+    views: u32,
+}
+
+impl CamerasEvaluation<'_> {
+    /// Does what is not in the store yet, until `is_interrupted` says so.
+    ///
+    /// # Errors
+    /// The first error of a unit; a store that cannot be read. A teaching that leads to no model is a result.
+    pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &EvaluationProgress) -> Result<()> {
+        let tasks = self.tasks()?;
+        progress.expect(tasks.len());
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let work = |unit: &Unit| {
+            if is_interrupted() {
+                return Ok(ControlFlow::Break(()));
+            }
+            let started = Instant::now();
+            let said = caught(|| self.work(*unit, is_interrupted))?;
+            let Some(said) = said else { return Ok(ControlFlow::Break(())) };
+            progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+            Ok(ControlFlow::Continue(()))
+        };
+        run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)
+    }
+
+    /// How many units are not in the store yet.
+    pub fn remaining(&self) -> Result<usize> {
+        Ok(self.tasks()?.len())
+    }
+
+    /// What a model said of a part's pictures of a set, if it was shown them.
+    pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
+        self.store.read_made_with(&file(cell, set), &self.settings())
+    }
+
+    /// Whether the teaching of a cell led to no model.
+    pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
+        cell.is_without_model(Marks::InPlanView, self.store)
+    }
+
+    fn settings(&self) -> CameraSettings {
+        /// The pictures and their scoring of this version.
+        const CAMERAS: u32 = 1;
+        CameraSettings { cameras: CAMERAS, teaching: self.store.settings().teaching(), views: self.views }
+    }
+
+    fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
+        let mut tasks = Vec::new();
+        for object in self.objects {
+            for &model in self.models {
+                let cell = Cell { model, object: &object.name };
+                if self.is_without_model(cell)? {
+                    continue;
+                }
+                let mut after = Vec::new();
+                for &set in self.sets {
+                    if self.record(cell, set)?.is_some() {
+                        continue;
+                    }
+                    if after.is_empty() && cell.teaching_from(Marks::InPlanView, self.store)?.is_none() {
+                        after.push(tasks.len());
+                        tasks.push(Task { unit: Unit::Teach(cell.network()), after: Vec::new() });
+                    }
+                    tasks.push(Task { unit: Unit::Pictures(cell, object, set), after: after.clone() });
+                }
+            }
+        }
+        Ok(tasks)
+    }
+
+    fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        match unit {
+            Unit::Teach(cell) => {
+                let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
+                teaching.teach(cell, Marks::InPlanView, is_interrupted)
+            }
+            Unit::Pictures(cell, object, set) => self.show(cell, object, set, is_interrupted),
+        }
+    }
+
+    fn show(
+        &self,
+        cell: Cell,
+        object: &ObjectSpec,
+        set: PictureSet,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let Some(model) = cell.read_model(Marks::InPlanView, self.store)? else {
+            return Ok(Some(NO_MODEL.to_owned()));
+        };
+        let started = Instant::now();
+        let mut detector: Option<PlanDetector> = None;
+        let mut pictures = Vec::new();
+        for number in 0..u64::from(self.views) {
+            if is_interrupted() {
+                return Ok(None);
+            }
+            let shown = set.draw(object, number, u64::from(self.views), self.store.settings().seed)?;
+            let camera = CameraOverTable { camera: shown.view.camera, table_height_m: 0.0, workspace: None };
+            let looking = match detector.take() {
+                Some(detector) => detector.moved_to(&camera)?,
+                None => PlanDetector::new(model.clone(), &camera)?,
+            };
+            let found = looking.detect(&shown.view.image, Verification::ByShape)?;
+            pictures.push(judged(object, number, &shown, &found));
+            detector = Some(looking);
+        }
+        let record = CameraRecord { pictures, seconds: started.elapsed().as_secs_f64() };
+        self.store.write_made_with(&file(cell, set), &self.settings(), &record)?;
+        let answers = || record.pictures.iter().flat_map(|picture| &picture.answers);
+        let found = answers().filter(|answer| answer.found.is_some()).count();
+        Ok(Some(format!("found {found}, {} wrong", answers().count() - found)))
+    }
+}
+
+/// Accepted detections beside the truth.
+fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[PlanDetection]) -> CameraPicture {
+    let num_counted = if shown.instances.len() <= 1 { 1 } else { usize::MAX };
+    let accepted: Vec<&PlanDetection> =
+        found.iter().take_while(|found| found.detection.is_accepted()).take(num_counted).collect();
+    let errors: Vec<Vec<Option<DetectionError>>> = accepted
+        .iter()
+        .map(|found| {
+            let base_from_tcp = found.pose.frame_from_tcp();
+            shown.instances.iter().map(|instance| Some(grasp_error(object, instance, &base_from_tcp))).collect()
+        })
+        .collect();
+    let matched = match_one_to_one(&errors, &vec![true; accepted.len()]);
+    let answers = accepted.iter().zip(&errors).zip(matched).map(|((found, errors), instance)| {
+        let nearest = || errors.iter().flatten().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm)).copied();
+        let error = instance.map_or_else(nearest, |instance| errors[instance]);
+        MetricAnswer {
+            score: found.detection.score,
+            error_mm: error.map(|error| error.distance_mm),
+            error_deg: error.map(|error| error.angle_deg),
+            sigma_mm: 1e3 * found.pose.uncertainty.position_m,
+            sigma_deg: found.pose.uncertainty.yaw_rad.to_degrees(),
+            found: instance,
+        }
+    });
+    let answers = answers.collect();
+    let (height_m, tilt_deg) = shown.height_and_tilt();
+    CameraPicture { number, height_m, tilt_deg, instances: shown.instances.len(), answers }
+}
+
+fn file(cell: Cell, set: PictureSet) -> String {
+    format!("cameras/{cell}.{}.json", set.name())
+}
+
+impl std::fmt::Display for Unit<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Teach(cell) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
+            Self::Pictures(cell, _, set) => write!(f, "{} {} {}", cell.model, set.name(), cell.object),
+        }
+    }
+}

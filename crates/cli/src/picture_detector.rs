@@ -1,0 +1,113 @@
+//! A grasp model behind any camera, or behind a calibrated one.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_calibration::Frame;
+use sdg_grasp::{
+    GraspDetection, GraspModel, PlanDetection, PlanDetector, PlanarPose, TaughtDemonstration, Verification,
+};
+
+use crate::camera_files::CameraFile;
+
+/// A model, and the camera whose pictures it is shown.
+#[derive(Debug)]
+pub enum PictureDetector {
+    /// Pictures of any camera.
+    AnyCamera(Box<GraspModel>),
+    /// Those of a calibrated one.
+    Calibrated(Box<CameraFile>, Box<PlanDetector>),
+}
+
+/// A detection, in metres as well where the camera is known.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// In pixels of the picture as given.
+    pub detection: GraspDetection,
+    /// In the camera's frame.
+    pub pose: Option<PlanarPose>,
+}
+
+impl PictureDetector {
+    /// Puts a model behind the camera of a file, if one is given.
+    ///
+    /// # Errors
+    /// A camera file that cannot be used; a model that was taught without a camera.
+    pub fn new(model: GraspModel, camera: Option<&Path>) -> Result<Self> {
+        match camera {
+            None => Ok(Self::AnyCamera(Box::new(model))),
+            Some(path) => Self::calibrated(model, CameraFile::read(path)?),
+        }
+    }
+
+    /// Puts a model behind a calibrated camera.
+    ///
+    /// # Errors
+    /// A model that was taught without a camera; a camera that does not see the plane of the marks.
+    pub fn calibrated(model: GraspModel, camera: CameraFile) -> Result<Self> {
+        let detector = PlanDetector::new(model, &camera.over_table)?;
+        Ok(Self::Calibrated(Box::new(camera), Box::new(detector)))
+    }
+
+    /// Finds the part in a picture, best score first.
+    ///
+    /// # Errors
+    /// A picture of another size than the calibrated camera's.
+    pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
+        match self {
+            Self::AnyCamera(model) => {
+                let found = model.detect(picture, verification)?;
+                Ok(found.into_iter().map(|detection| Found { detection, pose: None }).collect())
+            }
+            Self::Calibrated(camera, detector) => {
+                camera.check_picture(picture)?;
+                let found = detector.detect(picture, verification)?;
+                let metric = |PlanDetection { detection, pose }| Found { detection, pose: Some(pose) };
+                Ok(found.into_iter().map(metric).collect())
+            }
+        }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &GraspModel {
+        match self {
+            Self::AnyCamera(model) => model,
+            Self::Calibrated(_, detector) => detector.model(),
+        }
+    }
+
+    /// What positions are given in, where they are.
+    pub fn frame(&self) -> Option<Frame> {
+        match self {
+            Self::AnyCamera(_) => None,
+            Self::Calibrated(camera, _) => Some(camera.frame),
+        }
+    }
+
+    /// What a pixel covers in the plane of the marks, in metres, where the camera is known.
+    pub fn metres_per_pixel(&self, pixel: &Point2<f64>) -> Option<f64> {
+        match self {
+            Self::AnyCamera(_) => None,
+            Self::Calibrated(_, detector) => detector.metres_per_pixel(pixel),
+        }
+    }
+
+    /// The middles of the grasps of those demonstrations that were cut from this very picture, in its pixels; `find` gets the
+    /// picture as the model was shown it.
+    pub fn taught_grasps(
+        &self,
+        picture: &RgbImage,
+        find: fn(&RgbImage, &[TaughtDemonstration]) -> Vec<Point2<f64>>,
+    ) -> Result<Vec<Point2<f64>>> {
+        match self {
+            Self::AnyCamera(model) => Ok(find(picture, model.demonstrations())),
+            Self::Calibrated(camera, detector) => {
+                camera.check_picture(picture).context("a labelled picture")?;
+                let found = find(&detector.plan_view_of(picture), detector.model().demonstrations());
+                Ok(found.iter().filter_map(|grasp| detector.shown(grasp)).collect())
+            }
+        }
+    }
+}

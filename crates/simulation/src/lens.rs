@@ -1,0 +1,118 @@
+//! Pictures of cameras that MuJoCo cannot draw: with distortion, and with the optical axis beside the middle.
+//!
+//! ```text
+//! PinholeCamera with its lens ─ Frustum: a symmetric pinhole picture that holds all of it, finer ─ drawn ─ resampled
+//! ```
+
+use image::{Rgb, RgbImage};
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::PinholeCamera;
+
+use crate::camera::vertical_field_of_view_rad;
+use crate::error::{Result, SimulationError};
+use crate::render::RenderConfig;
+
+/// How much finer the drawn picture is: resampling then costs no sharpness.
+const FINENESS: f64 = 1.5;
+/// Samples a side for each pixel.
+const SAMPLES: u32 = 2;
+
+/// What MuJoCo draws: a picture with its axis in the middle and no distortion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frustum {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// In pixels, for x and y.
+    pub focal_px: f64,
+}
+
+impl Frustum {
+    /// The frustum that holds all that a camera sees.
+    ///
+    /// # Errors
+    /// [`SimulationError::Configuration`] for a lens that does not reach its own picture's corners.
+    pub(crate) fn around(camera: &PinholeCamera) -> Result<Self> {
+        Self::holding(camera).ok_or_else(|| SimulationError::Configuration {
+            field: "camera.lens",
+            expected: "a lens that reaches the picture's corners".into(),
+            found: format!("{:?}", camera.lens),
+        })
+    }
+
+    fn holding(camera: &PinholeCamera) -> Option<Self> {
+        let [width, height] = [camera.width, camera.height].map(f64::from);
+        let mut half = Vector2::zeros();
+        for step in 0..=16 {
+            let share = f64::from(step) / 16.0;
+            for (x, y) in
+                [(share * width, 0.0), (share * width, height), (0.0, share * height), (width, share * height)]
+            {
+                half = half.sup(&camera.unproject(&Point2::new(x, y))?.xy().coords.abs());
+            }
+        }
+        let focal_px = FINENESS * camera.fx.max(camera.fy);
+        // A pixel more on each side for the interpolation.
+        let side = |half: f64| (2.0 * (half * focal_px).ceil() + 2.0) as u32;
+        Some(Self { width: side(half.x), height: side(half.y), focal_px })
+    }
+
+    /// What MuJoCo's camera needs to draw it.
+    pub(crate) fn vertical_field_of_view_rad(&self) -> f64 {
+        vertical_field_of_view_rad(self.focal_px, self.height)
+    }
+
+    /// How it is drawn, otherwise as `like` is.
+    pub(crate) fn render_config(&self, like: &RenderConfig) -> RenderConfig {
+        RenderConfig { width: self.width, height: self.height, ..*like }
+    }
+
+    /// The camera's picture from the drawn one.
+    pub(crate) fn resample(&self, drawn: &RgbImage, camera: &PinholeCamera) -> RgbImage {
+        let middle = Vector2::new(f64::from(self.width), f64::from(self.height)) * 0.5;
+        let color = |at: Point2<f64>| -> [f32; 3] {
+            let Some(seen) = camera.unproject(&at) else { return [0.0; 3] };
+            let source = seen.xy().coords * self.focal_px + middle - Vector2::repeat(0.5);
+            let [x, y] = [source.x as f32, source.y as f32];
+            image::imageops::interpolate_bilinear(drawn, x, y).map_or([0.0; 3], |Rgb(color)| color.map(f32::from))
+        };
+        RgbImage::from_fn(camera.width, camera.height, |x, y| {
+            let mut sum = [0.0; 3];
+            for k in 0..SAMPLES * SAMPLES {
+                let [right, down] = [k % SAMPLES, k / SAMPLES].map(|k| (f64::from(k) + 0.5) / f64::from(SAMPLES));
+                let color = color(Point2::new(f64::from(x) + right, f64::from(y) + down));
+                (0..3).for_each(|c| sum[c] += color[c]);
+            }
+            Rgb(sum.map(|sum| (sum / (SAMPLES * SAMPLES) as f32).round() as u8))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::PlumbBob;
+
+    /// What is drawn of a bright disc lies where the camera's own projection puts it.
+    #[test]
+    fn a_disc_appears_where_the_camera_projects_it() {
+        let lens = PlumbBob { k1: -0.25, k2: 0.07, p1: 0.002, p2: -0.001, k3: 0.0 };
+        let camera = PinholeCamera { width: 320, height: 240, fx: 260.0, fy: 255.0, cx: 170.0, cy: 110.0, lens };
+        let frustum = Frustum::around(&camera).unwrap();
+        let (disc, radius) = (Point2::new(0.4, -0.3), 0.012);
+        let drawn = RgbImage::from_fn(frustum.width, frustum.height, |x, y| {
+            let [x, y] = [(x, frustum.width), (y, frustum.height)]
+                .map(|(at, side)| (f64::from(at) + 0.5 - 0.5 * f64::from(side)) / frustum.focal_px);
+            Rgb([if (Point2::new(x, y) - disc).norm() < radius { 255 } else { 0 }; 3])
+        });
+        let picture = frustum.resample(&drawn, &camera);
+        let mut sum = (0.0, Vector2::zeros());
+        for (x, y, color) in picture.enumerate_pixels() {
+            let weight = f64::from(color[0]);
+            sum = (sum.0 + weight, sum.1 + weight * Vector2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+        }
+        let expected = camera.project(&nalgebra::Point3::new(disc.x, disc.y, 1.0)).unwrap();
+        assert!((Point2::from(sum.1 / sum.0) - expected).norm() < 0.05, "{} {expected}", sum.1 / sum.0);
+    }
+}
