@@ -71,7 +71,7 @@ pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, Validati
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use plan::{
-    CameraOverTable, Circumstances, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty, UncertaintyConfig,
+    CameraOverTable, Circumstances, ErrorLength, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
     seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
 use self::picture::PlanMap;
-pub use self::uncertainty::{Circumstances, Uncertainty, UncertaintyConfig};
+pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
 
@@ -169,7 +169,7 @@ impl PlanDetector {
             // The plan view's y points against the world's.
             yaw: Angle::from_radians(-grasp.angle.radians()),
             opening_m: grasp.width / self.view.pixels_per_m,
-            uncertainty: circumstances.uncertainty(&UncertaintyConfig::default()),
+            uncertainty: circumstances.uncertainty(),
             circumstances,
         };
         Some(PlanDetection { detection: self.in_picture(detection)?, pose })
@@ -192,7 +192,6 @@ impl PlanDetector {
             mark_height_m: self.lengths.mark_height_m,
             diagonal_m: (x2 - x1).hypot(y2 - y1) / self.view.pixels_per_m,
             agreement: detection.agreement.unwrap_or(0.0),
-            visible: 1.0,
         })
     }
 
