@@ -10,8 +10,12 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod board;
 mod camera_file;
+mod detection;
 mod error;
 
+pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
-pub use error::CameraFileError;
+pub use detection::{MIN_CORNERS, SeenCorner, find_board};
+pub use error::{CalibrationError, CameraFileError};
