@@ -14,8 +14,15 @@ mod board;
 mod camera_file;
 mod detection;
 mod error;
+mod homography;
+mod intrinsics;
+mod least_squares;
+mod pose;
+mod projection;
 
 pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
 pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
+pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
+pub use pose::{BoardPose, board_pose};

@@ -128,7 +128,7 @@ fn what_is_no_board_is_told_by_what_is_missing() {
         Err(CalibrationError::OtherBoard { columns: 8, rows: 6, found_columns: 9, found_rows: 6 })
     );
     // What is left of a board beyond the border of the picture.
-    let cut = camera_from_board(&board, &WIDE, [660.0, 240.0], 0.3, [0.1, 0.1, 0.0]);
+    let cut = camera_from_board(&board, &WIDE, [720.0, 240.0], 0.3, [0.1, 0.1, 0.0]);
     assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
 }
 

@@ -56,14 +56,26 @@ impl Grid {
     }
 
     /// How wide the squares around a corner are at least, in pixels: from an edge to the one opposite.
-    pub(super) fn width(&self, [i, j]: Place) -> Option<f64> {
-        let here = self.corners.get(&[i, j])?;
+    pub(super) fn width(&self, place: Place) -> Option<f64> {
         let ways = |axis: usize| {
             let of_axis = NEIGHBOURS.iter().filter(move |(_, of, _)| *of == axis);
-            of_axis.filter_map(|([di, dj], ..)| Some(self.corners.get(&[i + di, j + dj])? - here))
+            of_axis.filter_map(move |(direction, ..)| self.way(place, *direction))
         };
         let widths = ways(0).flat_map(|u| ways(1).map(move |v| u.perp(&v).abs() / u.norm().max(v.norm())));
         widths.min_by(f64::total_cmp)
+    }
+
+    /// From a corner to its neighbour. Beyond the grid's border, which the board's outer squares are, as perspective goes on: the last
+    /// two ways, and by how much they shrink.
+    fn way(&self, [i, j]: Place, [di, dj]: Place) -> Option<Vector2<f64>> {
+        let at = |steps: i32| self.corners.get(&[i + steps * di, j + steps * dj]);
+        let here = at(0)?;
+        if let Some(there) = at(1) {
+            return Some(there - here);
+        }
+        let last = here - at(-1)?;
+        let shrinkage = at(-2).map_or(1.0, |before| last.norm() / (at(-1).unwrap_or(here) - before).norm());
+        Some(last * shrinkage.min(1.0))
     }
 
     /// The corners around the square between `[i, j]` and `[i + 1, j + 1]`, where all four are there.

@@ -15,7 +15,7 @@ use super::grid::Grid;
 use super::luminance::Luminance;
 
 /// The window's radius in sides of a square: it reaches neither the next edge nor a dot.
-const WINDOW: f64 = 0.4;
+const WINDOW: f64 = 0.38;
 /// Its bounds in pixels: fewer give too few gradients; more add the lens's curvature.
 const WINDOWS_PX: [f64; 2] = [2.5, 24.0];
 /// The weight's standard deviation in radii of the window.

@@ -3,6 +3,8 @@
 //! Every pixel is the mean over its area. The lens is undone at the pixels' corners and taken as linear within a pixel.
 #![allow(dead_code)]
 
+pub mod cameras;
+
 use image::{GrayImage, Luma};
 use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
 use sdg_calibration::Board;
