@@ -19,6 +19,7 @@ mod intrinsics;
 mod least_squares;
 mod pose;
 mod projection;
+mod table;
 
 pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
@@ -26,3 +27,4 @@ pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};
+pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};
