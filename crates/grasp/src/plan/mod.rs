@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
 use self::picture::PlanMap;
+pub(crate) use self::picture::PixelRect;
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
 
@@ -116,8 +117,28 @@ impl PlanDetector {
         Ok(found.into_iter().filter_map(|detection| self.placed(detection)).collect())
     }
 
+    /// The model, for plan views of known size.
+    pub(crate) fn model(&self) -> &GraspModel {
+        &self.model
+    }
+
+    /// Width and height of the plan view.
+    pub(crate) fn view_size(&self) -> [u32; 2] {
+        [self.view.width, self.view.height]
+    }
+
+    /// The plan view of a picture.
+    pub(crate) fn view_of(&self, picture: &RgbImage) -> RgbImage {
+        self.map.resample(picture)
+    }
+
+    /// A rectangle of the plan view of a picture.
+    pub(crate) fn window_of(&self, picture: &RgbImage, window: &PixelRect) -> RgbImage {
+        self.map.resample_window(picture, window)
+    }
+
     /// `None` where the camera does not show it.
-    fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
+    pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
         self.view.in_picture(&self.over_table.camera, &center)?;
