@@ -57,6 +57,7 @@ mod sizes;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;
+mod tracking;
 mod verdict;
 mod verification;
 
@@ -83,4 +84,5 @@ pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, Vali
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use teach::{Event, Preset, Taught, TeachOptions, teach};
+pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
