@@ -34,6 +34,7 @@ mod exit;
 mod files;
 mod interrupt;
 pub mod labelled_pictures;
+mod live_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
 mod page_teacher;
