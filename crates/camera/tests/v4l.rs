@@ -30,6 +30,7 @@ fn options(width: u32, height: u32, encoding: Encoding) -> OpenOptions {
         width,
         height,
         encoding: Some(encoding),
+        fps: Some(30.0),
         stall_timeout: Duration::from_secs(1),
         ..OpenOptions::default()
     }
