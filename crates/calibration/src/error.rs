@@ -228,14 +228,10 @@ pub enum CalibrationError {
         missing: String,
     },
     /// Robot poses and pictures that do not belong together.
-    #[error(
-        "expected robot poses and pictures that agree, found {rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px{hint}"
-    )]
+    #[error("expected robot poses and pictures that agree, found {found}{hint}")]
     HandEyeDisagrees {
-        /// Reprojection.
-        rms_px: f64,
-        /// Reprojection where each picture has a pose of its own.
-        board_rms_px: f64,
+        /// By how much they do not.
+        found: String,
         /// What would explain it.
         hint: String,
     },
