@@ -12,6 +12,7 @@
 
 mod board;
 mod camera_file;
+mod camera_sections;
 mod detection;
 mod error;
 mod hand_eye;

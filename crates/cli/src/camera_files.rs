@@ -24,13 +24,8 @@ pub struct CameraFile {
 impl CameraFile {
     /// Reads a file that has the camera's pose.
     pub fn read(path: &Path) -> Result<Self> {
-        let named = || path.display().to_string();
-        let bytes = files::read(path, MAX_BYTES)?;
-        let Ok(text) = String::from_utf8(bytes) else {
-            bail!("{}: expected YAML, found bytes that are no text", path.display());
-        };
-        let camera = CalibratedCamera::from_yaml(&text).with_context(named)?;
-        let (posed, table) = camera.posed().with_context(named)?;
+        let (camera, _) = read(path)?;
+        let (posed, table) = camera.posed().with_context(|| path.display().to_string())?;
         let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
         Ok(Self { frame: table.frame, over_table, camera })
     }
@@ -39,4 +34,14 @@ impl CameraFile {
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
         Ok(self.camera.check_picture(picture.dimensions())?)
     }
+}
+
+/// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.
+pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
+    let bytes = files::read(path, MAX_BYTES)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        bail!("{}: expected YAML, found bytes that are no text", path.display());
+    };
+    let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
+    Ok((camera, text))
 }
