@@ -202,7 +202,7 @@ impl Sheet {
         // Each line of the table has 20 bytes.
         let _ = write!(pdf, "xref\n0 {size}\n0000000000 65535 f \n");
         for offset in offsets {
-            let _ = write!(pdf, "{offset:010} 00000 n \n");
+            let _ = writeln!(pdf, "{offset:010} 00000 n ");
         }
         let _ = write!(pdf, "trailer\n<< /Size {size} /Root 1 0 R /Info 6 0 R >>\nstartxref\n{start}\n%%EOF\n");
         pdf.into_bytes()

@@ -9,6 +9,9 @@ use crate::board::Board;
 use crate::error::CalibrationError;
 use crate::pose::BoardPose;
 
+/// What a robot's pose may mean instead.
+type Reading = fn(&Isometry3<f64>) -> Isometry3<f64>;
+
 /// Another reading explains what is seen where it leaves at most this share of the reprojection.
 const MAX_SHARE: f64 = 0.3;
 
@@ -28,7 +31,7 @@ pub(super) fn checked<'a>(
     };
     let rms_px = solved.as_ref().map_or(f64::INFINITY, |solved| solved.minimum.at.rms_px());
     // A camera on the hand with poses inverted is a camera beside the robot: both have one equation.
-    let readings: [(&str, fn(&Isometry3<f64>) -> Isometry3<f64>); 4] = [
+    let readings: [(&str, Reading); 4] = [
         ("rotation_xyzw seems to hold w first", w_first),
         ("the poses seem to be flange_from_base, or --mount to be the other one", Isometry3::inverse),
         ("rotation_xyzw seems to hold w first, and --mount to be the other one", |pose| w_first(pose).inverse()),
