@@ -81,6 +81,7 @@ fn a_rendered_part_is_followed_in_metres() {
             frame_from_camera: simulated.posed_camera().world_from_camera,
             workspace: None,
         }),
+        flange_from_camera: None,
     };
     let file = path(&folder, "sim.yaml");
     fs::write(&file, camera.to_yaml()).unwrap();
