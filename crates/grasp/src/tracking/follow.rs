@@ -96,6 +96,11 @@ impl SizedPart {
         &detector.model().demonstrations()[self.demonstration_idx]
     }
 
+    /// ln of a scale over the nearest that is usual.
+    pub(super) fn log_size(&self, scale: f64) -> f64 {
+        self.range.log_size(scale)
+    }
+
     /// Refines the part about `start`; `None` where too little of it lies in the frame.
     ///
     /// # Units and frames

@@ -10,9 +10,9 @@ use sdg_shape::Evidence;
 
 use super::detector::PartDetector;
 use super::follow::{Effort, Followed, SizedPart};
+use crate::facts::TurnSource;
 use crate::model::Placement;
 use crate::sighting::Sighting;
-use crate::facts::TurnSource;
 use crate::verification::Overlay;
 
 /// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
@@ -20,10 +20,15 @@ use crate::verification::Overlay;
 const VELOCITY_GAIN: f64 = 0.4;
 /// Share of a new frame in the usual agreement and in the usual size. Chosen by hand.
 const STEADY_GAIN: f64 = 0.05;
+/// Every so many frames a track is captured: snapped from frame to frame, a long part slid along itself by 2 pixels. Chosen by
+/// hand.
+const CAPTURE_EVERY: u64 = 3;
 /// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
 const MAX_FORWARD_SECS: f64 = 0.1;
 /// An agreement of less than this share of the usual one is tried again with more effort. Chosen by hand.
 const POOR_SHARE: f64 = 0.85;
+/// What the pose of a search must gain in agreement to replace the followed one. Chosen by hand.
+const MIN_GAIN: f64 = 0.005;
 /// The comparing network is asked again where the agreement is not within this ratio of what it was when it was asked last, and
 /// after this time. Chosen by hand: asking takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
@@ -83,6 +88,8 @@ pub(super) struct Track {
     network_score: f64,
     keypoint_scores: Vec<f64>,
     turn_source: TurnSource,
+    /// Where the last search has the part, in pixels of the cut-out where the track has it; tried in the next frame.
+    alternative: Option<PlanarSimilarity>,
     history: VecDeque<PastPose>,
 }
 
@@ -113,6 +120,7 @@ impl Track {
             network_score: 0.0,
             keypoint_scores: Vec::new(),
             turn_source: found.turn_source,
+            alternative: None,
             history: VecDeque::new(),
         };
         made.take_over(found, time);
@@ -128,6 +136,11 @@ impl Track {
         if let Some(log_odds) = found.likeness {
             self.likeness = Some(Likeness { log_odds, agreement: found.agreement, at: time });
         }
+    }
+
+    /// Has the pose that a search found tried in the next frame, instead of where the track was in the frame searched.
+    pub(super) fn try_instead(&mut self, past: &PastPose, found: &Placement) {
+        self.alternative = Some(past.image_from_cutout.inverse().compose(&found.image_from_cutout));
     }
 
     /// The part's middle where the cut-out lies at `image_from_cutout`, in the frame of reference.
@@ -147,7 +160,7 @@ impl Track {
 
     /// Refines the part in a frame, wherever that leads; `None` where too little of it lies in the frame.
     pub(super) fn refine(
-        &self,
+        &mut self,
         detector: &PartDetector,
         picture: &RgbImage,
         time: Duration,
@@ -155,12 +168,19 @@ impl Track {
     ) -> Option<Followed> {
         let start = self.expected(detector, time);
         let followed = self.part.follow(detector, picture, &start, effort)?;
-        let is_poor = self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady);
-        if !is_poor || effort == Effort::Captured {
-            return Some(followed);
+        let captured_from = |start: &PlanarSimilarity, followed: Followed, gain: f64| {
+            let captured = self.part.follow(detector, picture, start, Effort::Captured);
+            captured.filter(|captured| captured.agreement > followed.agreement + gain).unwrap_or(followed)
+        };
+        let followed = match self.alternative.map(|alternative| start.compose(&alternative)) {
+            Some(alternative) => captured_from(&alternative, followed, MIN_GAIN),
+            None if effort == Effort::Snapped && self.is_poor(&followed) => captured_from(&start, followed, 0.0),
+            None => followed,
+        };
+        if self.alternative.take().is_some() {
+            self.steady_scale = followed.image_from_cutout.scale;
         }
-        let captured = self.part.follow(detector, picture, &start, Effort::Captured);
-        captured.filter(|captured| captured.agreement > followed.agreement).or(Some(followed))
+        Some(followed)
     }
 
     /// What the comparing network says of the part where it was refined to; it is asked only where that may have changed.
@@ -184,6 +204,16 @@ impl Track {
             self.likeness = Some(Likeness { log_odds, agreement: followed.agreement, at: time });
         }
         self.likeness.map(|likeness| likeness.log_odds)
+    }
+
+    /// ln of its size over the nearest that is usual, without the noise from frame to frame.
+    pub(super) fn log_size(&self) -> f64 {
+        self.part.log_size(self.steady_scale)
+    }
+
+    /// How the track is refined in a frame from the last one.
+    pub(super) fn usual_effort(&self, number: u64) -> Effort {
+        if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
     /// Whether an agreement is so far below the usual one that the part is not there.
