@@ -50,8 +50,7 @@ fn main() -> Result<()> {
     let model = match model_file {
         [file, ..] => GraspModel::from_bytes(&std::fs::read(file)?, &Device::flex())?,
         [] => {
-            let options =
-                TeachOptions { kind: ModelKind::S, symmetry: part.symmetry, ..TeachOptions::new(1) };
+            let options = TeachOptions { kind: ModelKind::S, symmetry: part.symmetry, ..TeachOptions::new(1) };
             teach(&[shipped::demonstration(&part.name)?], &options, &mut |_| ControlFlow::Continue(()))?.model
         }
     };

@@ -434,8 +434,7 @@ mod tests {
         .map(|detection| Found { detection, placement: None })
         .into();
         drop_repeated(&mut found);
-        let kept: Vec<_> =
-            found.iter().map(|kept| (kept.detection.bbox.x1, kept.detection.network_score)).collect();
+        let kept: Vec<_> = found.iter().map(|kept| (kept.detection.bbox.x1, kept.detection.network_score)).collect();
         assert_eq!(kept, [(0.0, 0.7), (100.0, 0.2)]);
     }
 }

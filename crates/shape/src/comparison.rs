@@ -98,8 +98,8 @@ impl Comparison<'_> {
     /// Everything that the image says of a pose. Slower than [`Self::agreement`], which suffices to climb.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
         let (evidence, agreement) = self.evidence_without_likeness(image_from_demonstration);
-        let likeness = (agreement >= self.min_agreement)
-            .then(|| self.likeness.log_odds(self.image, image_from_demonstration));
+        let likeness =
+            (agreement >= self.min_agreement).then(|| self.likeness.log_odds(self.image, image_from_demonstration));
         Evidence { likeness, ..evidence }
     }
 

@@ -147,7 +147,8 @@ mod tests {
         let whole = template.snapped(&GradientField::new(&image), &PlanarSimilarity::IDENTITY, &REACH);
         let shifted = PlanarSimilarity { tx: -f64::from(left), ty: -f64::from(top), ..PlanarSimilarity::IDENTITY };
         let pose = template.snapped(&GradientField::new(&window), &shifted, &REACH);
-        let apart = pose.apply(&MIDDLE) + nalgebra::Vector2::new(f64::from(left), f64::from(top)) - whole.apply(&MIDDLE);
+        let apart =
+            pose.apply(&MIDDLE) + nalgebra::Vector2::new(f64::from(left), f64::from(top)) - whole.apply(&MIDDLE);
         assert!(apart.norm() < 0.01, "{apart}");
     }
 }

@@ -17,8 +17,8 @@ use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCame
 use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
-use self::picture::PlanMap;
 pub(crate) use self::picture::PixelRect;
+use self::picture::PlanMap;
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
 

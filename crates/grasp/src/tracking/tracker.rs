@@ -46,7 +46,7 @@ const MAX_CARRY_STEPS: usize = 3;
 #[derive(Debug)]
 pub struct Tracker {
     detector: Arc<PartDetector>,
-    config: TrackerConfig,
+    pub(super) config: TrackerConfig,
     frames: FrameBuffer,
     next_number: u64,
     next_id: u64,
@@ -148,7 +148,7 @@ impl Tracker {
             match self.matched(&found, frame.number) {
                 Some((idx, past, Match::Confirms)) => {
                     self.tracks[idx].track.take_over(placement, frame.time);
-                    self.tracks[idx].track.try_instead(&past, placement);
+                    self.tracks[idx].track.correct(&self.detector, &past, placement);
                 }
                 Some((idx, _, Match::Corrects)) if found.detection.is_accepted() => {
                     let id = self.tracks[idx].track.id;
@@ -227,7 +227,8 @@ impl Tracker {
     fn judge_all(&mut self, refined: &mut Vec<Option<Refined>>, number: u64, captured: Duration, arrived: Vec<Track>) {
         let detector = self.detector.clone();
         let newcomers = refined.split_off(self.tracks.len());
-        let all = self.tracks.iter().map(|tracked| &tracked.track).chain(&arrived).zip(refined.iter().chain(&newcomers));
+        let all =
+            self.tracks.iter().map(|tracked| &tracked.track).chain(&arrived).zip(refined.iter().chain(&newcomers));
         let clues: Vec<Option<Clues>> = all
             .map(|(track, refined)| {
                 let Refined { followed, likeness } = refined.as_ref()?;
@@ -282,9 +283,7 @@ impl Tracker {
     ) {
         track.accept(&self.detector, followed, number, captured);
         let lost_nearest = || {
-            let apart = |tracked: &Tracked| {
-                (tracked.part.detection.grasp.center() - shown.0.grasp.center()).norm()
-            };
+            let apart = |tracked: &Tracked| (tracked.part.detection.grasp.center() - shown.0.grasp.center()).norm();
             let lost = self.tracks.iter().enumerate();
             let lost = lost.filter(|(_, tracked)| matches!(tracked.track.standing, Standing::Lost(_)));
             lost.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1))).map(|(idx, _)| idx)
@@ -323,7 +322,9 @@ impl Tracker {
             let (before, here) = self.tracks.split_at(idx);
             let here = &here[0].part;
             let is_double = here.is_followed()
-                && before.iter().any(|other| other.part.is_followed() && are_of_same_part(&other.part.detection, &here.detection));
+                && before
+                    .iter()
+                    .any(|other| other.part.is_followed() && are_of_same_part(&other.part.detection, &here.detection));
             if is_double {
                 self.tracks.remove(idx);
             } else {

@@ -185,12 +185,7 @@ const PLACEMENT_TRIES: usize = 40;
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
 
 /// At most `count` distractors of a seed whose middles lie between bounds in the base frame, in metres.
-pub(crate) fn sample_distractors_between(
-    x_m: Range<f64>,
-    y_m: Range<f64>,
-    count: usize,
-    seed: u64,
-) -> Vec<Distractor> {
+pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
     let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
     // A strip narrower than the margins keeps its middle.
     let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
@@ -200,11 +195,8 @@ pub(crate) fn sample_distractors_between(
         distractors: count..=count,
         ..VariationConfig::default()
     };
-    let config = VariationConfig {
-        object_x_m: ordered(config.object_x_m),
-        object_y_m: ordered(config.object_y_m),
-        ..config
-    };
+    let config =
+        VariationConfig { object_x_m: ordered(config.object_x_m), object_y_m: ordered(config.object_y_m), ..config };
     sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
 }
 

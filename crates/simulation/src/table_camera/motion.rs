@@ -111,7 +111,9 @@ mod tests {
         for _ in 0..2000 {
             let (place, yaw, direction) = (mover.place, mover.yaw_rad, mover.direction);
             mover.advance(0.01);
-            assert!((mover.place - place).norm() <= 0.0005 + 1e-12 && ((mover.yaw_rad - yaw).abs() - 0.005).abs() < 1e-12);
+            assert!(
+                (mover.place - place).norm() <= 0.0005 + 1e-12 && ((mover.yaw_rad - yaw).abs() - 0.005).abs() < 1e-12
+            );
             assert!(BOUNDS.x_m[0] <= mover.place.x && mover.place.x <= BOUNDS.x_m[1]);
             assert!(BOUNDS.y_m[0] <= mover.place.y && mover.place.y <= BOUNDS.y_m[1]);
             changes += usize::from(mover.direction != direction);
