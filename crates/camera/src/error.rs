@@ -1,13 +1,80 @@
 //! What can be wrong with a camera.
 
+use crate::fault::Fault;
+
 /// Why there is no frame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum CameraError {}
+pub enum CameraError {
+    /// Text that is no camera's address.
+    #[error("expected {expected}, found \"{found}\"")]
+    Address {
+        /// What it should have been.
+        expected: String,
+        /// What it is.
+        found: String,
+    },
+    /// An address that another crate opens.
+    #[error("{address}: expected a caller that opens simulated cameras; the crate camera does not")]
+    OpenedElsewhere {
+        /// The address.
+        address: String,
+    },
+    /// The camera does not open.
+    #[error("{address}: {why}")]
+    Open {
+        /// The address, without a password.
+        address: String,
+        /// What was expected and found.
+        why: String,
+    },
+    /// A setting that the camera does not have or does not take.
+    #[error("{address}: expected a camera with the setting {setting}, found {found}")]
+    Setting {
+        /// The address.
+        address: String,
+        /// What was to be set.
+        setting: &'static str,
+        /// What there is instead.
+        found: String,
+    },
+    /// What is wrong for now; the next call goes on.
+    #[error("{camera}: {fault}")]
+    Fault {
+        /// The camera's address, without a password.
+        camera: String,
+        /// What is wrong.
+        fault: Fault,
+    },
+    /// The camera ended for good: to open it again would end likewise.
+    #[error("{camera}: {why}")]
+    Ended {
+        /// The camera's address.
+        camera: String,
+        /// What ended it.
+        why: String,
+    },
+    /// A port of 127.0.0.1 cannot be taken.
+    #[error("expected a free port of 127.0.0.1, found port {port}: {source}")]
+    Port {
+        /// The port; 0 stands for any.
+        port: u16,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
 
 impl CameraError {
     /// Whether the camera may deliver frames again: the next call tries.
     pub fn is_passing(&self) -> bool {
-        false
+        self.fault().is_some()
+    }
+
+    /// The fault, where it is one.
+    pub fn fault(&self) -> Option<&Fault> {
+        match self {
+            Self::Fault { fault, .. } => Some(fault),
+            _ => None,
+        }
     }
 }

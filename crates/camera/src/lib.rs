@@ -1,34 +1,62 @@
 //! Live pictures: one trait, and the cameras behind it.
+//!
+//! ```text
+//! Address ── open ── Source: V4L2 node, HTTP, program, folder ── Reconnecting ── Watched ── Box<dyn Camera>
+//!                    pictures of one connection                  opens again     Frame.faults   │
+//!                                                                                  LatestFrame ─┘ a thread; newest frame only
+//! MjpegServer: pictures out, to browsers on this computer
+//! ```
+//! [`Camera::next_frame`] answers within about the stall timeout, with a [`Frame`] or an error. What is wrong with a camera is a
+//! [`Fault`]: where there is a picture all the same (frozen, black, another size, back again) it stands in [`Frame::faults`]; where
+//! there is none (stale, torn, gone) it is a [`CameraError::Fault`], and the next call goes on.
+//!
+//! Absent: any knowledge of lenses and tables (crate `calibration`), the simulated camera (crate `simulation`; [`Address::Sim`] is
+//! recognised here, opened there), TLS, sound, and video codecs other than motion JPEG.
+//!
+//! ```
+//! use sdg_camera::{Address, OpenOptions, open};
+//!
+//! let folder = tempfile::tempdir()?;
+//! image::RgbImage::from_pixel(4, 2, image::Rgb([9, 99, 199])).save(folder.path().join("a.png"))?;
+//! let address: Address = format!("dir:{}", folder.path().display()).parse()?;
+//! let mut camera = open(&address, &OpenOptions::default())?;
+//! let frame = camera.next_frame()?.expect("one picture");
+//! assert_eq!((frame.number, frame.picture.dimensions()), (0, (4, 2)));
+//! assert!(camera.next_frame()?.is_none());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod address;
+mod command_line;
+mod decode;
 mod error;
+mod fault;
+mod folder;
+mod frame;
+mod http;
+mod jpeg;
+mod latest;
+mod open;
+mod options;
+mod program;
+mod reconnecting;
+mod server;
+mod source;
+mod splitter;
+pub mod v4l;
+mod watched;
+mod yuv;
 
-use std::sync::Arc;
-use std::time::SystemTime;
-
-use image::RgbImage;
-
+pub use address::{Address, NodeName, Playback};
+pub use command_line::CommandLine;
 pub use error::CameraError;
-
-/// A picture, when it was taken and by which camera.
-#[derive(Debug, Clone)]
-pub struct Frame {
-    /// The picture.
-    pub picture: RgbImage,
-    /// Counted by the camera from 0; a gap means frames that were not delivered.
-    pub number: u64,
-    /// When it was taken; where the camera does not say, when it arrived.
-    pub captured: SystemTime,
-    /// The camera's address, as it was given.
-    pub camera: Arc<str>,
-}
-
-/// A source of frames.
-pub trait Camera: Send {
-    /// Waits for the next frame; `None` where there will be none, as at the end of a folder.
-    ///
-    /// # Errors
-    /// What went wrong with this frame or this camera. After an error that [`CameraError::is_passing`] the next call goes on.
-    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError>;
-}
+pub use fault::Fault;
+pub use frame::{Camera, Frame, mean_brightness};
+pub use http::Url;
+pub use latest::LatestFrame;
+pub use open::open;
+pub use options::{Encoding, OpenOptions};
+pub use server::MjpegServer;
+pub use watched::Watched;

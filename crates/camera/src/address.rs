@@ -1,0 +1,244 @@
+//! Where a camera is, as text.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Duration;
+
+use crate::command_line::CommandLine;
+use crate::error::CameraError;
+use crate::http::Url;
+
+/// Where a camera is.
+///
+/// | text | camera |
+/// |---|---|
+/// | `v4l:` | the first V4L2 node with a format that is read here |
+/// | `v4l:/dev/video2`, `v4l:RealSense` | that node; the first node whose card's name contains that |
+/// | `http://[USER:PASSWORD@]HOST[:PORT]/PATH` | motion JPEG, or one JPEG or PNG that is fetched again and again |
+/// | `cmd:PROGRAM ARGUMENTS` | a program that writes JPEG, PNG or PPM pictures to its standard output |
+/// | `dir:FOLDER` | its PNG and JPEG files in the order of their names; options as below |
+/// | `file:PATH` | one picture, once; with `?loop` again and again |
+/// | `sim:REST` | the simulated camera, which another crate opens |
+///
+/// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures a second; without it as fast as they are
+/// read), `loop` (begins again after the last), `follow` (`dir:` alone: waits for new files). A path that contains `?` itself
+/// must be followed by one more `?`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Address {
+    /// A V4L2 node.
+    V4l(NodeName),
+    /// A server.
+    Http(Url),
+    /// A program.
+    Command(CommandLine),
+    /// The pictures in a folder.
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// How they are played.
+        playback: Playback,
+    },
+    /// One picture.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// How it is played.
+        playback: Playback,
+    },
+    /// The simulated camera: what follows `sim:`.
+    Sim(String),
+}
+
+/// Which V4L2 node.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum NodeName {
+    /// The first that has a format which is read here.
+    Any,
+    /// The one with this path.
+    Path(PathBuf),
+    /// The first whose card's name contains this, whatever the case.
+    Card(String),
+}
+
+/// How the pictures of files are played.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Playback {
+    /// Time between pictures; `None`: as fast as they are read.
+    pub interval: Option<Duration>,
+    /// Begins again after the last.
+    pub is_looped: bool,
+    /// Waits for new files after the last.
+    pub is_followed: bool,
+}
+
+impl Address {
+    /// Whether what shows now is taken, so that a frame that was not fetched is lost; files and folders wait.
+    pub fn is_live(&self) -> bool {
+        !matches!(self, Self::Folder { .. } | Self::File { .. })
+    }
+}
+
+/// What [`Address::from_str`] expects.
+const EXPECTED: &str = "an address of a camera: v4l:, v4l:/dev/video0, http://HOST/PATH, cmd:PROGRAM ARGUMENTS, dir:FOLDER, \
+                        file:PATH or sim:";
+/// Frames a second that `fps=` takes.
+const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
+
+impl FromStr for Address {
+    type Err = CameraError;
+
+    fn from_str(text: &str) -> Result<Self, CameraError> {
+        let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
+        let (kind, rest) = text.split_once(':').ok_or_else(|| refused(EXPECTED))?;
+        match kind {
+            "v4l" => Ok(Self::V4l(match rest {
+                "" => NodeName::Any,
+                path if path.starts_with('/') => NodeName::Path(path.into()),
+                card => NodeName::Card(card.to_owned()),
+            })),
+            "http" => text.parse().map(Self::Http),
+            "https" => {
+                Err(refused("http://, since TLS is not spoken here (cmd:curl -sN URL or cmd:ffmpeg fetches https)"))
+            }
+            "cmd" => rest.parse().map(Self::Command).map_err(|error| match error {
+                CameraError::Address { expected, .. } => refused(&expected),
+                other => other,
+            }),
+            "dir" => {
+                let (path, playback) = parse_playback(rest, text)?;
+                if playback.is_looped && playback.is_followed {
+                    return Err(refused("loop or follow, not both"));
+                }
+                Ok(Self::Folder { path, playback })
+            }
+            "file" => {
+                let (path, playback) = parse_playback(rest, text)?;
+                if playback.is_followed {
+                    return Err(refused("fps or loop for file:; follow is for dir:"));
+                }
+                Ok(Self::File { path, playback })
+            }
+            "sim" => Ok(Self::Sim(rest.to_owned())),
+            _ => Err(refused(EXPECTED)),
+        }
+    }
+}
+
+/// `PATH` or `PATH?fps=10&loop&follow`.
+fn parse_playback(rest: &str, text: &str) -> Result<(PathBuf, Playback), CameraError> {
+    let refused = |expected: &str| CameraError::Address { expected: expected.into(), found: text.into() };
+    let (path, options) = rest.rsplit_once('?').unwrap_or((rest, ""));
+    if path.is_empty() {
+        return Err(refused("a path"));
+    }
+    let mut playback = Playback::default();
+    for option in options.split('&').filter(|option| !option.is_empty()) {
+        match option.split_once('=') {
+            None if option == "loop" => playback.is_looped = true,
+            None if option == "follow" => playback.is_followed = true,
+            Some(("fps", number)) => {
+                let fps =
+                    number.parse().ok().filter(|fps| FPS.contains(fps)).ok_or_else(|| refused("fps=0.1 to 1000"))?;
+                playback.interval = Some(Duration::from_secs_f64(1.0 / fps));
+            }
+            _ => return Err(refused("the options fps=NUMBER, loop or follow after ?")),
+        }
+    }
+    Ok((path.into(), playback))
+}
+
+impl fmt::Display for Address {
+    /// The address as it is parsed, but without the password.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::V4l(NodeName::Any) => f.write_str("v4l:"),
+            Self::V4l(NodeName::Path(path)) => write!(f, "v4l:{}", path.display()),
+            Self::V4l(NodeName::Card(card)) => write!(f, "v4l:{card}"),
+            Self::Http(url) => write!(f, "{url}"),
+            Self::Command(line) => write!(f, "cmd:{line}"),
+            Self::Folder { path, playback } => write!(f, "dir:{}{playback}", path.display()),
+            Self::File { path, playback } => write!(f, "file:{}{playback}", path.display()),
+            Self::Sim(rest) => write!(f, "sim:{rest}"),
+        }
+    }
+}
+
+impl fmt::Display for Playback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = '?';
+        let mut option = |text: String| {
+            let result = write!(f, "{separator}{text}");
+            separator = '&';
+            result
+        };
+        if let Some(interval) = self.interval {
+            option(
+                format!("fps={:.4}", 1.0 / interval.as_secs_f64())
+                    .trim_end_matches('0')
+                    .trim_end_matches('.')
+                    .to_owned(),
+            )?;
+        }
+        if self.is_looped {
+            option("loop".to_owned())?;
+        }
+        if self.is_followed {
+            option("follow".to_owned())?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_what_they_print() {
+        for text in [
+            "v4l:",
+            "v4l:/dev/video2",
+            "v4l:RealSense",
+            "http://10.0.0.7:8080/video?size=640",
+            "cmd:ffmpeg -i 'my film.mp4' -f mjpeg -",
+            "dir:/tmp/pictures",
+            "dir:pictures?fps=10&loop",
+            "dir:pictures?follow",
+            "file:a.png?fps=0.5&loop",
+            "sim:rod-end",
+        ] {
+            assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn paths_and_options_are_told_apart_at_the_last_question_mark() {
+        let Address::Folder { path, playback } = "dir:what?now?fps=4".parse().unwrap() else { panic!() };
+        assert_eq!((path.to_str().unwrap(), playback.interval), ("what?now", Some(Duration::from_millis(250))));
+        let Address::File { path, .. } = "file:what?now?".parse().unwrap() else { panic!() };
+        assert_eq!(path.to_str().unwrap(), "what?now");
+    }
+
+    #[test]
+    fn what_is_no_address_is_refused_with_what_was_expected() {
+        for (text, expected) in [
+            ("", "address of a camera"),
+            ("/dev/video0", "v4l:/dev/video0"),
+            ("rtsp://camera/", "address of a camera"),
+            ("https://camera/", "TLS is not spoken"),
+            ("http://", "HOST"),
+            ("cmd:", "a program"),
+            ("dir:", "a path"),
+            ("dir:?loop", "a path"),
+            ("dir:a?fps=0", "0.1 to 1000"),
+            ("dir:a?fps=x", "0.1 to 1000"),
+            ("dir:a?b", "fps=NUMBER, loop or follow"),
+            ("dir:a?loop&follow", "not both"),
+            ("file:a?follow", "for dir:"),
+        ] {
+            let error = text.parse::<Address>().unwrap_err().to_string();
+            assert!(error.contains(expected) && error.contains(&format!("\"{text}\"")), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! What can be wrong with a camera that is open.
+
+use std::fmt;
+
+/// One thing that is wrong with a camera or a frame.
+///
+/// | fault | where |
+/// |---|---|
+/// | `Stale`, `Torn`, `Gone` | [`CameraError::Fault`](crate::CameraError::Fault): there is no picture |
+/// | `Frozen`, `Black`, `OtherSize`, `Back` | [`Frame::faults`](crate::Frame::faults), beside the picture |
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Fault {
+    /// No frame within the stall timeout.
+    Stale {
+        /// Seconds since the last frame, or since the camera was opened.
+        silent_secs: f64,
+    },
+    /// A frame that did not arrive whole, or that cannot be decoded; it is not delivered.
+    Torn {
+        /// What arrived.
+        found: String,
+    },
+    /// The connection is lost; each further call tries to open it again.
+    Gone {
+        /// What ended it, or why it cannot be opened again.
+        why: String,
+    },
+    /// The same bits many times in a row; a sensor's noise differs in every frame.
+    Frozen {
+        /// How many frames in a row, this one included.
+        num_frames: u32,
+    },
+    /// Hardly a pixel that is not near 0, as with a cap on the lens.
+    Black,
+    /// The picture has another size than the frame before.
+    OtherSize {
+        /// Width and height before.
+        before: (u32, u32),
+        /// Width and height now.
+        now: (u32, u32),
+    },
+    /// The first frame after [`Fault::Gone`].
+    Back {
+        /// Seconds without a connection.
+        away_secs: f64,
+    },
+}
+
+impl Fault {
+    /// The name in JSON: one word in small letters.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Stale { .. } => "stale",
+            Self::Torn { .. } => "torn",
+            Self::Gone { .. } => "gone",
+            Self::Frozen { .. } => "frozen",
+            Self::Black => "black",
+            Self::OtherSize { .. } => "other-size",
+            Self::Back { .. } => "back",
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stale { silent_secs } => write!(f, "stale: no frame for {silent_secs:.1} s"),
+            Self::Torn { found } => write!(f, "torn: expected a whole picture, found {found}"),
+            Self::Gone { why } => write!(f, "gone: {why}"),
+            Self::Frozen { num_frames } => write!(f, "frozen: the same picture {num_frames} times in a row"),
+            Self::Black => write!(f, "black: hardly a pixel that is not near 0"),
+            Self::OtherSize { before, now } => {
+                write!(f, "other size: {} × {} pixels, before {} × {}", now.0, now.1, before.0, before.1)
+            }
+            Self::Back { away_secs } => write!(f, "back after {away_secs:.1} s"),
+        }
+    }
+}

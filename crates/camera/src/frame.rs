@@ -1,0 +1,70 @@
+//! A picture with its origin, and the trait of all cameras.
+
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use image::RgbImage;
+
+use crate::error::CameraError;
+use crate::fault::Fault;
+
+/// A picture, when it was taken and by which camera.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// The picture.
+    pub picture: RgbImage,
+    /// Counted by the camera from 0; a gap means frames that were not delivered.
+    pub number: u64,
+    /// When it was taken; where the camera does not say, when it arrived.
+    pub captured: SystemTime,
+    /// The camera's address as it was given, but without the password.
+    pub camera: Arc<str>,
+    /// What is wrong with it; empty where nothing is.
+    pub faults: Vec<Fault>,
+}
+
+impl Frame {
+    /// A frame without faults that was captured now.
+    pub fn new(picture: RgbImage, number: u64, camera: Arc<str>) -> Self {
+        Self { picture, number, captured: SystemTime::now(), camera, faults: Vec::new() }
+    }
+}
+
+/// A source of frames.
+pub trait Camera: Send {
+    /// Waits for the next frame; `None` where there will be none, as at the end of a folder.
+    ///
+    /// # Errors
+    /// What went wrong with this frame or this camera. After an error that [`CameraError::is_passing`] the next call goes on.
+    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError>;
+}
+
+impl<C: Camera + ?Sized> Camera for Box<C> {
+    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
+        (**self).next_frame()
+    }
+}
+
+/// The mean of all channels of all pixels, 0 to 255; 0 for a picture without pixels.
+pub fn mean_brightness(picture: &RgbImage) -> f64 {
+    let bytes = picture.as_raw();
+    // Rows of 4 KiB fit into u32 and are added without conversion to u64, which is four times as fast.
+    let sum: u64 =
+        bytes.chunks(1 << 12).map(|row| u64::from(row.iter().map(|&byte| u32::from(byte)).sum::<u32>())).sum();
+    sum as f64 / bytes.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn brightness_is_the_mean_of_all_channels() {
+        let mut picture = RgbImage::from_pixel(3000, 2, Rgb([10, 20, 30]));
+        assert_eq!(mean_brightness(&picture), 20.0);
+        picture.put_pixel(0, 0, Rgb([10, 20, 30 + 180]));
+        assert_eq!(mean_brightness(&picture), 20.0 + 180.0 / 18000.0);
+        assert_eq!(mean_brightness(&RgbImage::new(0, 0)), 0.0);
+    }
+}

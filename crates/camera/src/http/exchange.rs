@@ -1,0 +1,171 @@
+//! One request and the head of its answer.
+
+use std::io::{self, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::{Duration, Instant};
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::body::{Body, Framing};
+use super::url::Url;
+
+/// More than any camera's head.
+pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
+/// More headers than any camera's.
+pub(super) const MAX_HEADERS: usize = 64;
+/// From an address to the pictures.
+const MAX_REDIRECTS: u32 = 5;
+
+/// An answer with status 200.
+pub(super) struct Answer {
+    pub(super) content_type: String,
+    pub(super) body: Body,
+}
+
+/// Asks and follows redirects.
+///
+/// # Errors
+/// In words, why there is no answer with a body.
+pub(super) fn get(url: &Url, deadline: Instant) -> Result<Answer, String> {
+    let mut url = url.clone();
+    for _ in 0..=MAX_REDIRECTS {
+        match get_once(&url, deadline)? {
+            Reply::Answer(answer) => return Ok(answer),
+            Reply::Redirect(location) => url = url.redirected(&location)?,
+        }
+    }
+    Err(format!("expected pictures, found more than {MAX_REDIRECTS} redirects, the last to {url}"))
+}
+
+enum Reply {
+    Answer(Answer),
+    Redirect(String),
+}
+
+fn get_once(url: &Url, deadline: Instant) -> Result<Reply, String> {
+    let mut stream = connect(url, deadline)?;
+    let authorization = url
+        .credentials()
+        .map_or_else(String::new, |credentials| format!("Authorization: Basic {}\r\n", STANDARD.encode(credentials)));
+    let request = format!(
+        "GET {} HTTP/1.1\r\nHost: {}\r\n{authorization}User-Agent: sdg\r\nAccept: multipart/x-mixed-replace, image/jpeg, \
+         image/png\r\nConnection: close\r\n\r\n",
+        url.path(),
+        url.authority()
+    );
+    let left = time_left(deadline).ok_or("no answer in time")?;
+    stream.set_write_timeout(Some(left)).and_then(|()| stream.write_all(request.as_bytes())).map_err(in_words)?;
+
+    let mut bytes = Vec::new();
+    loop {
+        if let Some((head, length)) = Head::read(&bytes)? {
+            bytes.drain(..length);
+            // 100 Continue and its like stand before the answer.
+            if (100..200).contains(&head.status) {
+                continue;
+            }
+            return head.into_reply(stream, bytes);
+        }
+        if bytes.len() > MAX_HEAD_BYTES {
+            return Err(format!("expected a head of at most {MAX_HEAD_BYTES} bytes, found more"));
+        }
+        let left = time_left(deadline).ok_or("expected an answer, found none in time")?;
+        stream.set_read_timeout(Some(left)).map_err(in_words)?;
+        let mut piece = [0; 4096];
+        match stream.read(&mut piece).map_err(in_words)? {
+            0 => return Err(format!("expected an answer, found the connection closed after {} bytes", bytes.len())),
+            count => bytes.extend_from_slice(&piece[..count]),
+        }
+    }
+}
+
+fn connect(url: &Url, deadline: Instant) -> Result<TcpStream, String> {
+    let addresses =
+        (url.host(), url.port()).to_socket_addrs().map_err(|error| format!("{} is not known: {error}", url.host()))?;
+    let mut why = format!("{} has no number", url.host());
+    for address in addresses {
+        let left = time_left(deadline).ok_or("no connection in time")?;
+        match TcpStream::connect_timeout(&address, left) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => why = format!("no connection to {address}: {}", in_words(error)),
+        }
+    }
+    Err(why)
+}
+
+/// `None` when it is over.
+pub(super) fn time_left(deadline: Instant) -> Option<Duration> {
+    // A read timeout of 0 is refused by the system; less than a millisecond is as good as nothing.
+    deadline.checked_duration_since(Instant::now()).filter(|left| *left >= Duration::from_millis(1))
+}
+
+/// The system's message; that of a timeout depends on the system.
+pub(super) fn in_words(error: io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => "nothing in time".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// What counts of an answer's head.
+#[derive(Debug, Default, PartialEq, Eq)]
+struct Head {
+    status: u16,
+    content_type: String,
+    location: Option<String>,
+    length: Option<String>,
+    is_chunked: bool,
+}
+
+impl Head {
+    /// The head and its length; `None` while it has not all arrived.
+    fn read(bytes: &[u8]) -> Result<Option<(Self, usize)>, String> {
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+        let mut answer = httparse::Response::new(&mut headers);
+        let parsed = answer.parse(bytes).map_err(|error| format!("expected an answer of HTTP/1.1, found {error}"))?;
+        let httparse::Status::Complete(length) = parsed else {
+            return Ok(None);
+        };
+        let mut head = Self { status: answer.code.unwrap_or_default(), ..Self::default() };
+        for header in answer.headers.iter() {
+            let value = String::from_utf8_lossy(header.value).trim().to_owned();
+            match header.name.to_ascii_lowercase().as_str() {
+                "content-type" => head.content_type = value,
+                "location" => head.location = Some(value),
+                "content-length" => head.length = Some(value),
+                "transfer-encoding" => head.is_chunked = value.to_ascii_lowercase().ends_with("chunked"),
+                _ => {}
+            }
+        }
+        Ok(Some((head, length)))
+    }
+
+    fn into_reply(self, stream: TcpStream, rest: Vec<u8>) -> Result<Reply, String> {
+        match self.status {
+            200 => {}
+            301 | 302 | 303 | 307 | 308 => {
+                return self
+                    .location
+                    .map(Reply::Redirect)
+                    .ok_or_else(|| "expected a redirect's target, found none".to_owned());
+            }
+            401 => {
+                return Err(
+                    "expected http://USER:PASSWORD@HOST/… with the camera's user and password, found status 401".into(),
+                );
+            }
+            other => return Err(format!("expected status 200, found {other}")),
+        }
+        let framing = match self.length {
+            _ if self.is_chunked => Framing::chunked(),
+            None => Framing::UntilClose,
+            Some(length) => {
+                let left =
+                    length.parse().map_err(|_| format!("expected a number as Content-Length, found \"{length}\""))?;
+                Framing::Length { left }
+            }
+        };
+        Ok(Reply::Answer(Answer { content_type: self.content_type, body: Body::new(stream, rest, framing)? }))
+    }
+}

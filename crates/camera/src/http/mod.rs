@@ -1,0 +1,44 @@
+//! Cameras over HTTP/1.1: motion JPEG as `multipart/x-mixed-replace`, and single pictures that are fetched again and again.
+//!
+//! ```text
+//! Url ── exchange: connect, request, head, redirects ── Body: framing ─┬─ Multipart ── MotionJpeg   (one connection)
+//!                                                                      └─ one picture ── Snapshots  (a connection each)
+//! ```
+//! A small client of its own: what cameras speak needs no more, and everything that a server can send is bounded in memory and
+//! in time. Absent: TLS, compression, cookies, proxies, digest authentication, keep-alive between snapshots.
+
+mod body;
+mod exchange;
+mod motion_jpeg;
+mod multipart;
+mod snapshots;
+mod url;
+
+use std::time::Instant;
+
+use crate::error::CameraError;
+use crate::options::OpenOptions;
+use crate::source::Source;
+
+pub use url::Url;
+
+/// Asks the server and finds out by its answer which of the two it is.
+pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
+    let refused = |why: String| CameraError::Open { address: url.to_string(), why };
+    let answer = exchange::get(url, deadline).map_err(refused)?;
+    let kind = answer.content_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
+    match kind.as_str() {
+        "image/jpeg" | "image/jpg" | "image/png" => {
+            Ok(Box::new(snapshots::Snapshots::new(url.clone(), answer, options)))
+        }
+        _ if kind.starts_with("multipart/") => {
+            let source = motion_jpeg::MotionJpeg::new(&answer.content_type, answer.body).map_err(refused)?;
+            Ok(Box::new(source))
+        }
+        _ => Err(refused(format!(
+            "expected pictures (multipart/x-mixed-replace, image/jpeg or image/png), found {}; the address of a camera's page is \
+             not that of its pictures",
+            if kind.is_empty() { "no content type" } else { &kind }
+        ))),
+    }
+}

@@ -1,0 +1,76 @@
+//! Motion JPEG: one answer that does not end, a picture in each part.
+
+use std::time::{Duration, Instant, SystemTime};
+
+use super::body::{Body, Progress};
+use super::multipart::Multipart;
+use crate::decode::decode;
+use crate::source::{Missing, Source, Taken};
+
+/// For so long, newer pictures that have arrived are looked for. A server that sends faster than that can be read would be followed
+/// for ever.
+const MAX_CATCH_UP: Duration = Duration::from_millis(20);
+
+/// One connection.
+pub(super) struct MotionJpeg {
+    multipart: Multipart,
+    body: Body,
+    /// How the connection ended, found while looking for newer pictures.
+    end: Option<Result<Progress, String>>,
+}
+
+impl MotionJpeg {
+    /// # Errors
+    /// In words, a content type without a boundary.
+    pub(super) fn new(content_type: &str, body: Body) -> Result<Self, String> {
+        Ok(Self { multipart: Multipart::new(content_type)?, body, end: None })
+    }
+
+    /// Goes on to the newest part that has arrived; counts those that it passes over.
+    fn catch_up(&mut self, mut part: Vec<u8>) -> (Vec<u8>, u64) {
+        let start = Instant::now();
+        let mut num_skipped = 0;
+        // Broken framing is met again, and told, by the next call.
+        loop {
+            match self.multipart.next_part() {
+                Ok(Some(newer)) => {
+                    part = newer;
+                    num_skipped += 1;
+                }
+                Ok(None) if start.elapsed() < MAX_CATCH_UP => match self.body.read(self.multipart.buffer(), None) {
+                    Ok(Progress::More) => {}
+                    Ok(Progress::Late) => return (part, num_skipped),
+                    end => {
+                        self.end = Some(end);
+                        return (part, num_skipped);
+                    }
+                },
+                _ => return (part, num_skipped),
+            }
+        }
+    }
+}
+
+impl Source for MotionJpeg {
+    fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing> {
+        loop {
+            if let Some(part) = self.multipart.next_part().map_err(Missing::Gone)? {
+                let (part, num_skipped) = self.catch_up(part);
+                let captured = SystemTime::now();
+                let picture = decode(&part).map_err(Missing::Torn)?;
+                return Ok(Some(Taken { picture, captured, num_skipped }));
+            }
+            match self.end.take().unwrap_or_else(|| self.body.read(self.multipart.buffer(), Some(deadline))) {
+                Ok(Progress::More) => {}
+                Ok(Progress::Late) => return Err(Missing::Late),
+                Ok(Progress::End) if self.multipart.is_in_part() => {
+                    return Err(Missing::Gone(
+                        "the server closed the connection in the middle of a picture".to_owned(),
+                    ));
+                }
+                Ok(Progress::End) => return Err(Missing::Gone("the server closed the connection".to_owned())),
+                Err(why) => return Err(Missing::Gone(why)),
+            }
+        }
+    }
+}

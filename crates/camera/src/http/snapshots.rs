@@ -1,0 +1,62 @@
+//! Single pictures, fetched again and again.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant, SystemTime};
+
+use super::body::Progress;
+use super::exchange::{Answer, get};
+use super::url::Url;
+use crate::decode::{MAX_ENCODED_BYTES, decode};
+use crate::options::OpenOptions;
+use crate::source::{Missing, Source, Taken};
+
+/// A server of single pictures.
+pub(super) struct Snapshots {
+    url: Url,
+    /// The answer that showed that these are single pictures.
+    first: Option<Answer>,
+    interval: Duration,
+    next_at: Instant,
+}
+
+impl Snapshots {
+    pub(super) fn new(url: Url, first: Answer, options: &OpenOptions) -> Self {
+        let fps = options.fps.unwrap_or(OpenOptions::DEFAULT_SNAPSHOT_FPS);
+        Self { url, first: Some(first), interval: Duration::from_secs_f64(1.0 / fps), next_at: Instant::now() }
+    }
+}
+
+impl Source for Snapshots {
+    fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing> {
+        let wait = self.next_at.saturating_duration_since(Instant::now());
+        sleep(wait);
+        // The time between pictures, which was asked for, is not the camera's.
+        let deadline = deadline + wait;
+        self.next_at = Instant::now() + self.interval;
+        let mut answer = match self.first.take() {
+            Some(answer) => answer,
+            None => get(&self.url, deadline).map_err(Missing::Gone)?,
+        };
+        if !answer.content_type.trim_start().to_ascii_lowercase().starts_with("image/") {
+            return Err(Missing::Gone(format!("expected a picture, found {}", answer.content_type)));
+        }
+        let mut bytes = Vec::new();
+        loop {
+            match answer.body.read(&mut bytes, Some(deadline)) {
+                Ok(Progress::More) if bytes.len() > MAX_ENCODED_BYTES => {
+                    return Err(Missing::Gone(format!(
+                        "expected a picture of at most {MAX_ENCODED_BYTES} bytes, found more"
+                    )));
+                }
+                Ok(Progress::More) => {}
+                Ok(Progress::End) => break,
+                // The rest of a picture that is late is not waited for: the next one is asked for anew.
+                Ok(Progress::Late) => return Err(Missing::Late),
+                Err(why) => return Err(Missing::Torn(format!("{} bytes, then: {why}", bytes.len()))),
+            }
+        }
+        let captured = SystemTime::now();
+        let picture = decode(&bytes).map_err(Missing::Torn)?;
+        Ok(Some(Taken { picture, captured, num_skipped: 0 }))
+    }
+}

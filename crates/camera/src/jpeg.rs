@@ -1,0 +1,218 @@
+//! Where a JPEG ends, and the Huffman tables that webcams leave out.
+
+use std::borrow::Cow;
+
+/// What is known of a JPEG that grows at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum JpegEnd {
+    /// It has so many bytes, its end marker included.
+    At(usize),
+    /// More bytes are needed.
+    NotYet,
+    /// No JPEG goes on like this; the bytes before this position can be thrown away.
+    Broken(usize),
+}
+
+/// Walks over the markers of a JPEG, without decoding it. It goes on where it stopped, so that a growing buffer is read once.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct JpegScanner {
+    position: usize,
+    /// Within the entropy-coded data that follows a start of scan.
+    is_in_scan: bool,
+    first_scan: Option<usize>,
+    has_huffman_tables: bool,
+}
+
+const START: u8 = 0xd8;
+const END: u8 = 0xd9;
+const START_OF_SCAN: u8 = 0xda;
+const HUFFMAN_TABLES: u8 = 0xc4;
+
+impl JpegScanner {
+    /// Walks on. `bytes` begin with the start marker, and with what they began with in the call before.
+    pub(crate) fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
+        if self.position == 0 {
+            match bytes {
+                [0xff, START, ..] => self.position = 2,
+                [] | [0xff] => return JpegEnd::NotYet,
+                _ => return JpegEnd::Broken(bytes.len()),
+            }
+        }
+        loop {
+            if self.is_in_scan {
+                // Entropy-coded data has 0xff only before 0x00 and before the restart markers.
+                let rest = &bytes[self.position..];
+                match rest.windows(2).position(|pair| pair[0] == 0xff && !matches!(pair[1], 0x00 | 0xd0..=0xd7)) {
+                    Some(marker) => self.position += marker,
+                    None => {
+                        self.position += rest.len().saturating_sub(1);
+                        return JpegEnd::NotYet;
+                    }
+                }
+                self.is_in_scan = false;
+            }
+            let Some(&[prefix, marker]) = bytes.get(self.position..self.position + 2).and_then(|b| b.first_chunk())
+            else {
+                return JpegEnd::NotYet;
+            };
+            if prefix != 0xff {
+                return JpegEnd::Broken(self.position);
+            }
+            match marker {
+                0xff => self.position += 1,
+                END => return JpegEnd::At(self.position + 2),
+                // The next picture begins within this one: its rest was lost.
+                START => return JpegEnd::Broken(self.position),
+                0x01 | 0xd0..=0xd7 => self.position += 2,
+                _ => {
+                    let Some(&length) = bytes.get(self.position + 2..self.position + 4).and_then(|b| b.first_chunk())
+                    else {
+                        return JpegEnd::NotYet;
+                    };
+                    match marker {
+                        HUFFMAN_TABLES => self.has_huffman_tables = true,
+                        START_OF_SCAN => {
+                            self.first_scan.get_or_insert(self.position);
+                            self.is_in_scan = true;
+                        }
+                        _ => {}
+                    }
+                    let length = usize::from(u16::from_be_bytes(length));
+                    if length < 2 {
+                        return JpegEnd::Broken(self.position + 2);
+                    }
+                    if bytes.len() < self.position + 2 + length {
+                        // Looked at again when there is more: the flags above are set once more.
+                        self.is_in_scan = false;
+                        return JpegEnd::NotYet;
+                    }
+                    self.position += 2 + length;
+                }
+            }
+        }
+    }
+}
+
+/// The one JPEG that the bytes begin with, without what follows it, and with Huffman tables.
+///
+/// Motion JPEG (AVI1, USB video class) may leave out the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2; they are
+/// put before the first scan then.
+///
+/// # Errors
+/// In words, what is found where there is no whole JPEG.
+pub(crate) fn whole_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
+    let mut scanner = JpegScanner::default();
+    let end = match scanner.advance(bytes) {
+        JpegEnd::At(end) => end,
+        JpegEnd::NotYet => return Err(format!("a JPEG that ends after {} bytes without its end marker", bytes.len())),
+        JpegEnd::Broken(at) => return Err(format!("a JPEG that breaks off after {at} of {} bytes", bytes.len())),
+    };
+    let jpeg = &bytes[..end];
+    match scanner.first_scan {
+        None => Err(format!("a JPEG of {end} bytes without a picture in it")),
+        Some(_) if scanner.has_huffman_tables => Ok(Cow::Borrowed(jpeg)),
+        Some(scan) => Ok(Cow::Owned([&jpeg[..scan], &STANDARD_HUFFMAN_TABLES, &jpeg[scan..]].concat())),
+    }
+}
+
+/// The segment with the four tables of annex K: luminance and chrominance DC, luminance and chrominance AC.
+#[rustfmt::skip]
+const STANDARD_HUFFMAN_TABLES: [u8; 420] = [
+    0xff, 0xc4, 0x01, 0xa2, 0x00, 0x00, 0x01, 0x05, 0x01, 0x01, 0x01, 0x01, 0x01, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00,
+    0x00, 0x00, 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x09, 0x0a, 0x0b, 0x01, 0x00, 0x03, 0x01, 0x01, 0x01, 0x01,
+    0x01, 0x01, 0x01, 0x01, 0x01, 0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x07, 0x08, 0x09,
+    0x0a, 0x0b, 0x10, 0x00, 0x02, 0x01, 0x03, 0x03, 0x02, 0x04, 0x03, 0x05, 0x05, 0x04, 0x04, 0x00, 0x00, 0x01, 0x7d, 0x01,
+    0x02, 0x03, 0x00, 0x04, 0x11, 0x05, 0x12, 0x21, 0x31, 0x41, 0x06, 0x13, 0x51, 0x61, 0x07, 0x22, 0x71, 0x14, 0x32, 0x81,
+    0x91, 0xa1, 0x08, 0x23, 0x42, 0xb1, 0xc1, 0x15, 0x52, 0xd1, 0xf0, 0x24, 0x33, 0x62, 0x72, 0x82, 0x09, 0x0a, 0x16, 0x17,
+    0x18, 0x19, 0x1a, 0x25, 0x26, 0x27, 0x28, 0x29, 0x2a, 0x34, 0x35, 0x36, 0x37, 0x38, 0x39, 0x3a, 0x43, 0x44, 0x45, 0x46,
+    0x47, 0x48, 0x49, 0x4a, 0x53, 0x54, 0x55, 0x56, 0x57, 0x58, 0x59, 0x5a, 0x63, 0x64, 0x65, 0x66, 0x67, 0x68, 0x69, 0x6a,
+    0x73, 0x74, 0x75, 0x76, 0x77, 0x78, 0x79, 0x7a, 0x83, 0x84, 0x85, 0x86, 0x87, 0x88, 0x89, 0x8a, 0x92, 0x93, 0x94, 0x95,
+    0x96, 0x97, 0x98, 0x99, 0x9a, 0xa2, 0xa3, 0xa4, 0xa5, 0xa6, 0xa7, 0xa8, 0xa9, 0xaa, 0xb2, 0xb3, 0xb4, 0xb5, 0xb6, 0xb7,
+    0xb8, 0xb9, 0xba, 0xc2, 0xc3, 0xc4, 0xc5, 0xc6, 0xc7, 0xc8, 0xc9, 0xca, 0xd2, 0xd3, 0xd4, 0xd5, 0xd6, 0xd7, 0xd8, 0xd9,
+    0xda, 0xe1, 0xe2, 0xe3, 0xe4, 0xe5, 0xe6, 0xe7, 0xe8, 0xe9, 0xea, 0xf1, 0xf2, 0xf3, 0xf4, 0xf5, 0xf6, 0xf7, 0xf8, 0xf9,
+    0xfa, 0x11, 0x00, 0x02, 0x01, 0x02, 0x04, 0x04, 0x03, 0x04, 0x07, 0x05, 0x04, 0x04, 0x00, 0x01, 0x02, 0x77, 0x00, 0x01,
+    0x02, 0x03, 0x11, 0x04, 0x05, 0x21, 0x31, 0x06, 0x12, 0x41, 0x51, 0x07, 0x61, 0x71, 0x13, 0x22, 0x32, 0x81, 0x08, 0x14,
+    0x42, 0x91, 0xa1, 0xb1, 0xc1, 0x09, 0x23, 0x33, 0x52, 0xf0, 0x15, 0x62, 0x72, 0xd1, 0x0a, 0x16, 0x24, 0x34, 0xe1, 0x25,
+    0xf1, 0x17, 0x18, 0x19, 0x1a, 0x26, 0x27, 0x28, 0x29, 0x2a, 0x35, 0x36, 0x37, 0x38, 0x39, 0x3a, 0x43, 0x44, 0x45, 0x46,
+    0x47, 0x48, 0x49, 0x4a, 0x53, 0x54, 0x55, 0x56, 0x57, 0x58, 0x59, 0x5a, 0x63, 0x64, 0x65, 0x66, 0x67, 0x68, 0x69, 0x6a,
+    0x73, 0x74, 0x75, 0x76, 0x77, 0x78, 0x79, 0x7a, 0x82, 0x83, 0x84, 0x85, 0x86, 0x87, 0x88, 0x89, 0x8a, 0x92, 0x93, 0x94,
+    0x95, 0x96, 0x97, 0x98, 0x99, 0x9a, 0xa2, 0xa3, 0xa4, 0xa5, 0xa6, 0xa7, 0xa8, 0xa9, 0xaa, 0xb2, 0xb3, 0xb4, 0xb5, 0xb6,
+    0xb7, 0xb8, 0xb9, 0xba, 0xc2, 0xc3, 0xc4, 0xc5, 0xc6, 0xc7, 0xc8, 0xc9, 0xca, 0xd2, 0xd3, 0xd4, 0xd5, 0xd6, 0xd7, 0xd8,
+    0xd9, 0xda, 0xe2, 0xe3, 0xe4, 0xe5, 0xe6, 0xe7, 0xe8, 0xe9, 0xea, 0xf2, 0xf3, 0xf4, 0xf5, 0xf6, 0xf7, 0xf8, 0xf9, 0xfa,
+];
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use image::codecs::jpeg::JpegEncoder;
+    use image::{Rgb, RgbImage};
+
+    /// A picture of many colours and edges as JPEG.
+    pub(crate) fn jpeg(width: u32, height: u32) -> Vec<u8> {
+        let picture = RgbImage::from_fn(width, height, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8]));
+        let mut bytes = Vec::new();
+        JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(&picture).unwrap();
+        bytes
+    }
+
+    /// The bytes of each segment before the first scan, and what follows them.
+    fn segments(jpeg: &[u8]) -> (Vec<&[u8]>, &[u8]) {
+        let (mut found, mut at) = (Vec::new(), 2);
+        while jpeg[at + 1] != START_OF_SCAN {
+            let end = at + 2 + usize::from(u16::from_be_bytes([jpeg[at + 2], jpeg[at + 3]]));
+            found.push(&jpeg[at..end]);
+            at = end;
+        }
+        (found, &jpeg[at..])
+    }
+
+    /// As webcams send it.
+    pub(crate) fn without_tables(jpeg: &[u8]) -> Vec<u8> {
+        let (segments, rest) = segments(jpeg);
+        let kept: Vec<u8> = segments.into_iter().filter(|s| s[1] != HUFFMAN_TABLES).flatten().copied().collect();
+        [&jpeg[..2], &kept, rest].concat()
+    }
+
+    #[test]
+    fn tables_that_were_left_out_are_put_in() {
+        let original = jpeg(40, 30);
+        assert!(matches!(whole_jpeg(&original), Ok(Cow::Borrowed(same)) if same == original));
+        let bare = without_tables(&original);
+        assert_eq!(
+            bare.len(),
+            original.len() - 432,
+            "four segments of the encoder: 420 bytes of tables, 12 of markers"
+        );
+        let decode = |bytes: &[u8]| image::load_from_memory(bytes).map(|picture| picture.to_rgb8());
+        assert!(decode(&bare).is_err(), "the decoder needs the tables");
+        assert_eq!(decode(&whole_jpeg(&bare).unwrap()).unwrap(), decode(&original).unwrap());
+    }
+
+    #[test]
+    fn what_follows_the_end_is_cut_off_and_what_has_no_end_is_refused() {
+        let original = jpeg(40, 30);
+        let padded = [original.as_slice(), &[0; 9]].concat();
+        assert_eq!(whole_jpeg(&padded).unwrap(), original);
+        for length in [2, 3, 20, 300, original.len() / 2, original.len() - 1] {
+            let error = whole_jpeg(&original[..length]).unwrap_err();
+            assert!(error.contains(&format!("ends after {length} bytes")), "{error}");
+        }
+        assert!(whole_jpeg(&[0xff, START, 0xff, END]).unwrap_err().contains("without a picture"));
+        assert!(whole_jpeg(b"GIF89a").unwrap_err().contains("breaks off"));
+        // The first half, then the next picture.
+        let torn = [&original[..700], &original].concat();
+        assert!(whole_jpeg(&torn).unwrap_err().contains("breaks off after 700 of"));
+    }
+
+    #[test]
+    fn a_growing_jpeg_is_walked_over_in_any_pieces() {
+        let original = jpeg(64, 48);
+        for piece in [1, 2, 3, 7, 100] {
+            let mut scanner = JpegScanner::default();
+            for end in (0..original.len()).step_by(piece) {
+                assert_eq!(scanner.advance(&original[..end]), JpegEnd::NotYet, "{end} of {}", original.len());
+            }
+            assert_eq!(scanner.advance(&original), JpegEnd::At(original.len()));
+        }
+    }
+}

@@ -1,0 +1,245 @@
+//! Pictures to browsers on this computer, as motion JPEG.
+
+use std::io::{Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, OnceLock, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use image::RgbImage;
+use image::codecs::jpeg::JpegEncoder;
+
+use crate::error::CameraError;
+
+/// Of JPEG, 1 to 100: at 90 thin lines keep their colours.
+const QUALITY: u8 = 90;
+/// A browser that takes nothing for so long is disconnected.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// A request that has not arrived after this is not waited for.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(5);
+/// Between looks at whether the server ends, where no picture comes.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
+/// More than the windows of one user.
+const MAX_CONNECTIONS: usize = 32;
+/// More than a browser sends.
+const MAX_REQUEST_BYTES: usize = 16 << 10;
+
+const PAGE: &str = "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>sdg</title>\n\
+                    <style>body{margin:0;background:#222}img{display:block;max-width:100%;margin:auto}</style>\n\
+                    <img src=\"/stream\" alt=\"The live picture\"></html>\n";
+
+/// A server on 127.0.0.1 that shows the pictures which are published, to any number of browsers.
+///
+/// | path | answer |
+/// |---|---|
+/// | `/` | a page with the live picture |
+/// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
+/// | `/snapshot.jpg` | the newest picture; status 503 before the first |
+///
+/// [`publish`](Self::publish) never waits: a picture is encoded when the first browser wants it, and a slow browser gets the newest one
+/// when it is ready for it. Only requests that name 127.0.0.1 or localhost with this port are answered, and none from other pages: a
+/// name that was made to point here, or a page elsewhere, does not get the pictures.
+pub struct MjpegServer {
+    shared: Arc<Shared>,
+    port: u16,
+    thread: Option<JoinHandle<()>>,
+}
+
+#[derive(Default)]
+struct Shared {
+    newest: Mutex<Option<Arc<Published>>>,
+    changed: Condvar,
+    is_stopped: AtomicBool,
+    num_connections: AtomicUsize,
+}
+
+struct Published {
+    number: u64,
+    picture: RgbImage,
+    /// Encoded by whoever wants it first.
+    jpeg: OnceLock<Vec<u8>>,
+}
+
+impl Published {
+    fn jpeg(&self) -> &[u8] {
+        self.jpeg.get_or_init(|| {
+            let mut bytes = Vec::new();
+            // A picture without pixels is no JPEG; nobody can look at it either.
+            let _ = JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(&self.picture);
+            bytes
+        })
+    }
+}
+
+impl MjpegServer {
+    /// Takes a port of 127.0.0.1; 0 for any that is free.
+    ///
+    /// # Errors
+    /// [`CameraError::Port`] for one that is taken.
+    pub fn start(port: u16) -> Result<Self, CameraError> {
+        let failed = |source| CameraError::Port { port, source };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
+        let port = listener.local_addr().map_err(failed)?.port();
+        let shared = Arc::new(Shared::default());
+        let serving = Arc::clone(&shared);
+        let thread = std::thread::spawn(move || accept(&listener, port, &serving));
+        Ok(Self { shared, port, thread: Some(thread) })
+    }
+
+    /// The address of the page.
+    pub fn url(&self) -> String {
+        format!("http://127.0.0.1:{}/", self.port)
+    }
+
+    /// Shows a picture in place of the one before.
+    pub fn publish(&self, picture: RgbImage) {
+        let mut newest = self.shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let number = newest.as_ref().map_or(0, |published| published.number + 1);
+        *newest = Some(Arc::new(Published { number, picture, jpeg: OnceLock::new() }));
+        drop(newest);
+        self.shared.changed.notify_all();
+    }
+}
+
+impl Drop for MjpegServer {
+    fn drop(&mut self) {
+        self.shared.is_stopped.store(true, Ordering::SeqCst);
+        self.shared.changed.notify_all();
+        // Wakes the thread, which waits for a connection.
+        let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port));
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn accept(listener: &TcpListener, port: u16, shared: &Arc<Shared>) {
+    for stream in listener.incoming() {
+        if shared.is_stopped.load(Ordering::SeqCst) {
+            return;
+        }
+        let Ok(stream) = stream else {
+            // A connection that broke before it was taken, or no more files: the next one may do.
+            std::thread::sleep(Duration::from_millis(10));
+            continue;
+        };
+        if shared.num_connections.fetch_add(1, Ordering::SeqCst) >= MAX_CONNECTIONS {
+            shared.num_connections.fetch_sub(1, Ordering::SeqCst);
+            continue;
+        }
+        let shared = Arc::clone(shared);
+        std::thread::spawn(move || {
+            // A browser that has gone away is no error.
+            let _ = serve(stream, port, &shared);
+            shared.num_connections.fetch_sub(1, Ordering::SeqCst);
+        });
+    }
+}
+
+fn serve(mut stream: TcpStream, port: u16, shared: &Shared) -> std::io::Result<()> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(REQUEST_TIMEOUT))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    match read_path(&mut stream, port)? {
+        Err((status, why)) => respond(&mut stream, status, "text/plain; charset=utf-8", why.as_bytes()),
+        Ok(path) => match path.as_str() {
+            "/" => respond(&mut stream, "200 OK", "text/html; charset=utf-8", PAGE.as_bytes()),
+            "/stream" => stream_pictures(&mut stream, shared),
+            "/snapshot.jpg" => {
+                let newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                match newest {
+                    Some(published) => respond(&mut stream, "200 OK", "image/jpeg", published.jpeg()),
+                    None => respond(&mut stream, "503 Service Unavailable", "text/plain", b"there is no picture yet\n"),
+                }
+            }
+            _ => respond(&mut stream, "404 Not Found", "text/plain", b"there are /, /stream and /snapshot.jpg\n"),
+        },
+    }
+}
+
+/// The path of a request that may be answered; otherwise a status and the reason.
+type Asked = Result<String, (&'static str, &'static str)>;
+
+fn read_path(stream: &mut TcpStream, port: u16) -> std::io::Result<Asked> {
+    let mut bytes = Vec::new();
+    loop {
+        let mut headers = [httparse::EMPTY_HEADER; 64];
+        let mut request = httparse::Request::new(&mut headers);
+        match request.parse(&bytes) {
+            Ok(httparse::Status::Complete(_)) => return Ok(judge(&request, port)),
+            Ok(httparse::Status::Partial) if bytes.len() <= MAX_REQUEST_BYTES => {}
+            _ => return Ok(Err(("400 Bad Request", "expected a request of HTTP/1.1\n"))),
+        }
+        let mut piece = [0; 4096];
+        match stream.read(&mut piece)? {
+            0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
+            count => bytes.extend_from_slice(&piece[..count]),
+        }
+    }
+}
+
+fn judge(request: &httparse::Request<'_, '_>, port: u16) -> Asked {
+    let values = |name: &'static str| {
+        let named = request.headers.iter().filter(move |header| header.name.eq_ignore_ascii_case(name));
+        named.map(|header| String::from_utf8_lossy(header.value).trim().to_owned())
+    };
+    let names = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
+    let is_own = |name: &str| names.iter().any(|own| own == name);
+    let mut hosts = values("host");
+    if !(hosts.next().is_some_and(|host| is_own(&host)) && hosts.next().is_none()) {
+        return Err(("403 Forbidden", "this server answers to 127.0.0.1 and localhost only\n"));
+    }
+    if !values("origin").all(|origin| origin.strip_prefix("http://").is_some_and(is_own)) {
+        return Err(("403 Forbidden", "this server answers its own page only\n"));
+    }
+    if request.method != Some("GET") {
+        return Err(("405 Method Not Allowed", "expected GET\n"));
+    }
+    Ok(request.path.unwrap_or_default().split('?').next().unwrap_or_default().to_owned())
+}
+
+/// Every answer ends its connection, is not stored, and is not shown within other pages.
+fn head(status: &str, content_type: &str) -> String {
+    format!(
+        "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nConnection: close\r\nCache-Control: no-store\r\n\
+         X-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin\r\nContent-Security-Policy: default-src 'none'; \
+         img-src 'self'; style-src 'unsafe-inline'; frame-ancestors 'none'\r\n"
+    )
+}
+
+fn respond(stream: &mut TcpStream, status: &str, content_type: &str, body: &[u8]) -> std::io::Result<()> {
+    stream.write_all(format!("{}Content-Length: {}\r\n\r\n", head(status, content_type), body.len()).as_bytes())?;
+    stream.write_all(body)?;
+    stream.shutdown(std::net::Shutdown::Write)
+}
+
+fn stream_pictures(stream: &mut TcpStream, shared: &Shared) -> std::io::Result<()> {
+    let kind = "multipart/x-mixed-replace; boundary=sdg-picture";
+    stream.write_all(format!("{}\r\n--sdg-picture\r\n", head("200 OK", kind)).as_bytes())?;
+    let mut last = None;
+    while let Some(published) = next_picture(shared, last) {
+        last = Some(published.number);
+        let jpeg = published.jpeg();
+        let part = format!("Content-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n", jpeg.len());
+        stream.write_all(part.as_bytes())?;
+        stream.write_all(jpeg)?;
+        // Chromium shows a part when the next boundary has come: without it, each picture would be shown a picture late.
+        stream.write_all(b"\r\n--sdg-picture\r\n")?;
+    }
+    Ok(())
+}
+
+/// Waits for a picture after the last one; `None` when the server ends.
+fn next_picture(shared: &Shared, last: Option<u64>) -> Option<Arc<Published>> {
+    let mut newest = shared.newest.lock().unwrap_or_else(PoisonError::into_inner);
+    loop {
+        if shared.is_stopped.load(Ordering::SeqCst) {
+            return None;
+        }
+        match newest.as_ref() {
+            Some(published) if Some(published.number) != last => return Some(Arc::clone(published)),
+            _ => newest = shared.changed.wait_timeout(newest, LOOK_EVERY).unwrap_or_else(PoisonError::into_inner).0,
+        }
+    }
+}

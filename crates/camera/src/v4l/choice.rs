@@ -1,0 +1,103 @@
+//! Which of a node's formats and sizes is taken.
+
+use super::Format;
+use crate::options::{Encoding, OpenOptions};
+
+/// The sizes of a format, in pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sizes {
+    /// These: width and height.
+    Listed(Vec<(u32, u32)>),
+    /// All from the smallest to the largest; a driver may round.
+    Range {
+        /// The smallest width and height.
+        min: (u32, u32),
+        /// The largest width and height.
+        max: (u32, u32),
+    },
+}
+
+impl Sizes {
+    /// The size next to the wanted one by its number of pixels and its shape, and its place in the list.
+    fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
+        match self {
+            Self::Listed(sizes) => {
+                let differs = |size: &(u32, u32)| size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
+                sizes.iter().enumerate().min_by_key(|(_, size)| differs(size)).map(|(place, size)| (*size, place))
+            }
+            Self::Range { min, max } => {
+                let clamped = |wanted: u32, min: u32, max: u32| wanted.max(min).min(max);
+                Some(((clamped(wanted.0, min.0, max.0), clamped(wanted.1, min.1, max.1)), 0))
+            }
+        }
+    }
+}
+
+/// What is asked of the driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Choice {
+    pub(super) encoding: Encoding,
+    pub(super) size: (u32, u32),
+}
+
+/// The best of a node's formats: of the wanted size, fast enough, and with the least lost in its encoding, in that order.
+/// `None` where there is none that is read here.
+pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice> {
+    let wanted = (options.width, options.height);
+    let rated = formats.iter().filter_map(|format| {
+        let encoding = format.encoding.filter(|encoding| options.encoding.is_none_or(|wanted| wanted == *encoding))?;
+        let (size, place) = format.sizes.nearest(wanted)?;
+        let differs = size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
+        let fps = format.max_fps.get(place).copied().filter(|fps| *fps > 0.0);
+        // Drivers round: 29.97 frames a second are as good as 30.
+        let is_slow = options.fps.zip(fps).is_some_and(|(wanted, fps)| fps < wanted * 0.99);
+        let rank = Encoding::ALL.iter().position(|known| *known == encoding);
+        Some(((differs, is_slow, rank), Choice { encoding, size }))
+    });
+    rated.min_by_key(|(rating, _)| *rating).map(|(_, choice)| choice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn format(encoding: Option<Encoding>, sizes: &[(u32, u32)], max_fps: &[f64]) -> Format {
+        let fourcc = encoding.map_or("Z16 ".into(), |known| String::from_utf8_lossy(&known.fourcc()).into_owned());
+        let sizes = Sizes::Listed(sizes.to_vec());
+        Format { fourcc, description: String::new(), encoding, sizes, max_fps: max_fps.to_vec() }
+    }
+
+    fn options(width: u32, height: u32, fps: Option<f64>) -> OpenOptions {
+        OpenOptions { width, height, fps, ..OpenOptions::default() }
+    }
+
+    /// A usual USB webcam: large uncompressed frames are slow.
+    fn webcam() -> Vec<Format> {
+        vec![
+            format(Some(Encoding::Mjpeg), &[(1280, 720), (640, 480)], &[30.0, 30.0]),
+            format(Some(Encoding::Yuyv), &[(640, 480), (1280, 720)], &[29.97, 10.0]),
+        ]
+    }
+
+    #[test]
+    fn size_counts_before_speed_and_speed_before_loss() {
+        let choice = |encoding, size| Some(Choice { encoding, size });
+        assert_eq!(choose(&webcam(), &options(640, 480, Some(30.0))), choice(Encoding::Yuyv, (640, 480)));
+        assert_eq!(choose(&webcam(), &options(1280, 720, None)), choice(Encoding::Yuyv, (1280, 720)));
+        assert_eq!(choose(&webcam(), &options(1280, 720, Some(30.0))), choice(Encoding::Mjpeg, (1280, 720)));
+        assert_eq!(choose(&webcam(), &options(700, 500, None)), choice(Encoding::Yuyv, (640, 480)));
+        let jpeg = OpenOptions { encoding: Some(Encoding::Mjpeg), ..OpenOptions::default() };
+        assert_eq!(choose(&webcam(), &jpeg), choice(Encoding::Mjpeg, (640, 480)));
+        let rgb = OpenOptions { encoding: Some(Encoding::Rgb24), ..OpenOptions::default() };
+        assert_eq!(choose(&webcam(), &rgb), None);
+    }
+
+    #[test]
+    fn depth_alone_is_no_camera_and_ranges_are_kept_to() {
+        assert_eq!(choose(&[format(None, &[(640, 480)], &[30.0])], &OpenOptions::default()), None);
+        let mut any = format(Some(Encoding::Rgb24), &[], &[]);
+        assert_eq!(choose(std::slice::from_ref(&any), &OpenOptions::default()), None);
+        any.sizes = Sizes::Range { min: (320, 180), max: (1920, 1080) };
+        assert_eq!(choose(&[any], &options(100, 2000, Some(60.0))).unwrap().size, (320, 1080));
+    }
+}

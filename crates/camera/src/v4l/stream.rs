@@ -1,0 +1,209 @@
+//! A node that delivers frames.
+
+use std::path::PathBuf;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use linuxvideo::controls::Cid;
+use linuxvideo::format::{PixFormat, PixelFormat};
+use linuxvideo::stream::ReadStream;
+use linuxvideo::{Device, Fract};
+
+use super::choice::{Choice, choose};
+use super::nodes::{nodes, paths, read};
+use crate::address::{Address, NodeName};
+use crate::decode::{MAX_SIDE, decode};
+use crate::error::CameraError;
+use crate::options::{Encoding, OpenOptions};
+use crate::source::{Missing, Source, Taken};
+use crate::yuv::{rgb24_to_rgb, yuyv_to_rgb};
+
+/// Between looks at whether a buffer is filled: the wait has an end so, which the system's own has not.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// Buffers that were filled while nobody read for longer than this are thrown away: they are as old.
+const MAX_AGE: Duration = Duration::from_millis(200);
+/// V4L2's exposure times are in units of 100 µs.
+const EXPOSURES_A_SECOND: f64 = 1e4;
+/// V4L2_EXPOSURE_MANUAL.
+const EXPOSURE_MANUAL: i32 = 1;
+
+/// Opens a node and starts it.
+///
+/// # Errors
+/// [`CameraError::Open`] where there is no such node or it has no format that is read here, [`CameraError::Setting`] where it does not
+/// take a fixed exposure or white balance.
+pub(crate) fn open(name: &NodeName, options: &OpenOptions) -> Result<Box<dyn Source>, CameraError> {
+    let address = Address::V4l(name.clone()).to_string();
+    let refused = |why: String| CameraError::Open { address: address.clone(), why };
+    let path = find(name, options).map_err(refused)?;
+    let node = read(&path).map_err(|error| refused(format!("{} does not open: {error}", path.display())))?;
+    let offered = || node.formats.iter().map(|format| format.fourcc.as_str()).collect::<Vec<_>>().join(", ");
+    let choice = choose(&node.formats, options).ok_or_else(|| {
+        let expected = options.encoding.map_or_else(all_encodings, fourcc);
+        refused(format!("expected the format {expected} of {}, found {}", path.display(), offered()))
+    })?;
+    let failed = |step: &str, error: std::io::Error| refused(format!("{} {step}: {error}", path.display()));
+    let mut device = Device::open(&path).map_err(|error| failed("does not open", error))?;
+    set_controls(&mut device, options, &address)?;
+    Ok(Box::new(Stream::start(device, choice, options).map_err(|(step, error)| failed(step, error))?))
+}
+
+fn fourcc(encoding: Encoding) -> String {
+    String::from_utf8_lossy(&encoding.fourcc()).into_owned()
+}
+
+fn all_encodings() -> String {
+    Encoding::ALL.map(fourcc).join(" or ")
+}
+
+/// The node's path; in words, why there is none.
+fn find(name: &NodeName, options: &OpenOptions) -> Result<PathBuf, String> {
+    if let NodeName::Path(path) = name {
+        return Ok(path.clone());
+    }
+    let nodes = nodes();
+    let is_meant = |card: &str| match name {
+        NodeName::Card(part) => card.to_lowercase().contains(&part.to_lowercase()),
+        _ => true,
+    };
+    let mut readable = nodes.iter().filter(|node| choose(&node.formats, options).is_some());
+    if let Some(node) = readable.find(|node| is_meant(&node.name)) {
+        return Ok(node.path.clone());
+    }
+    let expected = match name {
+        NodeName::Card(part) => format!("a V4L2 camera with \"{part}\" in its name"),
+        _ => format!("a V4L2 camera with the format {}", options.encoding.map_or_else(all_encodings, fourcc)),
+    };
+    let found: Vec<_> = nodes.iter().map(|node| format!("{} ({})", node.path.display(), node.name)).collect();
+    Err(match (found.is_empty(), paths().is_empty()) {
+        (false, _) => format!("expected {expected}, found {}", found.join(", ")),
+        (true, true) => format!("expected {expected}, found no /dev/video*"),
+        (true, false) => {
+            format!("expected {expected}, found {} nodes in /dev, none of which opens and captures", paths().len())
+        }
+    })
+}
+
+/// Fixes exposure and white balance where that is asked for.
+fn set_controls(device: &mut Device, options: &OpenOptions, address: &str) -> Result<(), CameraError> {
+    let mut set = |setting: &'static str, values: [(Cid, i32); 2]| {
+        for (control, value) in values {
+            let range = device.controls().map_while(Result::ok).find(|known| known.id() == control);
+            let refused = |found: String| CameraError::Setting { address: address.to_owned(), setting, found };
+            let range = range.ok_or_else(|| refused(format!("none of V4L2's name {control:?}")))?;
+            if !(range.minimum()..=range.maximum()).contains(&value) {
+                let found = format!(
+                    "that {} goes from {} to {}, not to {value}",
+                    range.name(),
+                    range.minimum(),
+                    range.maximum()
+                );
+                return Err(refused(found));
+            }
+            device
+                .write_control_raw(control, value)
+                .map_err(|error| refused(format!("that it refuses {value}: {error}")))?;
+        }
+        Ok(())
+    };
+    if let Some(secs) = options.exposure_secs {
+        let units = (secs * EXPOSURES_A_SECOND).round() as i32;
+        set("fixed exposure", [(Cid::EXPOSURE_AUTO, EXPOSURE_MANUAL), (Cid::EXPOSURE_ABSOLUTE, units)])?;
+    }
+    if let Some(kelvin) = options.white_balance_kelvin {
+        let kelvin = i32::try_from(kelvin).unwrap_or(i32::MAX);
+        set("fixed white balance", [(Cid::AUTO_WHITE_BALANCE, 0), (Cid::WHITE_BALANCE_TEMPERATURE, kelvin)])?;
+    }
+    Ok(())
+}
+
+struct Stream {
+    stream: ReadStream,
+    encoding: Encoding,
+    width: u32,
+    height: u32,
+    bytes_per_row: usize,
+    last_read: Instant,
+}
+
+impl Stream {
+    fn start(device: Device, choice: Choice, options: &OpenOptions) -> Result<Self, (&'static str, std::io::Error)> {
+        let format = PixelFormat::from_fourcc(choice.encoding.fourcc());
+        let wanted = PixFormat::new(choice.size.0, choice.size.1, format);
+        let capture = device.video_capture(wanted).map_err(|error| ("does not take the format", error))?;
+        let given = capture.format();
+        let (width, height) = (given.width(), given.height());
+        if given.pixel_format() != format || width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+            let found = format!("expected {format}, found {} of {width} × {height} pixels", given.pixel_format());
+            return Err(("gives another format", std::io::Error::other(found)));
+        }
+        let bytes_per_row = given.bytes_per_line() as usize;
+        if let Some(fps) = options.fps {
+            // A driver that has one rate alone refuses; the rate that it has is seen in the frames.
+            let _ = capture.set_frame_interval(Fract::new(1000, (fps * 1000.0).round() as u32));
+        }
+        let stream = capture.into_stream().map_err(|error| ("does not start", error))?;
+        Ok(Self { stream, encoding: choice.encoding, width, height, bytes_per_row, last_read: Instant::now() })
+    }
+
+    /// Waits for a filled buffer.
+    fn wait(&self, deadline: Instant) -> Result<(), Missing> {
+        while self.stream.will_block().map_err(gone)? {
+            if Instant::now() >= deadline {
+                return Err(Missing::Late);
+            }
+            sleep(LOOK_EVERY);
+        }
+        Ok(())
+    }
+}
+
+fn gone(error: std::io::Error) -> Missing {
+    Missing::Gone(format!("the device does not answer: {error}"))
+}
+
+impl Source for Stream {
+    fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing> {
+        let mut num_skipped = 0;
+        if self.last_read.elapsed() > MAX_AGE {
+            while !self.stream.will_block().map_err(gone)? {
+                self.stream.dequeue(|_| Ok(())).map_err(gone)?;
+                num_skipped += 1;
+            }
+        }
+        self.wait(deadline)?;
+        let (encoding, width, height, stride) = (self.encoding, self.width, self.height, self.bytes_per_row);
+        let decoded = self.stream.dequeue(|buffer| {
+            if buffer.is_error() {
+                return Ok(Err(format!("{} bytes that the driver marks as faulty", buffer.len())));
+            }
+            Ok(match encoding {
+                Encoding::Yuyv => yuyv_to_rgb(&buffer, width, height, stride),
+                Encoding::Rgb24 => rgb24_to_rgb(&buffer, width, height, stride),
+                Encoding::Mjpeg => decode(&buffer),
+            })
+        });
+        self.last_read = Instant::now();
+        let picture = decoded.map_err(gone)?.map_err(Missing::Torn)?;
+        Ok(Some(Taken { num_skipped, ..Taken::now(picture) }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn what_is_no_node_is_refused_with_its_path() {
+        let refused =
+            |path: &Path| open(&NodeName::Path(path.to_owned()), &OpenOptions::default()).err().unwrap().to_string();
+        for path in ["/dev/null", "/dev/video-none", "/"] {
+            let error = refused(Path::new(path));
+            assert!(error.contains(&format!("v4l:{path}: {path} does not open")), "{error}");
+        }
+        let name = NodeName::Card("no such card".to_owned());
+        let error = open(&name, &OpenOptions::default()).err().unwrap().to_string();
+        assert!(error.contains("\"no such card\" in its name, found"), "{error}");
+    }
+}

@@ -1,0 +1,121 @@
+//! Pictures out and in again: the server's stream read by the client, and by others that are slow, foreign or rude.
+#![allow(clippy::unwrap_used)]
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use image::{Rgb, RgbImage};
+use sdg_camera::{Address, Camera, MjpegServer, OpenOptions};
+
+fn picture(level: u8) -> RgbImage {
+    RgbImage::from_pixel(640, 480, Rgb([level, level / 2, 255 - level]))
+}
+
+fn connect(server: &MjpegServer) -> TcpStream {
+    let authority = server.url().trim_start_matches("http://").trim_end_matches('/').to_owned();
+    let stream = TcpStream::connect(authority).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    stream
+}
+
+fn port(server: &MjpegServer) -> u16 {
+    server.url().trim_end_matches('/').rsplit(':').next().unwrap().parse().unwrap()
+}
+
+/// The whole answer to these lines.
+fn ask(server: &MjpegServer, lines: &str) -> String {
+    let mut stream = connect(server);
+    stream.write_all(format!("{lines}\r\n\r\n").replace("PORT", &port(server).to_string()).as_bytes()).unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+fn open(address: &str) -> Box<dyn Camera> {
+    sdg_camera::open(&address.parse::<Address>().unwrap(), &OpenOptions::default()).unwrap()
+}
+
+#[test]
+fn what_is_published_arrives_at_every_browser() {
+    let server = MjpegServer::start(0).unwrap();
+    let stream = format!("{}stream", server.url());
+    server.publish(picture(100));
+    let mut cameras = [open(&stream), open(&stream)];
+    for level in [100, 150, 200] {
+        server.publish(picture(level));
+        for camera in &mut cameras {
+            // At once, without waiting for the next picture; the one before may come first.
+            let arrived = loop {
+                let frame = camera.next_frame().unwrap().unwrap();
+                if frame.picture.get_pixel(9, 9)[0].abs_diff(level) < 5 {
+                    break frame;
+                }
+            };
+            assert_eq!(arrived.picture.dimensions(), (640, 480));
+            let [_, green, blue] = arrived.picture.get_pixel(300, 200).0;
+            assert!(green.abs_diff(level / 2) < 5 && blue.abs_diff(255 - level) < 5);
+        }
+    }
+    let mut snapshots = open(&format!("{}snapshot.jpg", server.url()));
+    assert!(snapshots.next_frame().unwrap().unwrap().picture.get_pixel(0, 0)[0].abs_diff(200) < 5);
+}
+
+#[test]
+fn a_browser_that_reads_nothing_holds_nobody_up() {
+    let server = MjpegServer::start(0).unwrap();
+    let mut idle = connect(&server);
+    idle.write_all(format!("GET /stream HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", port(&server)).as_bytes()).unwrap();
+    let mut camera = open(&format!("{}stream", server.url()));
+    let noise = |seed: u32| {
+        RgbImage::from_fn(640, 480, |x, y| {
+            Rgb([x.wrapping_mul(y).wrapping_mul(2_654_435_761).wrapping_add(seed) as u8; 3])
+        })
+    };
+    let mut longest = Duration::ZERO;
+    for seed in 0..100 {
+        let picture = noise(seed);
+        let start = Instant::now();
+        server.publish(picture);
+        longest = longest.max(start.elapsed());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // To publish is to put a picture in place; even on a busy machine that is no matter of the browsers' seconds.
+    assert!(longest < Duration::from_secs(1), "{longest:?}");
+    let frame = camera.next_frame().unwrap().unwrap();
+    assert_eq!(frame.picture.dimensions(), (640, 480));
+    let start = Instant::now();
+    drop(server);
+    assert!(start.elapsed() < Duration::from_secs(2), "the end does not wait for browsers");
+    drop(idle);
+}
+
+#[test]
+fn foreign_names_other_pages_and_other_methods_are_refused() {
+    let server = MjpegServer::start(0).unwrap();
+    server.publish(picture(7));
+    for own in ["127.0.0.1", "localhost"] {
+        assert!(ask(&server, &format!("GET / HTTP/1.1\r\nHost: {own}:PORT")).starts_with("HTTP/1.1 200 OK\r\n"));
+    }
+    for host in ["evil.example:PORT", "127.0.0.1", "127.0.0.1:1", "127.0.0.1:PORT.evil.example"] {
+        let answer = ask(&server, &format!("GET /snapshot.jpg HTTP/1.1\r\nHost: {host}"));
+        assert!(answer.starts_with("HTTP/1.1 403") && !answer.contains("JFIF"), "{host}: {answer}");
+    }
+    assert!(ask(&server, "GET / HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nHost: evil.example").starts_with("HTTP/1.1 403"));
+    assert!(ask(&server, "GET / HTTP/1.1").starts_with("HTTP/1.1 403"));
+    let origin =
+        |origin: &str| ask(&server, &format!("GET /stream HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nOrigin: {origin}"));
+    assert!(origin("http://evil.example").starts_with("HTTP/1.1 403"));
+    assert!(origin("null").starts_with("HTTP/1.1 403"));
+    assert!(ask(&server, "POST / HTTP/1.1\r\nHost: 127.0.0.1:PORT").starts_with("HTTP/1.1 405"));
+    assert!(ask(&server, "GET /etc/passwd HTTP/1.1\r\nHost: 127.0.0.1:PORT").starts_with("HTTP/1.1 404"));
+    assert!(ask(&server, "\x01\x02").starts_with("HTTP/1.1 400"));
+}
+
+#[test]
+fn before_the_first_picture_and_on_a_port_that_is_taken() {
+    let server = MjpegServer::start(0).unwrap();
+    assert!(ask(&server, "GET /snapshot.jpg HTTP/1.1\r\nHost: localhost:PORT").starts_with("HTTP/1.1 503"));
+    let error = MjpegServer::start(port(&server)).err().unwrap().to_string();
+    assert!(error.contains(&port(&server).to_string()), "{error}");
+}
