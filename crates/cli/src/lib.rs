@@ -37,6 +37,8 @@ mod interrupt;
 pub mod labelled_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
+mod page_camera;
+#[cfg(feature = "annotate")]
 mod page_teacher;
 pub mod picture_detector;
 mod pictures;
