@@ -9,11 +9,14 @@ import { replacePicture } from "./view.js";
 
 /** Between questions to the server: more pictures a second than a person needs to see. */
 const PAUSE_MS = 60;
+/** The same while the model is tried and waits for the camera's next frame; after a frame the next one is asked for at once. */
+const TRYING_PAUSE_MS = 15;
 /** After a failed question, or while nobody looks at the page. */
 const RETRY_MS = 500;
 /** Grasps of a frame that are told in words; all are drawn. */
 const MAX_TOLD = 3;
 const FAULTS = {
+  other_size: "Another size",
   stale: "No new picture",
   frozen: "Frozen picture",
   torn: "Broken pictures",
@@ -38,7 +41,8 @@ async function run() {
     if (document.hidden) pause = RETRY_MS;
     else {
       try {
-        await look();
+        const isNew = await look();
+        if (state.tab === "try" && state.hasModel) pause = isNew ? 0 : TRYING_PAUSE_MS;
       } catch (error) {
         Object.assign(state.live, { fault: { kind: "lost", text: error.message }, isUsable: false });
         pause = RETRY_MS;
@@ -50,19 +54,22 @@ async function run() {
   running = false;
 }
 
-/** Shows the newest frame, with the grasps found in this very frame where the model is tried. */
+/** Shows the newest frame, with the grasps found in this very frame where the model is tried; says whether it was a new one. */
 async function look() {
   const { live } = state;
   const now = await api.live();
   if (live.fault && !live.isUsable && now.is_usable) toast("The camera is back.");
   Object.assign(live, { fault: now.fault, isUsable: now.is_usable, nextPhoto: now.next_photo });
-  if (!now.frame) return;
+  if (!now.frame) return false;
   const { number, width, height } = now.frame;
-  const isTrying = state.tab === "try" && state.hasModel;
-  if (number === live.number && (!isTrying || live.detections)) return;
+  const isTrying = state.tab === "try" && state.hasModel && now.is_usable;
+  if (number === live.number && (!isTrying || live.detections)) return false;
   const [url, found] = await Promise.all([pictureOf(number), isTrying ? graspsIn(number) : { detections: null }]);
   // Whoever has paused or gone elsewhere meanwhile keeps what is on the stage.
-  if (!isLive() || isPaused()) return URL.revokeObjectURL(url);
+  if (!isLive() || isPaused()) {
+    URL.revokeObjectURL(url);
+    return false;
+  }
   const size = [width, height];
   const isOther = live.url === null || String(size) !== String(live.size);
   const old = live.url;
@@ -70,6 +77,7 @@ async function look() {
   if (isOther) showCurrent();
   else replacePicture(url);
   if (old) URL.revokeObjectURL(old);
+  return true;
 }
 
 /** The picture as an address that the browser has decoded already: a change of pictures then does not flicker. */
@@ -169,7 +177,8 @@ function renderState() {
   const kind = isPaused() ? "paused" : live.fault ? live.fault.kind : live.url ? "live" : "waiting";
   by("live-state").dataset.kind = live.fault && !isPaused() ? (live.isUsable ? "ended" : "fault") : kind;
   setText(by("live-word"), { paused: "Paused", live: "Live", waiting: "Waiting" }[kind] ?? FAULTS[kind]);
-  setText(by("live-why"), kind === "live" || kind === "waiting" ? state.camera : kind === "paused" ? "" : live.fault.text);
+  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. It is tried again and again.` }[kind];
+  setText(by("live-why"), why ?? live.fault.text);
 }
 
 function renderShooting() {
@@ -177,8 +186,7 @@ function renderShooting() {
   const isShooting = isLive() && state.tab === "mark";
   by("shoot").hidden = !isShooting;
   by("mark-work").hidden = isShooting;
-  by("camera-tools").hidden = !state.camera || state.tab !== "mark" || !state.images.length;
-  by("camera-button").setAttribute("aria-pressed", String(isShooting));
+  by("camera-button").hidden = !state.camera;
   by("back-to-photos").hidden = !state.images.length;
   by("take").disabled = !live.isUsable || Boolean(live.taking);
   setText(by("shoot-where"), live.nextPhoto ? `It is written to ${live.nextPhoto}.` : "");
@@ -202,11 +210,11 @@ function renderTrying() {
   by("live-toggle").textContent = !state.tryingLive ? "Back to the live picture" : live.paused ? "Go on" : "Pause";
   by("live-keep").hidden = !state.tryingLive;
   by("live-keep").disabled = live.number === null;
-  const isFound = state.tryingLive && live.detections && !live.failed;
+  const isFound = state.tryingLive && live.isUsable && live.detections && !live.failed;
   by("live-error").hidden = !state.tryingLive || !live.failed;
   setText(by("live-error"), live.failed ?? "");
   const time = isFound ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
-  setText(by("live-time"), live.failed || !state.tryingLive ? "" : time);
+  setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isFound ? cards(live.detections) : [];
   const said = JSON.stringify(told);
   if (by("live-found").dataset.said === said) return;

@@ -170,7 +170,9 @@ function drawDetection(detection, i) {
 export function renderOverlay() {
   next = new Map();
   if (state.tab === "try") {
-    const detections = isLive() ? state.live.detections : scene()?.detections;
+    // What was found in an old picture is not there now.
+    const inLive = state.live.isUsable ? state.live.detections : null;
+    const detections = isLive() ? inLive : scene()?.detections;
     const shown = detections?.filter((d) => d.is_accepted || state.showRefused) ?? [];
     // Worst first, so that the best is on top.
     shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => drawDetection(d, i));

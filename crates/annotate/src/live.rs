@@ -66,6 +66,8 @@ pub enum LiveFaultKind {
     Gone,
     /// Nothing is to be seen.
     Black,
+    /// Pictures of another size than the calibrated camera's.
+    OtherSize,
     /// There will be no more pictures, as at the end of a folder; the last one stays.
     Ended,
     /// It failed for good.

@@ -10,7 +10,8 @@ use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 use sdg_camera::{Address, Camera, CameraError, Fault, OpenOptions, Playback, open};
 
-use crate::exit::Usage;
+use crate::camera_files::CameraFile;
+use crate::exit::{Usage, one_line};
 
 /// Pictures a second from files whose address names no pace: a folder that is read as fast as it can be would be over, or take a
 /// core, before anybody has seen it.
@@ -26,22 +27,28 @@ pub struct PageCamera(Arc<Mutex<Newest>>);
 struct Newest {
     frame: Option<(Arc<RgbImage>, u64, Instant)>,
     fault: Option<LiveFault>,
+    calibration: Option<CameraFile>,
 }
 
 impl PageCamera {
-    /// Opens the camera at an address and begins to read it; gives the address without its password, too.
+    /// Opens the camera at an address and begins to read it; gives the address without its password, too. With a calibration
+    /// its size is asked for, and pictures of another size are a fault.
     ///
     /// # Errors
     /// Text that is no address, and a camera that does not open.
-    pub fn open(address: &str) -> Result<(Self, String)> {
+    pub fn open(address: &str, calibration: Option<CameraFile>) -> Result<(Self, String)> {
         let address: Address = address.parse().map_err(|error| Usage(format!("--from: {error}")))?;
         let address = paced(address);
-        let camera = open(&address, &OpenOptions::default()).context("--from")?;
-        Ok((Self::read(camera), address.to_string()))
+        let mut options = OpenOptions::default();
+        if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
+            (options.width, options.height) = (width, height);
+        }
+        let camera = open(&address, &options).context("--from")?;
+        Ok((Self::read(camera, calibration), address.to_string()))
     }
 
-    fn read(mut camera: Box<dyn Camera>) -> Self {
-        let newest = Arc::new(Mutex::new(Newest::default()));
+    fn read(mut camera: Box<dyn Camera>, calibration: Option<CameraFile>) -> Self {
+        let newest = Arc::new(Mutex::new(Newest { calibration, ..Newest::default() }));
         let writer = Arc::clone(&newest);
         std::thread::spawn(move || {
             loop {
@@ -77,7 +84,12 @@ impl Newest {
         let fault = |kind, text: String| Some(LiveFault { kind, text });
         match next {
             Ok(Some(frame)) => {
-                self.fault = frame.faults.iter().find_map(live_fault);
+                let other_size =
+                    self.calibration.as_ref().and_then(|camera| camera.check_picture(&frame.picture).err());
+                self.fault = match other_size {
+                    Some(error) => fault(LiveFaultKind::OtherSize, one_line(&error)),
+                    None => frame.faults.iter().find_map(live_fault),
+                };
                 self.frame = Some((Arc::new(frame.picture), frame.number, Instant::now()));
                 false
             }
@@ -182,7 +194,7 @@ mod tests {
     fn a_folder_is_read_at_a_pace_that_can_be_watched() {
         let folder = tempfile::tempdir().unwrap();
         picture(7).save(folder.path().join("a.png")).unwrap();
-        let (camera, address) = PageCamera::open(&format!("dir:{}?loop", folder.path().display())).unwrap();
+        let (camera, address) = PageCamera::open(&format!("dir:{}?loop", folder.path().display()), None).unwrap();
         assert!(address.ends_with("?fps=5&loop"), "{address}");
         let begun = Instant::now();
         let number = |camera: &PageCamera| camera.newest().frame.map(|frame| frame.number);
@@ -196,9 +208,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_opened_is_refused_before_the_page_opens() {
-        let wrong = PageCamera::open("table").unwrap_err();
+        let wrong = PageCamera::open("table", None).unwrap_err();
         assert!(wrong.is::<Usage>() && wrong.to_string().contains("--from: expected an address"), "{wrong}");
-        let missing = PageCamera::open("dir:/nowhere/at/all").unwrap_err();
+        let missing = PageCamera::open("dir:/nowhere/at/all", None).unwrap_err();
         let line = crate::exit::one_line(&missing);
         assert!(!missing.is::<Usage>() && line.contains("dir:/nowhere/at/all") && line.contains("folder"), "{line}");
     }

@@ -31,8 +31,9 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     if let Some(out) = &args.out {
         files::check_writable(out)?;
     }
-    let live =
-        args.from.as_deref().zip(photo_path).map(|(from, photo_path)| open_camera(from, photo_path)).transpose()?;
+    let calibration = camera.as_ref().map(|(file, _)| file.clone());
+    let open = |(from, photo_path)| open_camera(from, calibration, photo_path);
+    let live = args.from.as_deref().zip(photo_path).map(open).transpose()?;
     let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone(), live };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;
@@ -51,8 +52,8 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn open_camera(from: &str, photo_path: PathBuf) -> Result<LiveOptions> {
-    let (camera, address) = PageCamera::open(from)?;
+fn open_camera(from: &str, calibration: Option<CameraFile>, photo_path: PathBuf) -> Result<LiveOptions> {
+    let (camera, address) = PageCamera::open(from, calibration)?;
     Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
 }
 
