@@ -78,3 +78,165 @@ pub enum CameraFileError {
         y: [f64; 2],
     },
 }
+
+/// Why a board, a calibration or a pose cannot be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// A number of squares that no board of ours has.
+    #[error("expected {least} to {most} squares along each side of the board, found {columns} x {rows}")]
+    BoardSize {
+        /// Squares along x.
+        columns: u32,
+        /// Squares along y.
+        rows: u32,
+        /// Fewest.
+        least: u32,
+        /// Most.
+        most: u32,
+    },
+    /// Squares of a size that none have.
+    #[error("expected squares of 0.5 to 500 mm, found {} mm", 1000.0 * .found_m)]
+    SquareSize {
+        /// Metres.
+        found_m: f64,
+    },
+    /// A ruler's reading that no printer gives.
+    #[error(
+        "expected the printed 100 mm line to measure 90 to 110 mm, found {measured_mm} mm: measure the line below the board, in millimetres"
+    )]
+    Ruler {
+        /// What was measured.
+        measured_mm: f64,
+    },
+    /// A board that is larger than the paper.
+    #[error(
+        "expected {columns} x {rows} squares that fit on {paper}: at most {fits_mm:.1} mm each, found {square_mm:.1} mm"
+    )]
+    Paper {
+        /// The paper's name.
+        paper: &'static str,
+        /// Squares along x.
+        columns: u32,
+        /// Squares along y.
+        rows: u32,
+        /// A square's side.
+        square_mm: f64,
+        /// The largest that fits.
+        fits_mm: f64,
+    },
+    /// A file that `sdg camera board` did not write.
+    #[error("expected a board as `sdg camera board` writes it, found a file that does not tell its squares")]
+    NoBoardFile,
+    /// No grid of corners in the picture.
+    #[error(
+        "expected the board, found {}: it may be seen edge-on, cut off, covered, dark or out of focus",
+        if *.corners == 0 { "no corners of squares in a grid".to_owned() } else { format!("at most {columns} x {rows} corners of squares in a grid") }
+    )]
+    BoardNotFound {
+        /// Corners in the largest grid.
+        corners: usize,
+        /// Its extent along one axis.
+        columns: usize,
+        /// Its extent along the other.
+        rows: usize,
+    },
+    /// A grid of corners of which it is not known which they are.
+    #[error(
+        "expected enough of the board to know which of its squares are seen, found {corners} corners and no place on the board that its dots \
+         agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
+    )]
+    BoardUnclear {
+        /// Corners in the grid.
+        corners: usize,
+    },
+    /// The board has more squares than told.
+    #[error(
+        "expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}: give its squares with --squares"
+    )]
+    OtherBoard {
+        /// Squares along x, as told.
+        columns: u32,
+        /// Squares along y, as told.
+        rows: u32,
+        /// Squares along x, at least.
+        found_columns: u32,
+        /// Squares along y, at least.
+        found_rows: u32,
+    },
+    /// Fewer pictures than a calibration needs.
+    #[error("expected at least {least} pictures that show the board, found {found}{}", .hint)]
+    TooFewPictures {
+        /// Fewest.
+        least: usize,
+        /// How many there are.
+        found: usize,
+        /// What else to know, or empty.
+        hint: &'static str,
+    },
+    /// Pictures that leave the focal length open.
+    #[error(
+        "expected pictures that show the board tilted in several directions, found {found}: their poses are alike and leave the focal \
+         length open{}; tilt the board by 20 to 40 degrees to the left, to the right, upwards and downwards", .hint
+    )]
+    PosesAlike {
+        /// How they are alike.
+        found: String,
+        /// The focal length's error, or empty.
+        hint: String,
+    },
+    /// Corners that no pose explains.
+    #[error("expected corners that a pinhole camera can show of a flat board, found none that converge")]
+    NoPose,
+    /// A camera below the sheet, or at its horizon.
+    #[error(
+        "expected a camera that looks down at the sheet, found it {tilt_deg:.1} degrees from straight above: beyond {max_deg} degrees the table's \
+         horizon is near"
+    )]
+    Horizon {
+        /// The angle between the optical axis and the sheet's normal.
+        tilt_deg: f64,
+        /// The largest allowed.
+        max_deg: f64,
+    },
+    /// Robot poses that cannot be read.
+    #[error("expected robot poses as documented in docs/calibration.md, found: {found}")]
+    PosesUnreadable {
+        /// What the parser says.
+        found: String,
+    },
+    /// A robot pose that is none.
+    #[error("expected base_from_flange.{name} of {picture} to be {expected}, found {found:?}")]
+    RobotPose {
+        /// Whose pose.
+        picture: String,
+        /// The field.
+        name: &'static str,
+        /// What it must be.
+        expected: &'static str,
+        /// What it is.
+        found: Vec<f64>,
+    },
+    /// Robot poses that leave the transform open.
+    #[error(
+        "expected robot poses that turn the flange about two axes, found {found}: add poses turned by 20 to 40 degrees about {missing}"
+    )]
+    TurnsAlike {
+        /// What they do.
+        found: String,
+        /// What to turn about.
+        missing: String,
+    },
+    /// Robot poses and pictures that do not belong together.
+    #[error(
+        "expected robot poses and pictures that agree, found {rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px{hint}"
+    )]
+    HandEyeDisagrees {
+        /// Reprojection.
+        rms_px: f64,
+        /// Reprojection where each picture has a pose of its own.
+        board_rms_px: f64,
+        /// What would explain it.
+        hint: String,
+    },
+}

@@ -10,8 +10,21 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod board;
 mod camera_file;
+mod detection;
 mod error;
+mod homography;
+mod intrinsics;
+mod least_squares;
+mod pose;
+mod projection;
+mod table;
 
+pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
-pub use error::CameraFileError;
+pub use detection::{MIN_CORNERS, SeenCorner, find_board};
+pub use error::{CalibrationError, CameraFileError};
+pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
+pub use pose::{BoardPose, board_pose};
+pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};

@@ -52,6 +52,7 @@ pub mod shipped;
 mod statistics;
 mod teaching_page;
 mod teaching_progress;
+pub mod tracking;
 #[cfg(feature = "simulation")]
 pub mod trial;
 

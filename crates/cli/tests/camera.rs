@@ -8,7 +8,7 @@ use std::process::{Command, Output};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{OnTable, TABLE_CAMERAS, table_view};
+use sdg_simulation::scene::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
@@ -147,7 +147,7 @@ struct SecondCamera {
 
 fn second_camera(files: &Folder) -> SecondCamera {
     let part = ObjectSpec::by_name("pendulum").unwrap();
-    let shown = table_view(&part, OnTable::Part, &TABLE_CAMERAS[0], (5, 20), 31).unwrap();
+    let shown = other_view(&part, OnTable::Part, &OTHER_CAMERAS[0], (5, 20), 31).unwrap();
     let posed = shown.view.camera;
     let table =
         TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: posed.world_from_camera, workspace: None };

@@ -8,7 +8,10 @@ use std::path::Path;
 use sdg_cli::evaluation::axes::{
     Against, AxesEvaluation, AxesSummary, GraspCondition, GroupSummary, Selection, Way, comparison_tables,
 };
-use sdg_cli::evaluation::{Evaluation, EvaluationProgress, Settings, Store, Summary, TeachingRecord, markdown, page};
+use sdg_cli::evaluation::cameras::{self, CamerasEvaluation, CamerasSummary, PictureSet};
+use sdg_cli::evaluation::{
+    Evaluation, EvaluationProgress, Settings, Share, Store, Summary, TeachingRecord, markdown, page,
+};
 use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
@@ -149,4 +152,43 @@ fn interrupted_axes_go_on_and_share_the_teaching() {
     assert!(whole.seconds.pictures > 0.0 && whole.seconds.grasps > 0.0);
     // Once more there is nothing to do.
     assert_eq!(go_on_with_axes(folder.path(), &NAMES, &|| panic!("asked of work that there is none of")), whole);
+}
+
+/// Goes on with some sets of the cameras' pictures, and adds up what there is.
+fn go_on_with_cameras(folder: &Path, is_interrupted: &(dyn Fn() -> bool + Sync)) -> CamerasSummary {
+    let store = Store::open(folder, &settings()).unwrap();
+    let sets: Vec<PictureSet> = PictureSet::all()
+        .into_iter()
+        .filter(|set| ["webcam", "instances", "other-sizes"].contains(&set.name()))
+        .collect();
+    let evaluation = CamerasEvaluation {
+        models: &[ModelKind::S],
+        objects: &[ObjectSpec::by_name("pendulum").unwrap()],
+        sets: &sets,
+        preset: Preset::Edge,
+        store: &store,
+        views: 2,
+        jobs: 1,
+    };
+    evaluation.run(is_interrupted, &EvaluationProgress::new()).unwrap();
+    CamerasSummary::collect(&evaluation).unwrap()
+}
+
+#[test]
+fn interrupted_cameras_go_on_and_are_exact() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = folder.path().join("cameras/S-pendulum.webcam.json");
+    let interrupted = go_on_with_cameras(folder.path(), &|| first.exists());
+    assert!(interrupted.remaining > 0, "{interrupted:?}");
+    assert!(cameras::markdown(&interrupted, &[], "sdg evaluate --cameras").contains("Not complete"));
+    let whole = go_on_with_cameras(folder.path(), &|| false);
+    assert_eq!((whole.remaining, whole.sets.len()), (0, 3));
+    let of = |set: &str| whole.sets.iter().find(|figures| figures.set == set).unwrap();
+    assert_eq!((of("webcam").found, of("instances").found), (Share { count: 2, of: 2 }, Share { count: 6, of: 6 }));
+    assert!(of("webcam").errors.unwrap().p95_mm < 3.0, "{:?}", of("webcam"));
+    assert_eq!((of("other-sizes").accepted, of("other-sizes").found.of), (Share { count: 0, of: 2 }, 0));
+    assert!(cameras::page(&whole, &[], "sdg evaluate --cameras").to_html().is_ok());
+    // What is there is not done again.
+    let again = go_on_with_cameras(folder.path(), &|| panic!("asked of work that there is none of"));
+    assert_eq!(again.sets, whole.sets);
 }

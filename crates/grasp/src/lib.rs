@@ -57,6 +57,7 @@ mod sizes;
 mod taught;
 #[cfg(feature = "teach")]
 mod teach;
+mod tracking;
 mod verdict;
 mod verification;
 
@@ -71,7 +72,7 @@ pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, Validati
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use plan::{
-    CameraOverTable, Circumstances, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty, UncertaintyConfig,
+    CameraOverTable, Circumstances, ErrorLength, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
     seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};
@@ -83,4 +84,5 @@ pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, Vali
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
 pub use teach::{Event, Preset, Taught, TeachOptions, teach};
+pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;

@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use nalgebra::Point2;
-use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
+use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
 
 use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
@@ -224,17 +224,23 @@ impl GraspModel {
     /// # Errors
     /// As there.
     pub async fn detect_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<GraspDetection>> {
+        let found = self.find_async(image, verification).await?;
+        Ok(found.into_iter().map(|found| found.detection).collect())
+    }
+
+    /// [`Self::detect_async`], each detection with what tracking goes on from.
+    pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let (width, height) = image.dimensions();
         if width.min(height) < LEAST_SIDE_PX {
             return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
         }
-        let mut found: Vec<GraspDetection> = match (&self.network, verification) {
+        let mut found: Vec<Found> = match (&self.network, verification) {
             (Some(network), Verification::Off) => network
                 .proposals_async(image, &self.demonstrations)
                 .await?
                 .candidates
                 .iter()
-                .map(|c| self.unverified(c))
+                .map(|c| Found { detection: self.unverified(c), placement: None })
                 .collect(),
             (Some(network), Verification::ByShape) => {
                 let scene = Scene::new(image, &self.demonstrations);
@@ -244,8 +250,8 @@ impl GraspModel {
             (None, _) => self.judged(sightings(&Proposals::default(), &Scene::new(image, &self.demonstrations))),
         };
         let (width, height) = (f64::from(width), f64::from(height));
-        found.iter_mut().for_each(|detection| detection.bbox = detection.bbox.clip(width, height));
-        found.sort_by(|a, b| b.score.total_cmp(&a.score));
+        found.iter_mut().for_each(|found| found.detection.bbox = found.detection.bbox.clip(width, height));
+        found.sort_by(|a, b| b.detection.score.total_cmp(&a.detection.score));
         drop_repeated(&mut found);
         found.truncate(self.demonstrations[0].check().search.max_matches);
         Ok(found)
@@ -267,29 +273,78 @@ impl GraspModel {
     }
 
     /// Scores them, first each alone, then by the size of the surest among them.
-    fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<GraspDetection> {
-        let resemblance = self.calibrations.resemblance();
-        let clues: Vec<Clues> = sightings
-            .iter()
-            .map(|sighting| {
-                let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
-                let Overlay { evidence, log_size, .. } = sighting.overlay;
-                Clues { evidence, log_size, network, resemblance }
-            })
-            .collect();
-        let judged = judge_picture(&clues, &self.demonstrations[0].check().score);
-        let num_keypoints = if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 };
+    fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<Found> {
+        let clues: Vec<Clues> = sightings.iter().map(|sighting| self.clues(sighting)).collect();
+        let judged = self.judge(&clues);
+        let num_keypoints = self.num_keypoints();
         sightings
             .into_iter()
             .zip(judged)
-            .map(|(sighting, (score, evidence))| sighting.detection(score, evidence, num_keypoints))
+            .map(|(sighting, (score, evidence))| {
+                let placement = Placement::of(&sighting);
+                Found { detection: sighting.detection(score, evidence, num_keypoints), placement: Some(placement) }
+            })
             .collect()
+    }
+
+    /// What the verdict is to know of a place.
+    pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
+        let Overlay { evidence, log_size, .. } = sighting.overlay;
+        let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
+        Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance() }
+    }
+
+    /// The scores of all places in one picture.
+    pub(crate) fn judge(&self, clues: &[Clues]) -> Vec<(f64, Contributions)> {
+        judge_picture(clues, &self.demonstrations[0].check().score)
+    }
+
+    /// Keypoints of a detection of this model.
+    pub(crate) fn num_keypoints(&self) -> usize {
+        if self.kind().has_keypoints() { crate::NUM_KEYPOINTS } else { 0 }
+    }
+}
+
+/// A detection and what it was made of.
+pub(crate) struct Found {
+    pub(crate) detection: GraspDetection,
+    /// `None` without verification.
+    pub(crate) placement: Option<Placement>,
+}
+
+/// Where a demonstration lies in an image, and what else a later image of the sequence needs.
+#[derive(Debug, Clone)]
+pub(crate) struct Placement {
+    pub(crate) demonstration_idx: usize,
+    pub(crate) image_from_cutout: PlanarSimilarity,
+    pub(crate) image_from_marks: PlanarSimilarity,
+    pub(crate) agreement: f64,
+    pub(crate) likeness: Option<f64>,
+    pub(crate) network_score: f64,
+    pub(crate) keypoint_scores: Vec<f64>,
+    pub(crate) turn_source: TurnSource,
+}
+
+impl Placement {
+    fn of(sighting: &Sighting<'_>) -> Self {
+        let Overlay { demonstration_idx, image_from_cutout, image_from_marks, agreement, evidence, .. } =
+            sighting.overlay;
+        Self {
+            demonstration_idx,
+            image_from_cutout,
+            image_from_marks,
+            agreement,
+            likeness: evidence.likeness,
+            network_score: sighting.network_score,
+            keypoint_scores: sighting.keypoint_scores.clone(),
+            turn_source: sighting.turn_source,
+        }
     }
 }
 
 impl Sighting<'_> {
     /// A detection as the demonstration says, where it lies.
-    fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
+    pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
         let Overlay { demonstration, image_from_cutout, image_from_marks, agreement, .. } = self.overlay;
         let outline = demonstration.outline(&image_from_cutout);
         let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
@@ -314,17 +369,17 @@ const SAME_PART_SHARE: f64 = 0.3;
 /// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no
 /// outlines. Of those that ended in the same pose it is the one that the network was surest of, and not a matter of the
 /// last bit.
-fn drop_repeated(found: &mut Vec<GraspDetection>) {
+fn drop_repeated(found: &mut Vec<Found>) {
     // Chosen by hand: above the rounding of single precision, below any difference that tells poses apart.
     const SAME_SCORE: f64 = 1e-4;
-    let mut kept: Vec<GraspDetection> = Vec::with_capacity(found.len());
-    for detection in found.drain(..) {
-        match kept.iter_mut().find(|better| are_of_same_part(better, &detection)) {
-            None => kept.push(detection),
+    let mut kept: Vec<Found> = Vec::with_capacity(found.len());
+    for next in found.drain(..) {
+        match kept.iter_mut().find(|better| are_of_same_part(&better.detection, &next.detection)) {
+            None => kept.push(next),
             Some(better) => {
-                let as_good = better.score - detection.score < SAME_SCORE;
-                if as_good && detection.network_score > better.network_score {
-                    *better = detection;
+                let as_good = better.detection.score - next.detection.score < SAME_SCORE;
+                if as_good && next.detection.network_score > better.detection.network_score {
+                    *better = next;
                 }
             }
         }
@@ -332,7 +387,7 @@ fn drop_repeated(found: &mut Vec<GraspDetection>) {
     *found = kept;
 }
 
-fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> bool {
+pub(crate) fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> bool {
     match (&one.outline, &other.outline) {
         (Some(one), Some(other)) if one.bounds().intersection(&other.bounds()) > 0.0 => {
             one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
@@ -364,14 +419,16 @@ mod tests {
 
     #[test]
     fn of_repeated_detections_the_best_stays_and_of_equals_the_surest() {
-        let mut found = vec![
+        let mut found: Vec<Found> = [
             detection(0.0, 0.900_000_1, 0.1),
             detection(0.0, 0.9, 0.7),
             detection(100.0, 0.8, 0.2),
             detection(1.0, 0.7, 0.99),
-        ];
+        ]
+        .map(|detection| Found { detection, placement: None })
+        .into();
         drop_repeated(&mut found);
-        let kept: Vec<_> = found.iter().map(|kept| (kept.bbox.x1, kept.network_score)).collect();
+        let kept: Vec<_> = found.iter().map(|kept| (kept.detection.bbox.x1, kept.detection.network_score)).collect();
         assert_eq!(kept, [(0.0, 0.7), (100.0, 0.2)]);
     }
 }

@@ -97,6 +97,7 @@ pub(crate) fn halved(image: &RgbImage) -> RgbImage {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Overlay<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
+    pub(crate) demonstration_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
     /// The same for the marks and what surrounds them, which may be shifted against the outline.
     pub(crate) image_from_marks: PlanarSimilarity,
@@ -149,6 +150,7 @@ impl<'a> SizedDemonstration<'a> {
         let marks = self.prepared.settle_marks(&view.field, view_from_working);
         Overlay {
             demonstration: self.demonstration,
+            demonstration_idx: self.demonstration_idx,
             image_from_cutout,
             image_from_marks: self.image_from_cutout(&marks),
             agreement,

@@ -59,6 +59,7 @@ mod config;
 mod consensus;
 mod edge_points;
 mod error;
+mod following;
 mod gradient_field;
 mod likeness;
 mod parallel;
@@ -74,6 +75,7 @@ pub use config::{
     AgreementConfig, GradientConfig, ScaleRange, SettlingConfig, ShapeConfig, StructureConfig, SurfaceConfig,
 };
 pub use error::ShapeError;
+pub use following::Reach;
 pub use gradient_field::GradientField;
 pub use likeness::{LAYERS, Layer, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
 pub use refinement::Refinement;

@@ -28,7 +28,7 @@ pub struct ShapeTemplate {
     pub(crate) center: Point2<f64>,
     /// Finest first.
     pub(crate) levels: Vec<TemplateLevel>,
-    agreement_level_idx: usize,
+    pub(crate) agreement_level_idx: usize,
 }
 
 /// The edge points seen at one pyramid level of the demonstration.

@@ -47,6 +47,7 @@ mod record;
 mod render;
 pub mod scene;
 mod shake;
+pub mod table_camera;
 mod workcell;
 
 pub use attempt::{AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep};

@@ -52,7 +52,7 @@ impl Store {
     /// A folder that cannot be written, that another process works in, or whose models were taught with other settings.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
         files::prepare_folder(folder)?;
-        for inner in ["models", "cells", "pictures", "axes"] {
+        for inner in ["models", "cells", "pictures", "axes", "cameras"] {
             files::prepare_folder(&folder.join(inner))?;
         }
         let lock_file = folder.join(".lock");

@@ -68,7 +68,9 @@ impl PlumbBob {
         None
     }
 
-    fn polynomial(&self, point: &Point2<f64>) -> Point2<f64> {
+    /// What the polynomial makes of a point at depth 1, also beyond the radius at which it turns back: for optimisers, which must
+    /// be able to come back from there.
+    pub fn polynomial(&self, point: &Point2<f64>) -> Point2<f64> {
         let Self { p1, p2, .. } = *self;
         let (x, y, r2) = (point.x, point.y, point.coords.norm_squared());
         let radial = self.radial(r2);
@@ -82,7 +84,8 @@ impl PlumbBob {
         1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
     }
 
-    fn jacobian(&self, point: &Point2<f64>) -> Matrix2<f64> {
+    /// The derivative of [`Self::polynomial`] by the point.
+    pub fn jacobian(&self, point: &Point2<f64>) -> Matrix2<f64> {
         let Self { k1, k2, k3, p1, p2 } = *self;
         let (x, y, r2) = (point.x, point.y, point.coords.norm_squared());
         let radial = self.radial(r2);

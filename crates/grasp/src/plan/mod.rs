@@ -18,8 +18,9 @@ use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCame
 use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
+pub(crate) use self::picture::PixelRect;
 use self::picture::PlanMap;
-pub use self::uncertainty::{Circumstances, Uncertainty, UncertaintyConfig};
+pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
 
@@ -132,7 +133,7 @@ impl PlanDetector {
         Ok(Self { over_table: *over_table, view, map, ..self })
     }
 
-    /// The model.
+    /// The model, for plan views of known size.
     pub fn model(&self) -> &GraspModel {
         &self.model
     }
@@ -156,8 +157,18 @@ impl PlanDetector {
         Ok(found.into_iter().filter_map(|detection| self.placed(detection)).collect())
     }
 
+    /// Width and height of the plan view.
+    pub(crate) fn view_size(&self) -> [u32; 2] {
+        [self.view.width, self.view.height]
+    }
+
+    /// A rectangle of the plan view of a picture.
+    pub(crate) fn window_of(&self, picture: &RgbImage, window: &PixelRect) -> RgbImage {
+        self.map.resample_window(picture, window)
+    }
+
     /// `None` where the camera does not show it.
-    fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
+    pub(crate) fn placed(&self, detection: GraspDetection) -> Option<PlanDetection> {
         let grasp = detection.grasp;
         let center = grasp.center();
         let seen = self.view.in_picture(&self.over_table.camera, &center)?;
@@ -169,7 +180,7 @@ impl PlanDetector {
             // The plan view's y points against the world's.
             yaw: Angle::from_radians(-grasp.angle.radians()),
             opening_m: grasp.width / self.view.pixels_per_m,
-            uncertainty: circumstances.uncertainty(&UncertaintyConfig::default()),
+            uncertainty: circumstances.uncertainty(),
             circumstances,
         };
         Some(PlanDetection { detection: self.in_picture(detection)?, pose })
@@ -192,7 +203,6 @@ impl PlanDetector {
             mark_height_m: self.lengths.mark_height_m,
             diagonal_m: (x2 - x1).hypot(y2 - y1) / self.view.pixels_per_m,
             agreement: detection.agreement.unwrap_or(0.0),
-            visible: 1.0,
         })
     }
 

@@ -10,6 +10,15 @@ const CELL: u32 = 8;
 /// Most samples of the picture a side for a pixel of the plan view.
 const MAX_SAMPLES: usize = 8;
 
+/// A rectangle of pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PixelRect {
+    pub(crate) left: u32,
+    pub(crate) top: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
 /// Where the picture shows each pixel of a plan view: computed once for all pictures of a camera.
 #[derive(Debug, Clone)]
 pub(crate) struct PlanMap {
@@ -47,11 +56,17 @@ impl PlanMap {
 
     /// The plan view of a picture. Outside the picture it repeats the picture's border, so that no edge is made.
     pub(crate) fn resample(&self, picture: &RgbImage) -> RgbImage {
-        let mut out = Vec::with_capacity(3 * (self.width * self.height) as usize);
+        self.resample_window(picture, &PixelRect { left: 0, top: 0, width: self.width, height: self.height })
+    }
+
+    /// A rectangle of the plan view, which must lie in it: the same pixels as [`Self::resample`] gives there.
+    pub(crate) fn resample_window(&self, picture: &RgbImage, window: &PixelRect) -> RgbImage {
+        let PixelRect { left, top, width, height } = *window;
+        let mut out = Vec::with_capacity(3 * (width * height) as usize);
         let part = 1.0 / self.samples as f64;
         let weight = 1.0 / (self.samples * self.samples) as f32;
-        for y in 0..self.height {
-            for x in 0..self.width {
+        for y in top..top + height {
+            for x in left..left + width {
                 let mut sum = [0.0f32; 3];
                 for k in 0..self.samples * self.samples {
                     let [right, down] = [k % self.samples, k / self.samples].map(|k| (k as f64 + 0.5) * part);
@@ -61,7 +76,7 @@ impl PlanMap {
                 out.extend(sum.map(|value| (value * weight + 0.5) as u8));
             }
         }
-        RgbImage::from_raw(self.width, self.height, out).unwrap_or_default()
+        RgbImage::from_raw(width, height, out).unwrap_or_default()
     }
 
     /// Where the picture shows a point of a pixel; `None` where the lens shows nothing.

@@ -274,6 +274,11 @@ impl InstantSearch {
         &self.config.scales
     }
 
+    /// The edges that poses are refined by.
+    pub fn template(&self) -> &ShapeTemplate {
+        &self.template
+    }
+
     /// The demonstration over an image, whose gradients are `field`.
     pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
         let Self { template, surface, structure, likeness, .. } = self;

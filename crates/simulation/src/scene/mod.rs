@@ -14,9 +14,9 @@ pub mod footprint;
 mod fragment;
 mod light;
 pub mod mesh;
+mod other_camera;
 pub mod solids;
 mod table;
-mod table_camera;
 pub mod texture;
 mod views;
 
@@ -32,8 +32,8 @@ pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, 
 pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
+pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, draw, other_view};
 pub use table::{Table, TableSurface};
-pub use table_camera::{OnTable, TABLE_CAMERAS, TableCamera, TableView, draw, table_view};
 pub use views::{
     DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
     in_picture, test_view, test_views,
@@ -185,6 +185,22 @@ const PLACEMENT_TRIES: usize = 40;
 
 /// How far distractors spread beyond where the object may lie, in metres.
 const DISTRACTOR_MARGIN_M: f64 = 0.05;
+
+/// At most `count` distractors of a seed whose middles lie between bounds in the base frame, in metres.
+pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count: usize, seed: u64) -> Vec<Distractor> {
+    let within = |range: Range<f64>| range.start + DISTRACTOR_MARGIN_M..range.end - DISTRACTOR_MARGIN_M;
+    // A strip narrower than the margins keeps its middle.
+    let ordered = |range: Range<f64>| if range.start < range.end { range } else { range.end..range.start + 1e-6 };
+    let config = VariationConfig {
+        object_x_m: within(x_m),
+        object_y_m: within(y_m),
+        distractors: count..=count,
+        ..VariationConfig::default()
+    };
+    let config =
+        VariationConfig { object_x_m: ordered(config.object_x_m), object_y_m: ordered(config.object_y_m), ..config };
+    sample_distractors(Vec::new(), &config, &mut Stream::Distractors.rng(seed))
+}
 
 /// Distractors at random places that keep apart from each other and from what is `taken`.
 fn sample_distractors(

@@ -4,7 +4,7 @@ use anyhow::Result;
 use nalgebra::{Isometry3, Vector3};
 use sdg_simulation::CameraView;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{Axis, OnTable, TABLE_CAMERAS, table_view};
+use sdg_simulation::scene::{Axis, OTHER_CAMERAS, OnTable, other_view};
 
 use crate::evaluation::axes::draw;
 
@@ -14,7 +14,7 @@ const OTHER_SIZES_PERCENT: [u32; 4] = [80, 90, 110, 125];
 /// Pictures that are told apart in the tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureSet {
-    /// Taken by one of [`TABLE_CAMERAS`].
+    /// Taken by one of [`OTHER_CAMERAS`].
     Camera(usize),
     /// The wrist camera's, harder along an axis.
     Axis(Axis),
@@ -33,13 +33,13 @@ impl PictureSet {
     /// All of them, in the order in which they are reported.
     pub fn all() -> Vec<Self> {
         let axes = Axis::ALL.into_iter().filter(|axis| *axis != Axis::LookAlikes).map(Self::Axis);
-        (0..TABLE_CAMERAS.len()).map(Self::Camera).chain(axes).chain([Self::OtherSizes]).collect()
+        (0..OTHER_CAMERAS.len()).map(Self::Camera).chain(axes).chain([Self::OtherSizes]).collect()
     }
 
     /// The name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Camera(idx) => TABLE_CAMERAS[idx].name,
+            Self::Camera(idx) => OTHER_CAMERAS[idx].name,
             Self::Axis(axis) => axis.name(),
             Self::OtherSizes => "other-sizes",
         }
@@ -53,14 +53,14 @@ impl PictureSet {
                 let instances = shown.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
                 return Ok(Shown { view: shown.view, instances });
             }
-            Self::Camera(idx) => (OnTable::Part, &TABLE_CAMERAS[idx]),
+            Self::Camera(idx) => (OnTable::Part, &OTHER_CAMERAS[idx]),
             Self::OtherSizes => {
                 let percent = OTHER_SIZES_PERCENT[number as usize % OTHER_SIZES_PERCENT.len()];
-                let camera = &TABLE_CAMERAS[(number as usize / OTHER_SIZES_PERCENT.len()) % TABLE_CAMERAS.len()];
+                let camera = &OTHER_CAMERAS[(number as usize / OTHER_SIZES_PERCENT.len()) % OTHER_CAMERAS.len()];
                 (OnTable::Scaled(percent), camera)
             }
         };
-        let shown = table_view(part, on_table, camera, (number, of), seed)?;
+        let shown = other_view(part, on_table, camera, (number, of), seed)?;
         Ok(Shown { view: shown.view, instances: shown.truth.iter().map(|truth| truth.base_from_object).collect() })
     }
 }

@@ -24,7 +24,7 @@ use crate::workcell::{WorkcellConfig, build_model, camera_looking_down};
 
 /// A camera model and where it may hang.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableCamera {
+pub struct OtherCamera {
     /// The name in tables.
     pub name: &'static str,
     /// Resolution, focal length, axis and lens.
@@ -34,8 +34,8 @@ pub struct TableCamera {
 }
 
 /// Three cameras of other focal lengths, lenses and heights than the wrist camera (640 × 480, 550 px, 0.58 m).
-pub const TABLE_CAMERAS: [TableCamera; 3] = [
-    TableCamera {
+pub const OTHER_CAMERAS: [OtherCamera; 3] = [
+    OtherCamera {
         name: "webcam",
         intrinsics: PinholeCamera {
             width: 640,
@@ -48,7 +48,7 @@ pub const TABLE_CAMERAS: [TableCamera; 3] = [
         },
         distances_m: [0.42, 0.55],
     },
-    TableCamera {
+    OtherCamera {
         name: "phone",
         intrinsics: PinholeCamera {
             width: 960,
@@ -61,7 +61,7 @@ pub const TABLE_CAMERAS: [TableCamera; 3] = [
         },
         distances_m: [0.50, 0.75],
     },
-    TableCamera {
+    OtherCamera {
         name: "overhead",
         intrinsics: PinholeCamera {
             width: 1280,
@@ -98,7 +98,7 @@ pub enum OnTable {
 
 /// A picture with the truth about it.
 #[derive(Debug, Clone)]
-pub struct TableView {
+pub struct OtherView {
     /// The picture and its camera.
     pub view: CameraView,
     /// `None` where something else lies in the part's place.
@@ -113,13 +113,13 @@ pub struct TableView {
 ///
 /// # Errors
 /// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] where no place shows the whole part.
-pub fn table_view(
+pub fn other_view(
     spec: &ObjectSpec,
     on_table: OnTable,
-    camera: &TableCamera,
+    camera: &OtherCamera,
     (number, of): (u64, u64),
     seed: u64,
-) -> Result<TableView> {
+) -> Result<OtherView> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, number, seed));
     let scene_seed = rng.random();
     let shown = match on_table {
@@ -146,7 +146,7 @@ pub fn table_view(
         OnTable::Scaled(_) => None,
     };
     let height_m = posed.world_from_camera.translation.z;
-    Ok(TableView { view: CameraView { image, camera: posed }, truth, height_m, tilt_deg })
+    Ok(OtherView { view: CameraView { image, camera: posed }, truth, height_m, tilt_deg })
 }
 
 /// A picture of a scene by a camera that stands still beside the robot, whose arm is turned away.
@@ -194,7 +194,7 @@ fn shows_whole(camera: &PosedCamera, part: &PlacedObject) -> bool {
     })
 }
 
-fn no_place(camera: &TableCamera, part: &str) -> SimulationError {
+fn no_place(camera: &OtherCamera, part: &str) -> SimulationError {
     SimulationError::Configuration {
         field: "camera",
         expected: "a place that shows the whole part".into(),
@@ -217,8 +217,8 @@ mod tests {
     #[test]
     fn every_camera_shows_the_part_where_the_truth_says() {
         let spec = ObjectSpec::by_name("cranfield_face").unwrap();
-        for camera in &TABLE_CAMERAS {
-            let [first, again] = [0, 1].map(|_| table_view(&spec, OnTable::Part, camera, (18, 20), 3).unwrap());
+        for camera in &OTHER_CAMERAS {
+            let [first, again] = [0, 1].map(|_| other_view(&spec, OnTable::Part, camera, (18, 20), 3).unwrap());
             assert_eq!(first.view, again.view);
             assert!((20.0..25.0).contains(&first.tilt_deg), "{}", first.tilt_deg);
             assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
@@ -242,7 +242,7 @@ mod tests {
         }
     }
 
-    fn scene_of(spec: &ObjectSpec, camera: &TableCamera) -> SceneVariation {
+    fn scene_of(spec: &ObjectSpec, camera: &OtherCamera) -> SceneVariation {
         let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, 18, 3));
         SceneVariation::sample(Some(spec), &VariationConfig::default(), rng.random())
     }

@@ -1,0 +1,196 @@
+//! The dots in a grid's squares, and where on the board the grid lies.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Point2;
+
+use super::grid::{Grid, Place};
+use super::luminance::Luminance;
+use crate::board::{Board, PATTERN_SIDE};
+use crate::error::CalibrationError;
+
+/// How a grid lies on the board: the corner `[i, j]` of the board at each of the grid's places.
+pub(super) type Placed = BTreeMap<Place, [u32; 2]>;
+
+/// How much a dot is there, from 0 to 1, by the square between `[i, j]` and `[i + 1, j + 1]`.
+type Dots = BTreeMap<Place, f64>;
+
+/// The share of the squares that may contradict the board: shadows, glare.
+const MAX_CONTRADICTION: f64 = 0.2;
+/// By how many squares the second best placement must be worse. Windows of four by four squares differ in at least four.
+const MIN_MARGIN: f64 = 1.5;
+/// Corners that may lie outside the board, found in what lies beside it.
+const MAX_OUTSIDE: usize = 2;
+/// Below it no square has a dot: a plain checkerboard.
+const MAX_PLAIN: f64 = 0.3;
+/// Where a square is looked at for its own colour, in sides of the square from its middle: outside a dot, inside the edges.
+const RING: f64 = 0.32;
+
+/// Finds the grid's place on the board.
+///
+/// # Errors
+/// [`CalibrationError::BoardUnclear`] where several fit or none, [`CalibrationError::OtherBoard`] where a larger board fits.
+pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Result<Placed, CalibrationError> {
+    let dots = read(picture, grid);
+    if let Some(placed) = place(grid, &dots, [board.columns(), board.rows()]) {
+        return Ok(placed);
+    }
+    if let Some(placed) = place(grid, &dots, [PATTERN_SIDE; 2]) {
+        let most = |axis: usize| placed.values().map(|corner| corner[axis]).max().unwrap_or_default() + 1;
+        return Err(CalibrationError::OtherBoard {
+            columns: board.columns(),
+            rows: board.rows(),
+            found_columns: most(0),
+            found_rows: most(1),
+        });
+    }
+    let is_plain = dots.values().sum::<f64>() < MAX_PLAIN * 0.5 * dots.len() as f64;
+    plain(grid, board).filter(|_| is_plain).ok_or(CalibrationError::BoardUnclear { corners: grid.len() })
+}
+
+fn read(picture: &Luminance, grid: &Grid) -> Dots {
+    let mut seen = BTreeMap::new();
+    for place in grid.corners.keys() {
+        let Some(square) = grid.square(*place) else { continue };
+        let sample = |places: &[[f64; 2]]| {
+            let values: Option<Vec<f64>> =
+                places.iter().map(|place| picture.sample(&within(&square, *place))).collect();
+            values.map(|values| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        const NEAR: f64 = 0.05;
+        let middle = sample(&[[0.5, 0.5], [0.5 - NEAR, 0.5], [0.5 + NEAR, 0.5], [0.5, 0.5 - NEAR], [0.5, 0.5 + NEAR]]);
+        let diagonal = RING * std::f64::consts::FRAC_1_SQRT_2;
+        let [near, far] = [0.5 - diagonal, 0.5 + diagonal];
+        let [low, high] = [0.5 - RING, 0.5 + RING];
+        let ring = sample(&[
+            [near, near],
+            [far, near],
+            [near, far],
+            [far, far],
+            [low, 0.5],
+            [high, 0.5],
+            [0.5, low],
+            [0.5, high],
+        ]);
+        if let (Some(middle), Some(ring)) = (middle, ring) {
+            seen.insert(*place, (middle, ring));
+        }
+    }
+    let others = |[i, j]: Place| {
+        let rings: Vec<f64> = [[i + 1, j], [i - 1, j], [i, j + 1], [i, j - 1]]
+            .iter()
+            .filter_map(|place| seen.get(place).map(|(_, ring)| *ring))
+            .collect();
+        (!rings.is_empty()).then(|| rings.iter().sum::<f64>() / rings.len() as f64)
+    };
+    seen.iter()
+        .filter_map(|(place, (middle, ring))| {
+            let other = others(*place)?;
+            Some((*place, ((middle - ring) / (other - ring)).clamp(0.0, 1.0)))
+        })
+        .filter(|(_, dot)| dot.is_finite())
+        .collect()
+}
+
+/// The place at `[u, v]` of a square, 0 to 1 along each side.
+fn within(&[a, b, c, d]: &[Point2<f64>; 4], [u, v]: [f64; 2]) -> Point2<f64> {
+    let lower = a.coords * (1.0 - u) + b.coords * u;
+    let upper = c.coords * (1.0 - u) + d.coords * u;
+    Point2::from(lower * (1.0 - v) + upper * v)
+}
+
+/// The only placement on a board of so many squares that the dots agree with.
+fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
+    let mut placements: Vec<(f64, Turned)> = Turned::all(grid, sides)
+        .filter(|turned| turned.agrees_in_colour(grid))
+        .filter_map(|turned| Some((turned.contradiction(grid, dots, sides)?, turned)))
+        .collect();
+    placements.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (best, turned) = placements.first()?;
+    let second = placements.get(1).map_or(f64::INFINITY, |(second, _)| *second);
+    let is_clear = *best <= MAX_CONTRADICTION * dots.len() as f64 && second - best >= MIN_MARGIN;
+    is_clear.then(|| turned.corners(grid, sides))
+}
+
+/// A board without dots can be told from itself turned by half only by colours, and only where it is whole.
+fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
+    let sides = [board.columns(), board.rows()];
+    if grid.len() != board.num_corners() {
+        return None;
+    }
+    let mut whole = Turned::all(grid, sides)
+        .filter(|turned| turned.agrees_in_colour(grid) && turned.corners(grid, sides).len() == grid.len());
+    let first = whole.next()?;
+    whole.next().is_none().then(|| first.corners(grid, sides))
+}
+
+/// A turn by quarters, then a shift: from a grid's places to the board's corners.
+#[derive(Debug, Clone, Copy)]
+struct Turned {
+    quarters: i32,
+    shift: Place,
+}
+
+impl Turned {
+    /// Every way that leaves at most [`MAX_OUTSIDE`] rows or columns outside.
+    fn all(grid: &Grid, [columns, rows]: [u32; 2]) -> impl Iterator<Item = Self> {
+        (0..4).flat_map(move |quarters| {
+            let turned = Self { quarters, shift: [0, 0] };
+            let places: Vec<Place> = grid.corners.keys().map(|place| turned.corner(*place)).collect();
+            let ranges = [(0, columns), (1, rows)].map(|(axis, side)| {
+                let along = || places.iter().map(|place| place[axis]);
+                let (low, high) = (along().min().unwrap_or_default(), along().max().unwrap_or_default());
+                // Corners go from 1 to side - 1.
+                -low..=side as i32 - high
+            });
+            let [across, along] = ranges;
+            along.flat_map(move |y| across.clone().map(move |x| Self { quarters, shift: [x, y] }))
+        })
+    }
+
+    fn corner(&self, [i, j]: Place) -> Place {
+        let [x, y] = match self.quarters {
+            0 => [i, j],
+            1 => [-j, i],
+            2 => [-i, -j],
+            _ => [j, -i],
+        };
+        [x + self.shift[0], y + self.shift[1]]
+    }
+
+    /// The board's square at the grid's square `[i, j]`.
+    fn square(&self, [i, j]: Place) -> Place {
+        let (a, b) = (self.corner([i, j]), self.corner([i + 1, j + 1]));
+        [a[0].min(b[0]), a[1].min(b[1])]
+    }
+
+    fn agrees_in_colour(&self, grid: &Grid) -> bool {
+        let [column, row] = self.square([0, 0]);
+        ((column + row).rem_euclid(2) == 0) == grid.first_is_dark
+    }
+
+    /// How many squares contradict the board; `None` where too many corners lie outside.
+    fn contradiction(&self, grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<f64> {
+        let outside = grid.len() - self.corners(grid, sides).len();
+        if outside > MAX_OUTSIDE {
+            return None;
+        }
+        let of_dots: f64 = dots
+            .iter()
+            .map(|(place, dot)| {
+                let [column, row] = self.square(*place).map(|k| u32::try_from(k).unwrap_or(PATTERN_SIDE));
+                (f64::from(Board::has_dot(column, row)) - dot).abs()
+            })
+            .sum();
+        Some(of_dots + outside as f64)
+    }
+
+    fn corners(&self, grid: &Grid, [columns, rows]: [u32; 2]) -> Placed {
+        let inside = |value: i32, side: u32| u32::try_from(value).ok().filter(|value| (1..side).contains(value));
+        let placed = grid.corners.keys().filter_map(|place| {
+            let [i, j] = self.corner(*place);
+            Some((*place, [inside(i, columns)?, inside(j, rows)?]))
+        });
+        placed.collect()
+    }
+}

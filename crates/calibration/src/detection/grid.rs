@@ -1,0 +1,206 @@
+//! Saddle points to a grid: grown from one of them, from neighbour to neighbour.
+//!
+//! Legend: a grid's places `[i, j]` count from the first saddle point, and may be negative. Steps along `i` and `j` turn as the board's
+//! x and y do when its printed side is seen: `j` is to the left of `i` (y of pixels points down).
+
+use std::collections::{BTreeMap, VecDeque};
+
+use nalgebra::{Point2, Vector2};
+
+use super::saddle::Saddle;
+
+/// A place in a grid.
+pub(super) type Place = [i32; 2];
+
+/// The four neighbours of a place, and the axis of each.
+const NEIGHBOURS: [(Place, usize, f64); 4] =
+    [([1, 0], 0, 1.0), ([-1, 0], 0, -1.0), ([0, 1], 1, 1.0), ([0, -1], 1, -1.0)];
+/// How far a neighbour may lie from where the last step leads, in steps: perspective shortens steps by up to a sixth.
+const MAX_OFF: f64 = 0.3;
+/// How far the first neighbours may lie beside the edges' directions: the sine of 14 degrees.
+const MAX_SINE: f64 = 0.25;
+/// A neighbour's strength over a corner's: light falls off along a board, but not at once.
+const MIN_STRENGTH: f64 = 0.05;
+/// Corners from which grids are grown: the strongest that no grid holds yet.
+const MAX_SEEDS: usize = 60;
+
+/// Corners in a grid.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Grid {
+    /// Where each is in the picture.
+    pub(super) corners: BTreeMap<Place, Point2<f64>>,
+    /// Whether the square between `[0, 0]` and `[1, 1]` is dark.
+    pub(super) first_is_dark: bool,
+}
+
+impl Grid {
+    pub(super) fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Corners along both axes.
+    pub(super) fn extent(&self) -> [usize; 2] {
+        [0, 1].map(|axis| {
+            let along = || self.corners.keys().map(|place| place[axis]);
+            match (along().min(), along().max()) {
+                (Some(low), Some(high)) => (high - low + 1) as usize,
+                _ => 0,
+            }
+        })
+    }
+
+    /// The same grid in a picture `factor` times as large.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let corners = self.corners.iter().map(|(place, pixel)| (*place, pixel * factor)).collect();
+        Self { corners, ..*self }
+    }
+
+    /// How wide the squares around a corner are at least, in pixels: from an edge to the one opposite.
+    pub(super) fn width(&self, place: Place) -> Option<f64> {
+        let ways = |axis: usize| {
+            let of_axis = NEIGHBOURS.iter().filter(move |(_, of, _)| *of == axis);
+            of_axis.filter_map(move |(direction, ..)| self.way(place, *direction))
+        };
+        let widths = ways(0).flat_map(|u| ways(1).map(move |v| u.perp(&v).abs() / u.norm().max(v.norm())));
+        widths.min_by(f64::total_cmp)
+    }
+
+    /// From a corner to its neighbour. Beyond the grid's border, which the board's outer squares are, as perspective goes on: the last
+    /// two ways, and by how much they shrink.
+    fn way(&self, [i, j]: Place, [di, dj]: Place) -> Option<Vector2<f64>> {
+        let at = |steps: i32| self.corners.get(&[i + steps * di, j + steps * dj]);
+        let here = at(0)?;
+        if let Some(there) = at(1) {
+            return Some(there - here);
+        }
+        let last = here - at(-1)?;
+        let shrinkage = at(-2).map_or(1.0, |before| last.norm() / (at(-1).unwrap_or(here) - before).norm());
+        Some(last * shrinkage.min(1.0))
+    }
+
+    /// The corners around the square between `[i, j]` and `[i + 1, j + 1]`, where all four are there.
+    pub(super) fn square(&self, [i, j]: Place) -> Option<[Point2<f64>; 4]> {
+        let at = |di, dj| self.corners.get(&[i + di, j + dj]).copied();
+        Some([at(0, 0)?, at(1, 0)?, at(0, 1)?, at(1, 1)?])
+    }
+}
+
+/// All grids, largest first.
+pub(super) fn grow_all(saddles: &[Saddle]) -> Vec<Grid> {
+    let mut is_used = vec![false; saddles.len()];
+    let mut grids = Vec::new();
+    let mut seeds = 0;
+    for seed in 0..saddles.len() {
+        if is_used[seed] || seeds == MAX_SEEDS {
+            continue;
+        }
+        seeds += 1;
+        let Some(growth) = Growth::start(saddles, seed) else { continue };
+        let members = growth.grown();
+        if members.len() >= 4 {
+            for member in members.values() {
+                is_used[*member] = true;
+            }
+            grids.push(grid(saddles, &members));
+        }
+    }
+    grids.sort_by_key(|grid| std::cmp::Reverse(grid.len()));
+    grids
+}
+
+struct Growth<'a> {
+    saddles: &'a [Saddle],
+    members: BTreeMap<Place, usize>,
+    /// Steps to the next place along i and j, by place.
+    steps: BTreeMap<Place, [Vector2<f64>; 2]>,
+}
+
+impl<'a> Growth<'a> {
+    /// From a saddle point that has a neighbour along each edge.
+    fn start(saddles: &'a [Saddle], seed: usize) -> Option<Self> {
+        let first = &saddles[seed];
+        let step = |edge: Vector2<f64>| {
+            let ways = saddles.iter().filter(|other| is_neighbour(first, other)).map(|other| other.place - first.place);
+            let along = ways.filter(|way| way.perp(&edge).abs() < MAX_SINE * way.norm() && way.norm() > 0.0);
+            let nearest = along.min_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+            // Along the edge's direction, so that both steps are known to turn the same way.
+            Some(if nearest.dot(&edge) < 0.0 { -nearest } else { nearest })
+        };
+        let [edge, other_edge] = first.edges();
+        let (mut u, mut v) = (step(edge)?, step(other_edge)?);
+        if u.perp(&v) > 0.0 {
+            (u, v) = (v, u);
+        }
+        let steps = BTreeMap::from([([0, 0], [u, v])]);
+        Some(Self { saddles, members: BTreeMap::from([([0, 0], seed)]), steps })
+    }
+
+    fn grown(mut self) -> BTreeMap<Place, usize> {
+        let mut is_used = vec![false; self.saddles.len()];
+        for member in self.members.values() {
+            is_used[*member] = true;
+        }
+        let mut waiting = VecDeque::from([[0, 0]]);
+        while let Some(place) = waiting.pop_front() {
+            for ([di, dj], axis, sign) in NEIGHBOURS {
+                let next = [place[0] + di, place[1] + dj];
+                if self.members.contains_key(&next) {
+                    continue;
+                }
+                let from = &self.saddles[self.members[&place]];
+                let step = self.step(place, axis, sign);
+                let expected = from.place + step;
+                let radius = MAX_OFF * step.norm();
+                let candidates = self.saddles.iter().enumerate().filter(|(k, other)| {
+                    !is_used[*k] && (other.place - expected).norm() < radius && is_neighbour(from, other)
+                });
+                let off = |k: usize| (self.saddles[k].place - expected).norm();
+                let Some(found) = candidates.map(|(k, _)| k).min_by(|a, b| off(*a).total_cmp(&off(*b))) else {
+                    continue;
+                };
+                is_used[found] = true;
+                let mut steps = self.steps[&place];
+                steps[axis] = (self.saddles[found].place - from.place) * sign;
+                self.members.insert(next, found);
+                self.steps.insert(next, steps);
+                waiting.push_back(next);
+            }
+        }
+        self.members
+    }
+
+    /// The way to the next place: as the last step along this axis was, or as it is one row beside.
+    fn step(&self, [i, j]: Place, axis: usize, sign: f64) -> Vector2<f64> {
+        let [along, across] = if axis == 0 { [[1, 0], [0, 1]] } else { [[0, 1], [1, 0]] };
+        let sign_i = sign as i32;
+        let at = |place: Place| self.members.get(&place).map(|k| self.saddles[*k].place);
+        let beside = [1, -1].into_iter().find_map(|side| {
+            let row = [i + side * across[0], j + side * across[1]];
+            let next = [row[0] + sign_i * along[0], row[1] + sign_i * along[1]];
+            Some(at(next)? - at(row)?)
+        });
+        beside.unwrap_or_else(|| self.steps[&[i, j]][axis] * sign)
+    }
+}
+
+fn is_neighbour(first: &Saddle, other: &Saddle) -> bool {
+    other.strength > MIN_STRENGTH * first.strength
+        && first.strength > MIN_STRENGTH * other.strength
+        && first.is_opposite(other)
+}
+
+fn grid(saddles: &[Saddle], members: &BTreeMap<Place, usize>) -> Grid {
+    let corners: BTreeMap<Place, Point2<f64>> = members.iter().map(|(place, k)| (*place, saddles[*k].place)).collect();
+    let mut grid = Grid { corners, first_is_dark: false };
+    // At each corner of a dark square brightness falls towards the square's middle; squares alternate.
+    let mut votes = 0;
+    for (place, k) in members {
+        let Some([here, .., opposite]) = grid.square(*place) else { continue };
+        let way = opposite - here;
+        let falls = (way.transpose() * saddles[*k].hessian * way)[0] < 0.0;
+        let is_even = (place[0] + place[1]).rem_euclid(2) == 0;
+        votes += if falls == is_even { 1 } else { -1 };
+    }
+    grid.first_is_dark = votes > 0;
+    grid
+}

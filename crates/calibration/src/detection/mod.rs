@@ -1,0 +1,89 @@
+//! The board in a picture: corners to a fraction of a pixel, each with its place on the board.
+//!
+//! ```text
+//! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
+//!         ─ dots read, place and turn on the board ─ corners refined at full resolution                dots.rs, refine.rs
+//! ```
+//! A grid is grown by what its last steps were, so distortion and perspective need not be known. Pixels have the first pixel's centre at
+//! (0.5, 0.5).
+
+mod dots;
+mod grid;
+mod luminance;
+mod refine;
+mod saddle;
+
+use image::GrayImage;
+use nalgebra::Point2;
+
+use self::grid::Grid;
+use self::luminance::Luminance;
+use crate::board::Board;
+use crate::error::CalibrationError;
+
+/// A corner of the board and where the picture shows it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenCorner {
+    /// Which corner, as [`Board::corner`] counts.
+    pub corner: [u32; 2],
+    /// Where it appears, in pixels.
+    pub pixel: Point2<f64>,
+}
+
+/// Fewest corners of a board that is used: three by three.
+pub const MIN_CORNERS: usize = 9;
+/// Pictures are halved as long as they stay at least this long: in a blurred picture the corners are found only there.
+const MIN_SIDE: u32 = 160;
+/// Pictures larger than this are first looked at halved: smoothing there makes sharp corners of large squares no less visible.
+const MAX_SIDE: u32 = 2000;
+
+/// Finds the board, whole or in part.
+///
+/// # Units and frames
+/// Pixels with the first centre at (0.5, 0.5); corners as [`Board`] counts them, row by row.
+///
+/// # Errors
+/// [`CalibrationError::BoardNotFound`], [`CalibrationError::BoardUnclear`], [`CalibrationError::OtherBoard`].
+pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>, CalibrationError> {
+    let full = Luminance::of(picture);
+    let mut level = full.clone();
+    let mut scale = 1.0;
+    while level.longer_side() > MAX_SIDE {
+        level = level.halved();
+        scale *= 2.0;
+    }
+    let mut largest = Grid::default();
+    let mut refusal = None;
+    let mut found: Vec<SeenCorner> = Vec::new();
+    loop {
+        for grid in grid::grow_all(&saddle::find(&level)) {
+            if grid.len() > largest.len() {
+                largest = grid.clone();
+            }
+            if grid.len() < MIN_CORNERS || grid.len() <= found.len() {
+                continue;
+            }
+            match dots::identify(&level, &grid, board) {
+                Ok(placed) => {
+                    let corners = refine::refine(&full, &grid.scaled(scale), &placed);
+                    if corners.len() > found.len() {
+                        found = corners;
+                    }
+                }
+                // What the first grid that was large enough lacks says most: later ones are parts of it.
+                Err(error) => refusal = refusal.or(Some(error)),
+            }
+        }
+        if found.len() == board.num_corners() || level.longer_side() < 2 * MIN_SIDE {
+            break;
+        }
+        level = level.halved();
+        scale *= 2.0;
+    }
+    if found.len() >= MIN_CORNERS {
+        found.sort_by_key(|seen| (seen.corner[1], seen.corner[0]));
+        return Ok(found);
+    }
+    let [columns, rows] = largest.extent();
+    Err(refusal.unwrap_or(CalibrationError::BoardNotFound { corners: largest.len(), columns, rows }))
+}

@@ -1,0 +1,153 @@
+//! What a calibration's pictures lack, and the view that would help most.
+
+use std::fmt;
+
+use nalgebra::Point2;
+
+use super::bundle::Bundle;
+
+/// One thing to photograph.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Advice {
+    /// The board faces the camera in all pictures.
+    FaceOn {
+        /// The largest tilt.
+        max_tilt_deg: f64,
+    },
+    /// The board is tilted, but about one axis only.
+    OneAxis {
+        /// Which way it was not tilted.
+        missing: &'static str,
+    },
+    /// The board is small in all pictures.
+    TooFar {
+        /// Share of the picture that it fills at most.
+        max_share: f64,
+    },
+    /// Nothing is known of the lens there.
+    Empty {
+        /// Which part of the picture.
+        part: &'static str,
+    },
+    /// Few pictures.
+    Few {
+        /// How many are used.
+        found: usize,
+    },
+}
+
+impl fmt::Display for Advice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FaceOn { max_tilt_deg } => write!(
+                f,
+                "all pictures show the board nearly face-on (at most {max_tilt_deg:.0} degrees): tilt it by 20 to 40 degrees"
+            ),
+            Self::OneAxis { missing } => {
+                write!(f, "no picture shows the board tilted {missing}: tilt it so by 20 to 40 degrees")
+            }
+            Self::TooFar { max_share } => {
+                write!(
+                    f,
+                    "the board fills at most {:.0} % of the picture: go nearer, to 30 % or more",
+                    100.0 * max_share
+                )
+            }
+            Self::Empty { part } => write!(f, "no picture shows the board {part} of the picture: hold it there"),
+            Self::Few { found } => write!(f, "{found} pictures are few: 10 to 20 average more noise out"),
+        }
+    }
+}
+
+/// The tilt that makes a board no longer face-on.
+const MIN_TILT_DEG: f64 = 15.0;
+/// The least spread, largest less smallest, of tilts about an axis.
+const MIN_SPREAD_DEG: f64 = 15.0;
+/// The least share of the picture that the largest board fills.
+const MIN_SHARE: f64 = 0.12;
+const MIN_PICTURES: usize = 8;
+/// The picture's parts, three by three.
+const PARTS: [[&str; 3]; 3] = [
+    ["in the upper left corner", "at the upper border", "in the upper right corner"],
+    ["at the left border", "in the middle", "at the right border"],
+    ["in the lower left corner", "at the lower border", "in the lower right corner"],
+];
+
+/// What is missing, most useful first: without tilts the focal length is open, without corners the lens.
+pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
+    let mut advice = Vec::new();
+    let normals = bundle.normals();
+    // Towards the camera is -z.
+    let max_tilt = normals.iter().map(|normal| (-normal.z).clamp(-1.0, 1.0).acos()).fold(0.0, f64::max).to_degrees();
+    let spread = |component: usize| {
+        let angles = || normals.iter().map(|normal| normal[component].atan2(-normal.z).to_degrees());
+        angles().fold(f64::NEG_INFINITY, f64::max) - angles().fold(f64::INFINITY, f64::min)
+    };
+    if max_tilt < MIN_TILT_DEG {
+        advice.push(Advice::FaceOn { max_tilt_deg: max_tilt });
+    } else if spread(0) < MIN_SPREAD_DEG {
+        advice.push(Advice::OneAxis { missing: "to the left and to the right" });
+    } else if spread(1) < MIN_SPREAD_DEG {
+        advice.push(Advice::OneAxis { missing: "upwards and downwards" });
+    }
+    let (width, height) = (f64::from(bundle.camera.width), f64::from(bundle.camera.height));
+    let shares = bundle.views.iter().map(|corners| {
+        let places: Vec<Point2<f64>> = corners.iter().map(|seen| seen.pixel).collect();
+        hull_area(places) / (width * height)
+    });
+    let max_share = shares.fold(0.0, f64::max);
+    if max_share < MIN_SHARE {
+        advice.push(Advice::TooFar { max_share });
+    }
+    let mut is_seen = [[false; 3]; 3];
+    for seen in bundle.views.iter().flatten() {
+        let [column, row] =
+            [seen.pixel.x / width, seen.pixel.y / height].map(|share| (3.0 * share).clamp(0.0, 2.0) as usize);
+        is_seen[row][column] = true;
+    }
+    // Corners first: the lens bends most there.
+    for [row, column] in [[0, 0], [0, 2], [2, 0], [2, 2], [0, 1], [1, 0], [1, 2], [2, 1], [1, 1]] {
+        if !is_seen[row][column] {
+            advice.push(Advice::Empty { part: PARTS[row][column] });
+        }
+    }
+    if used.len() < MIN_PICTURES {
+        advice.push(Advice::Few { found: used.len() });
+    }
+    advice
+}
+
+/// The area of the convex hull, by Andrew's monotone chain.
+fn hull_area(mut points: Vec<Point2<f64>>) -> f64 {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let turns_right = |a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>| (b - a).perp(&(c - a)) <= 0.0;
+    let half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
+        let mut chain: Vec<Point2<f64>> = Vec::new();
+        for point in points {
+            while let [.., a, b] = &chain[..]
+                && turns_right(a, b, &point)
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        chain.pop();
+        chain
+    };
+    let mut hull = half(&mut points.iter().copied());
+    hull.extend(half(&mut points.iter().rev().copied()));
+    let next = |k: usize| hull[(k + 1) % hull.len()].coords;
+    0.5 * hull.iter().enumerate().map(|(k, point)| point.coords.perp(&next(k))).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hull_of_a_square_with_points_inside_is_the_square() {
+        let points = [[0.0, 0.0], [2.0, 0.0], [1.0, 1.0], [2.0, 2.0], [0.0, 2.0], [1.0, 0.0]].map(Point2::from);
+        assert!((hull_area(points.to_vec()) - 4.0).abs() < 1e-12);
+    }
+}

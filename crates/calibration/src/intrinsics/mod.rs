@@ -1,0 +1,235 @@
+//! Pictures of the board to a camera's focal length, centre and lens.
+//!
+//! ```text
+//! corners ─ homographies ─ focal length in closed form ─ poses ─ Levenberg–Marquardt over everything
+//!         ─ pictures that disagree with the others left out, one by one ─ errors, coverage
+//! ```
+//! The lens has k1, k2, p1, p2, and k3 where it is asked for: with fewer than some twenty pictures k3 follows the noise.
+//!
+//! # Source
+//! Zhang, A flexible new technique for camera calibration, 2000; closed form with the centre in the middle of the picture.
+
+mod bundle;
+mod coverage;
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+use sdg_geometry::{PinholeCamera, PlumbBob};
+
+use self::bundle::Bundle;
+pub use self::coverage::Advice;
+use crate::board::Board;
+use crate::detection::SeenCorner;
+use crate::error::CalibrationError;
+use crate::homography;
+use crate::least_squares::{Minimum, minimise};
+use crate::pose::{from_homography, places};
+use crate::projection::NUM_INTRINSICS;
+
+/// What is estimated, and from whom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CalibrationConfig {
+    /// Size of the pictures.
+    pub width: u32,
+    /// Size of the pictures.
+    pub height: u32,
+    /// Whether the lens has a k3.
+    pub has_k3: bool,
+}
+
+/// A camera and how well it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// Focal length, centre and lens.
+    pub camera: PinholeCamera,
+    /// Standard errors of fx, fy, cx, cy (pixels), k1, k2, p1, p2, k3, from the normal matrix and the residuals. They hold for noise in the
+    /// corners; a board that is not flat adds what they do not know of.
+    pub sigma: [f64; NUM_INTRINSICS],
+    /// Root of the mean squared distance between corners and where the camera puts them, over the pictures used.
+    pub rms_px: f64,
+    /// One for each picture, in the order given.
+    pub pictures: Vec<PictureFit>,
+    /// What the pictures lack, most useful first.
+    pub advice: Vec<Advice>,
+}
+
+/// What one picture contributed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PictureFit {
+    /// Its corners' RMS; of a picture left out, against the camera found without it.
+    pub rms_px: f64,
+    /// Where the board was.
+    pub camera_from_board: Isometry3<f64>,
+    /// Whether it was left out, because it disagrees with the others.
+    pub is_left_out: bool,
+}
+
+/// Three pictures give six equations for the closed form and leave something to check.
+pub const MIN_PICTURES: usize = 3;
+/// Where residuals begin to count less, in pixels, while pictures are judged: a few times what corners are off by.
+const ROBUST_PX: f64 = 1.0;
+/// A picture whose RMS is so many times the median is left out, if it also is so many pixels.
+const MAX_RMS_RATIO: f64 = 3.0;
+const MAX_RMS_PX: f64 = 0.5;
+/// Corners so many times the RMS away, and so many pixels, are left out in the end.
+const MAX_CORNER_RATIO: f64 = 6.0;
+/// The largest error of the focal length that is a calibration, as a share.
+const MAX_FOCAL_SIGMA: f64 = 0.03;
+/// What corners are off by at least: residuals of few corners may be smaller by chance.
+const MIN_CORNER_SIGMA_PX: f64 = 0.02;
+/// Boards whose normals differ by less look the same to the closed form, degrees.
+const MIN_TILT_RANGE_DEG: f64 = 6.0;
+
+/// Finds the camera that shows the boards as the pictures do.
+///
+/// # Units and frames
+/// Pixels with the first centre at (0.5, 0.5).
+///
+/// # Errors
+/// [`CalibrationError::TooFewPictures`], [`CalibrationError::PosesAlike`], [`CalibrationError::NoPose`].
+pub fn calibrate(
+    board: &Board,
+    pictures: &[Vec<SeenCorner>],
+    config: &CalibrationConfig,
+) -> Result<Calibration, CalibrationError> {
+    if pictures.len() < MIN_PICTURES {
+        return Err(too_few(pictures.len(), ""));
+    }
+    let all: Vec<usize> = (0..pictures.len()).collect();
+    let (mut used, mut minimum) = (all.clone(), first_fit(board, pictures, &all, config)?);
+    // One by one: a bad picture makes others look bad.
+    while let Some(worst) = disagreeing(&minimum.at.rms_of_pictures()) {
+        used.remove(worst);
+        if used.len() < MIN_PICTURES {
+            return Err(too_few(used.len(), ": the others contradict each other"));
+        }
+        minimum = first_fit(board, pictures, &used, config)?;
+    }
+    let kept = minimum.at.clone().without_outliers(MAX_CORNER_RATIO);
+    let minimum = minimise(Bundle { robust_px: f64::INFINITY, ..kept }).ok_or(CalibrationError::NoPose)?;
+    let bundle = &minimum.at;
+    let sigma = sigma_of(&minimum)?;
+    check_tilts(bundle, sigma[0] / bundle.camera.fx)?;
+    let fits = fits(board, pictures, &used, bundle)?;
+    let advice = coverage::advice(bundle, &used);
+    Ok(Calibration { camera: bundle.camera, sigma, rms_px: bundle.rms_px(), pictures: fits, advice })
+}
+
+fn too_few(found: usize, hint: &'static str) -> CalibrationError {
+    CalibrationError::TooFewPictures { least: MIN_PICTURES, found, hint }
+}
+
+/// The best of what two focal lengths lead to: that of the closed form, and the picture's longer side.
+fn first_fit<'a>(
+    board: &Board,
+    pictures: &'a [Vec<SeenCorner>],
+    used: &[usize],
+    config: &CalibrationConfig,
+) -> Result<Minimum<Bundle<'a>, NUM_INTRINSICS>, CalibrationError> {
+    let homographies: Option<Vec<_>> = used.iter().map(|k| homography::fit(&places(board, &pictures[*k]))).collect();
+    let homographies = homographies.ok_or(CalibrationError::NoPose)?;
+    let (width, height) = (f64::from(config.width), f64::from(config.height));
+    let [cx, cy] = [0.5 * width, 0.5 * height];
+    let longer = width.max(height);
+    let closed = focal_length(&homographies, cx, cy).filter(|f| (0.2 * longer..10.0 * longer).contains(f));
+    let minima = closed.into_iter().chain([longer]).filter_map(|focal| {
+        let camera = PinholeCamera {
+            width: config.width,
+            height: config.height,
+            fx: focal,
+            fy: focal,
+            cx,
+            cy,
+            lens: PlumbBob::NONE,
+        };
+        let undone = Matrix3::new(1.0 / focal, 0.0, -cx / focal, 0.0, 1.0 / focal, -cy / focal, 0.0, 0.0, 1.0);
+        let poses: Option<Vec<_>> = homographies.iter().map(|h| from_homography(&(undone * h))).collect();
+        let views = used.iter().map(|k| pictures[*k].iter().collect()).collect();
+        minimise(Bundle { board: *board, views, camera, poses: poses?, robust_px: ROBUST_PX, has_k3: config.has_k3 })
+    });
+    minima.min_by(|a, b| a.cost.total_cmp(&b.cost)).ok_or(CalibrationError::NoPose)
+}
+
+/// The focal length of square pixels with the given centre, by least squares over all homographies; `None` where it would be imaginary.
+///
+/// With `h` the columns of a homography, `ω = diag(1/f², 1/f², 1)`: `h1ᵀ ω h2 = 0` and `h1ᵀ ω h1 = h2ᵀ ω h2`.
+pub(crate) fn focal_length(homographies: &[Matrix3<f64>], cx: f64, cy: f64) -> Option<f64> {
+    let (mut above, mut below) = (0.0, 0.0);
+    for homography in homographies {
+        let [a, b] = [0, 1].map(|k| {
+            let h = homography.column(k);
+            Vector3::new(h[0] - cx * h[2], h[1] - cy * h[2], h[2])
+        });
+        // Boards near and far, small and large count alike.
+        let scale = 1.0 / (a.norm() * b.norm());
+        let planar = |a: &Vector3<f64>, b: &Vector3<f64>| a.x * b.x + a.y * b.y;
+        let equations =
+            [(planar(&a, &b), a.z * b.z), (0.5 * (planar(&a, &a) - planar(&b, &b)), 0.5 * (a.z * a.z - b.z * b.z))];
+        for (p, q) in equations {
+            above += scale * scale * p * p;
+            below -= scale * scale * p * q;
+        }
+    }
+    let squared = above / below;
+    (squared.is_finite() && squared > 0.0).then(|| squared.sqrt())
+}
+
+/// The picture that disagrees most with the others, if one does.
+fn disagreeing(rms: &[f64]) -> Option<usize> {
+    let mut sorted = rms.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[sorted.len() / 2];
+    let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]))?;
+    (rms[worst] > MAX_RMS_PX && rms[worst] > MAX_RMS_RATIO * median).then_some(worst)
+}
+
+fn sigma_of(minimum: &Minimum<Bundle<'_>, NUM_INTRINSICS>) -> Result<[f64; NUM_INTRINSICS], CalibrationError> {
+    let bundle = &minimum.at;
+    let parameters = NUM_INTRINSICS + 6 * bundle.views.len() - usize::from(!bundle.has_k3);
+    let freedom = (2 * bundle.num_corners()).saturating_sub(parameters).max(1);
+    let variance = (minimum.cost / freedom as f64).max(MIN_CORNER_SIGMA_PX * MIN_CORNER_SIGMA_PX);
+    let Some(covariance) = minimum.information.cholesky().map(|cholesky| cholesky.inverse() * variance) else {
+        return Err(alike(bundle, String::new()));
+    };
+    let mut sigma = [0.0; NUM_INTRINSICS];
+    for (k, sigma) in sigma.iter_mut().enumerate() {
+        *sigma = covariance[(k, k)].max(0.0).sqrt();
+    }
+    if !bundle.has_k3 {
+        sigma[NUM_INTRINSICS - 1] = 0.0;
+    }
+    Ok(sigma)
+}
+
+fn check_tilts(bundle: &Bundle<'_>, focal_sigma: f64) -> Result<(), CalibrationError> {
+    let is_known = focal_sigma < MAX_FOCAL_SIGMA;
+    if is_known && bundle.tilt_range_deg() >= MIN_TILT_RANGE_DEG {
+        return Ok(());
+    }
+    Err(alike(
+        bundle,
+        if is_known { String::new() } else { format!(" (error {:.0} %)", (100.0 * focal_sigma).min(999.0)) },
+    ))
+}
+
+fn alike(bundle: &Bundle<'_>, hint: String) -> CalibrationError {
+    let range = bundle.tilt_range_deg();
+    CalibrationError::PosesAlike { found: format!("tilts that differ by {range:.0} degrees at most"), hint }
+}
+
+/// Every picture against the camera: those used, and those left out.
+fn fits(
+    board: &Board,
+    pictures: &[Vec<SeenCorner>],
+    used: &[usize],
+    bundle: &Bundle<'_>,
+) -> Result<Vec<PictureFit>, CalibrationError> {
+    let rms = bundle.rms_of_pictures();
+    let fits = pictures.iter().enumerate().map(|(k, corners)| match used.iter().position(|used| *used == k) {
+        Some(at) => Ok(PictureFit { rms_px: rms[at], camera_from_board: bundle.poses[at], is_left_out: false }),
+        None => {
+            let pose = crate::pose::board_pose(&bundle.camera, board, corners).ok_or(CalibrationError::NoPose)?;
+            Ok(PictureFit { rms_px: pose.rms_px, camera_from_board: pose.camera_from_board, is_left_out: true })
+        }
+    });
+    fits.collect()
+}

@@ -1,0 +1,179 @@
+//! The focal length of a camera that was never calibrated, from one picture of the sheet, and what it costs not to know it.
+//!
+//! Square pixels, no lens distortion, and an optical axis near the middle of the picture are assumed. A sheet seen from straight above
+//! has the same picture at every focal length (twice as long, twice as far); the more it is tilted, the better it tells.
+
+use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
+use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+
+use super::locate_sheet;
+use crate::board::Board;
+use crate::detection::SeenCorner;
+use crate::error::CalibrationError;
+use crate::homography;
+use crate::intrinsics::focal_length;
+use crate::least_squares::{Block, Problem, minimise};
+use crate::pose::{board_pose, places};
+use crate::projection::{by_twist, motion, off, project};
+
+/// A focal length and its error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocalEstimate {
+    /// Pixels, the same for both axes.
+    pub focal_px: f64,
+    /// Its standard error, from the corners' residuals and an optical axis that is not quite in the middle.
+    pub sigma_px: f64,
+}
+
+impl FocalEstimate {
+    /// The error as a share.
+    pub fn relative_sigma(&self) -> f64 {
+        self.sigma_px / self.focal_px
+    }
+}
+
+/// How far the optical axis is from the picture's middle, as a share of its longer side: what phones and webcams have.
+const CENTER_SIGMA: f64 = 0.02;
+/// What corners are off by at least.
+const MIN_CORNER_SIGMA_PX: f64 = 0.05;
+/// Focal lengths that cameras have, in longer sides of the picture.
+const FOCALS: [f64; 2] = [0.3, 10.0];
+/// Shares of the longer side at which the search starts beside the closed form.
+const STARTS: [f64; 2] = [0.8, 1.5];
+
+/// A camera with its axis in the middle.
+fn centered((width, height): (u32, u32), focal_px: f64) -> PinholeCamera {
+    let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
+    PinholeCamera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
+}
+
+/// The focal length that the sheet's perspective tells; `None` where it tells nothing: seen from straight above.
+pub fn focal_from_sheet(size: (u32, u32), board: &Board, corners: &[SeenCorner]) -> Option<FocalEstimate> {
+    let longer = f64::from(size.0.max(size.1));
+    let middle = centered(size, longer);
+    let homography = homography::fit(&places(board, corners))?;
+    let closed = focal_length(&[homography], middle.cx, middle.cy);
+    let starts = closed.into_iter().chain(STARTS.map(|share| share * longer));
+    let plausible = FOCALS[0] * longer..FOCALS[1] * longer;
+    // The homography has eight parameters and explains all but the corners' noise, in x and in y.
+    let freedom = (2 * corners.len()).checked_sub(8).filter(|freedom| *freedom > 0)? as f64;
+    let noise = homography_rms_px(board, corners)? * (corners.len() as f64 / freedom).sqrt();
+    let corner_sigma = noise.max(MIN_CORNER_SIGMA_PX);
+    let prior = (corner_sigma / (CENTER_SIGMA * longer)).powi(2);
+    let found = starts.filter(|focal| plausible.contains(focal)).filter_map(|focal| {
+        let camera = centered(size, focal);
+        let camera_from_board = board_pose(&camera, board, corners)?.camera_from_board;
+        minimise(Sheet { board: *board, corners, camera, camera_from_board, prior })
+    });
+    let best = found.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    let covariance = best.information.try_inverse()? * (corner_sigma * corner_sigma);
+    let estimate = FocalEstimate { focal_px: best.at.camera.fx, sigma_px: covariance[(0, 0)].max(0.0).sqrt() };
+    (plausible.contains(&estimate.focal_px) && estimate.sigma_px.is_finite()).then_some(estimate)
+}
+
+/// How far corners are from where the homography puts them, root mean square: what it cannot explain is the lens.
+pub fn homography_rms_px(board: &Board, corners: &[SeenCorner]) -> Option<f64> {
+    let places = places(board, corners);
+    let homography = homography::fit(&places)?;
+    let sum: f64 =
+        places.iter().map(|(place, pixel)| (homography::apply(&homography, place) - pixel).norm_squared()).sum();
+    Some((sum / places.len() as f64).sqrt())
+}
+
+/// By how much positions move where the focal length is wrong, in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FocalCost {
+    /// How wrong it is assumed to be, as a share.
+    pub focal_error: f64,
+    /// The height above the sheet at which positions are compared.
+    pub height_m: f64,
+    /// At the sheet's middle.
+    pub at_sheet_m: f64,
+    /// At the worst place along the picture's border, as far as it shows that plane.
+    pub at_border_m: f64,
+}
+
+/// Compares positions at a height with those that a longer and a shorter focal length give, the pose found anew with each.
+///
+/// # Errors
+/// As [`locate_sheet`].
+pub fn focal_cost(
+    camera: &PinholeCamera,
+    board: &Board,
+    corners: &[SeenCorner],
+    height_m: f64,
+    focal_error: f64,
+) -> Result<FocalCost, CalibrationError> {
+    let posed = |factor: f64| {
+        let intrinsics = PinholeCamera { fx: camera.fx * factor, fy: camera.fy * factor, ..*camera };
+        let world_from_camera = locate_sheet(&intrinsics, board, corners)?.sheet_from_camera;
+        Ok(PosedCamera { intrinsics, world_from_camera })
+    };
+    let told = posed(1.0)?;
+    let others = [posed(1.0 + focal_error)?, posed(1.0 - focal_error)?];
+    let moved = |pixel: &Point2<f64>| {
+        let here = told.at_height(pixel, height_m)?;
+        let off = others.iter().filter_map(|other| Some((other.at_height(pixel, height_m)? - here).norm()));
+        Some(off.fold(0.0, f64::max))
+    };
+    let middle = told.project(&board.center().coords.push(height_m).into());
+    let [width, height] = [camera.width, camera.height].map(f64::from);
+    let border = (0..=8).map(|k| f64::from(k) / 8.0).flat_map(|share| {
+        [[share * width, 0.0], [share * width, height], [0.0, share * height], [width, share * height]]
+    });
+    Ok(FocalCost {
+        focal_error,
+        height_m,
+        at_sheet_m: middle.and_then(|pixel| moved(&pixel)).unwrap_or(f64::NAN),
+        at_border_m: border.filter_map(|pixel| moved(&pixel.into())).fold(0.0, f64::max),
+    })
+}
+
+/// Parameters: focal length, both coordinates of the centre, and the pose's twist.
+#[derive(Clone)]
+struct Sheet<'a> {
+    board: Board,
+    corners: &'a [SeenCorner],
+    camera: PinholeCamera,
+    camera_from_board: Isometry3<f64>,
+    /// The weight of the centre's square distance from the middle.
+    prior: f64,
+}
+
+impl Problem<9> for Sheet<'_> {
+    fn blocks(&self) -> Option<Vec<Block<9>>> {
+        let mut block = Block::empty();
+        for seen in self.corners {
+            let p = self.camera_from_board * self.board.corner(seen.corner);
+            let projected = project(&self.camera, &p)?;
+            let mut by_all = SMatrix::<f64, 2, 9>::zeros();
+            // One focal length for both axes.
+            by_all.set_column(0, &(projected.by_intrinsics.column(0) + projected.by_intrinsics.column(1)));
+            by_all.set_column(1, &projected.by_intrinsics.column(2));
+            by_all.set_column(2, &projected.by_intrinsics.column(3));
+            by_all.fixed_view_mut::<2, 6>(0, 3).copy_from(&(projected.by_point * by_twist(&p)));
+            block.add(&off(&projected.pixel, &seen.pixel), &by_all, &SMatrix::zeros(), 1.0);
+        }
+        let middle = centered((self.camera.width, self.camera.height), 1.0);
+        let center = SVector::<f64, 2>::new(self.camera.cx - middle.cx, self.camera.cy - middle.cy);
+        let mut by_center = SMatrix::<f64, 2, 9>::zeros();
+        by_center[(0, 1)] = 1.0;
+        by_center[(1, 2)] = 1.0;
+        block.add(&center, &by_center, &SMatrix::zeros(), self.prior);
+        block.own = Matrix6::identity();
+        (self.camera.fx > 0.0).then(|| vec![block])
+    }
+
+    fn stepped(&self, shared: &SVector<f64, 9>, _own: &[Vector6<f64>]) -> Self {
+        let focal = self.camera.fx + shared[0];
+        let camera = PinholeCamera {
+            fx: focal,
+            fy: focal,
+            cx: self.camera.cx + shared[1],
+            cy: self.camera.cy + shared[2],
+            ..self.camera
+        };
+        let twist = shared.fixed_rows::<6>(3).into_owned();
+        Self { camera, camera_from_board: motion(&twist) * self.camera_from_board, ..self.clone() }
+    }
+}

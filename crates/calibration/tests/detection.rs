@@ -1,0 +1,157 @@
+//! Boards in rendered pictures: which corners are found, how exactly, and what is said where they are not.
+#![allow(clippy::unwrap_used)]
+
+mod rendering;
+
+use image::GrayImage;
+use nalgebra::{Isometry3, Point2};
+use rendering::{Exposure, Random, camera_from_board, render, render_with};
+use sdg_calibration::{Board, CalibrationError, SeenCorner, find_board};
+use sdg_geometry::{PinholeCamera, PlumbBob};
+
+const WIDE: PinholeCamera = PinholeCamera {
+    width: 640,
+    height: 480,
+    fx: 520.0,
+    fy: 521.5,
+    cx: 325.0,
+    cy: 236.0,
+    lens: PlumbBob { k1: -0.25, k2: 0.08, p1: 0.001, p2: -0.0008, k3: 0.0 },
+};
+/// Corners are found to this, root mean square, in ordinary pictures: the issue asks for 0.1 px.
+const MAX_RMS_PX: f64 = 0.06;
+
+fn board() -> Board {
+    Board::new(9, 6, 0.025).unwrap()
+}
+
+/// RMS distance from the truth; fails where a corner is not the one that it is taken for.
+fn rms_px(corners: &[SeenCorner], board: &Board, camera: &PinholeCamera, pose: &Isometry3<f64>) -> f64 {
+    let squares = corners.iter().map(|seen| {
+        let off = (camera.project(&(pose * board.corner(seen.corner))).unwrap() - seen.pixel).norm();
+        assert!(off < 2.0, "corner {:?} is off by {off:.2} px", seen.corner);
+        off * off
+    });
+    (squares.sum::<f64>() / corners.len() as f64).sqrt()
+}
+
+fn seen(pose: &Isometry3<f64>, exposure: &Exposure) -> Result<Vec<SeenCorner>, CalibrationError> {
+    find_board(&render(&board(), &WIDE, pose, exposure, &mut Random(5)), &board())
+}
+
+#[test]
+fn all_corners_are_found_at_every_turn_and_tilt() {
+    let board = board();
+    let mut random = Random(1);
+    for k in 0..24 {
+        let roll = [0.0, 0.4, 1.0, -2.4, 9.0, -0.7][k % 6];
+        let tilts = [random.within(-0.3, 0.3), random.within(-0.3, 0.3), roll];
+        let distance = if k % 2 == 0 { 0.4 } else { 0.65 };
+        let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], distance, tilts);
+        let corners = seen(&pose, &Exposure::ORDINARY).unwrap();
+        let rms = rms_px(&corners, &board, &WIDE, &pose);
+        println!("{k}: {} corners, {rms:.4} px", corners.len());
+        assert!(corners.len() >= 34 && rms < MAX_RMS_PX, "{k}: {} corners, {rms:.3} px", corners.len());
+    }
+}
+
+#[test]
+fn blurred_dark_noisy_and_small_boards_are_found() {
+    let board = board();
+    let pose = |distance| camera_from_board(&board, &WIDE, [300.0, 250.0], distance, [0.15, -0.1, 0.2]);
+    let ordinary = Exposure::ORDINARY;
+    let cases = [
+        ("blurred by 2 px", 0.45, Exposure { blur: 8, ..ordinary }, 0.1),
+        ("dark", 0.45, Exposure { ink: 8.0, paper: 48.0, noise: 1.5, ..ordinary }, 0.15),
+        ("noisy", 0.45, Exposure { noise: 8.0, ..ordinary }, 0.15),
+        ("unevenly lit", 0.45, Exposure { falloff: 0.8, ..ordinary }, 0.1),
+        ("squares of 11 px", 1.15, ordinary, 0.15),
+    ];
+    for (name, distance, exposure, max_px) in cases {
+        let pose = pose(distance);
+        let corners = seen(&pose, &exposure).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let rms = rms_px(&corners, &board, &WIDE, &pose);
+        println!("{name}: {} corners, {rms:.4} px", corners.len());
+        assert!(corners.len() >= 36 && rms < max_px, "{name}: {} corners, {rms:.3} px", corners.len());
+    }
+}
+
+#[test]
+fn a_board_that_the_picture_cuts_off_is_known_all_the_same() {
+    let board = board();
+    for (k, pixel) in
+        [[0.0, 240.0], [640.0, 200.0], [320.0, 20.0], [330.0, 470.0], [560.0, 420.0]].into_iter().enumerate()
+    {
+        let pose = camera_from_board(&board, &WIDE, pixel, 0.4, [0.1, 0.1, 0.3 * k as f64]);
+        let corners = seen(&pose, &Exposure::ORDINARY).unwrap();
+        let rms = rms_px(&corners, &board, &WIDE, &pose);
+        println!("{pixel:?}: {} corners, {rms:.4} px", corners.len());
+        assert!(
+            (12..40).contains(&corners.len()) && rms < MAX_RMS_PX,
+            "{pixel:?}: {} corners, {rms:.3} px",
+            corners.len()
+        );
+    }
+}
+
+#[test]
+fn the_pictures_of_a_phone_are_found_too() {
+    let camera =
+        PinholeCamera { width: 4000, height: 3000, fx: 3100.0, fy: 3100.0, cx: 2005.0, cy: 1490.0, lens: WIDE.lens };
+    let board = board();
+    let pose = camera_from_board(&board, &camera, [2000.0, 1500.0], 0.4, [0.2, 0.1, 0.1]);
+    let picture =
+        render(&board, &camera, &pose, &Exposure { blur: 4, noise: 4.0, ..Exposure::ORDINARY }, &mut Random(3));
+    let corners = find_board(&picture, &board).unwrap();
+    assert_eq!(corners.len(), 40);
+    let rms = rms_px(&corners, &board, &camera, &pose);
+    println!("phone: {rms:.4} px");
+    assert!(rms < MAX_RMS_PX);
+}
+
+#[test]
+fn what_is_no_board_is_told_by_what_is_missing() {
+    let board = board();
+    let edge_on = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.5, [0.9, 0.0, 0.0]);
+    assert!(is_missing(&seen(&edge_on, &Exposure::ORDINARY)));
+    let grey = GrayImage::from_pixel(640, 480, image::Luma([90]));
+    assert!(matches!(find_board(&grey, &board), Err(CalibrationError::BoardNotFound { corners: 0, .. })));
+    assert!(matches!(
+        find_board(&GrayImage::new(3, 2), &board),
+        Err(CalibrationError::BoardNotFound { corners: 0, .. })
+    ));
+    let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.4, [0.1, 0.1, 0.0]);
+    let picture = render(&board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(5));
+    let smaller = Board::new(8, 6, 0.025).unwrap();
+    assert_eq!(
+        find_board(&picture, &smaller),
+        Err(CalibrationError::OtherBoard { columns: 8, rows: 6, found_columns: 9, found_rows: 6 })
+    );
+    // What is left of a board beyond the border of the picture.
+    let cut = camera_from_board(&board, &WIDE, [720.0, 240.0], 0.3, [0.1, 0.1, 0.0]);
+    assert!(is_missing(&seen(&cut, &Exposure::ORDINARY)));
+}
+
+/// Too little of it is seen; pieces of a grid may be.
+fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
+    matches!(found, Err(CalibrationError::BoardNotFound { .. } | CalibrationError::BoardUnclear { .. }))
+}
+
+#[test]
+fn a_board_without_dots_is_known_where_it_is_whole() {
+    let board = board();
+    let plain = |place: &Point2<f64>| {
+        let inside = (0.0..9.0).contains(&place.x) && (0.0..6.0).contains(&place.y);
+        inside && Board::is_dark(place.x as u32, place.y as u32)
+    };
+    let picture = |pixel| {
+        let pose = camera_from_board(&board, &WIDE, pixel, 0.45, [0.1, 0.2, 0.4]);
+        (render_with(&plain, &board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(2)), pose)
+    };
+    let (whole, pose) = picture([320.0, 240.0]);
+    let corners = find_board(&whole, &board).unwrap();
+    assert_eq!(corners.len(), 40);
+    assert!(rms_px(&corners, &board, &WIDE, &pose) < MAX_RMS_PX);
+    let (cut, _) = picture([560.0, 240.0]);
+    assert!(matches!(find_board(&cut, &board), Err(CalibrationError::BoardUnclear { .. })));
+}

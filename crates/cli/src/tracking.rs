@@ -1,0 +1,134 @@
+//! Parts followed through live pictures: tracking on the caller's thread, searches on another one.
+//!
+//! ```text
+//! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
+//!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
+//! ```
+//! A search takes as long as it takes, and what it found is carried forward. So that a test gives the same output on any machine,
+//! [`SearchTime::Frames`] runs each search on the caller's thread and hands its outcome over a fixed number of frames later.
+
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use image::RgbImage;
+use sdg_grasp::{PartDetector, PartSearch, SearchOutcome, TrackedPart, Tracker, TrackerConfig};
+
+/// Where searches run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SearchTime {
+    /// On a thread of their own, as long as they take.
+    AsItTakes,
+    /// On the caller's thread; known to the tracker so many frames after the one that was searched, at least one.
+    Frames(u32),
+}
+
+/// A tracker and what runs its searches.
+pub struct LiveTracker {
+    tracker: Tracker,
+    searches: Searches,
+}
+
+enum Searches {
+    Threaded {
+        /// `None` once the thread is to end.
+        due: Option<Sender<PartSearch>>,
+        done: Receiver<SearchOutcome>,
+        thread: Option<JoinHandle<()>>,
+    },
+    Delayed {
+        frames: u32,
+        /// What was found, and the frames until it is known.
+        outcome: Option<(SearchOutcome, u32)>,
+    },
+}
+
+impl LiveTracker {
+    /// A tracker that knows no part yet; it starts the search thread.
+    ///
+    /// # Errors
+    /// A thread that the system refuses.
+    pub fn new(detector: PartDetector, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
+        let searches = match search_time {
+            SearchTime::AsItTakes => {
+                let (due, searches) = channel::<PartSearch>();
+                let (finished, done) = channel();
+                let work = move || {
+                    for search in searches {
+                        if finished.send(search.run()).is_err() {
+                            break;
+                        }
+                    }
+                };
+                let thread = thread::Builder::new().name("search".to_owned()).spawn(work);
+                let thread = thread.context("a thread for searches does not start")?;
+                Searches::Threaded { due: Some(due), done, thread: Some(thread) }
+            }
+            SearchTime::Frames(frames) => Searches::Delayed { frames: frames.max(1), outcome: None },
+        };
+        Ok(Self { tracker: Tracker::new(detector, config), searches })
+    }
+
+    /// Follows all known parts into a frame, and searches frames where that is due. `captured` counts from any moment that is the
+    /// same for all frames.
+    ///
+    /// # Errors
+    /// What a search refuses, as a picture that is too small.
+    pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Result<Vec<TrackedPart>> {
+        if let Some(outcome) = self.searches.finished()? {
+            self.tracker.take_outcome(outcome)?;
+        }
+        let parts = self.tracker.frame(picture, captured);
+        if let Some(search) = self.tracker.search_due() {
+            self.searches.start(search)?;
+        }
+        Ok(parts)
+    }
+}
+
+impl Searches {
+    /// The outcome that is to be known before the next frame.
+    fn finished(&mut self) -> Result<Option<SearchOutcome>> {
+        match self {
+            Self::Threaded { done, .. } => match done.try_recv() {
+                Ok(outcome) => Ok(Some(outcome)),
+                Err(TryRecvError::Empty) => Ok(None),
+                Err(TryRecvError::Disconnected) => bail!("the search thread ended"),
+            },
+            Self::Delayed { outcome, .. } => {
+                if let Some((_, frames)) = outcome {
+                    *frames -= 1;
+                }
+                Ok(outcome.take_if(|(_, frames)| *frames == 0).map(|(outcome, _)| outcome))
+            }
+        }
+    }
+
+    fn start(&mut self, search: PartSearch) -> Result<()> {
+        match self {
+            Self::Threaded { due, .. } => {
+                let sent = due.as_ref().map(|due| due.send(search));
+                if !matches!(sent, Some(Ok(()))) {
+                    bail!("the search thread ended");
+                }
+            }
+            Self::Delayed { frames, outcome } => *outcome = Some((search.run(), *frames)),
+        }
+        Ok(())
+    }
+}
+
+impl Drop for LiveTracker {
+    /// Waits for a search that is running.
+    fn drop(&mut self) {
+        if let Searches::Threaded { due, thread, .. } = &mut self.searches {
+            due.take();
+            if let Some(thread) = thread.take() {
+                // A search that panicked has said so itself.
+                let _ = thread.join();
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What parts are searched for with and followed with: a model, with or without a calibrated camera.
+
+use std::sync::Arc;
+
+use image::{RgbImage, imageops};
+
+use burn::tensor::read_sync;
+
+use crate::error::Result;
+use crate::model::{Found, GraspDetection, GraspModel, Verification};
+use crate::plan::{PixelRect, PlanDetector, PlanarPose};
+
+/// A model, and the plan view that it works in where the camera is calibrated.
+#[derive(Debug, Clone)]
+pub enum PartDetector {
+    /// Poses in pixels alone.
+    Picture(GraspModel),
+    /// Poses in metres, too.
+    Plan(PlanDetector),
+}
+
+impl From<GraspModel> for PartDetector {
+    fn from(model: GraspModel) -> Self {
+        Self::Picture(model)
+    }
+}
+
+impl From<PlanDetector> for PartDetector {
+    fn from(detector: PlanDetector) -> Self {
+        Self::Plan(detector)
+    }
+}
+
+impl PartDetector {
+    pub(super) fn model(&self) -> &GraspModel {
+        match self {
+            Self::Picture(model) => model,
+            Self::Plan(detector) => detector.model(),
+        }
+    }
+
+    /// Width and height of the frame of reference.
+    pub(super) fn frame_size(&self, picture: &RgbImage) -> [u32; 2] {
+        match self {
+            Self::Picture(_) => [picture.width(), picture.height()],
+            Self::Plan(detector) => detector.view_size(),
+        }
+    }
+
+    /// A rectangle of the frame of reference, within it.
+    pub(super) fn window(&self, picture: &RgbImage, rect: &PixelRect) -> RgbImage {
+        match self {
+            Self::Picture(_) => {
+                let PixelRect { left, top, width, height } = *rect;
+                imageops::crop_imm(picture, left, top, width, height).to_image()
+            }
+            Self::Plan(detector) => detector.window_of(picture, rect),
+        }
+    }
+
+    /// What a whole picture shows; detections in the frame of reference.
+    fn find(&self, picture: &RgbImage) -> Result<Vec<Found>> {
+        let view;
+        let shown = match self {
+            Self::Picture(_) => picture,
+            Self::Plan(detector) => {
+                view = detector.plan_view_of(picture);
+                &view
+            }
+        };
+        read_sync(self.model().find_async(shown, Verification::ByShape))
+    }
+
+    /// A detection of the frame of reference in pixels of the picture, and in metres; `None` where the camera does not show it.
+    pub(super) fn output(&self, detection: GraspDetection) -> Option<(GraspDetection, Option<PlanarPose>)> {
+        match self {
+            Self::Picture(_) => Some((detection, None)),
+            Self::Plan(detector) => {
+                let placed = detector.placed(detection)?;
+                Some((placed.detection, Some(placed.pose)))
+            }
+        }
+    }
+}
+
+/// A search of one frame, to be run where there is time for it.
+#[derive(Debug)]
+pub struct PartSearch {
+    pub(super) number: u64,
+    pub(super) picture: Arc<RgbImage>,
+    pub(super) detector: Arc<PartDetector>,
+}
+
+/// What a search found.
+pub struct SearchOutcome {
+    pub(super) number: u64,
+    pub(super) found: Result<Vec<Found>>,
+}
+
+impl PartSearch {
+    /// Searches: some tens to some hundreds of milliseconds.
+    pub fn run(&self) -> SearchOutcome {
+        SearchOutcome { number: self.number, found: self.detector.find(&self.picture) }
+    }
+}

@@ -1,0 +1,192 @@
+//! One part refined in one frame: a window about where it is expected, its gradients, and the edges in it.
+//!
+//! ```text
+//! expected pose ─ outline's box and the reach ─ window, halved as the search halves ─ GradientField
+//!                                                                                       │ snapped or captured
+//!                                       edges, surface, hue, visible share ─ Followed ──┘
+//! ```
+
+use std::sync::Arc;
+
+use image::RgbImage;
+use sdg_geometry::{BoundingBox, PlanarSimilarity};
+use sdg_shape::{Evidence, GradientField, Reach};
+
+use super::detector::PartDetector;
+use crate::plan::PixelRect;
+use crate::prepared::{Prepared, WorkingSize, scaling};
+use crate::sizes::SizeRange;
+use crate::taught::TaughtDemonstration;
+use crate::verification::halved;
+
+/// Pixels of the halved picture about the reach, which the gradients' smoothing and the crests beside an edge need: 3 and 6.
+const BORDER_PX: f64 = 9.0;
+/// A pyramid has a level where both sides keep so many pixels; as in `sdg_shape`.
+const MIN_LEVEL_SIDE: u32 = 24;
+/// What the comparing network sees of a part, in lengths of the part: 1.2, and a pixel for interpolation.
+const SEEN_BY_NETWORK: f64 = 1.25;
+
+/// A demonstration at the size at which a part is followed.
+#[derive(Debug, Clone)]
+pub(super) struct SizedPart {
+    pub(super) demonstration_idx: usize,
+    range: SizeRange,
+    working: WorkingSize,
+    prepared: Arc<Prepared>,
+}
+
+/// How far from where it is expected a part is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// Some pixels: from frame to frame.
+    Snapped,
+    /// Twice as many, five times slower.
+    Captured,
+}
+
+/// A part in one frame.
+#[derive(Debug, Clone)]
+pub(super) struct Followed {
+    pub(super) image_from_cutout: PlanarSimilarity,
+    /// Edges and surface together, in `[0, 1]`.
+    pub(super) agreement: f64,
+    /// Without likeness.
+    pub(super) evidence: Evidence,
+    /// ln of its size over the nearest that is usual.
+    pub(super) log_size: f64,
+    /// Mean brightness over that of the demonstration.
+    pub(super) light: f64,
+}
+
+impl Effort {
+    /// In pixels of the halved picture. The scale hardly changes from frame to frame; free, it would only be noise. Chosen by hand.
+    fn reach(self) -> Reach {
+        match self {
+            Self::Snapped => Reach { shift_px: 12.0, turn_rad: 0.12, log_scale: 0.02 },
+            Self::Captured => Reach { shift_px: 20.0, turn_rad: 0.2, log_scale: 0.04 },
+        }
+    }
+}
+
+/// A window of a frame, halved.
+struct View {
+    image: RgbImage,
+    /// Shifts and shrinks.
+    view_from_frame: PlanarSimilarity,
+}
+
+impl SizedPart {
+    /// The demonstration for parts `scale` times as large as in it; `None` where it shows nothing to compare at that size.
+    pub(super) fn new(
+        detector: &PartDetector,
+        demonstration_idx: usize,
+        frame_size: [u32; 2],
+        scale: f64,
+    ) -> Option<Self> {
+        let demonstration = &detector.model().demonstrations()[demonstration_idx];
+        let tolerance = &demonstration.check().search.scales;
+        let range = SizeRange::all(demonstration.marks.photo_size, frame_size, tolerance)
+            .into_iter()
+            .min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))?;
+        let (working, prepared) = demonstration.prepared(&range).ok()?;
+        Some(Self { demonstration_idx, range, working, prepared })
+    }
+
+    pub(super) fn demonstration<'a>(&self, detector: &'a PartDetector) -> &'a TaughtDemonstration {
+        &detector.model().demonstrations()[self.demonstration_idx]
+    }
+
+    /// Refines the part about `start`; `None` where too little of it lies in the frame.
+    ///
+    /// # Units and frames
+    /// Poses map pixels of the cut-out to the detector's frame of reference.
+    pub(super) fn follow(
+        &self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        start: &PlanarSimilarity,
+        effort: Effort,
+    ) -> Option<Followed> {
+        let demonstration = self.demonstration(detector);
+        let reach = effort.reach();
+        let bounds = demonstration.outline(start).bounds();
+        let margin = (reach.shift_px + BORDER_PX) * self.working.shrink();
+        let search = &self.prepared.search;
+        let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / self.working.cutout_scale);
+        let view = self.view(detector, picture, &bounds, margin, step)?;
+        let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
+        let comparison = search.comparison(&view.image, &field);
+        let start = self.view_from_working(&view, start);
+        let pose = match effort {
+            Effort::Snapped => search.template().snapped(&field, &start, &reach),
+            Effort::Captured => search.template().captured(&field, &start, &reach),
+        };
+        let (evidence, agreement) = comparison.evidence_without_likeness(&pose);
+        let image_from_cutout = self.image_from_cutout(&view, &pose);
+        Some(Followed {
+            image_from_cutout,
+            agreement,
+            evidence,
+            log_size: self.range.log_size(image_from_cutout.scale),
+            light: search.brightness(&view.image, &pose),
+        })
+    }
+
+    /// What the comparing network says of a pose; `None` where too little of it lies in the frame.
+    pub(super) fn likeness(
+        &self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        image_from_cutout: &PlanarSimilarity,
+    ) -> Option<f64> {
+        let own = self.demonstration(detector).marks.region().bounds();
+        // A square about the part, however it is turned.
+        let side = SEEN_BY_NETWORK * own.width().max(own.height()) * image_from_cutout.scale;
+        let half = 0.5 * side * std::f64::consts::SQRT_2;
+        let center = image_from_cutout.apply(&own.center());
+        let square = BoundingBox { x1: center.x, y1: center.y, x2: center.x, y2: center.y };
+        let view = self.view(detector, picture, &square, half, 1)?;
+        let pose = self.view_from_working(&view, image_from_cutout);
+        // The network reads colours alone.
+        let no_field = GradientField::new(&RgbImage::new(1, 1));
+        Some(self.prepared.search.comparison(&view.image, &no_field).likeness.log_odds(&view.image, &pose))
+    }
+
+    /// The window of the frame `margin` about `bounds`, its corner at a multiple of `step` pixels of the halved picture.
+    fn view(
+        &self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        bounds: &BoundingBox,
+        margin: f64,
+        step: u32,
+    ) -> Option<View> {
+        let shrink = 1 << self.working.halvings;
+        let [width, height] = detector.frame_size(picture);
+        let span = |low: f64, high: f64, limit: u32| {
+            let grid = step * shrink;
+            let least = MIN_LEVEL_SIDE * grid;
+            let from = ((low - margin).max(0.0) as u32).min(limit) / grid * grid;
+            // Toward the end of the frame the window grows to the other side.
+            let from = from.min(limit.saturating_sub(least) / grid * grid);
+            let to = ((high + margin).max(0.0).ceil() as u32).max(from + least).min(limit);
+            (to >= from + shrink).then_some((from, to - from))
+        };
+        let (left, width) = span(bounds.x1, bounds.x2, width)?;
+        let (top, height) = span(bounds.y1, bounds.y2, height)?;
+        let mut image = detector.window(picture, &PixelRect { left, top, width, height });
+        for _ in 0..self.working.halvings {
+            image = halved(&image);
+        }
+        let shift = PlanarSimilarity { tx: -f64::from(left), ty: -f64::from(top), ..PlanarSimilarity::IDENTITY };
+        Some(View { image, view_from_frame: scaling(1.0 / f64::from(shrink)).compose(&shift) })
+    }
+
+    fn view_from_working(&self, view: &View, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
+        view.view_from_frame.compose(image_from_cutout).compose(&scaling(1.0 / self.working.cutout_scale))
+    }
+
+    fn image_from_cutout(&self, view: &View, view_from_working: &PlanarSimilarity) -> PlanarSimilarity {
+        view.view_from_frame.inverse().compose(view_from_working).compose(&scaling(self.working.cutout_scale))
+    }
+}

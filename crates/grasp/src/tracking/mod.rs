@@ -1,0 +1,100 @@
+//! Parts followed through a sequence of pictures.
+//!
+//! ```text
+//! frame n ─┬─ each track: pose carried forward by its velocity ─ window about it ─ edges ─ score ─ followed or lost
+//!          │                                                                                          ↑
+//!          └─ now and then: PartSearch, on another core ─ what frame n showed ─ carried forward ──────┘
+//!                                                         through the frames since, or matched to tracks
+//! ```
+//! **Glossary.** *Frame of reference*: the pixels that a model works in, those of the picture or of its plan view. *Followed*:
+//! refined near the last pose, in a window; nothing outside the window is read. *Captured*: the same with a wider reach, about five
+//! times slower. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the newest.
+//!
+//! A track is scored in every frame by the verdict that scores detections ([`crate::Contributions`]), with one difference: the
+//! comparing network, which takes more time than all else, is asked only when the agreement of edges and surface has fallen since
+//! it was last asked; searches ask it too. A track whose score falls below [`TrackerConfig::lose_below`] is lost in that frame.
+//!
+//! What is deliberately absent: clocks and threads. Frames bring their times, and whoever owns the [`Tracker`] runs the searches
+//! where and when it likes, so that the same code runs on two cores, in a browser, and in a test that is the same on any machine.
+
+mod arrival;
+mod detector;
+mod follow;
+mod track;
+mod tracker;
+
+use std::time::Duration;
+
+pub use self::detector::{PartDetector, PartSearch, SearchOutcome};
+pub use self::tracker::Tracker;
+use crate::model::GraspDetection;
+use crate::plan::PlanarPose;
+
+/// Whether a part is where its track says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TrackState {
+    /// It was refined in this frame, and its score holds.
+    Followed,
+    /// As `Followed`, for the first time since it was lost: this frame only.
+    FoundAgain,
+    /// It is not seen; the detection is the last one that held.
+    Lost,
+}
+
+/// A part in the newest frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedPart {
+    /// Stays the same while the part is followed and when it is found again; no other part gets it.
+    pub id: u64,
+    /// Whether it is where `detection` says.
+    pub state: TrackState,
+    /// Time since it was first found.
+    pub age: Duration,
+    /// Time since it was last seen; zero while it is followed.
+    pub unseen_for: Duration,
+    /// Where it is, in pixels of the picture as given, with its score in this frame; where it was last seen once it is lost.
+    pub detection: GraspDetection,
+    /// In metres, with a calibrated camera.
+    pub pose: Option<PlanarPose>,
+}
+
+impl TrackedPart {
+    /// Whether it is seen in this frame.
+    pub fn is_followed(&self) -> bool {
+        self.state != TrackState::Lost
+    }
+}
+
+/// When parts are searched for, lost and forgotten.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackerConfig {
+    /// Time from the start of one search to that of the next while all known parts are followed; as soon as one is lost, or none is
+    /// known, searches follow each other. Chosen by hand: a new part is found within this and the time of a search.
+    pub search_every: Duration,
+    /// A track with a lower score is lost. Below 0.5, where detections are accepted: the part was there in the last frame. Chosen by
+    /// hand.
+    pub lose_below: f64,
+    /// So long after it was lost a part is looked for where its velocity carries it, in every frame. Chosen by hand.
+    pub retry_for: Duration,
+    /// A part that was lost for longer is forgotten: found later it is another one. Chosen by hand.
+    pub forget_after: Duration,
+    /// Most parts that are followed at once. Chosen by hand, for time: each takes some milliseconds a frame.
+    pub max_parts: usize,
+}
+
+impl TrackerConfig {
+    /// What [`Default`] gives.
+    pub const DEFAULT: Self = Self {
+        search_every: Duration::from_millis(250),
+        lose_below: 0.35,
+        retry_for: Duration::from_millis(200),
+        forget_after: Duration::from_secs(10),
+        max_parts: 16,
+    };
+}
+
+impl Default for TrackerConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}

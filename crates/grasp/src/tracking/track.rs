@@ -1,0 +1,258 @@
+//! One part and what is known of it from frame to frame.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_shape::Evidence;
+
+use super::detector::PartDetector;
+use super::follow::{Effort, Followed, SizedPart};
+use crate::facts::TurnSource;
+use crate::model::Placement;
+use crate::sighting::Sighting;
+use crate::verification::Overlay;
+
+/// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
+/// motion.
+const VELOCITY_GAIN: f64 = 0.4;
+/// Share of a new frame in the usual agreement and in the usual size. Chosen by hand.
+const STEADY_GAIN: f64 = 0.05;
+/// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
+const MAX_FORWARD_SECS: f64 = 0.1;
+/// An agreement of less than this share of the usual one is tried again with more effort. Chosen by hand.
+const POOR_SHARE: f64 = 0.85;
+/// The comparing network is asked again where the agreement is not within this ratio of what it was when it was asked last, and
+/// after this time. Chosen by hand: asking takes about as long as following.
+const SAME_LOOKS: f64 = 0.85;
+const MAX_LIKENESS_AGE: Duration = Duration::from_secs(1);
+/// Frames whose poses are kept for searches that have not ended. Chosen by hand: two seconds at 100 frames a second.
+const MAX_HISTORY: usize = 200;
+
+/// What the comparing network said, and when.
+#[derive(Debug, Clone, Copy)]
+struct Likeness {
+    log_odds: f64,
+    /// Agreement of edges and surface then.
+    agreement: f64,
+    at: Duration,
+}
+
+/// Whether a part is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Standing {
+    /// Found by a search of an older frame and carried forward; `replaces` is the track that it corrects.
+    Arriving {
+        replaces: Option<u64>,
+    },
+    Followed,
+    /// Since that time.
+    Lost(Duration),
+}
+
+/// A pose in one frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PastPose {
+    pub(super) number: u64,
+    pub(super) image_from_cutout: PlanarSimilarity,
+    pub(super) agreement: f64,
+}
+
+/// One part.
+#[derive(Debug, Clone)]
+pub(super) struct Track {
+    pub(super) id: u64,
+    pub(super) standing: Standing,
+    pub(super) first_seen: Duration,
+    part: SizedPart,
+    /// In the frame at `time`, the last in which it held.
+    pub(super) image_from_cutout: PlanarSimilarity,
+    pub(super) time: Duration,
+    pub(super) number: u64,
+    velocity_px_per_s: Vector2<f64>,
+    turn_rad_per_s: f64,
+    /// The scale without its noise from frame to frame.
+    steady_scale: f64,
+    /// `None` before the first frame.
+    steady_agreement: Option<f64>,
+    likeness: Option<Likeness>,
+    /// Where the marks lie against the outline, as the last search settled them.
+    cutout_from_marks: PlanarSimilarity,
+    network_score: f64,
+    keypoint_scores: Vec<f64>,
+    turn_source: TurnSource,
+    history: VecDeque<PastPose>,
+}
+
+impl Track {
+    /// A track of what a search found in frame `number`; `None` where its demonstration shows nothing to compare at that size.
+    pub(super) fn new(
+        detector: &PartDetector,
+        frame_size: [u32; 2],
+        found: &Placement,
+        number: u64,
+        time: Duration,
+    ) -> Option<Self> {
+        let part = SizedPart::new(detector, found.demonstration_idx, frame_size, found.image_from_cutout.scale)?;
+        let mut made = Self {
+            id: 0,
+            standing: Standing::Arriving { replaces: None },
+            first_seen: time,
+            part,
+            image_from_cutout: found.image_from_cutout,
+            time,
+            number,
+            velocity_px_per_s: Vector2::zeros(),
+            turn_rad_per_s: 0.0,
+            steady_scale: found.image_from_cutout.scale,
+            steady_agreement: None,
+            likeness: None,
+            cutout_from_marks: PlanarSimilarity::IDENTITY,
+            network_score: 0.0,
+            keypoint_scores: Vec::new(),
+            turn_source: found.turn_source,
+            history: VecDeque::new(),
+        };
+        made.take_over(found, time);
+        Some(made)
+    }
+
+    /// Takes over what only a search measures: the marks' shift, the network's score, the likeness.
+    pub(super) fn take_over(&mut self, found: &Placement, time: Duration) {
+        self.cutout_from_marks = found.image_from_cutout.inverse().compose(&found.image_from_marks);
+        self.network_score = found.network_score;
+        self.keypoint_scores.clone_from(&found.keypoint_scores);
+        self.turn_source = found.turn_source;
+        if let Some(log_odds) = found.likeness {
+            self.likeness = Some(Likeness { log_odds, agreement: found.agreement, at: time });
+        }
+    }
+
+    /// The part's middle where the cut-out lies at `image_from_cutout`, in the frame of reference.
+    fn middle(&self, detector: &PartDetector, image_from_cutout: &PlanarSimilarity) -> Point2<f64> {
+        image_from_cutout.apply(&self.part.demonstration(detector).marks.bbox.center())
+    }
+
+    /// Where the part is expected at a time.
+    pub(super) fn expected(&self, detector: &PartDetector, time: Duration) -> PlanarSimilarity {
+        let secs = time.saturating_sub(self.time).as_secs_f64().min(MAX_FORWARD_SECS);
+        let middle = self.middle(detector, &self.image_from_cutout);
+        let turn = Angle::from_radians(self.turn_rad_per_s * secs);
+        let scale = self.steady_scale / self.image_from_cutout.scale;
+        let moved = PlanarSimilarity::about(middle, middle + self.velocity_px_per_s * secs, turn, scale);
+        moved.compose(&self.image_from_cutout)
+    }
+
+    /// Refines the part in a frame, wherever that leads; `None` where too little of it lies in the frame.
+    pub(super) fn refine(
+        &self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        time: Duration,
+        effort: Effort,
+    ) -> Option<Followed> {
+        let start = self.expected(detector, time);
+        let followed = self.part.follow(detector, picture, &start, effort)?;
+        let is_poor = self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady);
+        if !is_poor || effort == Effort::Captured {
+            return Some(followed);
+        }
+        let captured = self.part.follow(detector, picture, &start, Effort::Captured);
+        captured.filter(|captured| captured.agreement > followed.agreement).or(Some(followed))
+    }
+
+    /// What the comparing network says of the part where it was refined to; it is asked only where that may have changed.
+    pub(super) fn likeness(
+        &mut self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        time: Duration,
+        followed: &Followed,
+    ) -> Option<f64> {
+        let least = self.part.demonstration(detector).check().search.least_agreement;
+        if followed.agreement < least {
+            return None;
+        }
+        let is_the_same = self.likeness.is_some_and(|last| {
+            let ratio = followed.agreement / last.agreement.max(f64::MIN_POSITIVE);
+            (SAME_LOOKS..=1.0 / SAME_LOOKS).contains(&ratio) && time.saturating_sub(last.at) < MAX_LIKENESS_AGE
+        });
+        if !is_the_same {
+            let log_odds = self.part.likeness(detector, picture, &followed.image_from_cutout)?;
+            self.likeness = Some(Likeness { log_odds, agreement: followed.agreement, at: time });
+        }
+        self.likeness.map(|likeness| likeness.log_odds)
+    }
+
+    /// Whether an agreement is so far below the usual one that the part is not there.
+    pub(super) fn is_poor(&self, followed: &Followed) -> bool {
+        self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
+    }
+
+    /// The place as the verdict judges it.
+    pub(super) fn sighting<'a>(
+        &self,
+        detector: &'a PartDetector,
+        followed: &Followed,
+        likeness: Option<f64>,
+    ) -> Sighting<'a> {
+        let overlay = Overlay {
+            demonstration: self.part.demonstration(detector),
+            demonstration_idx: self.part.demonstration_idx,
+            image_from_cutout: followed.image_from_cutout,
+            image_from_marks: followed.image_from_cutout.compose(&self.cutout_from_marks),
+            agreement: followed.agreement,
+            evidence: Evidence { likeness, ..followed.evidence },
+            log_size: followed.log_size,
+            light: followed.light,
+        };
+        Sighting {
+            overlay,
+            network_score: self.network_score,
+            keypoint_scores: self.keypoint_scores.clone(),
+            turn_source: self.turn_source,
+        }
+    }
+
+    /// Moves the track to where it was refined to.
+    pub(super) fn accept(&mut self, detector: &PartDetector, followed: &Followed, number: u64, time: Duration) {
+        let secs = time.saturating_sub(self.time).as_secs_f64();
+        let shift = self.middle(detector, &followed.image_from_cutout) - self.middle(detector, &self.image_from_cutout);
+        let turn = (followed.image_from_cutout.angle - self.image_from_cutout.angle).radians();
+        if matches!(self.standing, Standing::Lost(_)) || secs > MAX_FORWARD_SECS {
+            self.velocity_px_per_s = Vector2::zeros();
+            self.turn_rad_per_s = 0.0;
+        } else if secs > 0.0 {
+            // The first measurement has nothing before it to be smoothed with.
+            let gain = if self.history.is_empty() { 1.0 } else { VELOCITY_GAIN };
+            self.velocity_px_per_s += (shift / secs - self.velocity_px_per_s) * gain;
+            self.turn_rad_per_s += (turn / secs - self.turn_rad_per_s) * gain;
+        }
+        self.steady_scale *= (followed.image_from_cutout.scale / self.steady_scale).powf(STEADY_GAIN);
+        let steady = self.steady_agreement.unwrap_or(followed.agreement);
+        self.steady_agreement = Some(steady + STEADY_GAIN * (followed.agreement - steady));
+        self.image_from_cutout = followed.image_from_cutout;
+        (self.time, self.number) = (time, number);
+        if self.history.len() == MAX_HISTORY {
+            self.history.pop_front();
+        }
+        let Followed { image_from_cutout, agreement, .. } = *followed;
+        self.history.push_back(PastPose { number, image_from_cutout, agreement });
+    }
+
+    /// Where it was in a frame, if it was followed there.
+    pub(super) fn past_pose(&self, number: u64) -> Option<PastPose> {
+        let idx = self.history.binary_search_by_key(&number, |past| past.number).ok()?;
+        self.history.get(idx).copied()
+    }
+
+    /// Goes on from another pose of the same part; its number, its age and its past stay.
+    pub(super) fn replace_by(&mut self, other: Self) {
+        let mut history = std::mem::take(&mut self.history);
+        history.retain(|past| other.history.front().is_none_or(|first| past.number < first.number));
+        history.extend(&other.history);
+        *self = Self { id: self.id, first_seen: self.first_seen, standing: Standing::Followed, history, ..other };
+    }
+}

@@ -1,0 +1,373 @@
+//! All parts of a sequence.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use image::RgbImage;
+
+use super::arrival::{BufferedFrame, Carried, FrameBuffer, Match, carry, compare, is_same_part};
+use super::detector::{PartDetector, PartSearch, SearchOutcome};
+use super::follow::{Effort, Followed};
+use super::track::{Standing, Track};
+use super::{TrackState, TrackedPart, TrackerConfig};
+use crate::error::Result;
+use crate::model::{Found, GraspDetection};
+use crate::plan::PlanarPose;
+use crate::verdict::Clues;
+
+/// Scores from which a detection becomes a track, and a lost track is found again: where detections are accepted.
+const ACCEPTED: f64 = 0.5;
+/// Captures of arriving tracks in one frame, so that a search that ends does not hold up the frame. Chosen by hand.
+const MAX_CARRY_STEPS: usize = 3;
+
+/// Follows parts from frame to frame.
+///
+/// # Example
+/// ```no_run
+/// # use std::{sync::Arc, time::Duration};
+/// # use sdg_grasp::{Device, GraspModel, Tracker, TrackerConfig};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let frames: Vec<image::RgbImage> = Vec::new();
+/// let model = GraspModel::from_bytes(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
+/// let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
+/// for (number, picture) in frames.into_iter().enumerate() {
+///     let parts = tracker.frame(Arc::new(picture), Duration::from_millis(10 * number as u64));
+///     for part in parts.iter().filter(|part| part.is_followed()) {
+///         println!("part {}: ({:.1}, {:.1})", part.id, part.detection.grasp.x, part.detection.grasp.y);
+///     }
+///     // On another thread, while further frames come in:
+///     if let Some(search) = tracker.search_due() {
+///         tracker.take_outcome(search.run())?;
+///     }
+/// }
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug)]
+pub struct Tracker {
+    detector: Arc<PartDetector>,
+    config: TrackerConfig,
+    frames: FrameBuffer,
+    next_number: u64,
+    next_id: u64,
+    tracks: Vec<Tracked>,
+    /// On their way to the newest frame.
+    arriving: Vec<Track>,
+    /// The frame that is being searched.
+    searching: Option<u64>,
+    /// When the last search began.
+    searched_at: Option<Duration>,
+}
+
+/// A track and what was last said of it.
+#[derive(Debug)]
+struct Tracked {
+    track: Track,
+    part: TrackedPart,
+}
+
+/// A track refined in the newest frame, before it is judged.
+struct Refined {
+    followed: Followed,
+    likeness: Option<f64>,
+}
+
+impl Tracker {
+    /// A tracker that knows no part yet.
+    pub fn new(detector: PartDetector, config: TrackerConfig) -> Self {
+        Self {
+            detector: Arc::new(detector),
+            config,
+            frames: FrameBuffer::default(),
+            next_number: 0,
+            next_id: 0,
+            tracks: Vec::new(),
+            arriving: Vec::new(),
+            searching: None,
+            searched_at: None,
+        }
+    }
+
+    /// Follows all known parts into a frame; all of them, those that are lost too, in the order in which they were first found.
+    ///
+    /// `captured` counts from any moment that is the same for all frames of the sequence. Frames of another size than the last ones
+    /// begin a new sequence.
+    pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Vec<TrackedPart> {
+        if self.frames.newest().is_some_and(|newest| newest.picture.dimensions() != picture.dimensions()) {
+            self.begin_anew();
+        }
+        let number = self.next_number;
+        self.next_number += 1;
+        self.frames.push(BufferedFrame { number, picture: picture.clone(), time: captured });
+        self.frames.forget_before(self.oldest_needed());
+
+        let mut arrived = self.carry_forward();
+        let mut refined = self.refine_all(&picture, captured, &mut arrived);
+        self.judge_all(&mut refined, number, captured, arrived);
+        self.drop_doubled();
+        self.tracks.retain(|tracked| match tracked.track.standing {
+            Standing::Lost(since) => captured.saturating_sub(since) < self.config.forget_after,
+            _ => true,
+        });
+        self.tracks.iter().map(|tracked| tracked.part.clone()).collect()
+    }
+
+    /// The search that is to be run now, on the newest frame; `None` while one is running and while none is due.
+    pub fn search_due(&mut self) -> Option<PartSearch> {
+        let newest = self.frames.newest()?;
+        if self.searching.is_some() {
+            return None;
+        }
+        let is_missing = self.tracks.is_empty()
+            || self.tracks.iter().any(|tracked| matches!(tracked.track.standing, Standing::Lost(_)));
+        let is_due = self.searched_at.is_none_or(|at| newest.time.saturating_sub(at) >= self.config.search_every);
+        if !(is_due || is_missing && self.arriving.is_empty()) {
+            return None;
+        }
+        self.searching = Some(newest.number);
+        self.searched_at = Some(newest.time);
+        let (number, picture) = (newest.number, newest.picture.clone());
+        Some(PartSearch { number, picture, detector: self.detector.clone() })
+    }
+
+    /// Takes what a search found; it is carried forward while the next frames are followed.
+    ///
+    /// # Errors
+    /// Those of [`crate::GraspModel::detect`].
+    pub fn take_outcome(&mut self, outcome: SearchOutcome) -> Result<()> {
+        if self.searching != Some(outcome.number) {
+            // Of a sequence that has ended.
+            return Ok(());
+        }
+        self.searching = None;
+        let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(()) };
+        let frame_size = self.detector.frame_size(&frame.picture);
+        for found in outcome.found? {
+            let Some(placement) = &found.placement else { continue };
+            let arriving = || Track::new(&self.detector, frame_size, placement, frame.number, frame.time);
+            match self.matched(&found, frame.number) {
+                Some((idx, Match::Confirms)) => self.tracks[idx].track.take_over(placement, frame.time),
+                Some((idx, Match::Corrects)) if found.detection.is_accepted() => {
+                    let id = self.tracks[idx].track.id;
+                    self.arriving.extend(arriving().map(|track| track.replacing(id)));
+                }
+                Some(_) => {}
+                None if found.detection.is_accepted() => self.arriving.extend(arriving()),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The track on which a detection of frame `number` lies.
+    fn matched(&self, found: &Found, number: u64) -> Option<(usize, Match)> {
+        let placement = found.placement.as_ref()?;
+        self.tracks.iter().enumerate().find_map(|(idx, tracked)| {
+            let past = tracked.track.past_pose(number)?;
+            let compared = compare(&self.detector, found, placement, &past);
+            (compared != Match::Other).then_some((idx, compared))
+        })
+    }
+
+    fn begin_anew(&mut self) {
+        self.frames = FrameBuffer::default();
+        self.tracks.clear();
+        self.arriving.clear();
+        self.searching = None;
+        self.searched_at = None;
+    }
+
+    fn oldest_needed(&self) -> u64 {
+        let arriving = self.arriving.iter().map(|track| track.number);
+        arriving.chain(self.searching).min().unwrap_or(self.next_number)
+    }
+
+    /// Carries what searches found through the buffered frames; returns what is near the newest.
+    fn carry_forward(&mut self) -> Vec<Track> {
+        let mut steps = MAX_CARRY_STEPS;
+        let mut arrived = Vec::new();
+        for mut track in std::mem::take(&mut self.arriving) {
+            match carry(&self.detector, &self.frames, &mut track, &mut steps) {
+                Carried::ToNewest => arrived.push(track),
+                Carried::Partly => self.arriving.push(track),
+                Carried::Lost => {}
+            }
+        }
+        arrived
+    }
+
+    /// Refines all tracks, and then those that arrived, in the newest frame.
+    fn refine_all(&mut self, picture: &RgbImage, captured: Duration, arrived: &mut [Track]) -> Vec<Option<Refined>> {
+        let detector = &*self.detector;
+        let retry_for = self.config.retry_for;
+        let known = self.tracks.iter_mut().map(|tracked| &mut tracked.track);
+        known
+            .chain(arrived)
+            .map(|track| {
+                let effort = match track.standing {
+                    Standing::Lost(since) if captured.saturating_sub(since) > retry_for => return None,
+                    Standing::Followed | Standing::Lost(_) => Effort::Snapped,
+                    Standing::Arriving { .. } => Effort::Captured,
+                };
+                let followed = track.refine(detector, picture, captured, effort)?;
+                if matches!(track.standing, Standing::Lost(_)) && track.is_poor(&followed) {
+                    return None;
+                }
+                let likeness = track.likeness(detector, picture, captured, &followed);
+                Some(Refined { followed, likeness })
+            })
+            .collect()
+    }
+
+    /// Scores what was refined, all of one picture at once, and decides what is followed.
+    fn judge_all(&mut self, refined: &mut Vec<Option<Refined>>, number: u64, captured: Duration, arrived: Vec<Track>) {
+        let detector = self.detector.clone();
+        let newcomers = refined.split_off(self.tracks.len());
+        let all =
+            self.tracks.iter().map(|tracked| &tracked.track).chain(&arrived).zip(refined.iter().chain(&newcomers));
+        let clues: Vec<Option<Clues>> = all
+            .map(|(track, refined)| {
+                let Refined { followed, likeness } = refined.as_ref()?;
+                Some(detector.model().clues(&track.sighting(&detector, followed, *likeness)))
+            })
+            .collect();
+        let asked: Vec<Clues> = clues.iter().flatten().copied().collect();
+        let mut judged = detector.model().judge(&asked).into_iter();
+        let mut verdicts = clues.iter().map(|clues| clues.as_ref().and_then(|_| judged.next())).collect::<Vec<_>>();
+        let of_newcomers = verdicts.split_off(self.tracks.len());
+
+        let output = |track: &Track, refined: &Refined, (score, evidence), size: [u32; 2]| {
+            let sighting = track.sighting(&detector, &refined.followed, refined.likeness);
+            let mut detection = sighting.detection(score, evidence, detector.model().num_keypoints());
+            detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
+            detector.output(detection)
+        };
+        let size = self.frames.newest().map_or([0, 0], |newest| detector.frame_size(&newest.picture));
+        for ((tracked, refined), verdict) in self.tracks.iter_mut().zip(refined.iter()).zip(verdicts) {
+            let least = match tracked.track.standing {
+                Standing::Lost(_) => ACCEPTED,
+                _ => self.config.lose_below,
+            };
+            let seen = refined.as_ref().zip(verdict).filter(|(_, (score, _))| *score >= least);
+            let shown = seen.and_then(|(refined, verdict)| {
+                output(&tracked.track, refined, verdict, size).map(|shown| (refined, shown))
+            });
+            match shown {
+                Some((refined, shown)) => tracked.follow(&detector, &refined.followed, number, captured, shown),
+                None => tracked.lose(captured),
+            }
+        }
+        for ((track, refined), verdict) in arrived.into_iter().zip(&newcomers).zip(of_newcomers) {
+            let seen = refined.as_ref().zip(verdict).filter(|(_, (score, _))| *score >= ACCEPTED);
+            let shown = seen.and_then(|(refined, verdict)| Some((refined, output(&track, refined, verdict, size)?)));
+            if let Some((refined, shown)) = shown {
+                self.enter(track, &refined.followed, number, captured, shown);
+            }
+        }
+    }
+
+    /// Makes an arrived track one that is followed: the one that it corrects, one that was lost, or a new one.
+    fn enter(
+        &mut self,
+        mut track: Track,
+        followed: &Followed,
+        number: u64,
+        captured: Duration,
+        shown: (GraspDetection, Option<PlanarPose>),
+    ) {
+        track.accept(&self.detector, followed, number, captured);
+        let lost_nearest = || {
+            let apart = |tracked: &Tracked| (tracked.part.detection.grasp.center() - shown.0.grasp.center()).norm();
+            let lost = self.tracks.iter().enumerate();
+            let lost = lost.filter(|(_, tracked)| matches!(tracked.track.standing, Standing::Lost(_)));
+            lost.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1))).map(|(idx, _)| idx)
+        };
+        let is_double = |tracked: &Tracked, id: Option<u64>| {
+            tracked.part.is_followed() && Some(tracked.track.id) != id && overlap(&tracked.part.detection, &shown.0)
+        };
+        let replaced = match track.standing {
+            Standing::Arriving { replaces } => replaces,
+            _ => None,
+        };
+        if self.tracks.iter().any(|tracked| is_double(tracked, replaced)) {
+            return;
+        }
+        let replaced = replaced.and_then(|id| self.tracks.iter().position(|tracked| tracked.track.id == id));
+        if let Some(idx) = replaced.or_else(lost_nearest) {
+            self.tracks[idx].go_on_as(track, captured, shown);
+        } else if self.tracks.len() < self.config.max_parts {
+            track.id = self.next_id;
+            self.next_id += 1;
+            track.standing = Standing::Followed;
+            let (detection, pose) = shown;
+            let age = captured.saturating_sub(track.first_seen);
+            let unseen_for = Duration::ZERO;
+            let part = TrackedPart { id: track.id, state: TrackState::Followed, age, unseen_for, detection, pose };
+            self.tracks.push(Tracked { track, part });
+        }
+    }
+
+    /// Of two tracks on one part the older one stays.
+    fn drop_doubled(&mut self) {
+        let mut idx = 1;
+        while idx < self.tracks.len() {
+            let (before, here) = self.tracks.split_at(idx);
+            let here = &here[0].part;
+            let is_double = here.is_followed()
+                && before
+                    .iter()
+                    .any(|other| other.part.is_followed() && overlap(&other.part.detection, &here.detection));
+            if is_double {
+                self.tracks.remove(idx);
+            } else {
+                idx += 1;
+            }
+        }
+    }
+}
+
+/// Whether two detections are on one part.
+fn overlap(one: &GraspDetection, other: &GraspDetection) -> bool {
+    match (&one.outline, &other.outline) {
+        (Some(one), Some(other)) => is_same_part(one, other),
+        _ => false,
+    }
+}
+
+impl Tracked {
+    fn follow(
+        &mut self,
+        detector: &PartDetector,
+        followed: &Followed,
+        number: u64,
+        captured: Duration,
+        (detection, pose): (GraspDetection, Option<PlanarPose>),
+    ) {
+        let was_lost = matches!(self.track.standing, Standing::Lost(_));
+        self.track.accept(detector, followed, number, captured);
+        self.track.standing = Standing::Followed;
+        self.part.state = if was_lost { TrackState::FoundAgain } else { TrackState::Followed };
+        self.part.age = captured.saturating_sub(self.track.first_seen);
+        self.part.unseen_for = Duration::ZERO;
+        (self.part.detection, self.part.pose) = (detection, pose);
+    }
+
+    fn lose(&mut self, captured: Duration) {
+        if !matches!(self.track.standing, Standing::Lost(_)) {
+            self.track.standing = Standing::Lost(captured);
+        }
+        self.part.state = TrackState::Lost;
+        self.part.age = captured.saturating_sub(self.track.first_seen);
+        self.part.unseen_for = captured.saturating_sub(self.track.time);
+    }
+
+    /// Goes on from where another track has the same part.
+    fn go_on_as(&mut self, other: Track, captured: Duration, (detection, pose): (GraspDetection, Option<PlanarPose>)) {
+        let was_lost = matches!(self.track.standing, Standing::Lost(_));
+        self.track.replace_by(other);
+        self.part.state = if was_lost { TrackState::FoundAgain } else { TrackState::Followed };
+        self.part.age = captured.saturating_sub(self.track.first_seen);
+        self.part.unseen_for = Duration::ZERO;
+        (self.part.detection, self.part.pose) = (detection, pose);
+    }
+}

@@ -1,0 +1,407 @@
+//! A camera that stands still over the table and shows parts that move: `sim:PART?speed=50&seed=1&fps=100&…`.
+//!
+//! ```text
+//! TableCameraConfig ─ scene by seed, a lane of the table for each part ─ Mover: place and yaw at each frame
+//!                                                                              │
+//!                                      Renderer ─ noise ─ TableView { picture, truth of every part }
+//! ```
+//! Frames are `1 / fps` of simulated time apart and are drawn as fast as the computer draws them. The same configuration gives the
+//! same frames to the bit. No robot stands in the scene.
+
+mod config;
+mod motion;
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use image::RgbImage;
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_camera::{CameraError, Frame};
+use sdg_geometry::PosedCamera;
+
+pub use self::config::TableCameraConfig;
+use self::motion::{Bounds, Mover};
+use crate::camera::{WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
+use crate::data::Data;
+use crate::error::Result;
+use crate::model::{Asset, Camera, Id, Joint, Model};
+use crate::objects::ObjectSpec;
+use crate::render::{RenderConfig, Renderer};
+use crate::scene::{
+    GraspTruth, MjcfFragment, PlacedObject, SceneVariation, VariationConfig, base_from_look_camera, pose_attributes,
+    sample_distractors_between,
+};
+
+/// The part of the table that the camera shows from its usual height, in the base frame.
+const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };
+/// Width of the strip along y in which other things lie.
+const STRIP_M: f64 = 0.10;
+/// Where things are put that are not to be seen: below the floor.
+const AWAY_M: f64 = -3.0;
+/// Half of the card's side, and how far above the table it lies, in metres.
+const CARD_HALF_M: f64 = 0.06;
+const CARD_HEIGHT_M: f64 = 0.05;
+/// Values of noise that are drawn once; every frame begins elsewhere in them.
+const NUM_NOISE: usize = 1 << 16;
+
+/// A part on the table in one frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovingTruth {
+    /// Where it is, and its grasp in the base frame and in pixels.
+    pub grasp: GraspTruth,
+    /// Whether the picture shows it: it is on the table and not under the card.
+    pub is_shown: bool,
+}
+
+/// One frame and the truth about it.
+#[derive(Debug, Clone)]
+pub struct TableView {
+    /// Counted from 0.
+    pub number: u64,
+    /// Simulated time since the first frame.
+    pub time: Duration,
+    /// The picture.
+    pub picture: RgbImage,
+    /// All of the part, in a fixed order; what lies beside is not among them.
+    pub truths: Vec<MovingTruth>,
+}
+
+/// A part that moves.
+struct Moving {
+    joint: Id<Joint>,
+    mover: Mover,
+    spec: ObjectSpec,
+    /// Middle of its outline from above, in the object frame.
+    middle: Point2<f64>,
+    is_away: bool,
+}
+
+/// The camera.
+pub struct TableCamera {
+    config: TableCameraConfig,
+    data: Data,
+    renderer: Renderer,
+    camera: Id<Camera>,
+    moving: Vec<Moving>,
+    card: Id<Joint>,
+    noise: Vec<i16>,
+    rng: Pcg64Mcg,
+    number: u64,
+    address: Arc<str>,
+    began: SystemTime,
+}
+
+impl TableCamera {
+    /// Builds the scene.
+    ///
+    /// # Errors
+    /// [`crate::SimulationError::UnknownName`] for a part that there is not; as [`Renderer::new`].
+    pub fn new(config: &TableCameraConfig) -> Result<Self> {
+        let spec = ObjectSpec::by_name(&config.part)?;
+        let beside = config.part_beside(&spec)?;
+        let scene = scene(config, &spec);
+        let mut fragment = scene.fragment();
+        let lanes = lanes(config.count + usize::from(beside.is_some()), config.num_things > 0);
+        let mut moving = Vec::new();
+        let specs = std::iter::repeat_n(&spec, config.count).chain(&beside);
+        for (idx, (spec, lane)) in specs.zip(lanes).enumerate() {
+            let (middle, radius_m) = middle_of(spec);
+            let is_part = idx < config.count;
+            let speed_m_s = if is_part { config.speed_m_s } else { 0.0 };
+            let turn_rad_s = if is_part { config.turn_rad_s } else { 0.0 };
+            let seed = config.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(idx as u64);
+            let mover = Mover::new(lane.shrunk(radius_m), speed_m_s, turn_rad_s, seed);
+            moving.push((mover, spec.clone(), middle));
+        }
+        if let Some(beside) = &beside {
+            fragment.append(renamed(beside.fragment(&away())));
+        }
+        let data = Data::new(Arc::new(Model::from_xml(&mjcf(config, &fragment), &fragment.files)?))?;
+        let model = data.model().clone();
+        let renderer = Renderer::new(&model, RenderConfig::default())?;
+        let joint_of = |idx: usize| match idx {
+            0 => "object_joint".to_owned(),
+            _ if idx < config.count => format!("instance_{}_joint", idx - 1),
+            _ => "beside_joint".to_owned(),
+        };
+        let moving = moving
+            .into_iter()
+            .enumerate()
+            .map(|(idx, (mover, spec, middle))| {
+                Ok(Moving { joint: model.id(&joint_of(idx))?, mover, spec, middle, is_away: false })
+            })
+            .collect::<Result<_>>()?;
+        let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
+        Ok(Self {
+            camera: model.id("over_table")?,
+            card: model.id("card_joint")?,
+            noise: (0..NUM_NOISE).map(|_| (config.noise * normal(&mut rng)).round() as i16).collect(),
+            rng,
+            number: 0,
+            address: format!("sim:{}", config.part).into(),
+            began: SystemTime::UNIX_EPOCH,
+            config: config.clone(),
+            data,
+            renderer,
+            moving,
+        })
+    }
+
+    /// The camera of an address without its `sim:`; frames count their times from now.
+    ///
+    /// # Errors
+    /// As [`TableCameraConfig`]'s `from_str` and [`Self::new`].
+    pub fn open(text: &str) -> Result<Self> {
+        let mut made = Self::new(&text.parse()?)?;
+        made.address = format!("sim:{text}").into();
+        made.began = SystemTime::now();
+        Ok(made)
+    }
+
+    /// What it was built from.
+    pub fn config(&self) -> &TableCameraConfig {
+        &self.config
+    }
+
+    /// The camera, posed in the robot's base frame, whose z is 0 on the table.
+    pub fn posed_camera(&self) -> PosedCamera {
+        posed_camera(&self.renderer, &self.data, self.camera)
+    }
+
+    /// The next frame; `None` at the end of the sequence.
+    ///
+    /// # Errors
+    /// As [`Renderer::image`].
+    pub fn next_view(&mut self) -> Result<Option<TableView>> {
+        let secs = self.number as f64 / self.config.fps;
+        if self.config.duration_secs.is_some_and(|duration| secs >= duration) {
+            return Ok(None);
+        }
+        if self.number > 0 {
+            self.moving.iter_mut().for_each(|moving| moving.mover.advance(1.0 / self.config.fps));
+        }
+        let is_hidden = self.config.hidden_secs.as_ref().is_some_and(|hidden| hidden.contains(&secs));
+        if self.moving[0].is_away && !is_hidden {
+            self.moving[0].mover.put_elsewhere();
+        }
+        self.moving[0].is_away = is_hidden;
+        let is_covered = self.config.covered_secs.as_ref().is_some_and(|covered| covered.contains(&secs));
+        for moving in &self.moving {
+            let pose = if moving.is_away { away() } else { moving.base_from_object() };
+            self.data.place(moving.joint, &pose);
+        }
+        let card = match is_covered {
+            true => {
+                let place = self.moving[0].mover.place;
+                Isometry3::translation(place.x, place.y, CARD_HEIGHT_M)
+            }
+            false => away(),
+        };
+        self.data.place(self.card, &card);
+        self.data.forward()?;
+        let mut picture = self.renderer.image(&mut self.data, self.camera)?;
+        self.add_noise(&mut picture);
+        let camera = self.posed_camera();
+        let parts = self.moving[..self.config.count].iter().enumerate();
+        let truths = parts
+            .filter_map(|(idx, moving)| {
+                let placed = PlacedObject { spec: moving.spec.clone(), base_from_object: moving.base_from_object() };
+                let is_shown = !moving.is_away && !(is_covered && idx == 0);
+                Some(MovingTruth { grasp: GraspTruth::new(&placed, &camera)?, is_shown })
+            })
+            .collect();
+        let view = TableView { number: self.number, time: Duration::from_secs_f64(secs), picture, truths };
+        self.number += 1;
+        Ok(Some(view))
+    }
+
+    fn add_noise(&mut self, picture: &mut RgbImage) {
+        if self.config.noise == 0.0 {
+            return;
+        }
+        // Every row begins elsewhere, so that no pattern repeats from row to row or from frame to frame.
+        let row_len = 3 * picture.width() as usize;
+        for row in picture.chunks_exact_mut(row_len) {
+            let from = self.rng.random_range(0..NUM_NOISE);
+            for (idx, value) in row.iter_mut().enumerate() {
+                let noise = self.noise[(from + idx) % NUM_NOISE];
+                *value = (i16::from(*value) + noise).clamp(0, 255) as u8;
+            }
+        }
+    }
+}
+
+impl sdg_camera::Camera for TableCamera {
+    fn next_frame(&mut self) -> std::result::Result<Option<Frame>, CameraError> {
+        // What the renderer refuses it refuses for good: the sequence ends.
+        let Ok(Some(view)) = self.next_view() else { return Ok(None) };
+        let (captured, camera) = (self.began + view.time, self.address.clone());
+        Ok(Some(Frame { picture: view.picture, number: view.number, captured, camera, faults: Vec::new() }))
+    }
+}
+
+impl Moving {
+    fn base_from_object(&self) -> Isometry3<f64> {
+        let Mover { place, yaw_rad, .. } = &self.mover;
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), *yaw_rad);
+        let middle = turn * Vector3::new(self.middle.x, self.middle.y, 0.0);
+        self.spec.base_from_object(place.x - middle.x, place.y - middle.y, *yaw_rad)
+    }
+}
+
+fn away() -> Isometry3<f64> {
+    Isometry3::translation(0.5, 0.0, AWAY_M)
+}
+
+/// Middle of the outline's box from above, and how far the outline reaches from it.
+fn middle_of(spec: &ObjectSpec) -> (Point2<f64>, f64) {
+    let bounds = |k: usize| {
+        let values = spec.footprint.iter().map(|point| point[k]);
+        0.5 * (values.clone().fold(f64::INFINITY, f64::min) + values.fold(f64::NEG_INFINITY, f64::max))
+    };
+    let middle = Point2::new(bounds(0), bounds(1));
+    (middle, spec.footprint.iter().map(|point| (point - middle).norm()).fold(0.0, f64::max))
+}
+
+/// Strips of the table along y, one for each part; the other things have the last strip.
+fn lanes(count: usize, with_things: bool) -> Vec<Bounds> {
+    let [low, high] = SHOWN.y_m;
+    let high = if with_things { high - STRIP_M } else { high };
+    let width = (high - low) / count as f64;
+    (0..count).map(|idx| Bounds { y_m: [low + width * idx as f64, low + width * (idx + 1) as f64], ..SHOWN }).collect()
+}
+
+/// Light and table of the seed, all of the part, and other things in their strip.
+fn scene(config: &TableCameraConfig, spec: &ObjectSpec) -> SceneVariation {
+    let mut scene = SceneVariation::sample(
+        None,
+        &VariationConfig { distractors: 0..=0, ..VariationConfig::default() },
+        config.seed,
+    );
+    let placed = || PlacedObject { spec: spec.clone(), base_from_object: away() };
+    scene.object = Some(placed());
+    scene.instances = (1..config.count).map(|_| placed()).collect();
+    let strip = SHOWN.y_m[1] - STRIP_M..SHOWN.y_m[1];
+    scene.distractors = sample_distractors_between(SHOWN.x_m[0]..SHOWN.x_m[1], strip, config.num_things, config.seed);
+    scene
+}
+
+/// The scene with floor, card and camera.
+fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> String {
+    let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, RenderConfig::default().height).to_degrees();
+    let look = base_from_look_camera();
+    let at = Translation3::new(look.translation.x, look.translation.y, config.height_m);
+    // Tilted about the middle of what it shows, so that this stays in the middle.
+    let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), config.tilt_rad);
+    let foot = Translation3::new(at.x, at.y, 0.0);
+    let optical = foot * tilt * foot.inverse() * Isometry3::from_parts(at, look.rotation);
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let pose = pose_attributes(&(optical * half_turn));
+    let mut text = String::new();
+    let _ = write!(
+        text,
+        "<mujoco><compiler angle='radian'/><option timestep='0.001'><flag contact='disable'/></option>\
+         <statistic center='0.4 0 0.3' extent='1.2'/><worldbody><camera name='over_table' {pose} fovy='{:.12}'/>\
+         <body name='card' pos='0.5 0 {AWAY_M}'><freejoint name='card_joint'/>\
+         <geom name='card' type='box' size='{CARD_HALF_M} {CARD_HALF_M} 0.001' rgba='0.75 0.7 0.6 1' contype='0' conaffinity='0' \
+         group='1'/></body></worldbody>{}</mujoco>",
+        fovy, fragment.sections
+    );
+    text
+}
+
+/// The same body under names of its own, so that it can stand beside another part.
+fn renamed(fragment: MjcfFragment) -> MjcfFragment {
+    let sections = fragment.sections.replace("=\"object", "=\"beside").replace(" file=\"", " file=\"beside_");
+    let files = fragment
+        .files
+        .into_iter()
+        .map(|asset| Asset { name: format!("beside_{}", asset.name), bytes: asset.bytes })
+        .collect();
+    MjcfFragment { sections, files }
+}
+
+/// A number of the normal distribution, by Box and Muller.
+fn normal(rng: &mut Pcg64Mcg) -> f64 {
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{footprint, in_picture};
+
+    fn views(text: &str, count: usize) -> Vec<TableView> {
+        let mut camera = TableCamera::new(&text.parse().unwrap()).unwrap();
+        (0..count).map_while(|_| camera.next_view().unwrap()).collect()
+    }
+
+    #[test]
+    fn the_same_address_gives_the_same_frames_and_another_seed_others() {
+        let [one, again, other] = ["key?seed=1", "key?seed=1", "key?seed=2"].map(|text| views(text, 2));
+        assert_eq!(one[1].picture, again[1].picture);
+        assert_eq!(one[1].truths, again[1].truths);
+        assert_ne!(one[1].picture, other[1].picture);
+    }
+
+    #[test]
+    fn the_part_moves_as_fast_as_asked_and_stays_in_the_picture() {
+        let mut camera =
+            TableCamera::new(&"rod_end?speed=50&turn=30&fps=20&seconds=4&noise=0".parse().unwrap()).unwrap();
+        let (posed, mut last) = (camera.posed_camera(), None::<GraspTruth>);
+        let mut number = 0;
+        while let Some(view) = camera.next_view().unwrap() {
+            let truth = view.truths[0].grasp.clone();
+            assert!(in_picture(&posed, &truth.line.center(), 10.0), "{number}");
+            if let Some(last) = last {
+                let turned = (truth.direction_rad - last.direction_rad + 9.0).rem_euclid(std::f64::consts::TAU) - 9.0;
+                let turned = sdg_geometry::Angle::from_radians(turned).radians().abs();
+                assert!((turned - 1.5f64.to_radians()).abs() < 1e-6, "{turned}");
+                // The marks are beside the middle of the part, so turning moves them, too.
+                assert!((truth.tcp - last.tcp).norm() < 0.0025 + 0.06 * turned, "{number}");
+            }
+            last = Some(truth);
+            number += 1;
+        }
+        assert_eq!(number, 80);
+    }
+
+    #[test]
+    fn a_hidden_part_is_not_shown_and_comes_back_elsewhere() {
+        let seen = views("key?fps=10&hide=0.2..0.4&cover=0.5..0.6&noise=0&turn=0", 8);
+        let shown: Vec<bool> = seen.iter().map(|view| view.truths[0].is_shown).collect();
+        assert_eq!(shown, [true, true, false, false, true, false, true, true]);
+        let moved = (seen[4].truths[0].grasp.tcp - seen[1].truths[0].grasp.tcp).norm();
+        assert!(moved > 0.02, "{moved}");
+        // The picture shows it where the truth says: the part is darker or brighter than the bare table.
+        let at = |view: &TableView, of: &TableView| {
+            let center = of.truths[0].grasp.line.center();
+            view.picture.get_pixel(center.x as u32, center.y as u32).0
+        };
+        assert_ne!(at(&seen[1], &seen[1]), at(&seen[2], &seen[1]));
+        assert_ne!(at(&seen[5], &seen[5]), at(&seen[4], &seen[5]));
+    }
+
+    #[test]
+    fn all_of_the_part_keep_apart_from_each_other_and_from_what_lies_beside() {
+        let mut camera = TableCamera::new(&"key?count=3&beside=mirrored&things=3&fps=2".parse().unwrap()).unwrap();
+        for _ in 0..6 {
+            assert_eq!(camera.next_view().unwrap().unwrap().truths.len(), 3);
+            let outlines: Vec<_> = camera
+                .moving
+                .iter()
+                .map(|moving| {
+                    let base_from_object = moving.base_from_object();
+                    PlacedObject { spec: moving.spec.clone(), base_from_object }.footprint()
+                })
+                .collect();
+            for (idx, outline) in outlines.iter().enumerate() {
+                assert!(outlines[..idx].iter().all(|other| footprint::separation(outline, other) > 0.0));
+            }
+        }
+    }
+}
