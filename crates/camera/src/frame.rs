@@ -1,5 +1,6 @@
 //! A picture with its origin, and the trait of all cameras.
 
+use std::fmt;
 use std::sync::Arc;
 use std::time::SystemTime;
 
@@ -9,7 +10,7 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 
 /// A picture, when it was taken and by which camera.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Frame {
     /// The picture.
     pub picture: RgbImage,
@@ -27,6 +28,14 @@ impl Frame {
     /// A frame without faults that was captured now.
     pub fn new(picture: RgbImage, number: u64, camera: Arc<str>) -> Self {
         Self { picture, number, captured: SystemTime::now(), camera, faults: Vec::new() }
+    }
+}
+
+impl fmt::Debug for Frame {
+    /// Without the pixels.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (width, height) = self.picture.dimensions();
+        write!(f, "frame {} of {}, {width} × {height} pixels, faults {:?}", self.number, self.camera, self.faults)
     }
 }
 

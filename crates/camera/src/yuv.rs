@@ -8,21 +8,24 @@ use image::RgbImage;
 /// # Errors
 /// In words, what is found where there are fewer bytes than the rows need.
 pub(crate) fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
+    if width == 0 || width % 2 == 1 {
+        return Err(format!("an odd width of {width} pixels"));
+    }
     let rows = rows(bytes, width as usize * 2, height, bytes_per_row)?;
-    let mut pixels = Vec::with_capacity(width as usize * height as usize * 3);
-    for row in rows {
-        for pair in row.chunks_exact(4) {
+    let mut pixels = vec![0; width as usize * height as usize * 3];
+    for (row, pixels) in rows.zip(pixels.chunks_exact_mut(width as usize * 3)) {
+        for (pair, rgb) in row.chunks_exact(4).zip(pixels.chunks_exact_mut(6)) {
             let [y0, u, y1, v] = [pair[0], pair[1], pair[2], pair[3]].map(i32::from);
             let (u, v) = (u - 128, v - 128);
-            for luma in [y0, y1] {
-                let scaled = 298 * (luma - 16) + 128;
-                for channel in [scaled + 409 * v, scaled - 100 * u - 208 * v, scaled + 516 * u] {
-                    pixels.push((channel >> 8).clamp(0, 255) as u8);
-                }
+            let [red, green, blue] = [409 * v + 128, 128 - 100 * u - 208 * v, 516 * u + 128];
+            let [left, right] = [298 * (y0 - 16), 298 * (y1 - 16)];
+            let channels = [left + red, left + green, left + blue, right + red, right + green, right + blue];
+            for (byte, channel) in rgb.iter_mut().zip(channels) {
+                *byte = (channel >> 8).clamp(0, 255) as u8;
             }
         }
     }
-    RgbImage::from_raw(width, height, pixels).ok_or_else(|| format!("an odd width of {width} pixels"))
+    RgbImage::from_raw(width, height, pixels).ok_or_else(|| format!("{width} × {height} pixels"))
 }
 
 /// Rows of RGB24 that may be padded.

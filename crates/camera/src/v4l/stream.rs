@@ -139,8 +139,9 @@ impl Stream {
         }
         let bytes_per_row = given.bytes_per_line() as usize;
         if let Some(fps) = options.fps {
-            // A driver that has one rate alone refuses; the rate that it has is seen in the frames.
-            let _ = capture.set_frame_interval(Fract::new(1000, (fps * 1000.0).round() as u32));
+            // The driver takes the nearest rate that it has; frames tell which. One without rates refuses.
+            let interval = Fract::new(1000, (fps * 1000.0).round() as u32);
+            capture.set_frame_interval(interval).map_err(|error| ("takes no frame rate", error))?;
         }
         let stream = capture.into_stream().map_err(|error| ("does not start", error))?;
         Ok(Self { stream, encoding: choice.encoding, width, height, bytes_per_row, last_read: Instant::now() })

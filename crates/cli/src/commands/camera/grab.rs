@@ -1,15 +1,130 @@
 //! `sdg camera grab`.
 
-use anyhow::{Result, bail};
-use clap::Args;
+use std::io::{Cursor, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
-use crate::exit::Outcome;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use image::ImageFormat;
+use sdg_camera::{Camera, Frame, LatestFrame};
+use sdg_report::write_atomically;
+use serde_json::json;
+
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::live_pictures::{LiveArgs, open};
 
 /// `sdg camera grab`
 #[derive(Debug, Args)]
-pub struct GrabArgs {}
+pub struct GrabArgs {
+    #[command(flatten)]
+    pub live: LiveArgs,
+    /// How many frames
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub count: u32,
+    /// Seconds between frames; without it, one after the other
+    #[arg(long, value_name = "SECS", default_value_t = 0.0)]
+    pub every: f64,
+    /// A PNG file for one frame; a folder, made where it is missing, for more
+    #[arg(long, value_name = "FILE|FOLDER")]
+    pub out: PathBuf,
+    /// Print a JSON object for each frame
+    #[arg(long)]
+    pub json: bool,
+}
 
-/// Runs it.
-pub fn run(_args: &GrabArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// Consecutive faults after which a camera is given up: at the default stall timeout, half a minute.
+const MAX_FAULTS: u32 = 15;
+
+/// Frames to PNG files.
+pub fn run(args: &GrabArgs) -> Result<Outcome> {
+    if !(0.0..=86400.0).contains(&args.every) {
+        return Err(Usage(format!("--every: expected 0 to 86400 seconds, found {}", args.every)).into());
+    }
+    let is_file = args.count == 1 && !args.out.is_dir();
+    if is_file {
+        let is_png = args.out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+        if !is_png {
+            let found = args.out.display();
+            return Err(Usage(format!("--out: expected a file that ends in .png, or a folder, found {found}")).into());
+        }
+        files::check_writable(&args.out)?;
+    } else {
+        std::fs::create_dir_all(&args.out)
+            .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
+    }
+    let interrupt = Interrupt::watch();
+    let mut camera = open(&args.live.from, &args.live.options())?;
+    // Between frames a live camera goes on: what is taken must be as old as the moment, not as the queue.
+    if args.every > 0.0 && args.live.from.is_live() {
+        camera = Box::new(LatestFrame::spawn(camera));
+    }
+    let start = Instant::now();
+    let mut num_written = 0;
+    while num_written < args.count && !interrupt.is_requested() {
+        let due = start + Duration::from_secs_f64(args.every * f64::from(num_written));
+        while Instant::now() < due && !interrupt.is_requested() {
+            std::thread::sleep(due.saturating_duration_since(Instant::now()).min(Duration::from_millis(100)));
+        }
+        let Some(frame) = next_frame(camera.as_mut())? else {
+            break;
+        };
+        let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
+        write_png(&path, &frame)?;
+        tell(&path, &frame, args.json)?;
+        num_written += 1;
+    }
+    if num_written == 0 {
+        bail!("{}: expected a frame, found that there is none", args.live.from);
+    }
+    if num_written < args.count {
+        eprintln!("sdg: {} of {} frames: there are no more", num_written, args.count);
+    }
+    Ok(Outcome::Done)
+}
+
+/// The next frame; passing faults are printed and passed over, but not for ever.
+fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
+    let mut num_faults = 0;
+    loop {
+        match camera.next_frame() {
+            Ok(frame) => return Ok(frame),
+            Err(error) if error.is_passing() && num_faults < MAX_FAULTS => {
+                eprintln!("sdg: {error}");
+                num_faults += 1;
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+fn write_png(path: &Path, frame: &Frame) -> Result<()> {
+    let mut png = Cursor::new(Vec::new());
+    frame.picture.write_to(&mut png, ImageFormat::Png)?;
+    Ok(write_atomically(path, &png.into_inner())?)
+}
+
+fn tell(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {
+    let unix_secs = frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
+    let (width, height) = frame.picture.dimensions();
+    let mut stdout = std::io::stdout().lock();
+    if is_json {
+        let faults: Vec<_> = frame.faults.iter().map(|fault| fault.name()).collect();
+        let told = json!({
+            "file": path.display().to_string(), "camera": &*frame.camera, "number": frame.number, "captured_unix_secs": unix_secs,
+            "width": width, "height": height, "faults": faults,
+        });
+        writeln!(stdout, "{told}")?;
+    } else {
+        let faults: String = frame.faults.iter().map(|fault| format!("; {fault}")).collect();
+        let number = frame.number;
+        writeln!(
+            stdout,
+            "{}: frame {number}, {width} × {height} pixels, at {unix_secs:.3} s (Unix time){faults}",
+            path.display()
+        )?;
+    }
+    Ok(())
 }

@@ -1,15 +1,76 @@
 //! `sdg camera list`.
 
-use anyhow::{Result, bail};
+use std::io::Write;
+
+use anyhow::Result;
 use clap::Args;
+use sdg_camera::v4l::{self, Format, Sizes};
+use serde_json::{Value, json};
 
 use crate::exit::Outcome;
 
 /// `sdg camera list`
 #[derive(Debug, Args)]
-pub struct ListArgs {}
+pub struct ListArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
 
-/// Runs it.
-pub fn run(_args: &ListArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// A line for each camera, and one for each of its formats.
+pub fn run(args: &ListArgs) -> Result<Outcome> {
+    let nodes = v4l::nodes();
+    let mut stdout = std::io::stdout().lock();
+    if args.json {
+        let cameras: Vec<Value> = nodes
+            .iter()
+            .map(|node| {
+                let formats: Vec<Value> = node.formats.iter().map(json_format).collect();
+                let address = format!("v4l:{}", node.path.display());
+                json!({"address": address, "name": node.name, "driver": node.driver, "bus": node.bus, "formats": formats})
+            })
+            .collect();
+        writeln!(stdout, "{}", json!({"cameras": cameras}))?;
+    } else {
+        for node in &nodes {
+            writeln!(stdout, "v4l:{}  {} (driver {}, {})", node.path.display(), node.name, node.driver, node.bus)?;
+            for format in &node.formats {
+                let unread = if format.encoding.is_some() { "" } else { ", not read by sdg" };
+                let sizes = in_words(&format.sizes);
+                writeln!(stdout, "    {}  {}{unread}: {sizes}", format.fourcc.trim(), format.description)?;
+            }
+        }
+        if nodes.is_empty() {
+            writeln!(
+                stdout,
+                "no V4L2 camera on this machine (no /dev/video* that opens and captures pictures); --from also takes http://, cmd:, \
+                 dir: and file:"
+            )?;
+        }
+    }
+    Ok(if nodes.is_empty() { Outcome::NothingToGrasp } else { Outcome::Done })
+}
+
+fn json_format(format: &Format) -> Value {
+    let sizes = match &format.sizes {
+        Sizes::Listed(sizes) => {
+            let rates = format.max_fps.iter().copied().chain(std::iter::repeat(0.0));
+            json!(
+                sizes
+                    .iter()
+                    .zip(rates)
+                    .map(|((w, h), fps)| json!({"width": w, "height": h, "max_fps": fps}))
+                    .collect::<Vec<_>>()
+            )
+        }
+        Sizes::Range { min, max } => json!({"min": [min.0, min.1], "max": [max.0, max.1]}),
+    };
+    json!({"fourcc": format.fourcc, "description": format.description, "read": format.encoding.is_some(), "sizes": sizes})
+}
+
+fn in_words(sizes: &Sizes) -> String {
+    match sizes {
+        Sizes::Listed(sizes) => sizes.iter().map(|(w, h)| format!("{w}x{h}")).collect::<Vec<_>>().join(" "),
+        Sizes::Range { min, max } => format!("{}x{} to {}x{}", min.0, min.1, max.0, max.1),
+    }
 }

@@ -1,0 +1,101 @@
+//! `--from ADDRESS`: a camera, by whichever crate opens it.
+
+use anyhow::{Context, Result};
+use clap::Args;
+use sdg_camera::{Address, Camera, Encoding, OpenOptions};
+
+/// A camera and what is asked of it.
+#[derive(Debug, Args)]
+pub struct LiveArgs {
+    /// Where pictures come from: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:
+    ///
+    /// Of folders and files, options follow a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
+    #[arg(long, value_name = "ADDRESS")]
+    pub from: Address,
+    /// Width and height in pixels that a V4L2 camera is asked for
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = parse_size)]
+    pub size: (u32, u32),
+    /// Frames a second that a V4L2 camera is asked for; snapshots a second over HTTP
+    #[arg(long, value_name = "N")]
+    pub fps: Option<f64>,
+    /// How a V4L2 camera encodes its frames; without it, what loses least
+    #[arg(long, value_name = "NAME")]
+    pub encoding: Option<EncodingName>,
+    /// A fixed exposure time of a V4L2 camera
+    #[arg(long, value_name = "MS")]
+    pub exposure_ms: Option<f64>,
+    /// A fixed white balance of a V4L2 camera
+    #[arg(long, value_name = "KELVIN")]
+    pub white_balance_kelvin: Option<u32>,
+    /// Without a frame for so long a camera is stale
+    #[arg(long, value_name = "SECS", default_value_t = 2.0)]
+    pub stall_secs: f64,
+}
+
+/// The names of encodings on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum EncodingName {
+    /// 4:2:2, two bytes a pixel
+    Yuyv,
+    /// Three bytes a pixel
+    Rgb24,
+    /// Motion JPEG
+    Mjpeg,
+}
+
+impl From<EncodingName> for Encoding {
+    fn from(name: EncodingName) -> Self {
+        match name {
+            EncodingName::Yuyv => Self::Yuyv,
+            EncodingName::Rgb24 => Self::Rgb24,
+            EncodingName::Mjpeg => Self::Mjpeg,
+        }
+    }
+}
+
+impl LiveArgs {
+    /// What the camera is asked for.
+    pub(crate) fn options(&self) -> OpenOptions {
+        OpenOptions {
+            width: self.size.0,
+            height: self.size.1,
+            fps: self.fps,
+            encoding: self.encoding.map(Encoding::from),
+            exposure_secs: self.exposure_ms.map(|ms| ms / 1e3),
+            white_balance_kelvin: self.white_balance_kelvin,
+            // What is no time at all is refused with its number when the camera is opened.
+            stall_timeout: std::time::Duration::try_from_secs_f64(self.stall_secs).unwrap_or_default(),
+            ..OpenOptions::default()
+        }
+    }
+}
+
+/// Opens a camera.
+///
+/// # Errors
+/// It does not open, or does not take what is asked of it.
+pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>> {
+    match address {
+        // The simulated camera has its place here.
+        address => sdg_camera::open(address, options).context("--from"),
+    }
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    let sides = sides.filter(|(width, height)| (1..=16384).contains(width) && (1..=16384).contains(height));
+    sides.ok_or_else(|| "expected width and height in pixels, as in 640x480".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_two_sides() {
+        assert_eq!(parse_size("640x480"), Ok((640, 480)));
+        for text in ["640", "640x", "0x480", "640x99999", "640 x 480", "640X480"] {
+            assert!(parse_size(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! `sdg camera list`, `grab` and `watch`, and addresses that are none.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use image::{Rgb, RgbImage};
+use serde_json::Value;
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+/// Exit code, and one line on standard error that contains every part.
+fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+    }
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+/// A folder with three pictures of levels 60, 90, 120.
+fn pictures() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, level) in [("a.png", 60), ("b.png", 90), ("c.png", 120)] {
+        RgbImage::from_pixel(32, 24, Rgb([level; 3])).save(folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+fn level(path: &Path) -> u8 {
+    image::open(path).unwrap().to_rgb8().get_pixel(5, 5)[0]
+}
+
+#[test]
+fn list_says_what_there_is_or_that_there_is_nothing() {
+    let told = sdg(&["camera", "list"]);
+    let listed = lines(&sdg(&["camera", "list", "--json"]));
+    let cameras = listed[0]["cameras"].as_array().unwrap();
+    // A machine with a camera is as good as one without.
+    assert_eq!(told.status.code(), Some(if cameras.is_empty() { 3 } else { 0 }));
+    let text = String::from_utf8_lossy(&told.stdout).into_owned();
+    assert!(text.contains(if cameras.is_empty() { "no V4L2 camera" } else { "v4l:/dev/video" }), "{text}");
+}
+
+#[test]
+fn one_frame_goes_to_a_file_and_several_to_a_folder() {
+    let (from, out) = (pictures(), tempfile::tempdir().unwrap());
+    let address = format!("dir:{}", from.path().display());
+    let file = out.path().join("one.png");
+    let output = sdg(&["camera", "grab", "--from", &address, "--out", file.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("frame 0, 32 × 24 pixels"));
+    assert_eq!(level(&file), 60);
+
+    let folder = out.path().join("many");
+    let output =
+        sdg(&["camera", "grab", "--from", &address, "--count", "9", "--out", folder.to_str().unwrap(), "--json"]);
+    assert_refused(&output, 0, &["3 of 9 frames"]);
+    let told = lines(&output);
+    assert_eq!(told.len(), 3);
+    for (i, (line, expected)) in told.iter().zip([60, 90, 120]).enumerate() {
+        assert_eq!((line["number"].as_u64(), line["width"].as_u64()), (Some(i as u64), Some(32)), "{line}");
+        assert_eq!(line["camera"], address.as_str());
+        assert!(line["captured_unix_secs"].as_f64().unwrap() > 1.6e9);
+        assert_eq!(level(Path::new(line["file"].as_str().unwrap())), expected);
+    }
+}
+
+#[test]
+fn frames_come_at_their_times_and_are_the_newest() {
+    let out = tempfile::tempdir().unwrap();
+    // Ten pictures a second, the level of each is 10 more than the last one's.
+    let picture =
+        |level: u32| format!("printf 'P6 1 1 255 '; printf '\\\\{level:o}\\\\{level:o}\\\\{level:o}'; sleep 0.1;");
+    let script: String = (1..20).map(|i| picture(i * 10)).collect();
+    let file = out.path().join("camera.sh");
+    fs::write(&file, script.replace("\\\\", "\\")).unwrap();
+    let address = format!("cmd:sh '{}'", file.display());
+    let folder = out.path().join("frames");
+    let start = std::time::Instant::now();
+    let arguments = ["--count", "3", "--every", "0.5", "--json", "--out", folder.to_str().unwrap()];
+    let output = sdg(&[&["camera", "grab", "--from", &address], arguments.as_slice()].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(start.elapsed().as_secs_f64() >= 1.0);
+    let numbers: Vec<u64> = lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect();
+    // Half a second is five pictures; a busy machine may be late by some.
+    assert!(numbers[0] < 5 && numbers[1] >= 3 && numbers[2] >= numbers[1] + 3, "{numbers:?}");
+}
+
+#[test]
+fn watch_tells_rate_brightness_and_faults() {
+    let from = pictures();
+    let address = format!("file:{}?fps=50&loop", from.path().join("b.png").display());
+    let output = sdg(&["camera", "watch", "--from", &address, "--seconds", "2.2", "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = lines(&output);
+    assert!(told.len() >= 2, "{told:?}");
+    assert_eq!(told[0]["brightness"].as_f64(), Some(90.0));
+    let fps = told[0]["fps"].as_f64().unwrap();
+    assert!(fps > 5.0 && fps < 52.0, "{fps}");
+    assert!(told[0]["faults"].as_array().unwrap().is_empty(), "files may repeat: {}", told[0]);
+
+    // The same picture again and again from a live camera, and black ones.
+    let watch = |line: &str| {
+        let address = format!("cmd:yes '{line}'");
+        let output = sdg(&["camera", "watch", "--from", &address, "--seconds", "1.2"]);
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let grey = watch("P6 1 1 255 zz");
+    assert!(grey.contains("frozen: the same picture") && !grey.contains("black"), "{grey}");
+    assert!(watch("P6 1 1 255 \x01\x01").contains("black: "));
+}
+
+#[test]
+fn cameras_that_are_none_are_refused() {
+    let from = pictures();
+    let out = from.path().join("out.png");
+    let grab = |address: &str, further: &[&str]| {
+        sdg(&[&["camera", "grab", "--out", out.to_str().unwrap(), "--from", address], further].concat())
+    };
+    assert_refused(&grab("/dev/video0", &[]), 2, &["expected an address of a camera", "/dev/video0"]);
+    assert_refused(&grab("https://camera/", &[]), 2, &["TLS"]);
+    assert_refused(&grab("dir:/nowhere", &[]), 1, &["--from", "dir:/nowhere", "expected a folder"]);
+    assert_refused(&grab("v4l:/dev/null", &[]), 1, &["v4l:/dev/null", "does not open"]);
+    assert_refused(&grab("cmd:no-such-program", &[]), 1, &["cannot be started"]);
+    assert_refused(&grab("cmd:sh -c 'echo no camera here >&2; exit 4'", &[]), 1, &["exit status: 4", "no camera here"]);
+    assert_refused(&grab("cmd:true", &[]), 1, &["expected a frame"]);
+    // Nobody listens on port 1.
+    assert_refused(&grab("http://127.0.0.1:1/", &[]), 1, &["http://127.0.0.1:1/", "no connection"]);
+    let file = format!("file:{}", from.path().join("a.png").display());
+    assert_refused(&grab(&file, &["--size", "640"]), 2, &["640x480"]);
+    assert_refused(&grab(&file, &["--stall-secs=-1"]), 1, &["stall timeout"]);
+    assert_refused(&grab(&file, &["--fps", "0"]), 1, &["0.1 to 1000 frames a second"]);
+    assert_refused(&grab(&file, &["--every=-1"]), 2, &["0 to 86400"]);
+    assert!(!out.exists(), "nothing is written by what fails");
+    let jpeg = sdg(&["camera", "grab", "--from", &file, "--out", "frame.jpg"]);
+    assert_refused(&jpeg, 2, &["ends in .png"]);
+}
