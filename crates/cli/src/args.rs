@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
+use sdg_camera::Address;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::ComputeBackend;
 
@@ -89,10 +90,10 @@ pub struct AnnotateArgs {
     #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION]")]
     pub images: Vec<String>,
     /// Live pictures, to take photos on the page and to try the model on: v4l:, v4l:/dev/video2, http://HOST/PATH,
-    /// cmd:PROGRAM ARGUMENTS, dir:FOLDER?loop or file:PATH. Photos are written as photo.png, photo-2.png … into the current
+    /// 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Photos are written as photo.png, photo-2.png … into the current
     /// folder, or as IMAGE
     #[arg(long, value_name = "ADDRESS")]
-    pub from: Option<String>,
+    pub from: Option<Address>,
     /// A picture, or a folder of pictures, to try the taught model on; repeat for several. The page takes more
     #[arg(long = "try", value_name = "PATH")]
     pub scenes: Vec<PathBuf>,

@@ -3,15 +3,17 @@
 //! A thread reads the camera without a pause, so that the page, which asks when it likes, gets the newest picture.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
-use sdg_camera::{Address, Camera, CameraError, Fault, OpenOptions, Playback, open};
+use sdg_camera::{Address, CameraError, Fault, OpenOptions, Playback};
 
 use crate::camera_files::CameraFile;
-use crate::exit::{Usage, one_line};
+use crate::exit::one_line;
+use crate::live_pictures;
 
 /// Pictures a second from files whose address names no pace: a folder that is read as fast as it can be would be over, or take a
 /// core, before anybody has seen it.
@@ -35,30 +37,29 @@ impl PageCamera {
     /// its size is asked for, and pictures of another size are a fault.
     ///
     /// # Errors
-    /// Text that is no address, and a camera that does not open.
-    pub fn open(address: &str, calibration: Option<CameraFile>) -> Result<(Self, String)> {
-        let address: Address = address.parse().map_err(|error| Usage(format!("--from: {error}")))?;
+    /// A camera that does not open.
+    pub fn open(address: Address, mut options: OpenOptions, calibration: Option<CameraFile>) -> Result<(Self, String)> {
         let address = paced(address);
-        let mut options = OpenOptions::default();
         if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
             (options.width, options.height) = (width, height);
         }
-        let camera = open(&address, &options).context("--from")?;
-        Ok((Self::read(camera, calibration), address.to_string()))
-    }
-
-    fn read(mut camera: Box<dyn Camera>, calibration: Option<CameraFile>) -> Self {
+        let mut camera = live_pictures::open(&address, &options)?;
         let newest = Arc::new(Mutex::new(Newest { calibration, ..Newest::default() }));
         let writer = Arc::clone(&newest);
-        std::thread::spawn(move || {
+        let is_simulated = matches!(address, Address::Sim(_));
+        thread::spawn(move || {
             loop {
                 let next = camera.next_frame();
+                if let (true, Ok(Some(frame))) = (is_simulated, &next) {
+                    // The simulated camera draws as fast as it can; its frames' times are those of its own clock.
+                    thread::sleep(frame.captured.duration_since(SystemTime::now()).unwrap_or_default());
+                }
                 if lock(&writer).has_ended_with(next) {
                     return;
                 }
             }
         });
-        Self(newest)
+        Ok((Self(newest), address.to_string()))
     }
 }
 
@@ -142,6 +143,10 @@ mod tests {
     use super::*;
     use image::Rgb;
 
+    fn open(address: &str) -> Result<(PageCamera, String)> {
+        PageCamera::open(address.parse().unwrap(), OpenOptions::default(), None)
+    }
+
     fn picture(level: u8) -> RgbImage {
         RgbImage::from_pixel(4, 3, Rgb([level; 3]))
     }
@@ -194,13 +199,13 @@ mod tests {
     fn a_folder_is_read_at_a_pace_that_can_be_watched() {
         let folder = tempfile::tempdir().unwrap();
         picture(7).save(folder.path().join("a.png")).unwrap();
-        let (camera, address) = PageCamera::open(&format!("dir:{}?loop", folder.path().display()), None).unwrap();
+        let (camera, address) = open(&format!("dir:{}?loop", folder.path().display())).unwrap();
         assert!(address.ends_with("?fps=5&loop"), "{address}");
         let begun = Instant::now();
         let number = |camera: &PageCamera| camera.newest().frame.map(|frame| frame.number);
         while number(&camera) < Some(2) {
             assert!(begun.elapsed() < Duration::from_secs(30));
-            std::thread::sleep(Duration::from_millis(5));
+            thread::sleep(Duration::from_millis(5));
         }
         assert!(begun.elapsed() >= 2 * FILES_INTERVAL);
         assert_eq!(*camera.newest().frame.unwrap().picture, picture(7));
@@ -208,10 +213,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_opened_is_refused_before_the_page_opens() {
-        let wrong = PageCamera::open("table", None).unwrap_err();
-        assert!(wrong.is::<Usage>() && wrong.to_string().contains("--from: expected an address"), "{wrong}");
-        let missing = PageCamera::open("dir:/nowhere/at/all", None).unwrap_err();
-        let line = crate::exit::one_line(&missing);
-        assert!(!missing.is::<Usage>() && line.contains("dir:/nowhere/at/all") && line.contains("folder"), "{line}");
+        let line = one_line(&open("dir:/nowhere/at/all").unwrap_err());
+        assert!(line.starts_with("--from: dir:/nowhere/at/all") && line.contains("expected a folder"), "{line}");
     }
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
+use sdg_camera::{Address, OpenOptions};
 use serde_json::json;
 
 use crate::args::AnnotateArgs;
@@ -33,7 +34,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, calibration, photo_path);
-    let live = args.from.as_deref().zip(photo_path).map(open).transpose()?;
+    let live = args.from.clone().zip(photo_path).map(open).transpose()?;
     let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone(), live };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;
@@ -52,8 +53,8 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn open_camera(from: &str, calibration: Option<CameraFile>, photo_path: PathBuf) -> Result<LiveOptions> {
-    let (camera, address) = PageCamera::open(from, calibration)?;
+fn open_camera(from: Address, calibration: Option<CameraFile>, photo_path: PathBuf) -> Result<LiveOptions> {
+    let (camera, address) = PageCamera::open(from, OpenOptions::default(), calibration)?;
     Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
 }
 
