@@ -15,7 +15,7 @@ async function send(method, path, body, options = {}) {
   } catch {
     throw new RequestError("No answer from sdg annotate. Is it still running in the terminal?", true);
   }
-  if (response.ok) return response.json();
+  if (response.ok) return options.isPicture ? response.blob() : response.json();
   if (response.status === 413) throw new RequestError("That is too large to be taken.");
   const text = await response.text();
   let message = text.trim() || `The server answered ${response.status}.`;
@@ -26,6 +26,10 @@ async function send(method, path, body, options = {}) {
   }
   throw new RequestError(message);
 }
+
+/** Never two detections at once: each uses every core. */
+let lastDetection = Promise.resolve();
+const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
 const json = (method, path, value, options) => send(method, path, JSON.stringify(value), options);
 
@@ -42,6 +46,11 @@ export const api = {
   stopTeaching: () => send("DELETE", "/api/teaching"),
   addScene: (file) => send("POST", `/api/scenes?name=${encodeURIComponent(file.name)}`, file),
   sceneUrl: (id) => `/api/scenes/${id}/picture`,
-  detect: (id) => send("POST", `/api/scenes/${id}/detect`),
+  detect: (id) => inTurn(() => send("POST", `/api/scenes/${id}/detect`)),
+  live: () => send("GET", "/api/live"),
+  livePicture: (number) => send("GET", `/api/live/${number}/picture`, undefined, { isPicture: true }),
+  detectLive: (number) => inTurn(() => send("POST", `/api/live/${number}/detect`)),
+  takePhoto: (number) => send("POST", `/api/live/${number}/photo`),
+  keepFrame: (number) => send("POST", `/api/live/${number}/keep`),
   accept: (id, marks) => json("POST", `/api/scenes/${id}/accept`, marks),
 };

@@ -2,7 +2,7 @@
 
 import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
 import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool } from "./editing.js";
-import { changed, image, marks, region, size, state } from "./store.js";
+import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX } from "./overlay.js";
 import { pan, toPhoto, zoom } from "./view.js";
 
@@ -174,7 +174,7 @@ function nearestVertex(place) {
 function begin(event, at) {
   const from = toPhoto(at);
   const taken = event.target.closest?.("[data-kind]");
-  if (event.button === 1 || spaceHeld || state.tab !== "mark") return panning();
+  if (event.button === 1 || spaceHeld || !isMarking()) return panning();
   if (taken?.dataset.kind === "draft" && taken.dataset.vertex === "0") {
     return { move() {}, end: () => closeOutline(state.draft.points) };
   }

@@ -3,8 +3,9 @@
 import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
 import { boundsOf } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
+import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
 import { openImage } from "./strip.js";
-import { marks, region, size, state } from "./store.js";
+import { isLive, isMarking, region, size, state } from "./store.js";
 import { actualSize, fit, middle, showBox, zoom } from "./view.js";
 
 const DEGREE = Math.PI / 180;
@@ -35,7 +36,7 @@ function putInTheMiddle() {
 
 /** The whole photo; when that is shown already, the part. */
 export function fitOrPart() {
-  const part = state.tab === "try" ? null : region();
+  const part = state.tab === "try" || isLive() ? null : region();
   if (state.view.fitted && part) showBox(boundsOf(part));
   else fit();
 }
@@ -73,6 +74,10 @@ const LOOKING = {
   1: actualSize,
   n: () => openImage(state.current + 1),
   m: () => openImage(state.current - 1),
+  c: toggleCamera,
+  t: takePhoto,
+  l: toggleLive,
+  k: keepPicture,
   "?": () => help.showModal(),
   escape: letGo,
 };
@@ -96,13 +101,13 @@ document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey) {
     const action = { z: event.shiftKey ? redo : undo, y: redo }[key];
     if (key === "s") event.preventDefault();
-    if (!action || writing || state.tab !== "mark") return;
+    if (!action || writing || !isMarking()) return;
     event.preventDefault();
     return action();
   }
   if (writing) return;
   const onPhoto = event.target === document.body || event.target.closest("#stage");
-  const marking = state.tab === "mark";
+  const marking = isMarking();
   if (key === " " && onPhoto) {
     event.preventDefault();
     return holdSpace(true);

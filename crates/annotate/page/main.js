@@ -3,11 +3,12 @@
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
 import "./gestures.js";
+import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
 import { renderSamples } from "./samples.js";
 import { onChange, state } from "./store.js";
-import { openImage, renderStrip, shownName } from "./strip.js";
+import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
 import { renderTeach, watch } from "./teach.js";
 import { renderTry } from "./try.js";
@@ -36,8 +37,8 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 
 onChange(() => {
   // Until the server has answered there is nothing to show.
-  if (!state.images.length) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderTry]) render();
+  if (!state.images.length && !state.camera) return;
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderTry, renderLive]) render();
   document.title = `${shownName()} · Teach a grasp`;
 });
 
@@ -52,8 +53,10 @@ try {
     images: session.images.map(adopt),
     scenes: session.scenes.map((scene) => ({ ...scene, detections: null })),
     teaching,
+    camera: session.camera,
   });
-  openImage(0);
+  if (state.images.length) openImage(0);
+  else showCurrent();
   watch();
 } catch (error) {
   by("hint").textContent = error.message;

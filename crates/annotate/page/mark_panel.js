@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, undo } from "./editing.js";
 import { gripperOf } from "./geometry.js";
-import { changed, image, marks, state } from "./store.js";
+import { changed, image, isMarking, marks, state } from "./store.js";
 import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
@@ -170,7 +170,9 @@ function hint() {
 }
 
 export function renderMarkPanel() {
+  renderTools();
   const target = image();
+  if (!target) return;
   renderSaved(target);
   renderTodo();
   renderAdvice(target);
@@ -178,13 +180,16 @@ export function renderMarkPanel() {
   note.hidden = !target.note;
   note.textContent = target.note ?? "";
   if (document.activeElement !== label) label.value = state.label;
-  const marking = state.tab === "mark";
+}
+
+function renderTools() {
+  const marking = isMarking();
   for (const button of document.querySelectorAll("button[data-tool]")) {
     button.setAttribute("aria-pressed", String(button.dataset.tool === state.tool));
   }
-  by("undo").disabled = !target.past.length;
-  by("redo").disabled = !target.future.length;
-  by("delete").disabled = !(state.draft || (state.selected && marks()[state.selected]));
+  by("undo").disabled = !image()?.past.length;
+  by("redo").disabled = !image()?.future.length;
+  by("delete").disabled = !(state.draft || (state.selected && image()?.marks[state.selected]));
   by("mark-tools").hidden = by("edit-tools").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
   const said = marking ? hint() : "";

@@ -16,6 +16,11 @@ document.getElementById("other-samples").addEventListener("click", () => {
 /** Shows samples of the marks as they are; pictures are asked for anew only when the marks have changed. */
 export function renderSamples() {
   if (state.tab !== "samples") return;
+  if (!image()) {
+    problem.hidden = false;
+    problem.textContent = "There is nothing to show yet: take a photo of the part first.";
+    return sheet.replaceChildren();
+  }
   const { id, marks, committed } = image();
   const wanted = `${id} ${first} ${committed}`;
   if (sheet.dataset.shown === wanted) return;

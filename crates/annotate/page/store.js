@@ -17,6 +17,13 @@ export const state = {
   /** What is being drawn just now: a box, a line, an unclosed outline. */
   draft: null,
   proposing: false,
+  /** The camera's address; null without one. */
+  camera: null,
+  /** Whether the first step shows the camera for a further photo, and the last one the camera instead of a picture. */
+  shooting: false,
+  tryingLive: true,
+  /** The frame on the stage, with its `detections` where the model is tried, and what is wrong with the camera. */
+  live: { number: null, url: null, size: null, detections: null, failed: null, fault: null, isUsable: false, paused: false },
   teaching: { status: "idle", losses: [], validations: [] },
   /** The part of the photo in view: screen = photo · scale + [x, y]. */
   view: { scale: 1, x: 0, y: 0, fitted: true },
@@ -42,6 +49,16 @@ export const image = () => state.images[state.current];
 export const marks = () => image().marks;
 export const scene = () => state.scenes[state.scene];
 export const size = () => [image().width, image().height];
+
+/** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */
+export function isLive() {
+  if (!state.camera || state.tab === "samples") return false;
+  if (state.tab === "try") return state.tryingLive;
+  return !state.images.length || (state.shooting && state.tab === "mark");
+}
+
+/** Whether the stage shows a photo on which marks can be made. */
+export const isMarking = () => state.tab === "mark" && !isLive();
 
 /** Where the part is, as far as it is marked: its outline, or its box. */
 export function region() {

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
-import { changed, image, marks, scene, state } from "./store.js";
+import { changed, image, isLive, marks, scene, state } from "./store.js";
 import { show } from "./view.js";
 
 const strip = document.getElementById("strip");
@@ -11,7 +11,7 @@ const empty = document.getElementById("empty");
 /** Opens another photo of the part for marking. */
 export function openImage(index) {
   if (index < 0 || index >= state.images.length) return;
-  Object.assign(state, { current: index, selected: null, vertex: null, draft: null });
+  Object.assign(state, { current: index, shooting: false, selected: null, vertex: null, draft: null });
   state.tool = nextTool();
   showCurrent();
 }
@@ -19,18 +19,26 @@ export function openImage(index) {
 /** Opens another picture to try. */
 export function openScene(index) {
   if (index < 0 || index >= state.scenes.length) return;
-  state.scene = index;
+  Object.assign(state, { scene: index, tryingLive: false });
   showCurrent();
+}
+
+/** What is on the stage: address, size and words; null where there is nothing yet. */
+function onStage() {
+  if (isLive()) return state.live.url && [state.live.url, state.live.size, `Live picture of ${state.camera}`];
+  const trying = state.tab === "try";
+  const shown = trying ? scene() : image();
+  if (!shown) return null;
+  return [trying ? api.sceneUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`];
 }
 
 /** Shows what the present step is about. */
 export function showCurrent() {
-  const trying = state.tab === "try";
-  const shown = trying ? scene() : image();
+  const shown = onStage();
   document.getElementById("photo").hidden = !shown;
   empty.hidden = Boolean(shown);
-  if (!shown) empty.textContent = "Drop pictures of the table here, or add them on the side.";
-  else show(trying ? api.sceneUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`);
+  if (shown) show(...shown);
+  else empty.textContent = isLive() ? "Waiting for the camera’s first picture…" : "Drop pictures of the table here, or add them on the side.";
   changed();
 }
 
@@ -50,7 +58,7 @@ export function renderStrip() {
   const trying = state.tab === "try";
   const entries = trying ? state.scenes : state.images;
   strip.setAttribute("aria-label", trying ? "Pictures to try" : "Photos of the part");
-  strip.hidden = state.tab === "samples" ? state.images.length < 2 : trying ? !entries.length : entries.length < 2;
+  strip.hidden = state.tab === "samples" ? state.images.length < 2 : trying || isLive() ? !entries.length : entries.length < 2;
   const current = trying ? state.scene : state.current;
   while (strip.children.length > entries.length) strip.lastChild.remove();
   entries.forEach((entry, i) => {
@@ -66,10 +74,10 @@ export function renderStrip() {
     if (picture.getAttribute("src") !== url) picture.src = url;
     name.textContent = entry.name;
     word.textContent = words(entry, trying);
-    item.firstChild.setAttribute("aria-current", String(i === current));
+    item.firstChild.setAttribute("aria-current", String(i === current && !isLive()));
   });
 }
 
 /** For the title of the window. */
-export const shownName = () => (state.tab === "try" ? scene() : image())?.name ?? "";
-export const isMarked = () => Boolean((marks().box || marks().outline) && marks().grasp);
+export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? scene() : image())?.name) ?? "";
+export const isMarked = () => Boolean(image() && (marks().box || marks().outline) && marks().grasp);

@@ -2,17 +2,17 @@
 
 import { showCurrent } from "./strip.js";
 import { isMarked } from "./strip.js";
-import { changed, state } from "./store.js";
+import { changed, isLive, state } from "./store.js";
 
 const NAMES = ["mark", "samples", "teach", "try"];
 const tab = (name) => document.getElementById(`tab-${name}`);
 
 export function openTab(name) {
   if (state.tab === name) return;
-  const wasTrying = state.tab === "try";
+  const before = [state.tab === "try", isLive()];
   Object.assign(state, { tab: name, draft: null });
   // Only then is another picture shown: the view of one that stays is kept.
-  if (wasTrying !== (name === "try")) showCurrent();
+  if (String(before) !== String([name === "try", isLive()])) showCurrent();
   changed();
   document.querySelector(".panel").scrollTop = 0;
 }

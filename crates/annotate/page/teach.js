@@ -66,7 +66,7 @@ export async function watch() {
   }
   if (state.teaching.status === "done") {
     // What another model found is old news.
-    for (const scene of state.scenes) scene.detections = null;
+    for (const scene of [...state.scenes, state.live]) scene.detections = null;
     changed();
   }
 }
@@ -128,9 +128,9 @@ export function renderTeach() {
   const marked = state.images.filter((i) => (i.marks.box || i.marks.outline) && i.marks.grasp);
   by("teach-from").textContent = marked.length
     ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”.`
-    : "Mark the part on a photo first: box and grasp.";
+    : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
-    const lacks = image().advice.models.find((m) => m.model === input.value).lacks;
+    const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];
     const needsOutline = input.value === "D" && marked.some((i) => !i.marks.outline);
     input.disabled = needsOutline || (!marked.length && lacks.length > 0);
     if (input.disabled && input.checked && marked.length) document.querySelector("[name=model][value=C]").checked = true;

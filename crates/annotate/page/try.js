@@ -2,8 +2,9 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
+import { poseText } from "./live.js";
 import { openImage, openScene } from "./strip.js";
-import { changed, scene, state } from "./store.js";
+import { changed, isLive, scene, state } from "./store.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 
@@ -120,13 +121,15 @@ function card(detection, i, shown) {
     if (detection.is_accepted) row.append(button("Right: learn from it", () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }
-  item.append(title, row);
+  item.append(title);
+  if (detection.pose) item.append(text("p", poseText(detection.pose), "pose"));
+  item.append(row);
   return item;
 }
 
 function renderFound() {
   const found = by("found");
-  const shown = scene();
+  const shown = isLive() ? null : scene();
   const said = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
   if (found.dataset.said === said) return;
   found.dataset.said = said;

@@ -34,6 +34,11 @@ export function show(url, size, alt) {
   fit();
 }
 
+/** Shows the next picture of the same size; the view stays. */
+export function replacePicture(url) {
+  photo.src = url;
+}
+
 export function fit() {
   const { clientWidth, clientHeight } = stage;
   const room = Math.min(MARGIN_PX, clientWidth / 20);

@@ -16,7 +16,7 @@ pub type TeacherError = Box<dyn std::error::Error + Send + Sync>;
 #[non_exhaustive]
 pub enum Error {
     /// There is nothing to mark.
-    #[error("expected at least one image to mark, found none")]
+    #[error("expected at least one image to mark, or a camera to take it with, found none")]
     NoImage,
     /// A file could not be read or written.
     #[error("{}: {action}: {source}", path.display())]
@@ -72,6 +72,23 @@ pub enum Error {
     TooManyPictures {
         /// The bound.
         most: usize,
+    },
+    /// The page was opened without a camera.
+    #[error("expected a page with a camera, found none: open it with --from")]
+    NoCamera,
+    /// A frame that was not shown, or so long ago that it is not kept any more.
+    #[error("expected a frame that was shown lately, found frame {number}")]
+    NoSuchFrame {
+        /// Its number.
+        number: u64,
+    },
+    /// The camera is not in a state for this.
+    #[error("expected {expected}, found {found}")]
+    Camera {
+        /// What is needed.
+        expected: &'static str,
+        /// What is wrong.
+        found: String,
     },
     /// The request makes no sense.
     #[error("{what}: expected {expected}, found {found}")]

@@ -8,8 +8,8 @@
 //!    └─ Server: 127.0.0.1 only, behind a Guard (token, Host, Origin) ─ routes ─ page/ (HTML, CSS, JavaScript)
 //! ```
 //!
-//! What is deliberately absent: grasp models and burn. Teaching and detecting come in through [`GraspTeacher`], so that
-//! this crate builds in seconds. No request names a path: pictures have numbers.
+//! What is deliberately absent: grasp models, burn and cameras. Teaching and detecting come in through [`GraspTeacher`], live
+//! pictures through [`LivePictures`], so that this crate builds in seconds. No request names a path: pictures have numbers.
 //!
 //! ```no_run
 //! use std::sync::Arc;
@@ -31,6 +31,7 @@ mod error;
 mod gripper;
 mod guard;
 mod http;
+mod live;
 mod marks;
 mod names;
 mod outline;
@@ -47,9 +48,12 @@ mod views;
 pub use advice::{Advice, Fix, ModelAdvice, Remark};
 pub use error::{Error, Result, TeacherError};
 pub use gripper::{Gripper, Reach};
+pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictures};
 pub use marks::{GraspMarks, Marks};
 pub use server::Server;
 pub use session::{Session, SessionOptions};
-pub use teacher::{FoundGrasp, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+pub use teacher::{
+    FoundGrasp, GraspPose, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep,
+};
 pub use teaching::{News, Status};
 pub use views::{ImageView, Saved, SceneView, SessionView};

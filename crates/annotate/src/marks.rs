@@ -190,6 +190,7 @@ mod tests {
             outline: None,
             grasp: PlanarGrasp { x: 10.0, y: 40.0, angle: Angle::ZERO, width: 30.0 },
             line_length: 40.0,
+            pose: None,
         };
         let marks = Marks::of_found(&found, [200, 100]);
         let line = marks.grasp.unwrap().line();

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::picture::Picture;
-
 /// The last part of a path, for people.
 pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
@@ -19,16 +17,22 @@ pub fn safe_stem(name: &str) -> String {
     if safe.chars().all(|c| c == '_') { "part".to_owned() } else { safe }
 }
 
-/// A name beside `beside` that is not taken, like the picture's own.
-pub fn free_name(beside: &Path, picture: &Picture) -> PathBuf {
-    let stem = safe_stem(&Path::new(&picture.name).file_stem().unwrap_or_default().to_string_lossy());
-    let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
-    let numbered = |n: usize| if n == 1 { stem.clone() } else { format!("{stem}-{n}") };
-    let taken = |path: &Path| path.exists() || path.with_extension("json").exists();
-    (1..)
-        .map(|n| beside.with_file_name(format!("{}.{extension}", numbered(n))))
-        .find(|path| !taken(path))
-        .expect("numbers do not run out")
+/// A name beside `beside` that is not taken, made of what of `name` any file system takes.
+pub fn free_name(beside: &Path, name: &str, extension: &str) -> PathBuf {
+    let stem = safe_stem(&Path::new(name).file_stem().unwrap_or_default().to_string_lossy());
+    free_numbered(&beside.with_file_name(format!("{stem}.{extension}")))
+}
+
+/// The path itself or, where a picture or marks of that name are there already, the same with a number.
+pub fn free_numbered(path: &Path) -> PathBuf {
+    let (stem, extension) = (path.file_stem().unwrap_or_default(), path.extension().unwrap_or_default());
+    let numbered = |n: usize| match n {
+        1 => path.to_owned(),
+        _ => path.with_file_name(format!("{}-{n}.{}", stem.to_string_lossy(), extension.to_string_lossy())),
+    };
+    let marks = |path: &Path| ["json", "coco.json"].iter().any(|extension| path.with_extension(extension).exists());
+    let taken = |path: &Path| path.exists() || marks(path);
+    (1..).map(numbered).find(|path| !taken(path)).expect("numbers do not run out")
 }
 
 #[cfg(test)]
@@ -46,11 +50,14 @@ mod tests {
     #[test]
     fn a_taken_name_is_numbered() {
         let folder = tempfile::tempdir().unwrap();
-        let picture = |name: &str| Picture { path: "/tmp/upload.png".into(), name: name.into(), size: [1, 1] };
         let beside = folder.path().join("photo.png");
-        assert_eq!(free_name(&beside, &picture("table.jpg")), folder.path().join("table.png"));
+        assert_eq!(free_name(&beside, "table.jpg", "png"), folder.path().join("table.png"));
         std::fs::write(folder.path().join("table.png"), "").unwrap();
         std::fs::write(folder.path().join("table-2.json"), "").unwrap();
-        assert_eq!(free_name(&beside, &picture("table.jpg")), folder.path().join("table-3.png"));
+        assert_eq!(free_name(&beside, "table.jpg", "png"), folder.path().join("table-3.png"));
+        let spaced = folder.path().join("my part.png");
+        assert_eq!(free_numbered(&spaced), spaced);
+        std::fs::write(&spaced, "").unwrap();
+        assert_eq!(free_numbered(&spaced), folder.path().join("my part-2.png"));
     }
 }

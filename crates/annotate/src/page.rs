@@ -16,6 +16,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("geometry.js", SCRIPT, include_str!("../page/geometry.js")),
     ("gestures.js", SCRIPT, include_str!("../page/gestures.js")),
     ("keyboard.js", SCRIPT, include_str!("../page/keyboard.js")),
+    ("live.js", SCRIPT, include_str!("../page/live.js")),
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
     ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),

@@ -100,6 +100,19 @@ pub fn jpeg(image: &RgbImage) -> Vec<u8> {
     }
 }
 
+/// The picture as PNG, without loss.
+///
+/// # Errors
+/// A picture without pixels.
+pub fn png(image: &RgbImage) -> Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, ImageFormat::Png).map_err(|error| Error::Camera {
+        expected: "a picture that can be written as PNG",
+        found: error.to_string(),
+    })?;
+    Ok(bytes.into_inner())
+}
+
 fn read(path: &Path) -> Result<Vec<u8>> {
     let failed = || Error::file(path, "cannot read");
     let found = fs::metadata(path).map_err(failed())?.len();

@@ -11,9 +11,10 @@ use tempfile::TempDir;
 use crate::advice::advise;
 use crate::annotation_file;
 use crate::error::{Error, Result};
+use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
-use crate::names::{file_name, free_name, safe_stem};
-use crate::picture::{Picture, pictures_in};
+use crate::names::{file_name, free_name, free_numbered, safe_stem};
+use crate::picture::{Picture, pictures_in, png};
 use crate::preview::Previews;
 use crate::teacher::{GraspTeacher, ModelLetter};
 use crate::teaching::Teaching;
@@ -33,6 +34,8 @@ pub struct SessionOptions {
     pub scenes: Vec<PathBuf>,
     /// Where a taught model is written; without it, beside the first picture under the object's name.
     pub model_path: Option<PathBuf>,
+    /// A camera to take pictures with; with one, `images` may be empty.
+    pub live: Option<LiveOptions>,
 }
 
 /// One sitting.
@@ -41,6 +44,9 @@ pub struct Session {
     pub(crate) teaching: Teaching,
     pub(crate) previews: Previews,
     model_path: Option<PathBuf>,
+    /// What is written for the person at the page stands beside this: the first picture, or the first photo to be taken.
+    home: PathBuf,
+    live: Option<LiveDesk>,
     /// Pictures that came from the page, until one is accepted.
     uploads: TempDir,
     state: Mutex<State>,
@@ -75,11 +81,10 @@ impl Session {
     /// Opens pictures and their marks.
     ///
     /// # Errors
-    /// No picture, or one that cannot be read, or marks that belong to another.
+    /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
-        if options.images.is_empty() {
-            return Err(Error::NoImage);
-        }
+        let first = options.images.first().map(|(path, _)| path);
+        let home = first.or(options.live.as_ref().map(|live| &live.photo_path)).ok_or(Error::NoImage)?.clone();
         let mut label = None;
         let mut images = Vec::new();
         for (path, annotation) in &options.images {
@@ -113,6 +118,8 @@ impl Session {
             teaching: Teaching::default(),
             previews: Previews::default(),
             model_path: options.model_path.clone(),
+            home,
+            live: options.live.clone().map(LiveDesk::new),
             uploads,
             state: Mutex::new(state),
         })
@@ -130,6 +137,7 @@ impl Session {
             images: (0..state.images.len()).map(|id| state.image_view(id)).collect(),
             scenes: (0..state.scenes.len()).map(|id| state.scene_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
+            camera: self.live.as_ref().map(|desk| desk.options.address.clone()),
         }
     }
 
@@ -141,7 +149,7 @@ impl Session {
     fn model_path(&self, state: &State) -> PathBuf {
         self.model_path.clone().unwrap_or_else(|| {
             let name = format!("{}.sdg", safe_stem(&state.label));
-            state.images[0].picture.path.with_file_name(name)
+            self.home.with_file_name(name)
         })
     }
 
@@ -255,25 +263,59 @@ impl Session {
         }
         let mut picture = scene.picture;
         if scene.uploaded {
-            let beside = state.images[0].picture.path.clone();
-            let target = free_name(&beside, &picture);
+            let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
+            let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
             sdg_report::write_atomically(&target, &bytes)?;
             picture.name = file_name(&target);
             picture.path = target;
         }
-        let opened = annotation_file::open(&picture.path, None, picture.size)?;
-        let id = state.images.len();
-        state.images.push(MarkedPicture {
-            picture,
-            marks,
-            file: opened.path,
-            note: opened.note,
-            saved: Saved::Nothing,
-        });
+        let id = state.add_image(picture, marks)?;
         state.scenes[scene_id].became = Some(id);
         state.save(id);
         Ok(state.image_view(id))
+    }
+
+    /// The camera.
+    ///
+    /// # Errors
+    /// [`Error::NoCamera`].
+    pub(crate) fn live_desk(&self) -> Result<&LiveDesk> {
+        self.live.as_ref().ok_or(Error::NoCamera)
+    }
+
+    /// The file that the next photo goes to.
+    ///
+    /// # Errors
+    /// [`Error::NoCamera`].
+    pub(crate) fn next_photo(&self) -> Result<PathBuf> {
+        Ok(free_numbered(&self.live_desk()?.options.photo_path))
+    }
+
+    /// Writes a frame that was shown as PNG, under a name that is not taken, and makes it a photo of the object.
+    ///
+    /// # Errors
+    /// No camera, or one that shows something else than what is before it; a frame that is not kept any more; a file that
+    /// cannot be written.
+    pub fn take_photo(&self, number: u64) -> Result<ImageView> {
+        let frame = self.live_desk()?.photo(number)?;
+        let bytes = png(&frame)?;
+        // Held until the photo is written: the next one finds its name taken.
+        let mut state = self.state();
+        let path = self.next_photo()?;
+        sdg_report::write_atomically(&path, &bytes)?;
+        let picture = Picture { name: file_name(&path), path, size: [frame.width(), frame.height()] };
+        let id = state.add_image(picture, Marks::default())?;
+        Ok(state.image_view(id))
+    }
+
+    /// Makes a frame that was shown a picture to try.
+    ///
+    /// # Errors
+    /// No camera, a frame that is not kept any more, more pictures than a sitting keeps.
+    pub fn keep_frame(&self, number: u64) -> Result<SceneView> {
+        let bytes = png(&*self.live_desk()?.frame(number)?)?;
+        self.add_scene(&format!("live-{number}.png"), &bytes)
     }
 
     /// One picture with its marks, as teaching takes it.
@@ -299,7 +341,7 @@ impl Session {
         };
         let begun: Vec<_> = marked.iter().filter(|image| image.marks != Marks::default()).collect();
         if begun.is_empty() {
-            let name = marked[0].picture.name.clone();
+            let name = marked.first().map_or_else(|| "no photo yet".to_owned(), |image| image.picture.name.clone());
             return Err(Error::NotMarked { name, expected: "a box and a grasp", found: "no marks" });
         }
         for image in &begun {
@@ -321,6 +363,14 @@ impl State {
 
     fn scene(&self, id: usize) -> Result<&Scene> {
         self.scenes.get(id).ok_or(Error::NoSuchPicture { id, count: self.scenes.len() })
+    }
+
+    /// Adds a picture with marks that are not saved yet, and says its number.
+    fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
+        let opened = annotation_file::open(&picture.path, None, picture.size)?;
+        let (file, note) = (opened.path, opened.note);
+        self.images.push(MarkedPicture { picture, marks, file, note, saved: Saved::Nothing });
+        Ok(self.images.len() - 1)
     }
 
     fn save(&mut self, id: usize) {

@@ -164,4 +164,23 @@ pub struct FoundGrasp {
     pub grasp: PlanarGrasp,
     /// Length of the marked line in this image.
     pub line_length: f64,
+    /// Where that is over the table, if the camera is calibrated.
+    pub pose: Option<GraspPose>,
+}
+
+/// A grasp in millimetres and degrees, for people.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GraspPose {
+    /// What positions are given in: `table`, `base`.
+    pub frame: &'static str,
+    /// The middle between the jaws.
+    pub position_mm: [f64; 3],
+    /// The turn about the frame's z.
+    pub yaw_deg: f64,
+    /// Between the jaws.
+    pub opening_mm: f64,
+    /// One standard deviation of the position.
+    pub sigma_mm: f64,
+    /// One standard deviation of the turn.
+    pub sigma_deg: f64,
 }

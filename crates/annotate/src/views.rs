@@ -70,4 +70,6 @@ pub struct SessionView {
     pub scenes: Vec<SceneView>,
     /// Where a taught model is written.
     pub model_path: String,
+    /// The camera's address, if there is one.
+    pub camera: Option<String>,
 }

@@ -30,6 +30,8 @@ fn wrong_and_missing_tokens_are_refused_everywhere() {
         ("PUT", "/api/images/0/marks"),
         ("POST", "/api/teaching"),
         ("POST", "/api/scenes?name=a.png"),
+        ("GET", "/api/live"),
+        ("POST", "/api/live/0/photo"),
         ("GET", "/nowhere"),
     ] {
         for headers in [vec![("Host", host.as_str())], vec![("Host", host.as_str()), ("Cookie", wrong.as_str())]] {

@@ -86,9 +86,15 @@ pub struct DemoArgs {
 #[derive(Debug, ClapArgs)]
 pub struct AnnotateArgs {
     /// Photos of one part, PNG or JPEG. Marks are read from and written to the file of the same name with .json, or
-    /// to ANNOTATION; another tool's file is read and left as it is
-    #[arg(required = true, value_name = "IMAGE[:ANNOTATION]")]
+    /// to ANNOTATION; another tool's file is read and left as it is. With --from, one that is not there yet is the name
+    /// of the photo that is taken
+    #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION]")]
     pub images: Vec<String>,
+    /// Live pictures, to take photos on the page and to try the model on: v4l:, v4l:/dev/video2, http://HOST/PATH,
+    /// 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Photos are written as photo.png, photo-2.png … into the current
+    /// folder, or as IMAGE
+    #[arg(long, value_name = "ADDRESS")]
+    pub from: Option<Address>,
     /// A picture, or a folder of pictures, to try the taught model on; repeat for several. The page takes more
     #[arg(long = "try", value_name = "PATH")]
     pub scenes: Vec<PathBuf>,
@@ -688,6 +694,8 @@ mod tests {
             "sdg demo",
             "sdg demo --json",
             "sdg annotate photo.png",
+            "sdg annotate --from v4l:",
+            "sdg annotate --from dir:pictures?loop part.png --camera c.yaml --mark-height-mm 12",
             "sdg annotate a.png b.png:b.json --try table --out m.sdg --port 8080 --no-browser --json",
             "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60 --report r",
             "sdg detect --grasp-model m.sdg --json --no-verify a.png b.png",

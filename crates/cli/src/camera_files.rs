@@ -44,6 +44,11 @@ impl CameraFile {
         Ok(Self { frame: table.frame, over_table, camera })
     }
 
+    /// Width and height of its pictures.
+    pub fn size_px(&self) -> [u32; 2] {
+        [self.camera.intrinsics.width, self.camera.intrinsics.height]
+    }
+
     /// Whether a picture can be this camera's.
     ///
     /// # Errors

@@ -38,6 +38,8 @@ pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
+mod page_camera;
+#[cfg(feature = "annotate")]
 mod page_teacher;
 pub mod picture_detector;
 mod pictures;

@@ -5,14 +5,16 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use image::RgbImage;
 use sdg_annotate::{
-    FoundGrasp, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingStep,
+    FoundGrasp, GraspPose, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeacherError,
+    TeachingStep,
 };
+use sdg_calibration::Frame;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Event, GraspDetection, GraspModel, ModelKind, Preset, TeachOptions, Verification, teach};
+use sdg_grasp::{Event, ModelKind, PlanarPose, Preset, TeachOptions, Verification, teach};
 
 use crate::camera_files::CameraFile;
-use crate::picture_detector::PictureDetector;
+use crate::picture_detector::{Found, PictureDetector};
 
 /// Teaches with one preset.
 pub struct PageTeacher {
@@ -110,13 +112,14 @@ impl TaughtModel for PageModel {
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
         let detector = self.detector();
         let found = detector.detect(image, Verification::ByShape)?;
-        Ok(found.iter().map(|found| found_grasp(detector.model(), &found.detection)).collect())
+        Ok(found.iter().map(|found| found_grasp(&detector, found)).collect())
     }
 }
 
 /// The marked line is as long, against the part, as the first demonstration's: detections tell its middle only.
-fn found_grasp(model: &GraspModel, detection: &GraspDetection) -> FoundGrasp {
-    let taught = &model.demonstrations()[0].marks;
+fn found_grasp(detector: &PictureDetector, found: &Found) -> FoundGrasp {
+    let taught = &detector.model().demonstrations()[0].marks;
+    let detection = &found.detection;
     let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
     FoundGrasp {
         score: detection.score,
@@ -125,5 +128,17 @@ fn found_grasp(model: &GraspModel, detection: &GraspDetection) -> FoundGrasp {
         outline: detection.outline.clone(),
         grasp: detection.grasp,
         line_length: taught.grasp.length() * scale,
+        pose: found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| grasp_pose(pose, frame)),
+    }
+}
+
+fn grasp_pose(pose: &PlanarPose, frame: Frame) -> GraspPose {
+    GraspPose {
+        frame: frame.name(),
+        position_mm: pose.position_m.coords.map(|metres| 1e3 * metres).into(),
+        yaw_deg: pose.yaw.degrees(),
+        opening_mm: 1e3 * pose.opening_m,
+        sigma_mm: 1e3 * pose.uncertainty.position_m,
+        sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
     }
 }

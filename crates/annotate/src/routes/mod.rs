@@ -14,8 +14,15 @@
 //! | `GET /api/scenes/{id}/picture` | that picture |
 //! | `POST /api/scenes/{id}/detect` | grasps in it |
 //! | `POST /api/scenes/{id}/accept` | makes it a demonstration with the marks given |
+//! | `GET /api/live` | the number of the camera's newest frame, and what is wrong with the camera |
+//! | `GET /api/live/{number}/picture` | that frame, as JPEG |
+//! | `POST /api/live/{number}/detect` | grasps in it |
+//! | `POST /api/live/{number}/photo` | writes it as a photo of the part, to be marked |
+//! | `POST /api/live/{number}/keep` | makes it a picture to try |
 
+mod detections;
 mod images;
+mod live;
 mod scenes;
 
 use std::sync::Arc;
@@ -64,6 +71,7 @@ pub fn answer(session: &Arc<Session>, request: &Request) -> Response {
             json_of(Ok(session.teaching.news()))
         }
         ("POST", ["api", "scenes"]) => json_of(scenes::add(session, request)),
+        (method, ["api", "live", rest @ ..]) => live::answer(session, method, rest).unwrap_or_else(no_such_address),
         (method, ["api", kind @ ("images" | "scenes"), id, rest @ ..]) => {
             let Ok(id) = id.parse::<usize>() else { return no_such_address() };
             let answered = match *kind {
@@ -116,9 +124,9 @@ fn picture_of(outcome: Result<(Vec<u8>, &'static str)>) -> Response {
 
 fn refusal(error: &Error) -> Response {
     let status = match error {
-        Error::NoSuchPicture { .. } => 404,
+        Error::NoSuchPicture { .. } | Error::NoSuchFrame { .. } | Error::NoCamera => 404,
         Error::Demonstration { .. } | Error::NotMarked { .. } | Error::Request { .. } | Error::Teacher(_) => 422,
-        Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } => 409,
+        Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } | Error::Camera { .. } => 409,
         Error::TooLarge { .. } => 413,
         _ => 500,
     };

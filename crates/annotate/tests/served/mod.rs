@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use image::{Rgb, RgbImage};
 use sdg_annotate::{
-    FoundGrasp, GraspTeacher, Server, Session, SessionOptions, TaughtModel, TaughtSummary, TeachRequest, TeacherError,
-    TeachingStep,
+    FoundGrasp, GraspTeacher, LiveOptions, LivePictures, Server, Session, SessionOptions, TaughtModel, TaughtSummary,
+    TeachRequest, TeacherError, TeachingStep,
 };
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -72,6 +72,7 @@ impl TaughtModel for InPlaceModel {
             outline: self.0.annotation.outline.clone(),
             grasp: PlanarGrasp::from_line(&line, self.0.annotation.jaw_width.unwrap_or(30.0)),
             line_length: line.length(),
+            pose: None,
         }])
     }
 }
@@ -124,7 +125,18 @@ impl Served {
         let image: PathBuf = folder.path().join("photo.png");
         std::fs::write(&image, photo_png()).unwrap();
         std::fs::write(folder.path().join("secret.txt"), "not for the page").unwrap();
-        let options = SessionOptions { images: vec![(image, None)], ..SessionOptions::default() };
+        Self::open(folder, SessionOptions { images: vec![(image, None)], ..SessionOptions::default() })
+    }
+
+    /// A server with a camera and no photo, in an empty folder.
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
+    pub fn with_camera(pictures: Arc<dyn LivePictures>) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
+        Self::open(folder, SessionOptions { live: Some(live), ..SessionOptions::default() })
+    }
+
+    fn open(folder: tempfile::TempDir, options: SessionOptions) -> Self {
         let server = Server::bind(Session::open(&options, Arc::new(InPlace)).unwrap(), 0).unwrap();
         let url = server.url();
         let (address, token) = url.split_once("/?token=").unwrap();

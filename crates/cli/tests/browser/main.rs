@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod keyboard;
+mod live;
 mod page;
 mod photo_to_grasp;
 mod small_screen;

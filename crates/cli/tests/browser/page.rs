@@ -33,11 +33,18 @@ impl Page {
     /// Opens the page on a copy of the shipped pendulum's photo, which nothing is marked on.
     pub fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("photo.png");
-        std::fs::copy(shipped_photo(), &photo).unwrap();
+        std::fs::copy(shipped_photo(), folder.path().join("photo.png")).unwrap();
+        let page = Self::open_in(folder, &["photo.png"]);
+        page.wait_for("the photo", "const p = document.getElementById('photo'); return p.complete && p.naturalWidth");
+        page
+    }
+
+    /// Opens the page with these arguments, which name files in the folder.
+    pub fn open_in(folder: TempDir, arguments: &[&str]) -> Self {
         let mut server = Command::new(env!("CARGO_BIN_EXE_sdg"))
             .args(["annotate", "--no-browser", "--json"])
-            .arg(&photo)
+            .args(arguments)
+            .current_dir(folder.path())
             // It is ended without a word, and what it keeps for the sitting goes with the folder.
             .env("TMPDIR", folder.path())
             .stdout(Stdio::piped())
@@ -51,7 +58,6 @@ impl Page {
         browser.emulate(1280, 800, false).unwrap();
         let page = Self { browser, folder, server, url };
         page.browser.open(&page.url).unwrap();
-        page.wait_for("the photo", "const p = document.getElementById('photo'); return p.complete && p.naturalWidth");
         page
     }
 
@@ -96,6 +102,13 @@ impl Page {
         let script = "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(
             !document.getElementById('propose').disabled && document.getElementById('saved').innerText !== 'Saving…'))))";
         self.wait_for("the page to settle", script);
+    }
+
+    /// Waits until what was just done is drawn.
+    pub fn settle_frames(&self) {
+        let script =
+            "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))";
+        self.wait_for("the page to draw", script);
     }
 
     /// Waits until all is saved and reads what stands on the disk.

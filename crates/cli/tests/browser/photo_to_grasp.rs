@@ -140,7 +140,7 @@ fn teach(page: &Page) {
 }
 
 /// Asks again for longer than the browser's own patience: the computer may be busy.
-fn patiently(page: &Page, what: &str, script: &str) {
+pub fn patiently(page: &Page, what: &str, script: &str) {
     const TIMES: usize = 8;
     for _ in 1..TIMES {
         if page.browser.wait_for(what, script).is_ok() {

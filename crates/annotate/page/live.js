@@ -1,0 +1,242 @@
+// The camera: its newest picture on the stage, photos taken of it, and the taught model tried on it again and again.
+
+import { api } from "./api.js";
+import { adopt } from "./editing.js";
+import { openImage, showCurrent } from "./strip.js";
+import { changed, isLive, state } from "./store.js";
+import { toast } from "./toast.js";
+import { replacePicture } from "./view.js";
+
+/** Between questions to the server: more pictures a second than a person needs to see. */
+const PAUSE_MS = 60;
+/** The same while the model is tried and waits for the camera's next frame; after a frame the next one is asked for at once. */
+const TRYING_PAUSE_MS = 15;
+/** After a failed question, or while nobody looks at the page. */
+const RETRY_MS = 500;
+/** Grasps of a frame that are told in words; all are drawn. */
+const MAX_TOLD = 3;
+const FAULTS = {
+  other_size: "Another size",
+  stale: "No new picture",
+  frozen: "Frozen picture",
+  torn: "Broken pictures",
+  gone: "Camera gone",
+  black: "Black picture",
+  ended: "The end",
+  failed: "Camera failed",
+  lost: "No answer",
+};
+
+const by = (id) => document.getElementById(id);
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const isPaused = () => state.tab === "try" && state.live.paused;
+
+/** Asks for the newest frame as long as it is shown. */
+let running = false;
+async function run() {
+  if (running) return;
+  running = true;
+  while (isLive() && !isPaused()) {
+    let pause = PAUSE_MS;
+    if (document.hidden) pause = RETRY_MS;
+    else {
+      try {
+        const isNew = await look();
+        if (state.tab === "try" && state.hasModel) pause = isNew ? 0 : TRYING_PAUSE_MS;
+      } catch (error) {
+        Object.assign(state.live, { fault: { kind: "lost", text: error.message }, isUsable: false });
+        pause = RETRY_MS;
+      }
+      changed();
+    }
+    await wait(pause);
+  }
+  running = false;
+}
+
+/** Shows the newest frame, with the grasps found in this very frame where the model is tried; says whether it was a new one. */
+async function look() {
+  const { live } = state;
+  const now = await api.live();
+  if (live.fault && !live.isUsable && now.is_usable) toast("The camera is back.");
+  Object.assign(live, { fault: now.fault, isUsable: now.is_usable, nextPhoto: now.next_photo });
+  if (!now.frame) return false;
+  const { number, width, height } = now.frame;
+  const isTrying = state.tab === "try" && state.hasModel && now.is_usable;
+  if (number === live.number && (!isTrying || live.detections)) return false;
+  const [url, found] = await Promise.all([pictureOf(number), isTrying ? graspsIn(number) : { detections: null }]);
+  // Whoever has paused or gone elsewhere meanwhile keeps what is on the stage.
+  if (!isLive() || isPaused()) {
+    URL.revokeObjectURL(url);
+    return false;
+  }
+  const size = [width, height];
+  const isOther = live.url === null || String(size) !== String(live.size);
+  const old = live.url;
+  Object.assign(live, { number, size, url, failed: null, ...found });
+  if (isOther) showCurrent();
+  else replacePicture(url);
+  if (old) URL.revokeObjectURL(old);
+  return true;
+}
+
+/** The picture as an address that the browser has decoded already: a change of pictures then does not flicker. */
+async function pictureOf(number) {
+  const url = URL.createObjectURL(await api.livePicture(number));
+  const decoded = new Image();
+  decoded.src = url;
+  await decoded.decode();
+  return url;
+}
+
+async function graspsIn(number) {
+  try {
+    const { detections, seconds } = await api.detectLive(number);
+    return { detections, seconds };
+  } catch (error) {
+    if (error.lost) throw error;
+    return { detections: [], failed: error.message };
+  }
+}
+
+/** Shows the live picture for a photo, or goes back to the photos. */
+export function toggleCamera() {
+  if (!state.camera || state.tab !== "mark" || !state.images.length) return;
+  Object.assign(state, { shooting: !state.shooting, draft: null });
+  showCurrent();
+}
+
+/** Makes the frame that is on the stage a photo of the part. */
+export async function takePhoto() {
+  const { live } = state;
+  if (state.tab !== "mark" || !isLive() || !live.isUsable || live.taking) return;
+  live.taking = true;
+  changed();
+  try {
+    const view = await api.takePhoto(live.number);
+    state.images.push(adopt(view));
+    openImage(state.images.length - 1);
+    // The button goes with the live picture.
+    by("overlay").focus({ preventScroll: true });
+    toast(`Photo taken: ${view.name}`);
+  } catch (error) {
+    toast(error.message);
+  }
+  live.taking = false;
+  changed();
+}
+
+/** Pauses and goes on; from another picture, back to the camera. */
+export function toggleLive() {
+  if (!state.camera || state.tab !== "try") return;
+  if (state.tryingLive) state.live.paused = !state.live.paused;
+  else {
+    Object.assign(state, { tryingLive: true });
+    state.live.paused = false;
+    showCurrent();
+  }
+  changed();
+}
+
+/** Makes the frame that is on the stage a picture to try. */
+export async function keepPicture() {
+  const { live } = state;
+  if (state.tab !== "try" || !isLive() || live.number === null) return;
+  const { number, detections, seconds } = live;
+  try {
+    const scene = await api.keepFrame(number);
+    state.scenes.push({ ...scene, detections, seconds });
+    toast(`Kept as ${scene.name}`);
+  } catch (error) {
+    toast(error.message);
+  }
+  changed();
+}
+
+by("take").addEventListener("click", takePhoto);
+by("back-to-photos").addEventListener("click", toggleCamera);
+by("camera-button").addEventListener("click", toggleCamera);
+by("live-toggle").addEventListener("click", toggleLive);
+by("live-keep").addEventListener("click", keepPicture);
+
+function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** A grasp over the table, in words. */
+export function poseText({ frame, position_mm, yaw_deg, opening_mm, sigma_mm, sigma_deg }) {
+  const [x, y, z] = position_mm.map((v) => v.toFixed(1));
+  return `x ${x}, y ${y}, z ${z} mm (±\u00a0${sigma_mm.toFixed(1)}), turned ${yaw_deg.toFixed(1)}° (±\u00a0${sigma_deg.toFixed(1)}), jaws ${opening_mm.toFixed(1)} mm apart; frame: ${frame}`;
+}
+
+function renderState() {
+  const { live } = state;
+  by("live-state").hidden = !isLive();
+  by("stage").classList.toggle("unusable", isLive() && live.url !== null && !live.isUsable);
+  if (!isLive()) return;
+  const kind = isPaused() ? "paused" : live.fault ? live.fault.kind : live.url ? "live" : "waiting";
+  by("live-state").dataset.kind = live.fault && !isPaused() ? (live.isUsable ? "ended" : "fault") : kind;
+  setText(by("live-word"), { paused: "Paused", live: "Live", waiting: "Waiting" }[kind] ?? FAULTS[kind]);
+  const why = { paused: "", live: state.camera, waiting: state.camera, gone: `${live.fault?.text}. It is tried again and again.` }[kind];
+  setText(by("live-why"), why ?? live.fault.text);
+}
+
+function renderShooting() {
+  const { live } = state;
+  const isShooting = isLive() && state.tab === "mark";
+  by("shoot").hidden = !isShooting;
+  by("mark-work").hidden = isShooting;
+  by("camera-button").hidden = !state.camera;
+  by("back-to-photos").hidden = !state.images.length;
+  by("take").disabled = !live.isUsable || Boolean(live.taking);
+  setText(by("shoot-where"), live.nextPhoto ? `It is written to ${live.nextPhoto}.` : "");
+}
+
+function cards(detections) {
+  const accepted = detections.filter((d) => d.is_accepted);
+  if (!accepted.length) {
+    const best = detections[0];
+    return [["There is nothing to grasp.", best ? `best ${best.score.toFixed(2)}` : "", ""]];
+  }
+  const told = accepted.slice(0, MAX_TOLD).map((d) => ["Found the part", `score ${d.score.toFixed(2)}`, d.pose ? poseText(d.pose) : ""]);
+  if (accepted.length > MAX_TOLD) told.push([`And ${accepted.length - MAX_TOLD} more`, "", ""]);
+  return told;
+}
+
+function renderTrying() {
+  const { live } = state;
+  by("live").hidden = !state.camera;
+  if (!state.camera) return;
+  by("live-toggle").textContent = !state.tryingLive ? "Back to the live picture" : live.paused ? "Go on" : "Pause";
+  by("live-keep").hidden = !state.tryingLive;
+  by("live-keep").disabled = live.number === null;
+  const isFound = state.tryingLive && live.isUsable && live.detections && !live.failed;
+  by("live-error").hidden = !state.tryingLive || !live.failed;
+  setText(by("live-error"), live.failed ?? "");
+  const time = isFound ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
+  setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
+  const told = isFound ? cards(live.detections) : [];
+  const said = JSON.stringify(told);
+  if (by("live-found").dataset.said === said) return;
+  by("live-found").dataset.said = said;
+  by("live-found").replaceChildren(...told.map(([title, score, pose]) => {
+    const item = document.createElement("div");
+    item.className = "found";
+    item.innerHTML = '<h3><span></span><span class="score"></span></h3><p class="pose"></p>';
+    item.querySelector("span").textContent = title;
+    item.querySelector(".score").textContent = score;
+    item.querySelector(".pose").textContent = pose;
+    item.querySelector(".pose").hidden = !pose;
+    return item;
+  }));
+  // Told to those who do not see the page when the number changes only; the figures change with every frame.
+  const count = live.detections?.filter((d) => d.is_accepted).length ?? 0;
+  setText(by("live-said"), isFound ? `${count} found` : "");
+}
+
+export function renderLive() {
+  renderState();
+  renderShooting();
+  if (state.tab === "try") renderTrying();
+  if (isLive() && !isPaused()) run();
+}
