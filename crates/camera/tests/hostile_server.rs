@@ -13,7 +13,7 @@ use support::{Script, Server, jpeg, level_of, open, part};
 
 const OK: &str = "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=cut\r\n\r\n";
 
-/// What a server that has come to its senses does: three pictures of level 200, and silence.
+/// A server that works: three pictures of level 200, then nothing more.
 fn recover(stream: &mut TcpStream) {
     let _ = stream.write_all(OK.as_bytes());
     for _ in 0..3 {
