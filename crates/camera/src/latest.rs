@@ -171,6 +171,8 @@ mod tests {
         let (send, receive) = channel();
         let (asked, was_asked) = channel();
         let mut latest = LatestFrame::spawn(Box::new(Driven(receive, asked)));
+        // Declared last, it is dropped first where an assertion fails: `latest` would wait for its thread for ever.
+        let send = send;
         assert!(latest.take(Duration::from_millis(20)).unwrap().is_none() && !latest.has_ended());
         for number in 0..5 {
             was_asked.recv().unwrap();

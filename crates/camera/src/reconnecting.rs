@@ -206,8 +206,8 @@ mod tests {
         assert_eq!(fault_of(&mut camera), Fault::Torn { found: "half".into() });
         assert_eq!(camera.next_frame().unwrap().unwrap().number, 2);
         assert_eq!(fault_of(&mut camera), Fault::Gone { why: "cable".into() });
-        // The pause of 100 ms is longer than the stall timeout of 50 ms.
-        assert_eq!(fault_of(&mut camera), Fault::Gone { why: "cable".into() });
+        // The pause of 100 ms is longer than the stall timeout of 50 ms: this call ends before the connection is opened again.
+        assert!(matches!(fault_of(&mut camera), Fault::Gone { .. }));
         let back = loop {
             match camera.next_frame() {
                 Ok(frame) => break frame.unwrap(),

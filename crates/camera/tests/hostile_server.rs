@@ -13,7 +13,7 @@ use support::{Script, Server, jpeg, level_of, open, part};
 
 const OK: &str = "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=cut\r\n\r\n";
 
-/// What a server that has come to its senses does: three pictures of level 200, and silence.
+/// A server that works: three pictures of level 200, then nothing more.
 fn recover(stream: &mut TcpStream) {
     let _ = stream.write_all(OK.as_bytes());
     for _ in 0..3 {
@@ -28,7 +28,7 @@ fn faults_until(camera: &mut dyn Camera, level: u8) -> Vec<Fault> {
     let mut faults = Vec::new();
     let start = Instant::now();
     loop {
-        assert!(start.elapsed() < Duration::from_secs(10), "no picture of level {level}: {faults:?}");
+        assert!(start.elapsed() < Duration::from_secs(30), "no picture of level {level}: {faults:?}");
         match camera.next_frame() {
             Ok(Some(frame)) => {
                 let is_wanted = level_of(&frame).abs_diff(level) < 5;
@@ -70,7 +70,7 @@ fn gone_because(faults: &[Fault], part: &str) {
 #[test]
 fn a_stall_is_stale_and_a_connection_that_stays_silent_is_opened_again() {
     let faults = faults_of(|_| sleep(Duration::from_secs(20)));
-    assert!(matches!(faults[0], Fault::Stale { silent_secs } if silent_secs >= 0.2), "{faults:?}");
+    assert!(matches!(faults[0], Fault::Stale { silent_secs } if silent_secs >= 0.4), "{faults:?}");
     gone_because(&faults, "no frame for");
 }
 
@@ -82,7 +82,7 @@ fn a_stall_in_mid_picture_loses_nothing_when_it_goes_on() {
             stream.write_all(OK.as_bytes()).unwrap();
             let (half, rest) = picture.split_at(picture.len() / 2);
             stream.write_all(half).unwrap();
-            sleep(Duration::from_millis(300));
+            sleep(Duration::from_millis(600));
             stream.write_all(rest).unwrap();
             sleep(Duration::from_secs(20));
         })],
@@ -168,10 +168,18 @@ fn of_a_flood_the_newest_picture_is_given_and_the_numbers_show_the_gap() {
     let server = Server::start(vec![flood], Box::new(recover));
     let mut camera = open(&server.url("/"));
     sleep(Duration::from_millis(300));
-    let frame = camera.next_frame().unwrap().unwrap();
-    // All 100 came long ago; the last one has level 198 and number 99.
-    assert_eq!(frame.number, 99);
-    assert!(level_of(&frame).abs_diff(198) < 5, "{}", level_of(&frame));
+    let mut num_frames = 0;
+    loop {
+        let frame = camera.next_frame().unwrap().unwrap();
+        num_frames += 1;
+        // Whatever was passed over is counted: picture n has level 2 n.
+        assert!(u64::from(level_of(&frame)).abs_diff(2 * frame.number) < 5, "{frame:?} {}", level_of(&frame));
+        if frame.number == 99 {
+            break;
+        }
+    }
+    // All came long ago, so that one is enough; a machine that is busy elsewhere may take some more.
+    assert!(num_frames < 20, "{num_frames} of 100");
 }
 
 #[test]
@@ -251,7 +259,7 @@ fn a_server_that_went_away_comes_back() {
     drop(server);
     let start = Instant::now();
     let mut gone = 0;
-    while start.elapsed() < Duration::from_secs(2) {
+    while start.elapsed() < Duration::from_secs(4) {
         match camera.next_frame() {
             Err(error) => gone += usize::from(matches!(error.fault(), Some(Fault::Gone { .. }))),
             Ok(frame) => assert!(frame.is_some()),
@@ -306,6 +314,6 @@ fn a_picture_that_drips_is_late_and_not_waited_for() {
     let mut camera = open(&server.url("/"));
     let start = Instant::now();
     assert!(matches!(camera.next_frame().unwrap_err().fault(), Some(Fault::Stale { .. })));
-    assert!(start.elapsed() < Duration::from_secs(1));
+    assert!(start.elapsed() < Duration::from_secs(3));
     assert!(faults_until(camera.as_mut(), 200).len() > 1);
 }

@@ -10,7 +10,7 @@ use image::{Rgb, RgbImage};
 use sdg_camera::{Address, Camera, CameraError, Fault, LatestFrame, OpenOptions};
 
 fn try_open(command: &str) -> Result<Box<dyn Camera>, CameraError> {
-    let options = OpenOptions { stall_timeout: Duration::from_millis(300), ..OpenOptions::default() };
+    let options = OpenOptions { stall_timeout: Duration::from_secs(2), ..OpenOptions::default() };
     sdg_camera::open(&format!("cmd:{command}").parse::<Address>()?, &options)
 }
 

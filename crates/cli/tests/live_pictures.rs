@@ -91,8 +91,8 @@ fn frames_come_at_their_times_and_are_the_newest() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(start.elapsed().as_secs_f64() >= 1.0);
     let numbers: Vec<u64> = lines(&output).iter().map(|line| line["number"].as_u64().unwrap()).collect();
-    // Half a second is five pictures; a busy machine may be late by some.
-    assert!(numbers[0] < 5 && numbers[1] >= 3 && numbers[2] >= numbers[1] + 3, "{numbers:?}");
+    // Half a second is five pictures, fewer on a busy machine; in order they would be 0, 1, 2.
+    assert!(numbers[1] >= numbers[0] + 2 && numbers[2] >= numbers[1] + 2, "{numbers:?}");
 }
 
 #[test]

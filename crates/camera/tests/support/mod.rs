@@ -12,7 +12,7 @@ use image::{Rgb, RgbImage};
 use sdg_camera::{Address, Camera, CameraError, Frame, OpenOptions};
 
 /// Without a frame for so long a camera of these tests is stale.
-pub const STALL_TIMEOUT: Duration = Duration::from_millis(200);
+pub const STALL_TIMEOUT: Duration = Duration::from_millis(400);
 
 /// What a connection does, after its request was read.
 pub type Script = Box<dyn Fn(&mut TcpStream) + Send + Sync>;
