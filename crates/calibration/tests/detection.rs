@@ -155,3 +155,41 @@ fn a_board_without_dots_is_known_where_it_is_whole() {
     let (cut, _) = picture([560.0, 240.0]);
     assert!(matches!(find_board(&cut, &board), Err(CalibrationError::BoardUnclear { .. })));
 }
+
+#[test]
+fn a_board_among_other_squares_and_partly_covered_is_found() {
+    let board = board();
+    // Squares of random colour all around, and a dark disc over the board, as a thumb.
+    let printed = |place: &Point2<f64>| {
+        let on_sheet = (-1.0..10.0).contains(&place.x) && (-1.0..7.0).contains(&place.y);
+        let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
+        let thumb = (place - Point2::new(8.2, 1.3)).norm() < 0.9;
+        if on_sheet {
+            thumb || board.is_inked(place)
+        } else {
+            Random(cell(place.x).wrapping_mul(1009).wrapping_add(cell(place.y))).unit() < 0.5
+        }
+    };
+    for (k, tilts) in [[0.05, 0.1, 0.2], [-0.2, 0.15, -0.9], [0.2, -0.25, 1.5]].into_iter().enumerate() {
+        let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.55, tilts);
+        let picture = render_with(&printed, &board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(k as u64));
+        let corners = find_board(&picture, &board).unwrap();
+        // Corners next to the disc's border are drawn towards it.
+        let rms = rms_px(&corners, &board, &WIDE, &pose);
+        println!("clutter {k}: {} corners, {rms:.4} px", corners.len());
+        assert!((34..40).contains(&corners.len()) && rms < 0.1, "{k}: {} corners, {rms:.3} px", corners.len());
+    }
+    // Without the board nothing is taken for it.
+    let floor = |place: &Point2<f64>| {
+        let cell = |value: f64| (1.3 * value).floor() as i64 as u64;
+        Random(cell(place.x).wrapping_mul(1009).wrapping_add(cell(place.y))).unit() < 0.5
+    };
+    let tiles = |place: &Point2<f64>| (place.x.floor() + place.y.floor()) as i64 % 2 == 0;
+    for (name, print) in [("floor", &floor as &dyn Fn(&Point2<f64>) -> bool), ("tiles", &tiles)] {
+        let pose = camera_from_board(&board, &WIDE, [320.0, 240.0], 0.5, [0.1, 0.1, 0.0]);
+        let picture = render_with(print, &board, &WIDE, &pose, &Exposure::ORDINARY, &mut Random(1));
+        let found = find_board(&picture, &board);
+        println!("{name}: {:?}", found.as_ref().map(Vec::len));
+        assert!(is_missing(&found), "{name}");
+    }
+}

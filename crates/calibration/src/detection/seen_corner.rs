@@ -5,7 +5,7 @@ use nalgebra::Point2;
 /// A corner of the board and where the picture shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeenCorner {
-    /// Which corner, as [`Board::corner`] counts.
+    /// Which corner, as [`Board::corner`](crate::Board::corner) counts.
     pub corner: [u32; 2],
     /// Where it appears, in pixels.
     pub pixel: Point2<f64>,
