@@ -179,13 +179,13 @@ fn a_round_part_beside_another() {
 }
 
 #[test]
-fn a_small_part_beside_another_with_a_calibrated_camera() {
-    assert_tracked("key", 11, "spring_clip", by_plan_view);
+fn a_flat_part_with_fine_print_beside_another() {
+    assert_tracked("circuit_board", 12, "key", by_picture);
 }
 
 #[test]
 fn three_of_a_part_keep_their_ids() {
-    let sequence = tracked("key?speed=50&turn=30&fps=100&seconds=2&noise=2&seed=5&count=3", by_plan_view);
+    let sequence = tracked("circuit_board?speed=50&turn=30&fps=100&seconds=2&noise=2&seed=5&count=3", by_picture);
     sequence.assert_nothing_else();
     (0..3).for_each(|which| sequence.assert_followed(which));
     let last = &sequence.frames.last().unwrap().1;

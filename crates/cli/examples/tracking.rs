@@ -2,8 +2,8 @@
 //! `tracking 'pendulum?speed=50&noise=2&beside=mirrored' 500`.
 //!
 //! Frames are rendered first, then tracked once as fast as they can be taken, and once at the pace of the camera. Prints
-//! frames a second, the processor time of following a frame, and the errors against the truth. Without a model file, model S is
-//! taught from the shipped photo.
+//! frames a second, the time of following a frame, the processor time of all threads, and the errors against the truth, beside those
+//! of detections in single frames. Without a model file, model S is taught from the shipped photo.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -96,10 +96,20 @@ fn detect(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry) -> 
 fn track(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry, is_paced: bool) -> Result<()> {
     let mut tracker = LiveTracker::new(model.clone().into(), TrackerConfig::default(), SearchTime::AsItTakes)?;
     let (mut walls, mut all) = (Vec::new(), Vec::new());
-    let (start, cpu_before) = (Instant::now(), process_time()?);
-    for frame in shown {
+    let (mut start, mut cpu_before) = (Instant::now(), process_time()?);
+    for (idx, frame) in shown.iter().enumerate() {
         if is_paced {
             std::thread::sleep(frame.time.saturating_sub(start.elapsed()));
+        }
+        // The first search is not what is measured.
+        if idx == 0 && !is_paced {
+            while !tracker.frame(frame.picture.clone(), frame.time)?.iter().any(TrackedPart::is_followed) {
+                if start.elapsed() > Duration::from_secs(10) {
+                    return Err("the part was not found in the first frame".into());
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            (start, cpu_before) = (Instant::now(), process_time()?);
         }
         let began = Instant::now();
         let parts = tracker.frame(frame.picture.clone(), frame.time)?;

@@ -200,7 +200,8 @@ impl TableCamera {
         let truths = parts
             .filter_map(|(idx, moving)| {
                 let placed = PlacedObject { spec: moving.spec.clone(), base_from_object: moving.base_from_object() };
-                let is_shown = !moving.is_away && !(is_covered && idx == 0);
+                let is_under_card = is_covered && idx == 0;
+                let is_shown = !(moving.is_away || is_under_card);
                 Some(MovingTruth { grasp: GraspTruth::new(&placed, &camera)?, is_shown })
             })
             .collect();
