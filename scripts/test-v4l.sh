@@ -15,7 +15,7 @@ if [ ! -e "$work/kernel/done" ]; then
     package=$(apt-cache depends linux-image-amd64 | sed -n 's/.*Depends: \(linux-image-[0-9][^ ]*-amd64\)$/\1/p' | head -1)
     [ -n "$package" ] || { echo "test-v4l: apt knows no linux-image-amd64; run apt-get update" >&2; exit 1; }
     rm -rf "$work/kernel" "$work"/*.deb
-    (cd "$work" && apt-get download -qq "$package" 2>/dev/null)
+    (cd "$work" && apt-get download -qq "$package") || { echo "test-v4l: cannot download $package; run apt-get update" >&2; exit 1; }
     dpkg-deb -x "$work"/linux-image-*.deb "$work/kernel"
     rm "$work"/*.deb
     depmod -b "$work/kernel" "$(ls "$work/kernel/lib/modules")"

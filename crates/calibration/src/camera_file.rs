@@ -14,14 +14,15 @@
 //!     translation_m: [0.5, 0.0, 0.58]
 //!     rotation_xyzw: [1.0, 0.0, 0.0, 0.0]
 //!   workspace_m: {x: [0.3, 0.7], y: [-0.3, 0.3]}   # may be left out
+//! hand_eye:                    # ours; where the camera is on the robot's hand
+//!   flange_from_camera: {translation_m: [0.05, 0.0, 0.06], rotation_xyzw: [0.0, 0.0, 0.0, 1.0]}
 //! ```
-
-use std::fmt::Write;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera, Workspace};
 use serde::{Deserialize, Serialize};
 
+use crate::camera_sections::merged;
 use crate::error::CameraFileError;
 
 /// What poses are given in.
@@ -53,6 +54,8 @@ pub struct CalibratedCamera {
     pub intrinsics: PinholeCamera,
     /// Where it is; `None` in a file of intrinsics alone.
     pub table: Option<TablePose>,
+    /// From the optical frame to the robot's flange, in metres, of a camera on the hand.
+    pub flange_from_camera: Option<Isometry3<f64>>,
 }
 
 /// Where a camera is.
@@ -73,6 +76,22 @@ const HEIGHTS_M: [f64; 2] = [0.05, 20.0];
 /// How far a quaternion may be from length 1: files round.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 
+/// What we write, in this order.
+const SECTIONS: [&str; 10] = [
+    "image_width",
+    "image_height",
+    "camera_name",
+    "camera_matrix",
+    "distortion_model",
+    "distortion_coefficients",
+    "rectification_matrix",
+    "projection_matrix",
+    "table",
+    "hand_eye",
+];
+/// No arm carries its camera farther from the flange, metres.
+const MAX_ON_HAND_M: f64 = 2.0;
+
 #[derive(Deserialize)]
 struct File {
     image_width: u32,
@@ -84,6 +103,14 @@ struct File {
     distortion_coefficients: Matrix,
     #[serde(default)]
     table: Option<Table>,
+    #[serde(default)]
+    hand_eye: Option<HandEyeSection>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HandEyeSection {
+    flange_from_camera: Pose,
 }
 
 #[derive(Deserialize)]
@@ -131,29 +158,63 @@ impl CalibratedCamera {
         Ok(Self {
             intrinsics: intrinsics(&file)?,
             table: file.table.map(TablePose::read).transpose()?,
+            flange_from_camera: file.hand_eye.map(|section| on_hand(&section.flange_from_camera)).transpose()?,
             name: file.camera_name,
         })
     }
 
     /// The file, which [`Self::from_yaml`] reads to the same values.
     pub fn to_yaml(&self) -> String {
+        self.sections().into_iter().map(|(_, section)| section).collect()
+    }
+
+    /// An existing file with this camera's values: what other programs keep in it, and comments, stay.
+    ///
+    /// # Errors
+    /// [`CameraFileError::NotUpdatable`] where the file is not laid out line by line.
+    pub fn update_yaml(&self, existing: &str) -> Result<String, CameraFileError> {
+        let updated = merged(existing, &SECTIONS, &self.sections());
+        match Self::from_yaml(&updated) {
+            Ok(read) if read.is_near(self) => Ok(updated),
+            _ => Err(CameraFileError::NotUpdatable),
+        }
+    }
+
+    /// Whether both are the same but for the last digits of a quaternion, which is made one again when it is read.
+    fn is_near(&self, other: &Self) -> bool {
+        let poses =
+            |camera: &Self| [camera.table.as_ref().map(|table| table.frame_from_camera), camera.flange_from_camera];
+        let is_near = |(a, b): (Option<Isometry3<f64>>, Option<Isometry3<f64>>)| match (a, b) {
+            (Some(a), Some(b)) => (a.to_homogeneous() - b.to_homogeneous()).norm() < MAX_QUATERNION_ERROR,
+            (a, b) => a == b,
+        };
+        (&self.name, self.intrinsics) == (&other.name, other.intrinsics)
+            && poses(self).into_iter().zip(poses(other)).all(is_near)
+    }
+
+    fn sections(&self) -> Vec<(&'static str, String)> {
         let PinholeCamera { width, height, fx, fy, cx, cy, lens } = self.intrinsics;
         let (cx, cy) = (cx - 0.5, cy - 0.5);
-        let coefficients = lens.to_array();
-        let mut text = format!(
-            "image_width: {width}\nimage_height: {height}\ncamera_name: {:?}\n\
-             camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{fx:?}, 0.0, {cx:?}, 0.0, {fy:?}, {cy:?}, 0.0, 0.0, 1.0]\n\
-             distortion_model: plumb_bob\n\
-             distortion_coefficients:\n  rows: 1\n  cols: 5\n  data: {coefficients:?}\n\
-             rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]\n\
-             projection_matrix:\n  rows: 3\n  cols: 4\n  \
-             data: [{fx:?}, 0.0, {cx:?}, 0.0, 0.0, {fy:?}, {cy:?}, 0.0, 0.0, 0.0, 1.0, 0.0]\n",
-            self.name
-        );
-        if let Some(table) = &self.table {
-            table.write(&mut text);
-        }
-        text
+        let matrix = |name: &str, rows: u32, columns: u32, data: &[f64]| {
+            format!("{name}:\n  rows: {rows}\n  cols: {columns}\n  data: {data:?}\n")
+        };
+        let unit = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let projection = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let texts = [
+            Some(format!("image_width: {width}\n")),
+            Some(format!("image_height: {height}\n")),
+            Some(format!("camera_name: {:?}\n", self.name)),
+            Some(matrix("camera_matrix", 3, 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])),
+            Some("distortion_model: plumb_bob\n".to_owned()),
+            Some(matrix("distortion_coefficients", 1, 5, &lens.to_array())),
+            Some(matrix("rectification_matrix", 3, 3, &unit)),
+            Some(matrix("projection_matrix", 3, 4, &projection)),
+            self.table.as_ref().map(TablePose::to_yaml),
+            self.flange_from_camera
+                .as_ref()
+                .map(|pose| format!("hand_eye:\n  flange_from_camera:\n{}", pose_yaml(pose))),
+        ];
+        SECTIONS.into_iter().zip(texts).filter_map(|(name, text)| Some((name, text?))).collect()
     }
 
     /// The camera in its frame, and where the table is.
@@ -199,21 +260,8 @@ fn intrinsics(file: &File) -> Result<PinholeCamera, CameraFileError> {
 
 impl TablePose {
     fn read(file: Table) -> Result<Self, CameraFileError> {
-        let Pose { translation_m, rotation_xyzw } = file.frame_from_camera;
-        let &[x, y, z] = &translation_m[..] else {
-            return Err(pose_error("translation_m", "three numbers", &translation_m));
-        };
-        let &[i, j, k, w] = &rotation_xyzw[..] else {
-            return Err(pose_error("rotation_xyzw", "four numbers", &rotation_xyzw));
-        };
-        if ![x, y, z].iter().all(|value| value.is_finite()) {
-            return Err(pose_error("translation_m", "finite", &translation_m));
-        }
-        let rotation = Quaternion::new(w, i, j, k);
-        let has_unit_length = (rotation.norm() - 1.0).abs() <= MAX_QUATERNION_ERROR;
-        if !has_unit_length {
-            return Err(pose_error("rotation_xyzw", "a quaternion of length 1", &rotation_xyzw));
-        }
+        let frame_from_camera = read_pose(&file.frame_from_camera, "table.frame_from_camera")?;
+        let z = frame_from_camera.translation.z;
         let height = z - file.height_m;
         if !(HEIGHTS_M[0]..=HEIGHTS_M[1]).contains(&height) {
             let hint = if height > HEIGHTS_M[1] { ": millimetres given as metres?" } else { "" };
@@ -225,37 +273,54 @@ impl TablePose {
         {
             return Err(CameraFileError::Workspace { x, y });
         }
-        Ok(Self {
-            frame: file.frame,
-            height_m: file.height_m,
-            frame_from_camera: Isometry3::from_parts(
-                Translation3::new(x, y, z),
-                UnitQuaternion::from_quaternion(rotation),
-            ),
-            workspace,
-        })
+        Ok(Self { frame: file.frame, height_m: file.height_m, frame_from_camera, workspace })
     }
 
-    fn write(&self, text: &mut String) {
-        let Isometry3 { rotation, translation } = self.frame_from_camera;
-        let [x, y, z]: [f64; 3] = translation.vector.into();
-        let [i, j, k, w]: [f64; 4] = rotation.coords.into();
-        let frame = self.frame.name();
-        // Writing to a string cannot fail.
-        let _ = write!(
-            text,
-            "table:\n  frame: {frame}\n  height_m: {:?}\n  frame_from_camera:\n    translation_m: [{x:?}, {y:?}, {z:?}]\n    \
-             rotation_xyzw: [{i:?}, {j:?}, {k:?}, {w:?}]\n",
-            self.height_m
-        );
-        if let Some(Workspace { x_m, y_m }) = self.workspace {
-            let _ = writeln!(text, "  workspace_m: {{x: {x_m:?}, y: {y_m:?}}}");
-        }
+    fn to_yaml(&self) -> String {
+        let (frame, height, pose) = (self.frame.name(), self.height_m, pose_yaml(&self.frame_from_camera));
+        let workspace = match self.workspace {
+            Some(Workspace { x_m, y_m }) => format!("  workspace_m: {{x: {x_m:?}, y: {y_m:?}}}\n"),
+            None => String::new(),
+        };
+        format!("table:\n  frame: {frame}\n  height_m: {height:?}\n  frame_from_camera:\n{pose}{workspace}")
     }
 }
 
-fn pose_error(name: &'static str, expected: &'static str, found: &[f64]) -> CameraFileError {
-    CameraFileError::Pose { name, expected, found: found.to_vec() }
+fn pose_yaml(pose: &Isometry3<f64>) -> String {
+    let [x, y, z]: [f64; 3] = pose.translation.vector.into();
+    let [i, j, k, w]: [f64; 4] = pose.rotation.coords.into();
+    format!("    translation_m: [{x:?}, {y:?}, {z:?}]\n    rotation_xyzw: [{i:?}, {j:?}, {k:?}, {w:?}]\n")
+}
+
+fn on_hand(pose: &Pose) -> Result<Isometry3<f64>, CameraFileError> {
+    let read = read_pose(pose, "hand_eye.flange_from_camera")?;
+    if read.translation.vector.norm() > MAX_ON_HAND_M {
+        let expected = "within 2 m of the flange (millimetres given as metres?)";
+        return Err(pose_error("hand_eye.flange_from_camera.translation_m", expected, &pose.translation_m));
+    }
+    Ok(read)
+}
+
+fn read_pose(pose: &Pose, name: &str) -> Result<Isometry3<f64>, CameraFileError> {
+    let Pose { translation_m, rotation_xyzw } = pose;
+    let translation = |expected| pose_error(&format!("{name}.translation_m"), expected, translation_m);
+    let rotation = |expected| pose_error(&format!("{name}.rotation_xyzw"), expected, rotation_xyzw);
+    let &[x, y, z] = &translation_m[..] else { return Err(translation("three numbers")) };
+    let &[i, j, k, w] = &rotation_xyzw[..] else { return Err(rotation("four numbers")) };
+    if ![x, y, z].iter().all(|value| value.is_finite()) {
+        return Err(translation("finite"));
+    }
+    let quaternion = Quaternion::new(w, i, j, k);
+    let has_unit_length = (quaternion.norm() - 1.0).abs() <= MAX_QUATERNION_ERROR;
+    if !has_unit_length {
+        return Err(rotation("a quaternion of length 1"));
+    }
+    let unit = UnitQuaternion::from_quaternion(quaternion);
+    Ok(Isometry3::from_parts(Translation3::new(x, y, z), unit))
+}
+
+fn pose_error(name: &str, expected: &'static str, found: &[f64]) -> CameraFileError {
+    CameraFileError::Pose { name: name.to_owned(), expected, found: found.to_vec() }
 }
 
 #[cfg(test)]
@@ -317,6 +382,21 @@ table:
         assert_eq!(again, camera);
         let named = CalibratedCamera { name: "a \"camera\": {with} # marks".to_owned(), table: None, ..camera };
         assert_eq!(read(&named.to_yaml()).unwrap(), named);
+        let on_hand = CalibratedCamera { flange_from_camera: Some(Isometry3::translation(0.05, 0.0, 0.06)), ..named };
+        assert_eq!(read(&on_hand.to_yaml()).unwrap(), on_hand);
+    }
+
+    #[test]
+    fn an_existing_file_keeps_what_is_not_ours() {
+        let existing = format!("# bought 2019\n{OF_ROS}serial_number: 17  # on the back\n{TABLE}");
+        let mut camera = read(&existing).unwrap();
+        camera.intrinsics.fx = 500.0;
+        camera.table = None;
+        camera.flange_from_camera = Some(Isometry3::translation(0.05, 0.0, 0.06));
+        let updated = camera.update_yaml(&existing).unwrap();
+        assert!(updated.starts_with("# bought 2019\n") && updated.contains("serial_number: 17  # on the back\n"));
+        assert_eq!(read(&updated).unwrap(), camera);
+        assert_eq!(camera.update_yaml("{a: 1}"), Err(CameraFileError::NotUpdatable));
     }
 
     #[test]
@@ -339,6 +419,12 @@ table:
         let metres = with("0.58]", "580]").to_string();
         assert!(metres.contains("579.99 m: millimetres given as metres?"), "{metres}");
         assert!(matches!(with("0.58]", "-0.58]"), CameraFileError::Height { hint: "", .. }));
+        assert!(matches!(
+            read(&format!(
+                "{OF_ROS}hand_eye:\n  flange_from_camera: {{translation_m: [50, 0, 60], rotation_xyzw: [0, 0, 0, 1]}}\n"
+            )),
+            Err(CameraFileError::Pose { .. })
+        ));
         assert!(matches!(with("[0.3, 0.7]", "[0.7, 0.3]"), CameraFileError::Workspace { .. }));
     }
 }

@@ -35,10 +35,10 @@ pub enum CameraFileError {
         height: u32,
     },
     /// A pose that is none.
-    #[error("expected table.frame_from_camera.{name} to be {expected}, found {found:?}")]
+    #[error("expected {name} to be {expected}, found {found:?}")]
     Pose {
         /// The field.
-        name: &'static str,
+        name: String,
         /// What it must be.
         expected: &'static str,
         /// What it is.
@@ -69,6 +69,11 @@ pub enum CameraFileError {
         /// Its rows.
         found_height: u32,
     },
+    /// An existing file that is not laid out as ROS's tools do.
+    #[error(
+        "expected the existing camera file to have each field on lines of its own, as ROS's camera_calibration writes it; write another file"
+    )]
+    NotUpdatable,
     /// A workspace without extent.
     #[error("expected table.workspace_m with each range from low to high, found x {x:?}, y {y:?}")]
     Workspace {
@@ -228,14 +233,10 @@ pub enum CalibrationError {
         missing: String,
     },
     /// Robot poses and pictures that do not belong together.
-    #[error(
-        "expected robot poses and pictures that agree, found {rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px{hint}"
-    )]
+    #[error("expected robot poses and pictures that agree, found {found}{hint}")]
     HandEyeDisagrees {
-        /// Reprojection.
-        rms_px: f64,
-        /// Reprojection where each picture has a pose of its own.
-        board_rms_px: f64,
+        /// By how much they do not.
+        found: String,
         /// What would explain it.
         hint: String,
     },

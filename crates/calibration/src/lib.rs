@@ -1,19 +1,43 @@
-//! Calibrated cameras: where they are and what their lenses do, as files.
+//! Calibrated cameras: how they are calibrated, and their files.
 //!
 //! ```text
-//! camera_info YAML of ROS ─┐
-//!                          ├─ CalibratedCamera ─ PosedCamera, table, workspace ─ plan view
-//! `table:` beside it ──────┘
+//! Board ─ Sheet (SVG, PDF) ─ printed, photographed ─ find_board: corners to 0.03 px, each with its place on the board
+//!   ├─ calibrate           many pictures            ─ focal length, centre, lens, with errors and advice
+//!   ├─ locate_sheet        one, on the table        ─ where the camera is over the table
+//!   └─ calibrate_hand_eye  many, with robot poses   ─ where the camera is on the robot, or beside it
+//! CalibratedCamera: ROS's camera_info YAML, `table:` and `hand_eye:` beside it ─ PosedCamera, workspace ─ plan view
 //! ```
 //! **Frames.** ROS and OpenCV put the first pixel's centre at (0, 0), this project at (0.5, 0.5): half a pixel is added when
-//! such a file is read and taken away when it is written. Lengths in metres, `z` up from the table.
+//! such a file is read and taken away when it is written. The board's origin is the outer corner of its lower left dark square, x right,
+//! y up, z out of the sheet. Lengths in metres, `z` up from the table.
+//!
+//! **Left out**: fisheye lenses, several cameras at once, rolling shutters; files and clocks, which `cli` has.
+//!
+//! ```
+//! use nalgebra::{Isometry3, Vector3};
+//! use sdg_calibration::{Board, SeenCorner, locate_sheet};
+//! use sdg_geometry::PinholeCamera;
+//!
+//! // A camera 0.5 m above the sheet's origin, looking straight down.
+//! let board = Board::new(9, 6, 0.025)?;
+//! let camera_from_sheet = Isometry3::new(Vector3::new(0.0, 0.0, 0.5), Vector3::x() * std::f64::consts::PI);
+//! let seen = board.corners().map(|corner| {
+//!     let p_in_camera = camera_from_sheet * board.corner(corner);
+//!     SeenCorner { corner, pixel: PinholeCamera::WRIST.project(&p_in_camera).expect("in front of the camera") }
+//! });
+//! let sheet = locate_sheet(&PinholeCamera::WRIST, &board, &seen.collect::<Vec<_>>())?;
+//! assert!((sheet.sheet_from_camera.translation.z - 0.5).abs() < 1e-9);
+//! # Ok::<(), sdg_calibration::CalibrationError>(())
+//! ```
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod board;
 mod camera_file;
+mod camera_sections;
 mod detection;
 mod error;
+mod hand_eye;
 mod homography;
 mod intrinsics;
 mod least_squares;
@@ -25,6 +49,7 @@ pub use board::{Board, Paper, Sheet};
 pub use camera_file::{CalibratedCamera, Frame, TablePose};
 pub use detection::{MIN_CORNERS, SeenCorner, find_board};
 pub use error::{CalibrationError, CameraFileError};
+pub use hand_eye::{HandEye, HandEyeView, MIN_POSES, Mount, RobotPose, calibrate_hand_eye, read_robot_poses};
 pub use intrinsics::{Advice, Calibration, CalibrationConfig, MIN_PICTURES, PictureFit, calibrate};
 pub use pose::{BoardPose, board_pose};
 pub use table::{FocalCost, FocalEstimate, SheetPose, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet};

@@ -8,6 +8,7 @@ use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::ComputeBackend;
 
 use crate::commands::camera::CameraCommand;
+use crate::live_pictures::RequestArgs;
 
 /// Teach a robot a grasp from one photo, on an ordinary computer.
 #[derive(Debug, Parser)]
@@ -222,12 +223,26 @@ pub struct DetectArgs {
     /// A JSON line for each image
     #[arg(long)]
     pub json: bool,
-    /// Write each image with its grasps drawn on it into this folder
-    #[arg(long, value_name = "DIR")]
+    /// Write each image with its grasps drawn on it into this folder; with --from, show them in browsers at this port of
+    /// 127.0.0.1 instead, 0 for any
+    #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
     /// PNG or JPEG images
-    #[arg(required = true, value_name = "IMAGE")]
+    #[arg(required_unless_present = "from", value_name = "IMAGE")]
     pub images: Vec<PathBuf>,
+    /// Live pictures instead of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS',
+    /// dir:FOLDER, file:PATH or sim:PART. Parts are followed from frame to frame; --json prints a line for each frame
+    #[arg(long, value_name = "ADDRESS", help_heading = "Live pictures")]
+    pub from: Option<Address>,
+    /// End after so many frames
+    #[arg(long, value_name = "N", help_heading = "Live pictures")]
+    pub frames: Option<u64>,
+    /// Search every frame on its own, instead of following parts
+    #[arg(long, help_heading = "Live pictures")]
+    pub every_frame: bool,
+    /// What the camera is asked for
+    #[command(flatten)]
+    pub request: RequestArgs,
 }
 
 /// `sdg rehearse`

@@ -14,14 +14,6 @@ use crate::files;
 /// Larger camera files than any tool writes.
 const MAX_BYTES: u64 = 1 << 20;
 
-fn read(path: &Path) -> Result<CalibratedCamera> {
-    let bytes = files::read(path, MAX_BYTES)?;
-    let Ok(text) = String::from_utf8(bytes) else {
-        bail!("{}: expected YAML, found bytes that are no text", path.display());
-    };
-    CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())
-}
-
 /// A camera's file, read.
 #[derive(Debug, Clone)]
 pub struct CameraFile {
@@ -38,7 +30,7 @@ impl CameraFile {
     /// # Errors
     /// A file that cannot be read.
     pub fn read_intrinsics(path: &Path) -> Result<PinholeCamera> {
-        Ok(read(path)?.intrinsics)
+        Ok(read(path)?.0.intrinsics)
     }
 
     /// Reads a file that has the camera's pose.
@@ -46,9 +38,8 @@ impl CameraFile {
     /// # Errors
     /// A file that cannot be read or has no pose.
     pub fn read(path: &Path) -> Result<Self> {
-        let named = || path.display().to_string();
-        let camera = read(path)?;
-        let (posed, table) = camera.posed().with_context(named)?;
+        let (camera, _) = read(path)?;
+        let (posed, table) = camera.posed().with_context(|| path.display().to_string())?;
         let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
         Ok(Self { frame: table.frame, over_table, camera })
     }
@@ -79,4 +70,14 @@ impl CameraFile {
         photos.iter().try_for_each(|photo| self.check_picture(&photo.image))?;
         Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
     }
+}
+
+/// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.
+pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
+    let bytes = files::read(path, MAX_BYTES)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        bail!("{}: expected YAML, found bytes that are no text", path.display());
+    };
+    let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
+    Ok((camera, text))
 }

@@ -35,7 +35,7 @@ mod files;
 mod found_record;
 mod interrupt;
 pub mod labelled_pictures;
-mod live_pictures;
+pub mod live_pictures;
 mod machine;
 #[cfg(feature = "annotate")]
 mod page_camera;

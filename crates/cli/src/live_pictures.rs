@@ -12,6 +12,18 @@ pub struct LiveArgs {
     /// Of folders and files, options follow a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
     #[arg(long, value_name = "ADDRESS")]
     pub from: Address,
+    /// What the camera is asked for
+    #[command(flatten)]
+    pub request: RequestArgs,
+}
+
+/// The heading of these options in the help.
+const LIVE: &str = "Live pictures";
+
+/// What a camera is asked for.
+#[derive(Debug, Args)]
+#[command(next_help_heading = LIVE)]
+pub struct RequestArgs {
     /// Width and height in pixels that a V4L2 camera is asked for
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = parse_size)]
     pub size: (u32, u32),
@@ -56,6 +68,13 @@ impl From<EncodingName> for Encoding {
 impl LiveArgs {
     /// What the camera is asked for.
     pub(crate) fn options(&self) -> OpenOptions {
+        self.request.options()
+    }
+}
+
+impl RequestArgs {
+    /// The same for the crate that opens it.
+    pub(crate) fn options(&self) -> OpenOptions {
         OpenOptions {
             width: self.size.0,
             height: self.size.1,
@@ -76,7 +95,17 @@ impl LiveArgs {
 /// It does not open, or does not take what is asked of it.
 pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>> {
     match address {
-        // The simulated camera has its place here.
+        #[cfg(feature = "simulation")]
+        Address::Sim(text) => {
+            let camera = sdg_simulation::table_camera::TableCamera::open(text).context("--from")?;
+            Ok(Box::new(camera))
+        }
+        #[cfg(not(feature = "simulation"))]
+        Address::Sim(_) => Err(crate::exit::Usage(
+            "--from sim: this sdg was built without the simulator: expected a build with cargo's feature \"simulation\""
+                .to_owned(),
+        )
+        .into()),
         address => sdg_camera::open(address, options).context("--from"),
     }
 }

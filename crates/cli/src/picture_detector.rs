@@ -7,7 +7,8 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_calibration::Frame;
 use sdg_grasp::{
-    GraspDetection, GraspModel, PlanDetection, PlanDetector, PlanarPose, TaughtDemonstration, Verification,
+    GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose, TaughtDemonstration,
+    Verification,
 };
 
 use crate::camera_files::CameraFile;
@@ -67,6 +68,25 @@ impl PictureDetector {
                 let metric = |PlanDetection { detection, pose }| Found { detection, pose: Some(pose) };
                 Ok(found.into_iter().map(metric).collect())
             }
+        }
+    }
+
+    /// Whether a picture can be the calibrated camera's.
+    ///
+    /// # Errors
+    /// A picture of another size.
+    pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
+        match self {
+            Self::AnyCamera(_) => Ok(()),
+            Self::Calibrated(camera, _) => camera.check_picture(picture),
+        }
+    }
+
+    /// The same for a tracker.
+    pub fn to_part_detector(&self) -> PartDetector {
+        match self {
+            Self::AnyCamera(model) => GraspModel::clone(model).into(),
+            Self::Calibrated(_, detector) => PlanDetector::clone(detector).into(),
         }
     }
 

@@ -151,7 +151,12 @@ fn second_camera(files: &Folder) -> SecondCamera {
     let posed = shown.view.camera;
     let table =
         TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: posed.world_from_camera, workspace: None };
-    let camera = CalibratedCamera { name: "webcam".into(), intrinsics: posed.intrinsics, table: Some(table) };
+    let camera = CalibratedCamera {
+        name: "webcam".into(),
+        intrinsics: posed.intrinsics,
+        table: Some(table),
+        flange_from_camera: None,
+    };
     let line = shown.truth.unwrap().line;
     SecondCamera {
         file: files.camera("webcam.yaml", &camera.to_yaml()),

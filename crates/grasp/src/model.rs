@@ -21,7 +21,7 @@ use crate::model_file::Calibrations;
 use crate::models::{Candidate, Network, Proposals};
 use crate::sighting::{SAME_PART_IOU, Sighting, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verdict::{Clues, Contributions, judge_picture};
+use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{Overlay, Scene};
 
 /// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
@@ -275,7 +275,7 @@ impl GraspModel {
     /// Scores them, first each alone, then by the size of the surest among them.
     fn judged(&self, sightings: Vec<Sighting<'_>>) -> Vec<Found> {
         let clues: Vec<Clues> = sightings.iter().map(|sighting| self.clues(sighting)).collect();
-        let judged = self.judge(&clues);
+        let judged = judge_picture(&clues, &self.demonstrations[0].check().score);
         let num_keypoints = self.num_keypoints();
         sightings
             .into_iter()
@@ -294,9 +294,13 @@ impl GraspModel {
         Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance() }
     }
 
-    /// The scores of all places in one picture.
-    pub(crate) fn judge(&self, clues: &[Clues]) -> Vec<(f64, Contributions)> {
-        judge_picture(clues, &self.demonstrations[0].check().score)
+    /// The scores of all places in one picture of a sequence in which parts had that size before, as [`Clues::log_size`].
+    pub(crate) fn judge_in_sequence(
+        &self,
+        clues: &[Clues],
+        earlier_log_size: Option<f64>,
+    ) -> Vec<(f64, Contributions)> {
+        judge_picture_of_sequence(clues, earlier_log_size, &self.demonstrations[0].check().score)
     }
 
     /// Keypoints of a detection of this model.
@@ -389,12 +393,14 @@ fn drop_repeated(found: &mut Vec<Found>) {
 
 pub(crate) fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> bool {
     match (&one.outline, &other.outline) {
-        (Some(one), Some(other)) if one.bounds().intersection(&other.bounds()) > 0.0 => {
-            one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
-        }
-        (Some(_), Some(_)) => false,
+        (Some(one), Some(other)) => are_outlines_of_same_part(one, other),
         _ => one.bbox.iou(&other.bbox) >= SAME_PART_IOU,
     }
+}
+
+pub(crate) fn are_outlines_of_same_part(one: &Polygon, other: &Polygon) -> bool {
+    one.bounds().intersection(&other.bounds()) > 0.0
+        && one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
 }
 
 #[cfg(test)]

@@ -120,16 +120,28 @@ const MIN_REFERENCE_SCORE: f64 = 0.3;
 /// The scores of all detections in one picture and where they come from: first each is judged alone, then by the size of
 /// the surest among them, since the parts of one picture are equally far from the camera.
 pub(crate) fn judge_picture(clues: &[Clues], config: &ScoreConfig) -> Vec<(f64, Contributions)> {
-    if config.is_size_known {
-        return clues.iter().map(|clues| judge(clues, Some(0.0), config)).collect();
-    }
-    let reference = clues
-        .iter()
-        .map(|clues| (judge(clues, None, config).0, clues.log_size))
-        .filter(|(score, _)| *score >= MIN_REFERENCE_SCORE)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, log_size)| log_size);
+    let surest = || {
+        clues
+            .iter()
+            .map(|clues| (judge(clues, None, config).0, clues.log_size))
+            .filter(|(score, _)| *score >= MIN_REFERENCE_SCORE)
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, log_size)| log_size)
+    };
+    let reference = if config.is_size_known { Some(0.0) } else { surest() };
     clues.iter().map(|clues| judge(clues, reference, config)).collect()
+}
+
+/// The same for a picture of a sequence in which parts had a size before, as [`Clues::log_size`].
+pub(crate) fn judge_picture_of_sequence(
+    clues: &[Clues],
+    earlier_log_size: Option<f64>,
+    config: &ScoreConfig,
+) -> Vec<(f64, Contributions)> {
+    let Some(earlier) = earlier_log_size.filter(|_| !config.is_size_known) else {
+        return judge_picture(clues, config);
+    };
+    clues.iter().map(|clues| judge(clues, Some(earlier), config)).collect()
 }
 
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {

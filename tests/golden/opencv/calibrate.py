@@ -4,7 +4,7 @@
     python tests/golden/opencv/calibrate.py FOLDER > tests/golden/opencv/calibration.json
 
 Needs opencv-contrib-python-headless 4.11. The lens has k1, k2, p1, p2, as ours has without --k3. Corners are those of
-findChessboardCornersSB or of findChessboardCorners with cornerSubPix, whichever gives the lower reprojection error.
+findChessboardCornersSB or of findChessboardCorners with cornerSubPix (five windows), whichever gives the lower reprojection error.
 """
 
 import json
@@ -25,13 +25,16 @@ def sector_based(picture):
     return cv2.findChessboardCornersSB(picture, shape, flags=cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE)
 
 
-def sub_pixel(picture):
-    found, corners = cv2.findChessboardCorners(picture, shape)
-    if found:
-        criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
-        # A window that stays within squares of 20 pixels seen at 40 degrees.
-        corners = cv2.cornerSubPix(picture, corners, (5, 5), (-1, -1), criteria)
-    return found, corners
+def sub_pixel(half_window):
+    def way(picture):
+        found, corners = cv2.findChessboardCorners(picture, shape)
+        if found:
+            criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
+            corners = cv2.cornerSubPix(picture, corners, (half_window, half_window), (-1, -1), criteria)
+        return found, corners
+
+    way.__name__ = f"sub_pixel_{half_window}"
+    return way
 
 
 def calibrate(points, corners, size):
@@ -46,7 +49,7 @@ for name, camera in told["cameras"].items():
     pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in sorted(folder.glob(f"{name}_*.png"))]
     size = pictures[0].shape[::-1]
     best = None
-    for way in (sector_based, sub_pixel):
+    for way in (sector_based, *map(sub_pixel, (3, 4, 5, 7, 9))):
         found = [way(picture) for picture in pictures]
         corners = [np.float32(corners) for is_found, corners in found if is_found]
         print(name, way.__name__, len(corners), "of", len(pictures), file=sys.stderr)

@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-use super::Board;
+use super::checkerboard::Board;
 use crate::error::CalibrationError;
 
 /// A sheet's size, wider than high.
@@ -90,8 +90,8 @@ impl Sheet {
     /// [`CalibrationError::Paper`] where it does not fit.
     pub fn new(board: Board, paper: Paper) -> Result<Self, CalibrationError> {
         let [paper_width, paper_height] = paper.size_mm();
-        let square = 1000.0 * board.square_m;
-        let (columns, rows) = (board.columns, board.rows);
+        let square = 1000.0 * board.square_m();
+        let (columns, rows) = (board.columns(), board.rows());
         let [width, height] = [columns, rows].map(|side| f64::from(side) * square);
         let [room_x, room_y] = room_mm(paper);
         if width > room_x || height > room_y {
@@ -118,7 +118,7 @@ impl Sheet {
 
     /// `sdg-board squares=9x6 square_mm=25 paper=a4`: what both files say of themselves.
     pub fn facts(&self) -> String {
-        let Board { columns, rows, square_m } = self.board;
+        let (columns, rows, square_m) = (self.board.columns(), self.board.rows(), self.board.square_m());
         format!(
             "sdg-board squares={columns}x{rows} square_mm={} paper={}",
             trimmed(1000.0 * square_m),
@@ -202,7 +202,7 @@ impl Sheet {
         // Each line of the table has 20 bytes.
         let _ = write!(pdf, "xref\n0 {size}\n0000000000 65535 f \n");
         for offset in offsets {
-            let _ = write!(pdf, "{offset:010} 00000 n \n");
+            let _ = writeln!(pdf, "{offset:010} 00000 n ");
         }
         let _ = write!(pdf, "trailer\n<< /Size {size} /Root 1 0 R /Info 6 0 R >>\nstartxref\n{start}\n%%EOF\n");
         pdf.into_bytes()
@@ -241,7 +241,7 @@ fn room_mm(paper: Paper) -> [f64; 2] {
 }
 
 fn footer(shapes: &mut Vec<Shape>, board: &Board, left: f64, bottom: f64) {
-    let Board { columns, rows, square_m } = *board;
+    let (columns, rows, square_m) = (board.columns(), board.rows(), board.square_m());
     // Between the line and the board the white must be wide enough that the outer squares' corners stay clear.
     let line = bottom - 12.0;
     let mut text = |x: f64, y: f64, size: f64, text: String| shapes.push(Shape::Text { x, y, size, text });

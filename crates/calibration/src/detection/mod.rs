@@ -12,23 +12,15 @@ mod grid;
 mod luminance;
 mod refine;
 mod saddle;
+mod seen_corner;
 
 use image::GrayImage;
-use nalgebra::Point2;
 
 use self::grid::Grid;
 use self::luminance::Luminance;
+pub use self::seen_corner::SeenCorner;
 use crate::board::Board;
 use crate::error::CalibrationError;
-
-/// A corner of the board and where the picture shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenCorner {
-    /// Which corner, as [`Board::corner`] counts.
-    pub corner: [u32; 2],
-    /// Where it appears, in pixels.
-    pub pixel: Point2<f64>,
-}
 
 /// Fewest corners of a board that is used: three by three.
 pub const MIN_CORNERS: usize = 9;

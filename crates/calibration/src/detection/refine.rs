@@ -9,10 +9,10 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use super::SeenCorner;
 use super::dots::Placed;
 use super::grid::Grid;
 use super::luminance::Luminance;
+use super::seen_corner::SeenCorner;
 
 /// The window's radius in sides of a square: it reaches neither the next edge nor a dot.
 const WINDOW: f64 = 0.38;

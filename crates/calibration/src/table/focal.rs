@@ -6,7 +6,7 @@
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 
-use super::locate_sheet;
+use super::sheet_pose::locate_sheet;
 use crate::board::Board;
 use crate::detection::SeenCorner;
 use crate::error::CalibrationError;

@@ -45,7 +45,8 @@ pub struct Format {
     pub encoding: Option<Encoding>,
     /// The sizes.
     pub sizes: Sizes,
-    /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say.
+    /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say. Empty for an encoding
+    /// that is not read here.
     pub max_fps: Vec<f64>,
 }
 

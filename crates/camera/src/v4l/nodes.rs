@@ -52,8 +52,9 @@ fn read_format(device: &Device, format: PixelFormat, description: &str) -> Forma
         Err(_) => Sizes::Range { min: (1, 1), max: (u32::MAX, u32::MAX) },
     };
     let max_fps = match &sizes {
-        Sizes::Listed(sizes) => sizes.iter().map(|size| max_fps(device, format, *size)).collect(),
-        Sizes::Range { .. } => Vec::new(),
+        // Dozens of calls a size: for what is read alone.
+        Sizes::Listed(sizes) if encoding.is_some() => sizes.iter().map(|size| max_fps(device, format, *size)).collect(),
+        _ => Vec::new(),
     };
     Format { fourcc: format.to_string(), description: description.to_owned(), encoding, sizes, max_fps }
 }

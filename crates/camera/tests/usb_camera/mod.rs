@@ -265,7 +265,7 @@ impl Device {
         // End of frame, and a bit that alternates from frame to frame.
         self.payload = vec![2, 0x82 | (self.num_frames % 2) as u8];
         self.payload.extend(jpeg);
-        if self.payload.len() % request_bytes == 0 {
+        if self.payload.len().is_multiple_of(request_bytes) {
             self.payload.push(0);
         }
         assert!(self.payload.len() < MAX_PAYLOAD_BYTES as usize);

@@ -11,9 +11,10 @@ use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
+use super::detect_live;
 use crate::args::DetectArgs;
 use crate::commands::devices;
-use crate::exit::{Outcome, one_line};
+use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
 use crate::picture_detector::{Found, PictureDetector};
@@ -21,6 +22,14 @@ use crate::pictures;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
+    if args.from.is_none() && (args.frames.is_some() || args.every_frame) {
+        return Err(
+            Usage("--frames and --every-frame: expected live pictures (--from), found images".to_owned()).into()
+        );
+    }
+    if args.from.is_some() && !args.images.is_empty() {
+        return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
+    }
     let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     for lack in model.lacks() {
         eprintln!("{}: {lack}", args.grasp_model.display());
@@ -31,11 +40,14 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
         model = model.with_max_detections(args.max as usize)?;
     }
+    let detector =
+        PictureDetector::new(model, args.camera.as_deref()).with_context(|| args.grasp_model.display().to_string())?;
+    if let Some(address) = &args.from {
+        return detect_live::run(args, address, detector);
+    }
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }
-    let detector =
-        PictureDetector::new(model, args.camera.as_deref()).with_context(|| args.grasp_model.display().to_string())?;
     let mut stdout = std::io::stdout().lock();
     let (mut found_any, mut failed) = (false, 0);
     for path in &args.images {
@@ -138,6 +150,11 @@ fn of_other_size(detector: &PictureDetector, (width, height): (u32, u32)) -> Opt
 }
 
 fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Frame>) -> Result<()> {
+    Ok(writeln!(out, "{}: {}", path.display(), told(found, frame))?)
+}
+
+/// A detection in words, in metres as well where positions are in `frame`.
+pub(super) fn told(found: &Found, frame: Option<Frame>) -> String {
     let Found { detection, pose } = found;
     let grasp = detection.grasp;
     let metric = pose.zip(frame).map(|(pose, frame)| {
@@ -154,10 +171,8 @@ fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Fr
     let metric = metric.unwrap_or_default();
     let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
     let refused = detection.refused().map(|why| format!("; refused: {why}")).unwrap_or_default();
-    writeln!(
-        out,
-        "{}: grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
-        path.display(),
+    format!(
+        "grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
         grasp.x,
         grasp.y,
         grasp.angle.degrees(),
@@ -165,8 +180,7 @@ fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Fr
         detection.score,
         detection.network_score,
         detection.turn_source.name(),
-    )?;
-    Ok(())
+    )
 }
 
 /// Writes the image with its detections as PNG, under its own name.

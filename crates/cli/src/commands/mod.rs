@@ -9,6 +9,7 @@ pub mod completions;
 #[cfg(feature = "simulation")]
 pub mod demo;
 pub mod detect;
+mod detect_live;
 pub mod devices;
 #[cfg(feature = "simulation")]
 pub mod evaluate;

@@ -1,7 +1,8 @@
 //! What a search found in an older frame, brought to the newest one.
 //!
 //! ```text
-//! detections in frame k ─┬─ on a track, where that was in frame k ─ as there: likeness, marks and network score are taken over
+//! detections in frame k ─┬─ on a track, where that was in frame k ─ about there: likeness, marks and network score are taken
+//!                        │                                        │ over, and the difference is tried in the next frame
 //!                        │                                        └ elsewhere, and agrees better: carried forward, replaces it
 //!                        └─ on no track ─ carried forward, becomes a track
 //! carried forward: frame k ─ k + stride ─ … ─ newest, some steps a call
@@ -12,23 +13,23 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
-use sdg_geometry::Polygon;
 
 use super::detector::PartDetector;
 use super::follow::Effort;
 use super::track::{PastPose, Standing, Track};
-use crate::model::{Found, Placement};
+use crate::model::{Found, Placement, are_outlines_of_same_part};
 
 /// Longest time from one frame that a detection is carried through to the next: a part at 0.5 m/s moves by 20 pixels of a
 /// millimetre, which a capture reaches. Chosen by that reasoning.
 const MAX_STRIDE: Duration = Duration::from_millis(40);
 /// Frames that are kept for a search that has not ended; of more, every second one is kept. Chosen by hand: 44 MB of 640×480.
 const MAX_BUFFERED: usize = 48;
-/// A detection within this distance and turn of its track confirms it. Chosen by hand: beyond the noise of either.
-const SAME_PLACE_PX: f64 = 2.5;
-const SAME_TURN_RAD: f64 = 0.05;
-/// What another pose of the same part must gain in agreement to replace the followed one. Chosen by hand.
-const MIN_GAIN: f64 = 0.01;
+/// A pose this far from that of its track is carried forward like one of another part: from the track's own pose a capture does
+/// not reach it. In pixels of the cut-out, and in radians. Chosen by hand.
+const FAR_PX: f64 = 8.0;
+const FAR_RAD: f64 = 0.15;
+/// What such a pose must gain in agreement. Chosen by hand.
+const MIN_GAIN: f64 = 0.02;
 
 /// A frame that may still be needed.
 #[derive(Debug, Clone)]
@@ -120,11 +121,11 @@ pub(super) fn carry(detector: &PartDetector, frames: &FrameBuffer, track: &mut T
 pub(super) enum Match {
     /// Another part.
     Other,
-    /// The same part where the track has it.
+    /// The same part about where the track has it.
     Confirms,
-    /// The same part, better placed.
+    /// The same part, elsewhere, and agreeing better.
     Corrects,
-    /// The same part, no better placed.
+    /// The same part, elsewhere or turned by its symmetry, and agreeing no better.
     Disagrees,
 }
 
@@ -132,27 +133,18 @@ pub(super) enum Match {
 pub(super) fn compare(detector: &PartDetector, found: &Found, placement: &Placement, past: &PastPose) -> Match {
     let demonstration = &detector.model().demonstrations()[placement.demonstration_idx];
     let there = demonstration.outline(&past.image_from_cutout);
-    if !found.detection.outline.as_ref().is_some_and(|outline| is_same_part(outline, &there)) {
+    if !found.detection.outline.as_ref().is_some_and(|outline| are_outlines_of_same_part(outline, &there)) {
         return Match::Other;
     }
+    let difference = past.image_from_cutout.inverse().compose(&placement.image_from_cutout);
     let middle = demonstration.marks.grasp.center();
-    let apart = (placement.image_from_cutout.apply(&middle) - past.image_from_cutout.apply(&middle)).norm();
-    let symmetry = detector.model().facts().symmetry;
-    let turned = symmetry.distance(placement.image_from_cutout.angle, past.image_from_cutout.angle);
-    let shrink = (placement.image_from_cutout.scale).max(1.0);
-    if apart <= SAME_PLACE_PX * shrink && turned <= SAME_TURN_RAD {
-        // A pose turned by the part's symmetry has the marks shifted to another side.
-        let is_turned = (placement.image_from_cutout.angle - past.image_from_cutout.angle).radians().abs() > 1.0;
-        return if is_turned { Match::Disagrees } else { Match::Confirms };
+    let apart_px = (difference.apply(&middle) - middle).norm();
+    if apart_px <= FAR_PX && difference.angle.radians().abs() <= FAR_RAD {
+        return Match::Confirms;
     }
-    if placement.agreement > past.agreement + MIN_GAIN { Match::Corrects } else { Match::Disagrees }
-}
-
-/// As of detections: parts do not lie in each other.
-pub(super) fn is_same_part(one: &Polygon, other: &Polygon) -> bool {
-    const SAME_PART_SHARE: f64 = 0.3;
-    one.bounds().intersection(&other.bounds()) > 0.0
-        && one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
+    let seen = detector.model().facts().symmetry.visible(difference.angle).radians().abs();
+    let is_better = placement.agreement > past.agreement + MIN_GAIN;
+    if is_better && (apart_px > FAR_PX || seen > FAR_RAD) { Match::Corrects } else { Match::Disagrees }
 }
 
 impl Track {

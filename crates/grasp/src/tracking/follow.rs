@@ -47,6 +47,9 @@ pub(super) enum Effort {
 /// A part in one frame.
 #[derive(Debug, Clone)]
 pub(super) struct Followed {
+    /// Where the edges alone have it.
+    pub(super) by_edges: PlanarSimilarity,
+    /// Where edges and surface together have it: there, or corrected.
     pub(super) image_from_cutout: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`.
     pub(super) agreement: f64,
@@ -96,7 +99,13 @@ impl SizedPart {
         &detector.model().demonstrations()[self.demonstration_idx]
     }
 
-    /// Refines the part about `start`; `None` where too little of it lies in the frame.
+    /// ln of a scale over the nearest that is usual.
+    pub(super) fn log_size(&self, scale: f64) -> f64 {
+        self.range.log_size(scale)
+    }
+
+    /// Refines the part about `start`; `None` where too little of it lies in the frame. `correction` is where the part was last found
+    /// against where the edges alone had it; it is applied where the frame agrees better with it.
     ///
     /// # Units and frames
     /// Poses map pixels of the cut-out to the detector's frame of reference.
@@ -106,6 +115,7 @@ impl SizedPart {
         picture: &RgbImage,
         start: &PlanarSimilarity,
         effort: Effort,
+        correction: Option<&PlanarSimilarity>,
     ) -> Option<Followed> {
         let demonstration = self.demonstration(detector);
         let reach = effort.reach();
@@ -121,9 +131,14 @@ impl SizedPart {
             Effort::Snapped => search.template().snapped(&field, &start, &reach),
             Effort::Captured => search.template().captured(&field, &start, &reach),
         };
+        let by_edges = self.image_from_cutout(&view, &pose);
+        let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
+        let corrected = correction.map(|correction| self.view_from_working(&view, &by_edges.compose(correction)));
+        let pose = corrected.filter(|corrected| both(corrected) > both(&pose)).unwrap_or(pose);
         let (evidence, agreement) = comparison.evidence_without_likeness(&pose);
         let image_from_cutout = self.image_from_cutout(&view, &pose);
         Some(Followed {
+            by_edges,
             image_from_cutout,
             agreement,
             evidence,

@@ -20,6 +20,8 @@
 mod arrival;
 mod detector;
 mod follow;
+#[cfg(all(test, feature = "teach"))]
+mod tests;
 mod track;
 mod tracker;
 

@@ -20,10 +20,19 @@ use crate::verification::Overlay;
 const VELOCITY_GAIN: f64 = 0.4;
 /// Share of a new frame in the usual agreement and in the usual size. Chosen by hand.
 const STEADY_GAIN: f64 = 0.05;
+/// Every so many frames a track is captured: snapped from frame to frame, a long part slid along itself by 2 pixels. Chosen by
+/// hand.
+const CAPTURE_EVERY: u64 = 3;
 /// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
 const MAX_FORWARD_SECS: f64 = 0.1;
 /// An agreement of less than this share of the usual one is tried again with more effort. Chosen by hand.
 const POOR_SHARE: f64 = 0.85;
+/// Larger differences between a search and the edges alone are no correction but another place. In pixels of the cut-out, and in
+/// radians; chosen by hand.
+const MAX_CORRECTION_PX: f64 = 3.0;
+const MAX_CORRECTION_RAD: f64 = 0.06;
+/// What the pose of a search must gain in agreement to replace the followed one. Chosen by hand.
+const MIN_GAIN: f64 = 0.005;
 /// The comparing network is asked again where the agreement is not within this ratio of what it was when it was asked last, and
 /// after this time. Chosen by hand: asking takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
@@ -56,6 +65,8 @@ pub(super) enum Standing {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PastPose {
     pub(super) number: u64,
+    /// Where the edges alone had it.
+    pub(super) by_edges: PlanarSimilarity,
     pub(super) image_from_cutout: PlanarSimilarity,
     pub(super) agreement: f64,
 }
@@ -67,8 +78,8 @@ pub(super) struct Track {
     pub(super) standing: Standing,
     pub(super) first_seen: Duration,
     part: SizedPart,
-    /// In the frame at `time`, the last in which it held.
-    pub(super) image_from_cutout: PlanarSimilarity,
+    /// Where the edges had it in the frame at `time`, the last in which it was seen.
+    by_edges: PlanarSimilarity,
     pub(super) time: Duration,
     pub(super) number: u64,
     velocity_px_per_s: Vector2<f64>,
@@ -83,6 +94,10 @@ pub(super) struct Track {
     network_score: f64,
     keypoint_scores: Vec<f64>,
     turn_source: TurnSource,
+    /// Where searches have the part against where the edges alone have it, in the cut-out's frame.
+    correction: Option<PlanarSimilarity>,
+    /// Where the last search has the part, further off; tried in the next frame.
+    alternative: Option<PlanarSimilarity>,
     history: VecDeque<PastPose>,
 }
 
@@ -101,7 +116,7 @@ impl Track {
             standing: Standing::Arriving { replaces: None },
             first_seen: time,
             part,
-            image_from_cutout: found.image_from_cutout,
+            by_edges: found.image_from_cutout,
             time,
             number,
             velocity_px_per_s: Vector2::zeros(),
@@ -113,6 +128,8 @@ impl Track {
             network_score: 0.0,
             keypoint_scores: Vec::new(),
             turn_source: found.turn_source,
+            correction: None,
+            alternative: None,
             history: VecDeque::new(),
         };
         made.take_over(found, time);
@@ -130,6 +147,28 @@ impl Track {
         }
     }
 
+    /// Compares the pose that a search found with where the edges had the part in that frame: the difference corrects the frames
+    /// that follow, or is tried in the next one where it is large.
+    pub(super) fn correct(&mut self, detector: &PartDetector, past: &PastPose, found: &Placement) {
+        let difference = past.by_edges.inverse().compose(&found.image_from_cutout);
+        let middle = self.part.demonstration(detector).marks.bbox.center();
+        let (shift, turn) = (difference.apply(&middle) - middle, difference.angle.radians());
+        if found.agreement < past.agreement {
+            return;
+        }
+        if shift.norm() > MAX_CORRECTION_PX || turn.abs() > MAX_CORRECTION_RAD {
+            self.correction = None;
+            self.alternative = Some(difference);
+            return;
+        }
+        // Half of what it was before, so that the noise of one search does not move the part by all of it.
+        let before = self.correction.unwrap_or(difference);
+        let shift = 0.5 * (shift + (before.apply(&middle) - middle));
+        let turn = Angle::from_radians(0.5 * (turn + before.angle.radians()));
+        let scale = (difference.scale * before.scale).sqrt();
+        self.correction = Some(PlanarSimilarity::about(middle, middle + shift, turn, scale));
+    }
+
     /// The part's middle where the cut-out lies at `image_from_cutout`, in the frame of reference.
     fn middle(&self, detector: &PartDetector, image_from_cutout: &PlanarSimilarity) -> Point2<f64> {
         image_from_cutout.apply(&self.part.demonstration(detector).marks.bbox.center())
@@ -138,29 +177,36 @@ impl Track {
     /// Where the part is expected at a time.
     pub(super) fn expected(&self, detector: &PartDetector, time: Duration) -> PlanarSimilarity {
         let secs = time.saturating_sub(self.time).as_secs_f64().min(MAX_FORWARD_SECS);
-        let middle = self.middle(detector, &self.image_from_cutout);
+        let middle = self.middle(detector, &self.by_edges);
         let turn = Angle::from_radians(self.turn_rad_per_s * secs);
-        let scale = self.steady_scale / self.image_from_cutout.scale;
+        let scale = self.steady_scale / self.by_edges.scale;
         let moved = PlanarSimilarity::about(middle, middle + self.velocity_px_per_s * secs, turn, scale);
-        moved.compose(&self.image_from_cutout)
+        moved.compose(&self.by_edges)
     }
 
     /// Refines the part in a frame, wherever that leads; `None` where too little of it lies in the frame.
     pub(super) fn refine(
-        &self,
+        &mut self,
         detector: &PartDetector,
         picture: &RgbImage,
         time: Duration,
         effort: Effort,
     ) -> Option<Followed> {
         let start = self.expected(detector, time);
-        let followed = self.part.follow(detector, picture, &start, effort)?;
-        let is_poor = self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady);
-        if !is_poor || effort == Effort::Captured {
-            return Some(followed);
+        let followed = self.part.follow(detector, picture, &start, effort, self.correction.as_ref())?;
+        let captured_from = |start: &PlanarSimilarity, followed: Followed, gain: f64| {
+            let captured = self.part.follow(detector, picture, start, Effort::Captured, self.correction.as_ref());
+            captured.filter(|captured| captured.agreement > followed.agreement + gain).unwrap_or(followed)
+        };
+        let followed = match self.alternative.map(|alternative| start.compose(&alternative)) {
+            Some(alternative) => captured_from(&alternative, followed, MIN_GAIN),
+            None if effort == Effort::Snapped && self.is_poor(&followed) => captured_from(&start, followed, 0.0),
+            None => followed,
+        };
+        if self.alternative.take().is_some() {
+            self.steady_scale = followed.by_edges.scale;
         }
-        let captured = self.part.follow(detector, picture, &start, Effort::Captured);
-        captured.filter(|captured| captured.agreement > followed.agreement).or(Some(followed))
+        Some(followed)
     }
 
     /// What the comparing network says of the part where it was refined to; it is asked only where that may have changed.
@@ -184,6 +230,16 @@ impl Track {
             self.likeness = Some(Likeness { log_odds, agreement: followed.agreement, at: time });
         }
         self.likeness.map(|likeness| likeness.log_odds)
+    }
+
+    /// ln of its size over the nearest that is usual, without the noise from frame to frame.
+    pub(super) fn log_size(&self) -> f64 {
+        self.part.log_size(self.steady_scale)
+    }
+
+    /// How the track is refined in a frame from the last one.
+    pub(super) fn usual_effort(&self, number: u64) -> Effort {
+        if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
     /// Whether an agreement is so far below the usual one that the part is not there.
@@ -219,8 +275,8 @@ impl Track {
     /// Moves the track to where it was refined to.
     pub(super) fn accept(&mut self, detector: &PartDetector, followed: &Followed, number: u64, time: Duration) {
         let secs = time.saturating_sub(self.time).as_secs_f64();
-        let shift = self.middle(detector, &followed.image_from_cutout) - self.middle(detector, &self.image_from_cutout);
-        let turn = (followed.image_from_cutout.angle - self.image_from_cutout.angle).radians();
+        let shift = self.middle(detector, &followed.by_edges) - self.middle(detector, &self.by_edges);
+        let turn = (followed.by_edges.angle - self.by_edges.angle).radians();
         if matches!(self.standing, Standing::Lost(_)) || secs > MAX_FORWARD_SECS {
             self.velocity_px_per_s = Vector2::zeros();
             self.turn_rad_per_s = 0.0;
@@ -230,16 +286,16 @@ impl Track {
             self.velocity_px_per_s += (shift / secs - self.velocity_px_per_s) * gain;
             self.turn_rad_per_s += (turn / secs - self.turn_rad_per_s) * gain;
         }
-        self.steady_scale *= (followed.image_from_cutout.scale / self.steady_scale).powf(STEADY_GAIN);
+        self.steady_scale *= (followed.by_edges.scale / self.steady_scale).powf(STEADY_GAIN);
         let steady = self.steady_agreement.unwrap_or(followed.agreement);
         self.steady_agreement = Some(steady + STEADY_GAIN * (followed.agreement - steady));
-        self.image_from_cutout = followed.image_from_cutout;
+        self.by_edges = followed.by_edges;
         (self.time, self.number) = (time, number);
         if self.history.len() == MAX_HISTORY {
             self.history.pop_front();
         }
-        let Followed { image_from_cutout, agreement, .. } = *followed;
-        self.history.push_back(PastPose { number, image_from_cutout, agreement });
+        let Followed { by_edges, image_from_cutout, agreement, .. } = *followed;
+        self.history.push_back(PastPose { number, by_edges, image_from_cutout, agreement });
     }
 
     /// Where it was in a frame, if it was followed there.

@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use image::RgbImage;
 
-use super::arrival::{BufferedFrame, Carried, FrameBuffer, Match, carry, compare, is_same_part};
+use super::arrival::{BufferedFrame, Carried, FrameBuffer, Match, carry, compare};
 use super::detector::{PartDetector, PartSearch, SearchOutcome};
 use super::follow::{Effort, Followed};
-use super::track::{Standing, Track};
+use super::track::{PastPose, Standing, Track};
 use super::{TrackState, TrackedPart, TrackerConfig};
 use crate::error::Result;
-use crate::model::{Found, GraspDetection};
+use crate::model::{Found, GraspDetection, are_of_same_part};
 use crate::plan::PlanarPose;
 use crate::verdict::Clues;
 
@@ -46,7 +46,7 @@ const MAX_CARRY_STEPS: usize = 3;
 #[derive(Debug)]
 pub struct Tracker {
     detector: Arc<PartDetector>,
-    config: TrackerConfig,
+    pub(super) config: TrackerConfig,
     frames: FrameBuffer,
     next_number: u64,
     next_id: u64,
@@ -146,8 +146,11 @@ impl Tracker {
             let Some(placement) = &found.placement else { continue };
             let arriving = || Track::new(&self.detector, frame_size, placement, frame.number, frame.time);
             match self.matched(&found, frame.number) {
-                Some((idx, Match::Confirms)) => self.tracks[idx].track.take_over(placement, frame.time),
-                Some((idx, Match::Corrects)) if found.detection.is_accepted() => {
+                Some((idx, past, Match::Confirms)) => {
+                    self.tracks[idx].track.take_over(placement, frame.time);
+                    self.tracks[idx].track.correct(&self.detector, &past, placement);
+                }
+                Some((idx, _, Match::Corrects)) if found.detection.is_accepted() => {
                     let id = self.tracks[idx].track.id;
                     self.arriving.extend(arriving().map(|track| track.replacing(id)));
                 }
@@ -159,13 +162,13 @@ impl Tracker {
         Ok(())
     }
 
-    /// The track on which a detection of frame `number` lies.
-    fn matched(&self, found: &Found, number: u64) -> Option<(usize, Match)> {
+    /// The track on which a detection of frame `number` lies, and where that was there.
+    fn matched(&self, found: &Found, number: u64) -> Option<(usize, PastPose, Match)> {
         let placement = found.placement.as_ref()?;
         self.tracks.iter().enumerate().find_map(|(idx, tracked)| {
             let past = tracked.track.past_pose(number)?;
             let compared = compare(&self.detector, found, placement, &past);
-            (compared != Match::Other).then_some((idx, compared))
+            (compared != Match::Other).then_some((idx, past, compared))
         })
     }
 
@@ -200,13 +203,14 @@ impl Tracker {
     fn refine_all(&mut self, picture: &RgbImage, captured: Duration, arrived: &mut [Track]) -> Vec<Option<Refined>> {
         let detector = &*self.detector;
         let retry_for = self.config.retry_for;
+        let number = self.next_number - 1;
         let known = self.tracks.iter_mut().map(|tracked| &mut tracked.track);
         known
             .chain(arrived)
             .map(|track| {
                 let effort = match track.standing {
                     Standing::Lost(since) if captured.saturating_sub(since) > retry_for => return None,
-                    Standing::Followed | Standing::Lost(_) => Effort::Snapped,
+                    Standing::Followed | Standing::Lost(_) => track.usual_effort(number),
                     Standing::Arriving { .. } => Effort::Captured,
                 };
                 let followed = track.refine(detector, picture, captured, effort)?;
@@ -232,7 +236,9 @@ impl Tracker {
             })
             .collect();
         let asked: Vec<Clues> = clues.iter().flatten().copied().collect();
-        let mut judged = detector.model().judge(&asked).into_iter();
+        // Parts of one sequence have one size, as those of one picture: a look-alike of another size is no lost part.
+        let earlier_log_size = self.tracks.first().map(|tracked| tracked.track.log_size());
+        let mut judged = detector.model().judge_in_sequence(&asked, earlier_log_size).into_iter();
         let mut verdicts = clues.iter().map(|clues| clues.as_ref().and_then(|_| judged.next())).collect::<Vec<_>>();
         let of_newcomers = verdicts.split_off(self.tracks.len());
 
@@ -283,7 +289,9 @@ impl Tracker {
             lost.min_by(|a, b| apart(a.1).total_cmp(&apart(b.1))).map(|(idx, _)| idx)
         };
         let is_double = |tracked: &Tracked, id: Option<u64>| {
-            tracked.part.is_followed() && Some(tracked.track.id) != id && overlap(&tracked.part.detection, &shown.0)
+            tracked.part.is_followed()
+                && Some(tracked.track.id) != id
+                && are_of_same_part(&tracked.part.detection, &shown.0)
         };
         let replaced = match track.standing {
             Standing::Arriving { replaces } => replaces,
@@ -316,21 +324,13 @@ impl Tracker {
             let is_double = here.is_followed()
                 && before
                     .iter()
-                    .any(|other| other.part.is_followed() && overlap(&other.part.detection, &here.detection));
+                    .any(|other| other.part.is_followed() && are_of_same_part(&other.part.detection, &here.detection));
             if is_double {
                 self.tracks.remove(idx);
             } else {
                 idx += 1;
             }
         }
-    }
-}
-
-/// Whether two detections are on one part.
-fn overlap(one: &GraspDetection, other: &GraspDetection) -> bool {
-    match (&one.outline, &other.outline) {
-        (Some(one), Some(other)) => is_same_part(one, other),
-        _ => false,
     }
 }
 

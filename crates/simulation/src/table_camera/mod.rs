@@ -10,39 +10,30 @@
 
 mod config;
 mod motion;
+mod scene;
 
-use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use image::RgbImage;
-use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_camera::{CameraError, Frame};
 use sdg_geometry::PosedCamera;
 
 pub use self::config::TableCameraConfig;
-use self::motion::{Bounds, Mover};
-use crate::camera::{WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
+use self::motion::Mover;
+use self::scene::{away, lanes, middle_of, mjcf, renamed, scene};
+use crate::camera::posed_camera;
 use crate::data::Data;
 use crate::error::Result;
-use crate::model::{Asset, Camera, Id, Joint, Model};
+use crate::model::{Camera, Id, Joint, Model};
 use crate::objects::ObjectSpec;
 use crate::render::{RenderConfig, Renderer};
-use crate::scene::{
-    GraspTruth, MjcfFragment, PlacedObject, SceneVariation, VariationConfig, base_from_look_camera, pose_attributes,
-    sample_distractors_between,
-};
+use crate::scene::{GraspTruth, PlacedObject};
 
-/// The part of the table that the camera shows from its usual height, in the base frame.
-const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };
-/// Width of the strip along y in which other things lie.
-const STRIP_M: f64 = 0.10;
-/// Where things are put that are not to be seen: below the floor.
-const AWAY_M: f64 = -3.0;
-/// Half of the card's side, and how far above the table it lies, in metres.
-const CARD_HALF_M: f64 = 0.06;
+/// How far above the table the card lies, in metres.
 const CARD_HEIGHT_M: f64 = 0.05;
 /// Values of noise that are drawn once; every frame begins elsewhere in them.
 const NUM_NOISE: usize = 1 << 16;
@@ -239,7 +230,7 @@ impl sdg_camera::Camera for TableCamera {
         // What the renderer refuses it refuses for good: the sequence ends.
         let Ok(Some(view)) = self.next_view() else { return Ok(None) };
         let (captured, camera) = (self.began + view.time, self.address.clone());
-        Ok(Some(Frame { picture: view.picture, number: view.number, captured, camera, faults: Vec::new() }))
+        Ok(Some(Frame { captured, ..Frame::new(view.picture, view.number, camera) }))
     }
 }
 
@@ -250,78 +241,6 @@ impl Moving {
         let middle = turn * Vector3::new(self.middle.x, self.middle.y, 0.0);
         self.spec.base_from_object(place.x - middle.x, place.y - middle.y, *yaw_rad)
     }
-}
-
-fn away() -> Isometry3<f64> {
-    Isometry3::translation(0.5, 0.0, AWAY_M)
-}
-
-/// Middle of the outline's box from above, and how far the outline reaches from it.
-fn middle_of(spec: &ObjectSpec) -> (Point2<f64>, f64) {
-    let bounds = |k: usize| {
-        let values = spec.footprint.iter().map(|point| point[k]);
-        0.5 * (values.clone().fold(f64::INFINITY, f64::min) + values.fold(f64::NEG_INFINITY, f64::max))
-    };
-    let middle = Point2::new(bounds(0), bounds(1));
-    (middle, spec.footprint.iter().map(|point| (point - middle).norm()).fold(0.0, f64::max))
-}
-
-/// Strips of the table along y, one for each part; the other things have the last strip.
-fn lanes(count: usize, with_things: bool) -> Vec<Bounds> {
-    let [low, high] = SHOWN.y_m;
-    let high = if with_things { high - STRIP_M } else { high };
-    let width = (high - low) / count as f64;
-    (0..count).map(|idx| Bounds { y_m: [low + width * idx as f64, low + width * (idx + 1) as f64], ..SHOWN }).collect()
-}
-
-/// Light and table of the seed, all of the part, and other things in their strip.
-fn scene(config: &TableCameraConfig, spec: &ObjectSpec) -> SceneVariation {
-    let mut scene = SceneVariation::sample(
-        None,
-        &VariationConfig { distractors: 0..=0, ..VariationConfig::default() },
-        config.seed,
-    );
-    let placed = || PlacedObject { spec: spec.clone(), base_from_object: away() };
-    scene.object = Some(placed());
-    scene.instances = (1..config.count).map(|_| placed()).collect();
-    let strip = SHOWN.y_m[1] - STRIP_M..SHOWN.y_m[1];
-    scene.distractors = sample_distractors_between(SHOWN.x_m[0]..SHOWN.x_m[1], strip, config.num_things, config.seed);
-    scene
-}
-
-/// The scene with floor, card and camera.
-fn mjcf(config: &TableCameraConfig, fragment: &MjcfFragment) -> String {
-    let fovy = vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, RenderConfig::default().height).to_degrees();
-    let look = base_from_look_camera();
-    let at = Translation3::new(look.translation.x, look.translation.y, config.height_m);
-    // Tilted about the middle of what it shows, so that this stays in the middle.
-    let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), config.tilt_rad);
-    let foot = Translation3::new(at.x, at.y, 0.0);
-    let optical = foot * tilt * foot.inverse() * Isometry3::from_parts(at, look.rotation);
-    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let pose = pose_attributes(&(optical * half_turn));
-    let mut text = String::new();
-    let _ = write!(
-        text,
-        "<mujoco><compiler angle='radian'/><option timestep='0.001'><flag contact='disable'/></option>\
-         <statistic center='0.4 0 0.3' extent='1.2'/><worldbody><camera name='over_table' {pose} fovy='{:.12}'/>\
-         <body name='card' pos='0.5 0 {AWAY_M}'><freejoint name='card_joint'/>\
-         <geom name='card' type='box' size='{CARD_HALF_M} {CARD_HALF_M} 0.001' rgba='0.75 0.7 0.6 1' contype='0' conaffinity='0' \
-         group='1'/></body></worldbody>{}</mujoco>",
-        fovy, fragment.sections
-    );
-    text
-}
-
-/// The same body under names of its own, so that it can stand beside another part.
-fn renamed(fragment: MjcfFragment) -> MjcfFragment {
-    let sections = fragment.sections.replace("=\"object", "=\"beside").replace(" file=\"", " file=\"beside_");
-    let files = fragment
-        .files
-        .into_iter()
-        .map(|asset| Asset { name: format!("beside_{}", asset.name), bytes: asset.bytes })
-        .collect();
-    MjcfFragment { sections, files }
 }
 
 /// A number of the normal distribution, by Box and Muller.

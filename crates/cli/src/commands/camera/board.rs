@@ -1,15 +1,71 @@
 //! `sdg camera board`.
 
-use anyhow::{Result, bail};
-use clap::Args;
+use std::io::Write;
+use std::path::PathBuf;
 
-use crate::exit::Outcome;
+use anyhow::Result;
+use clap::{Args, ValueEnum};
+use sdg_calibration::{Board, Paper, Sheet};
+use sdg_report::write_atomically;
+
+use super::board_in_use::squares;
+use crate::exit::{Outcome, Usage};
 
 /// `sdg camera board`
 #[derive(Debug, Args)]
-pub struct BoardArgs {}
+pub struct BoardArgs {
+    /// Where the SVG goes
+    #[arg(long, default_value = "board.svg", value_name = "FILE")]
+    out: PathBuf,
+    /// Where a PDF of the same sheet goes
+    #[arg(long, value_name = "FILE")]
+    pdf: Option<PathBuf>,
+    /// Squares across and up
+    #[arg(long, default_value = "9x6", value_name = "WxH", value_parser = squares)]
+    squares: [u32; 2],
+    /// A square's side in millimetres; without it, the most whole 5 mm that fit on the paper
+    #[arg(long, value_name = "MM")]
+    square_mm: Option<f64>,
+    /// The paper
+    #[arg(long, default_value = "a4", value_name = "PAPER")]
+    paper: PaperName,
+}
 
-/// Runs it.
-pub fn run(_args: &BoardArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// Names of [`Paper`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PaperName {
+    A4,
+    A3,
+    Letter,
+}
+
+impl From<PaperName> for Paper {
+    fn from(name: PaperName) -> Self {
+        match name {
+            PaperName::A4 => Self::A4,
+            PaperName::A3 => Self::A3,
+            PaperName::Letter => Self::Letter,
+        }
+    }
+}
+
+/// Writes the sheet.
+pub fn run(args: &BoardArgs) -> Result<Outcome> {
+    let (paper, [columns, rows]) = (Paper::from(args.paper), args.squares);
+    let laid_out = || {
+        let square_m = match args.square_mm {
+            Some(millimetres) => millimetres / 1000.0,
+            None => Sheet::square_m_that_fits(columns, rows, paper)?,
+        };
+        Sheet::new(Board::new(columns, rows, square_m)?, paper).map(|sheet| (sheet, 1000.0 * square_m))
+    };
+    let (sheet, square_mm) = laid_out().map_err(|error| Usage(error.to_string()))?;
+    write_atomically(&args.out, sheet.to_svg().as_bytes())?;
+    if let Some(pdf) = &args.pdf {
+        write_atomically(pdf, &sheet.to_pdf())?;
+    }
+    let mut stdout = std::io::stdout().lock();
+    writeln!(stdout, "{}: {columns} x {rows} squares of {square_mm} mm on {}", args.out.display(), paper.name())?;
+    writeln!(stdout, "Print it at 100 %, glue it to something flat, and measure the 100 mm line: --measured-mm")?;
+    Ok(Outcome::Done)
 }

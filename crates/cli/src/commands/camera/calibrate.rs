@@ -1,15 +1,189 @@
 //! `sdg camera calibrate`.
 
-use anyhow::{Result, bail};
-use clap::Args;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use crate::exit::Outcome;
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
+use rayon::prelude::*;
+use sdg_calibration::{Board, CalibratedCamera, Calibration, CalibrationConfig, SeenCorner, calibrate, find_board};
+use sdg_report::write_atomically;
+use serde_json::{Value, json};
+
+use super::board_in_use::{BoardInUse, grey, named};
+use crate::exit::{Outcome, one_line};
+use crate::files;
 
 /// `sdg camera calibrate`
 #[derive(Debug, Args)]
-pub struct CalibrateArgs {}
+pub struct CalibrateArgs {
+    /// Pictures of the board, PNG or JPEG: 10 to 20, tilted every way by 20 to 40 degrees, all over the picture
+    #[arg(required = true, value_name = "PICTURE")]
+    pictures: Vec<PathBuf>,
+    #[command(flatten)]
+    board: BoardInUse,
+    /// The camera's name in its file; without it, that of the existing file or `camera`
+    #[arg(long, value_name = "NAME")]
+    camera_name: Option<String>,
+    /// The lens has a k3, too: for wide lenses and 20 pictures or more
+    #[arg(long)]
+    k3: bool,
+    /// Where the camera's file goes; comments and other programs' fields of an existing one stay
+    #[arg(long, default_value = "camera.yaml", value_name = "FILE")]
+    out: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
 
-/// Runs it.
-pub fn run(_args: &CalibrateArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// A picture in which the board was found.
+struct Seen<'a> {
+    path: &'a Path,
+    size: (u32, u32),
+    corners: Vec<SeenCorner>,
+}
+
+/// Larger camera files than any tool writes.
+const MAX_BYTES: u64 = 1 << 20;
+/// Names of intrinsics as the library orders them.
+const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
+
+/// Finds the camera and writes its file.
+pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
+    let board = args.board.read()?;
+    files::check_writable(&args.out)?;
+    let looked: Vec<(&Path, Result<Seen<'_>>)> =
+        args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
+    let mut lines: Vec<Value> = Vec::new();
+    let mut seen = Vec::new();
+    for (path, result) in looked {
+        match result {
+            Ok(found) => seen.push(found),
+            Err(error) => {
+                let error = one_line(&error);
+                eprintln!("left out: {error}");
+                lines.push(json!({"picture": named(path), "error": error}));
+            }
+        }
+    }
+    let Some(first) = seen.first() else {
+        bail!("expected pictures that show the board, found none among {}", args.pictures.len());
+    };
+    let (size, first) = (first.size, first.path);
+    if let Some(other) = seen.iter().find(|other| other.size != size) {
+        bail!(
+            "{}: expected pictures of one size: {} x {} as {}, found {} x {}",
+            other.path.display(),
+            size.0,
+            size.1,
+            first.display(),
+            other.size.0,
+            other.size.1
+        );
+    }
+    warn_of_squares(&board, &seen);
+    let corners: Vec<Vec<SeenCorner>> = seen.iter().map(|seen| seen.corners.clone()).collect();
+    let config = CalibrationConfig { width: size.0, height: size.1, has_k3: args.k3 };
+    let found = calibrate(&board, &corners, &config)?;
+    write_camera(args, &found)?;
+    for (seen, fit) in seen.iter().zip(&found.pictures) {
+        lines.push(json!({
+            "picture": named(seen.path), "corners": seen.corners.len(), "rms_px": fit.rms_px, "left_out": fit.is_left_out,
+        }));
+    }
+    report(args, &found, &seen, lines)?;
+    Ok(Outcome::Done)
+}
+
+fn look<'a>(path: &'a Path, board: &Board) -> Result<Seen<'a>> {
+    let picture = files::read_image(path)?;
+    let corners = find_board(&grey(&picture), board).with_context(|| named(path))?;
+    Ok(Seen { path, size: picture.dimensions(), corners })
+}
+
+/// Corners that no picture shows may not be there.
+fn warn_of_squares(board: &Board, seen: &[Seen<'_>]) {
+    let most = |axis: usize| {
+        let corners = seen.iter().flat_map(|seen| &seen.corners);
+        corners.map(|seen| seen.corner[axis]).max().unwrap_or_default() + 1
+    };
+    let (columns, rows) = (most(0), most(1));
+    if (columns, rows) != (board.columns(), board.rows()) {
+        eprintln!(
+            "no picture shows more than {columns} x {rows} squares of {} x {}: check --squares",
+            board.columns(),
+            board.rows()
+        );
+    }
+}
+
+fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
+    let existing = match fs::exists(&args.out) {
+        Ok(true) => String::from_utf8(files::read(&args.out, MAX_BYTES)?)
+            .map_err(|_| anyhow!("{}: expected YAML, found bytes that are no text", args.out.display()))?,
+        _ => String::new(),
+    };
+    let old = CalibratedCamera::from_yaml(&existing).ok();
+    if old.as_ref().is_some_and(|old| old.table.is_some() || old.flange_from_camera.is_some()) {
+        eprintln!(
+            "{}: the camera's place was measured with the old lens and is removed: run table or hand-eye again",
+            args.out.display()
+        );
+    }
+    let name = args.camera_name.clone().or(old.map(|old| old.name)).unwrap_or_else(|| "camera".to_owned());
+    let camera = CalibratedCamera { name, intrinsics: found.camera, table: None, flange_from_camera: None };
+    let text = if existing.trim().is_empty() {
+        camera.to_yaml()
+    } else {
+        camera.update_yaml(&existing).with_context(|| named(&args.out))?
+    };
+    Ok(write_atomically(&args.out, text.as_bytes())?)
+}
+
+/// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.
+fn values(found: &Calibration) -> [f64; 9] {
+    let camera = found.camera;
+    let [k1, k2, p1, p2, k3] = camera.lens.to_array();
+    [camera.fx, camera.fy, camera.cx - 0.5, camera.cy - 0.5, k1, k2, p1, p2, k3]
+}
+
+fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: Vec<Value>) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    let advice: Vec<String> = found.advice.iter().map(ToString::to_string).collect();
+    if args.json {
+        let by_name = |values: &[f64]| {
+            NAMES.into_iter().map(str::to_owned).zip(values.iter().map(|v| json!(v))).collect::<Value>()
+        };
+        let object = json!({
+            "out": named(&args.out), "width": found.camera.width, "height": found.camera.height,
+            "intrinsics": by_name(&values(found)), "sigma": by_name(&found.sigma), "rms_px": found.rms_px,
+            "pictures": lines, "advice": advice,
+        });
+        writeln!(stdout, "{object}")?;
+        return Ok(());
+    }
+    let used = found.pictures.iter().filter(|fit| !fit.is_left_out).count();
+    writeln!(
+        stdout,
+        "{}: {} x {} px, reprojection {:.3} px RMS over {used} pictures",
+        args.out.display(),
+        found.camera.width,
+        found.camera.height,
+        found.rms_px
+    )?;
+    for ((name, value), sigma) in NAMES.into_iter().zip(values(found)).zip(found.sigma) {
+        let digits = if name.starts_with(['f', 'c']) { 2 } else { 5 };
+        if sigma > 0.0 {
+            writeln!(stdout, "  {name} {value:.digits$} ± {sigma:.digits$}")?;
+        }
+    }
+    for (seen, fit) in seen.iter().zip(&found.pictures) {
+        let left_out = if fit.is_left_out { ", left out: it disagrees with the others" } else { "" };
+        writeln!(stdout, "  {}: {} corners, {:.3} px{left_out}", seen.path.display(), seen.corners.len(), fit.rms_px)?;
+    }
+    for advice in advice {
+        writeln!(stdout, "next: {advice}")?;
+    }
+    Ok(())
 }

@@ -1,15 +1,197 @@
 //! `sdg camera hand-eye`.
 
-use anyhow::{Result, bail};
-use clap::Args;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use crate::exit::Outcome;
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use rayon::prelude::*;
+use sdg_calibration::{
+    Board, CalibratedCamera, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose, calibrate_hand_eye, find_board,
+    read_robot_poses,
+};
+use sdg_report::write_atomically;
+use serde_json::{Value, json};
+
+use super::board_in_use::{BoardInUse, grey, named, pose_json};
+use crate::camera_files;
+use crate::exit::{Outcome, one_line};
+use crate::files;
 
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
-pub struct HandEyeArgs {}
+pub struct HandEyeArgs {
+    /// The camera's file from `sdg camera calibrate`
+    #[arg(long, value_name = "FILE")]
+    camera: PathBuf,
+    /// Robot poses with the pictures taken there: YAML, JSON or CSV; pictures stand beside it
+    #[arg(long, value_name = "FILE")]
+    poses: PathBuf,
+    /// What the camera is fixed to: the robot's hand, or its base
+    #[arg(long, value_name = "PLACE")]
+    mount: MountName,
+    #[command(flatten)]
+    board: BoardInUse,
+    /// The table's z in the robot's base, for a camera beside the robot; without it, that of the camera's file or 0
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    table_height_mm: Option<f64>,
+    /// Where the file with the camera's place goes; without it, nothing is written
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
 
-/// Runs it.
-pub fn run(_args: &HandEyeArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// Names of [`Mount`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MountName {
+    Hand,
+    Base,
+}
+
+impl From<MountName> for Mount {
+    fn from(name: MountName) -> Self {
+        match name {
+            MountName::Hand => Self::Hand,
+            MountName::Base => Self::Base,
+        }
+    }
+}
+
+/// Larger files of robot poses than anybody measures.
+const MAX_BYTES: u64 = 4 << 20;
+/// A picture so many times worse than the median is named.
+const MAX_RMS_RATIO: f64 = 3.0;
+
+/// Finds the camera on the robot or beside it.
+pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
+    let board = args.board.read()?;
+    let mount = Mount::from(args.mount);
+    let (camera, existing) = camera_files::read(&args.camera)?;
+    let bytes = files::read(&args.poses, MAX_BYTES)?;
+    let poses = read_robot_poses(&String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
+    if let Some(out) = &args.out {
+        files::check_writable(out)?;
+    }
+    let folder = args.poses.parent().unwrap_or(Path::new("."));
+    let looked: Vec<(&RobotPose, Result<HandEyeView>)> =
+        poses.par_iter().map(|pose| (pose, look(pose, folder, &camera, &board))).collect();
+    let (mut lines, mut seen, mut views) = (Vec::new(), Vec::new(), Vec::new());
+    for (pose, result) in looked {
+        match result {
+            Ok(view) => {
+                seen.push(pose);
+                views.push(view);
+            }
+            Err(error) => {
+                let error = one_line(&error);
+                eprintln!("left out: {error}");
+                lines.push(json!({"picture": pose.picture, "error": error}));
+            }
+        }
+    }
+    let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)?;
+    if let Some(out) = &args.out {
+        let camera = placed(args, camera, &found, mount);
+        let text = camera.update_yaml(&existing).with_context(|| named(out))?;
+        CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
+        write_atomically(out, text.as_bytes())?;
+    }
+    for (k, pose) in seen.iter().enumerate() {
+        let [metres, radians] = found.spread[k];
+        lines.push(json!({
+            "picture": pose.picture, "corners": views[k].corners.len(), "rms_px": found.pictures_rms_px[k],
+            "without_it_mm": 1000.0 * metres, "without_it_deg": radians.to_degrees(),
+        }));
+    }
+    report(args, mount, &found, &seen, lines)?;
+    Ok(Outcome::Done)
+}
+
+fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {
+    let path = folder.join(&pose.picture);
+    let picture = files::read_image(&path)?;
+    if let Err(error) = camera.check_picture(picture.dimensions()) {
+        bail!("{}: {error}", path.display());
+    }
+    let corners = find_board(&grey(&picture), board).with_context(|| named(&path))?;
+    Ok(HandEyeView { base_from_flange: pose.base_from_flange, corners })
+}
+
+fn placed(args: &HandEyeArgs, camera: CalibratedCamera, found: &HandEye, mount: Mount) -> CalibratedCamera {
+    match mount {
+        Mount::Hand => CalibratedCamera { flange_from_camera: Some(found.frame_from_camera), ..camera },
+        Mount::Base => {
+            let old = camera.table.as_ref().filter(|table| table.frame == Frame::Base);
+            let told = args.table_height_mm.map(|height| height / 1000.0);
+            let table = TablePose {
+                frame: Frame::Base,
+                height_m: told.or(old.map(|table| table.height_m)).unwrap_or_default(),
+                frame_from_camera: found.frame_from_camera,
+                workspace: old.and_then(|table| table.workspace),
+            };
+            CalibratedCamera { table: Some(table), ..camera }
+        }
+    }
+}
+
+fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose], lines: Vec<Value>) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    let (frame, board_frame) = match mount {
+        Mount::Hand => ("flange", "base"),
+        Mount::Base => ("base", "flange"),
+    };
+    let mut rms = found.pictures_rms_px.clone();
+    rms.sort_by(f64::total_cmp);
+    let median = rms[rms.len() / 2];
+    let widest = |k: usize| found.spread.iter().map(|spread| spread[k]).fold(0.0, f64::max);
+    let (spread_mm, spread_deg) = (1000.0 * widest(0), widest(1).to_degrees());
+    if args.json {
+        let robot =
+            found.robot_sigma.map(|[metres, radians]| json!({"mm": 1000.0 * metres, "deg": radians.to_degrees()}));
+        let object = json!({
+            (format!("{frame}_from_camera")): pose_json(&found.frame_from_camera),
+            (format!("{board_frame}_from_board")): pose_json(&found.frame_from_board),
+            "sigma_mm": 1000.0 * found.sigma_m, "sigma_deg": found.sigma_rad.to_degrees(), "rms_px": found.rms_px,
+            "board_rms_px": found.board_rms_px, "robot_sigma": robot, "spread_mm": spread_mm, "spread_deg": spread_deg,
+            "pictures": lines, "out": args.out.as_deref().map(named),
+        });
+        writeln!(stdout, "{object}")?;
+        return Ok(());
+    }
+    let [x, y, z]: [f64; 3] = (found.frame_from_camera.translation.vector * 1000.0).into();
+    let [i, j, k, w]: [f64; 4] = found.frame_from_camera.rotation.coords.into();
+    writeln!(
+        stdout,
+        "{frame}_from_camera: ({x:.2}, {y:.2}, {z:.2}) mm, rotation_xyzw ({i:.5}, {j:.5}, {k:.5}, {w:.5})"
+    )?;
+    writeln!(
+        stdout,
+        "  ± {:.2} mm, ± {:.3} degrees; one picture left out moves it by up to {spread_mm:.2} mm, {spread_deg:.3} degrees",
+        1000.0 * found.sigma_m,
+        found.sigma_rad.to_degrees()
+    )?;
+    writeln!(
+        stdout,
+        "  reprojection {:.2} px RMS with the robot's poses, {:.2} px without",
+        found.rms_px, found.board_rms_px
+    )?;
+    if let Some([metres, radians]) = found.robot_sigma {
+        writeln!(
+            stdout,
+            "  the robot's poses are off by about {:.2} mm and {:.3} degrees along and about each axis",
+            1000.0 * metres,
+            radians.to_degrees()
+        )?;
+    }
+    for (pose, rms) in seen.iter().zip(&found.pictures_rms_px) {
+        let worse = if *rms > MAX_RMS_RATIO * median {
+            ": far more than the others; take it again or leave it out"
+        } else {
+            ""
+        };
+        writeln!(stdout, "  {}: {rms:.2} px{worse}", pose.picture)?;
+    }
+    Ok(())
 }

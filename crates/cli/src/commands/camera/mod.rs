@@ -1,6 +1,7 @@
 //! `sdg camera`: calibration and live pictures. Each verb's arguments stand beside what it does.
 
 mod board;
+mod board_in_use;
 mod calibrate;
 mod grab;
 mod hand_eye;

@@ -1,15 +1,260 @@
 //! `sdg camera table`.
 
-use anyhow::{Result, bail};
-use clap::Args;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use crate::exit::Outcome;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use sdg_calibration::{
+    Board, CalibratedCamera, FocalCost, Frame, SeenCorner, SheetPose, TablePose, find_board, focal_cost,
+    focal_from_sheet, homography_rms_px, locate_sheet,
+};
+use sdg_geometry::{PinholeCamera, PlumbBob};
+use sdg_report::write_atomically;
+use serde_json::{Value, json};
+
+use super::board_in_use::{BoardInUse, grey, named, pose_json};
+use crate::camera_files;
+use crate::exit::{Outcome, Usage};
+use crate::files;
 
 /// `sdg camera table`
 #[derive(Debug, Args)]
-pub struct TableArgs {}
+pub struct TableArgs {
+    /// One picture of the sheet lying on the table
+    #[arg(value_name = "PICTURE")]
+    picture: PathBuf,
+    /// The camera's file from `sdg camera calibrate`; without it, the focal length is estimated and the lens taken as straight
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    #[command(flatten)]
+    board: BoardInUse,
+    /// The sheet's origin (the outer corner above its lower left text) in the robot's base; without it, the sheet is the frame
+    #[arg(
+        long,
+        value_name = "X,Y",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_negative_numbers = true,
+        allow_hyphen_values = true
+    )]
+    sheet_in_base_mm: Vec<f64>,
+    /// The direction of the sheet's x in the robot's base, about its z
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        hide_default_value = true,
+        value_name = "DEG",
+        requires = "sheet_in_base_mm",
+        allow_hyphen_values = true
+    )]
+    sheet_yaw_deg: f64,
+    /// The table's z in the robot's base
+    #[arg(
+        long,
+        default_value_t = 0.0,
+        hide_default_value = true,
+        value_name = "MM",
+        requires = "sheet_in_base_mm",
+        allow_hyphen_values = true
+    )]
+    table_height_mm: f64,
+    /// How high the sheet lies above the table, on a plate
+    #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM")]
+    sheet_thickness_mm: f64,
+    /// The height of a part's marks, at which the cost of a wrong focal length is told
+    #[arg(long, default_value_t = 30.0, value_name = "MM")]
+    mark_height_mm: f64,
+    /// Focal length in pixels of a camera without file
+    #[arg(long, value_name = "PX", conflicts_with = "camera")]
+    focal_px: Option<f64>,
+    /// Where the file with `table:` goes; without it, the camera's file itself
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
 
-/// Runs it.
-pub fn run(_args: &TableArgs) -> Result<Outcome> {
-    bail!("expected a build that has this")
+/// A focal length taken from the sheet's perspective must be known to this share.
+const MAX_FOCAL_SIGMA: f64 = 0.1;
+/// Pictures of webcams and phones are about so wide.
+const USUAL_VIEW_DEG: f64 = 60.0;
+/// The error of the focal length of which the cost is told.
+const FOCAL_ERROR: f64 = 0.1;
+/// A straight lens explains corners to this; more is the lens's distortion.
+const MAX_STRAIGHT_PX: f64 = 1.0;
+/// The longest distance from a robot's base to a sheet.
+const MAX_REACH_MM: f64 = 5000.0;
+
+/// Finds the camera over the sheet and writes it into a camera file.
+pub fn run(args: &TableArgs) -> Result<Outcome> {
+    let board = args.board.read()?;
+    let frame_from_sheet = frame_from_sheet(args)?;
+    let existing = args.camera.as_deref().map(camera_files::read).transpose()?;
+    let Some(out) = args.out.as_ref().or(args.camera.as_ref()) else {
+        return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
+    };
+    files::check_writable(out)?;
+    let picture = files::read_image(&args.picture)?;
+    if let Some((camera, _)) = &existing {
+        camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
+    }
+    let corners = find_board(&grey(&picture), &board).with_context(|| named(&args.picture))?;
+    let (mut camera, source) = match &existing {
+        Some((camera, _)) => (camera.clone(), Source::File),
+        None => guessed(args, picture.dimensions(), &board, &corners)?,
+    };
+    let sheet = locate_sheet(&camera.intrinsics, &board, &corners).with_context(|| named(&args.picture))?;
+    let (frame, height_m) = match args.sheet_in_base_mm[..] {
+        [] => (Frame::Table, 0.0),
+        _ => (Frame::Base, args.table_height_mm / 1000.0),
+    };
+    let workspace = camera.table.as_ref().filter(|table| table.frame == frame).and_then(|table| table.workspace);
+    let frame_from_camera = frame_from_sheet * sheet.sheet_from_camera;
+    camera.table = Some(TablePose { frame, height_m, frame_from_camera, workspace });
+    let text = match &existing {
+        Some((_, text)) => camera.update_yaml(text).with_context(|| named(out))?,
+        None => camera.to_yaml(),
+    };
+    // What `detect --camera` would refuse is refused here.
+    CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
+    let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
+    write_atomically(out, text.as_bytes())?;
+    report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
+    Ok(Outcome::Done)
+}
+
+/// Where the focal length is from.
+enum Source {
+    File,
+    Given,
+    /// Error as a share, homography's RMS.
+    Perspective(f64),
+    Guess,
+}
+
+impl Source {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::File => "file",
+            Self::Given => "given",
+            Self::Perspective(_) => "perspective",
+            Self::Guess => "guess",
+        }
+    }
+}
+
+/// From the sheet's frame to that of the file.
+fn frame_from_sheet(args: &TableArgs) -> Result<Isometry3<f64>> {
+    let thickness = args.sheet_thickness_mm;
+    let [x, y] = match args.sheet_in_base_mm[..] {
+        [] => [0.0, 0.0],
+        [x, y] => [x, y],
+        _ => return Err(Usage("expected --sheet-in-base-mm X,Y".to_owned()).into()),
+    };
+    let values = [x, y, args.table_height_mm, thickness, args.mark_height_mm, args.sheet_yaw_deg];
+    if let Some(value) = values.into_iter().find(|value| !(-MAX_REACH_MM..=MAX_REACH_MM).contains(value)) {
+        return Err(Usage(format!("expected lengths up to {MAX_REACH_MM} mm, found {value}")).into());
+    }
+    let translation = Translation3::new(x, y, args.table_height_mm + thickness).vector / 1000.0;
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), args.sheet_yaw_deg.to_radians());
+    Ok(Isometry3::from_parts(translation.into(), rotation))
+}
+
+/// A camera without file: its axis in the middle, a straight lens, and a focal length from wherever there is one.
+fn guessed(
+    args: &TableArgs,
+    size: (u32, u32),
+    board: &Board,
+    corners: &[SeenCorner],
+) -> Result<(CalibratedCamera, Source)> {
+    let (width, height) = size;
+    let estimate = focal_from_sheet(size, board, corners).filter(|found| found.relative_sigma() < MAX_FOCAL_SIGMA);
+    let (focal, source) = match (args.focal_px, estimate) {
+        (Some(focal), _) => (focal, Source::Given),
+        (None, Some(found)) => (found.focal_px, Source::Perspective(found.relative_sigma())),
+        (None, None) => {
+            let half = 0.5 * f64::from(width.max(height));
+            (half / (0.5 * USUAL_VIEW_DEG).to_radians().tan(), Source::Guess)
+        }
+    };
+    let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
+    let intrinsics = PinholeCamera { width, height, fx: focal, fy: focal, cx, cy, lens: PlumbBob::NONE };
+    let Ok(intrinsics) = intrinsics.checked() else {
+        bail!("expected --focal-px of some pixels, found {focal}");
+    };
+    if let Some(rms) = homography_rms_px(board, corners).filter(|rms| *rms > MAX_STRAIGHT_PX) {
+        eprintln!("the sheet's lines are bent by {rms:.1} px RMS: calibrate the lens (sdg camera calibrate)");
+    }
+    Ok((
+        CalibratedCamera { name: "uncalibrated".to_owned(), intrinsics, table: None, flange_from_camera: None },
+        source,
+    ))
+}
+
+fn report(
+    args: &TableArgs,
+    out: &Path,
+    camera: &CalibratedCamera,
+    sheet: &SheetPose,
+    source: &Source,
+    cost: &FocalCost,
+    num_corners: usize,
+) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    let focal = camera.intrinsics.fx;
+    let place = camera.table.as_ref().map(|table| (table.frame.name(), table.frame_from_camera));
+    let (frame, pose) = place.unwrap_or((Frame::Table.name(), sheet.sheet_from_camera));
+    let [sigma_mm, sigma_deg] = [1000.0 * sheet.sigma_height_m, sheet.sigma_tilt_rad.to_degrees()];
+    let costs = [cost.at_sheet_m, cost.at_border_m].map(|metres| 1000.0 * metres);
+    if args.json {
+        let sigma: Value = match source {
+            Source::Perspective(sigma) => json!(sigma * focal),
+            _ => Value::Null,
+        };
+        let object = json!({
+            "out": named(out), "frame": frame, "frame_from_camera": pose_json(&pose), "corners": num_corners, "rms_px": sheet.rms_px,
+            "sigma_height_mm": sigma_mm, "sigma_tilt_deg": sigma_deg, "tilt_deg": sheet.tilt_rad.to_degrees(),
+            "focal": {"px": focal, "source": source.name(), "sigma_px": sigma},
+            "focal_cost": {
+                "focal_error": cost.focal_error, "mark_height_mm": args.mark_height_mm,
+                "at_sheet_mm": costs[0], "at_border_mm": costs[1],
+            },
+        });
+        writeln!(stdout, "{object}")?;
+        return Ok(());
+    }
+    let [x, y, z]: [f64; 3] = (pose.translation.vector * 1000.0).into();
+    writeln!(
+        stdout,
+        "{}: camera at {frame} ({x:.1}, {y:.1}, {z:.1}) mm, {:.1} degrees from straight down",
+        out.display(),
+        sheet.tilt_rad.to_degrees()
+    )?;
+    writeln!(
+        stdout,
+        "  {num_corners} corners, {:.3} px RMS; height ± {sigma_mm:.2} mm, tilt ± {sigma_deg:.3} degrees",
+        sheet.rms_px
+    )?;
+    match source {
+        Source::File => return Ok(()),
+        Source::Given => writeln!(stdout, "  focal length {focal:.0} px as given")?,
+        Source::Perspective(sigma) => {
+            writeln!(stdout, "  focal length {focal:.0} px from the sheet's perspective, ± {:.0} %", 100.0 * sigma)?;
+        }
+        Source::Guess => {
+            writeln!(
+                stdout,
+                "  focal length {focal:.0} px guessed for a view of {USUAL_VIEW_DEG} degrees: the sheet is tilted too little to tell it"
+            )?;
+        }
+    }
+    writeln!(
+        stdout,
+        "  10 % of focal length cost, {} mm above the sheet: {:.1} mm at the sheet, {:.1} mm at the picture's border",
+        args.mark_height_mm, costs[0], costs[1]
+    )?;
+    Ok(())
 }

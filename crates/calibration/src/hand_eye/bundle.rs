@@ -1,0 +1,132 @@
+//! Reprojection over all pictures as a function of `X` and `Y`, and of what each robot pose is off by.
+
+use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
+use sdg_geometry::PinholeCamera;
+
+use super::view::{HandEyeView, Mount};
+use crate::board::Board;
+use crate::least_squares::{Block, Problem};
+use crate::projection::{by_twist, motion, off, project};
+
+#[derive(Debug, Clone)]
+pub(super) struct Bundle<'a> {
+    camera: PinholeCamera,
+    board: Board,
+    mount: Mount,
+    views: Vec<&'a HandEyeView>,
+    /// `A_i`.
+    motions: Vec<Isometry3<f64>>,
+    pub(super) x: Isometry3<f64>,
+    pub(super) y: Isometry3<f64>,
+    /// What each pose is off by: a small motion in the flange's frame.
+    errors: Vec<Isometry3<f64>>,
+    /// Metres and radians of robot error that weigh as much as a pixel; `None` where poses are exact.
+    robot_sigma: Option<[f64; 2]>,
+}
+
+impl<'a> Bundle<'a> {
+    pub(super) fn new(
+        camera: PinholeCamera,
+        board: Board,
+        mount: Mount,
+        views: &'a [HandEyeView],
+        motions: Vec<Isometry3<f64>>,
+        [x, y]: [Isometry3<f64>; 2],
+    ) -> Self {
+        let errors = vec![Isometry3::identity(); views.len()];
+        Self { camera, board, mount, views: views.iter().collect(), motions, x, y, errors, robot_sigma: None }
+    }
+
+    /// The same with robot errors of so many metres and radians for a pixel.
+    pub(super) fn with_robot_sigma(&self, sigma: [f64; 2]) -> Self {
+        Self { robot_sigma: Some(sigma), ..self.clone() }
+    }
+
+    pub(super) fn num_views(&self) -> usize {
+        self.views.len()
+    }
+
+    /// The same without one picture.
+    pub(super) fn without(&self, view: usize) -> Self {
+        let mut fewer = self.clone();
+        fewer.views.remove(view);
+        fewer.motions.remove(view);
+        fewer.errors.remove(view);
+        fewer
+    }
+
+    /// RMS of each picture, the robot's poses as given.
+    pub(super) fn rms_of_pictures(&self) -> Vec<f64> {
+        (0..self.views.len()).map(|k| (self.square(k) / self.views[k].corners.len() as f64).sqrt()).collect()
+    }
+
+    /// RMS over all, the robot's poses as given.
+    pub(super) fn rms_px(&self) -> f64 {
+        let count: usize = self.views.iter().map(|view| view.corners.len()).sum();
+        ((0..self.views.len()).map(|k| self.square(k)).sum::<f64>() / count as f64).sqrt()
+    }
+
+    fn square(&self, view: usize) -> f64 {
+        let camera_from_board = self.x.inverse() * self.motions[view] * self.y;
+        let squares = self.views[view].corners.iter().map(|seen| {
+            let p = camera_from_board * self.board.corner(seen.corner);
+            project(&self.camera, &p)
+                .map_or(f64::INFINITY, |projected| off(&projected.pixel, &seen.pixel).norm_squared())
+        });
+        squares.sum()
+    }
+
+    fn block(&self, view: usize) -> Option<Block<12>> {
+        let mut block = Block::empty();
+        let camera_from_x = self.x.inverse();
+        let (motion, error) = (&self.motions[view], &self.errors[view]);
+        // The flange is on the camera's side of A on the hand, and on the board's side else.
+        let (camera_from_flange, flange_from_y) = match self.mount {
+            Mount::Hand => (camera_from_x, *motion),
+            Mount::Base => (camera_from_x * motion, Isometry3::identity()),
+        };
+        let camera_from_y: Isometry3<f64> = camera_from_flange * error * flange_from_y;
+        let turn = |isometry: &Isometry3<f64>| -> Matrix3<f64> { isometry.rotation.to_rotation_matrix().into_inner() };
+        let (turn_of_y, turn_of_flange) = (turn(&(camera_from_y * self.y)), turn(&camera_from_flange));
+        for seen in &self.views[view].corners {
+            let b = self.board.corner(seen.corner);
+            let in_flange = error * (flange_from_y * (self.y * b));
+            let p = camera_from_flange * in_flange;
+            let projected = project(&self.camera, &p)?;
+            let mut by_shared = SMatrix::<f64, 2, 12>::zeros();
+            // X and Y are followed by their small motions: X⁻¹ is preceded by the inverse.
+            by_shared.fixed_view_mut::<2, 6>(0, 0).copy_from(&-(projected.by_point * by_twist(&p)));
+            by_shared.fixed_view_mut::<2, 6>(0, 6).copy_from(&(projected.by_point * turn_of_y * by_twist(&b)));
+            let by_own = match self.robot_sigma {
+                Some(_) => projected.by_point * turn_of_flange * by_twist(&in_flange),
+                None => SMatrix::zeros(),
+            };
+            block.add(&off(&projected.pixel, &seen.pixel), &by_shared, &by_own, 1.0);
+        }
+        match self.robot_sigma {
+            Some([sigma_m, sigma_rad]) => {
+                let turn = error.rotation.scaled_axis();
+                let shift = error.translation.vector;
+                let scales = [sigma_m, sigma_m, sigma_m, sigma_rad, sigma_rad, sigma_rad].map(|sigma| 1.0 / sigma);
+                let twist = Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z);
+                let weights = Matrix6::from_diagonal(&Vector6::from(scales));
+                block.add(&(weights * twist), &SMatrix::zeros(), &weights, 1.0);
+            }
+            // Nothing depends on them.
+            None => block.own = Matrix6::identity(),
+        }
+        block.cost.is_finite().then_some(block)
+    }
+}
+
+impl Problem<12> for Bundle<'_> {
+    fn blocks(&self) -> Option<Vec<Block<12>>> {
+        (0..self.views.len()).map(|view| self.block(view)).collect()
+    }
+
+    fn stepped(&self, shared: &SVector<f64, 12>, own: &[Vector6<f64>]) -> Self {
+        let twist = |from: usize| motion(&shared.fixed_rows::<6>(from).into_owned());
+        let errors = self.errors.iter().zip(own).map(|(error, step)| motion(step) * error).collect();
+        Self { x: self.x * twist(0), y: self.y * twist(6), errors, ..self.clone() }
+    }
+}

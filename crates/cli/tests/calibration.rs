@@ -1,0 +1,335 @@
+//! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file that `sdg detect --camera` takes, and what is refused.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../calibration/tests/rendering/mod.rs"]
+mod rendering;
+
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use image::GrayImage;
+use nalgebra::{Isometry3, Point2, Vector3};
+use rendering::cameras::{CAMERAS, board, poses};
+use rendering::{Exposure, Random, camera_from_board, render, render_with, turn};
+use sdg_geometry::PinholeCamera;
+use serde_json::Value;
+
+/// The focal length from 15 pictures, as a share: the issue's bound.
+const MAX_FOCAL_ERROR: f64 = 0.002;
+/// The camera over the table with intrinsics that are off by that much, from 0.3 m.
+const MAX_PLACE_ERROR_M: f64 = 0.001;
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+/// Standard output of a command that succeeds.
+fn said(arguments: &[&str]) -> String {
+    let output = sdg(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&said(arguments)).unwrap()
+}
+
+/// Exit code, and a message with every part.
+fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = sdg(arguments);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+    }
+}
+
+struct Folder {
+    folder: tempfile::TempDir,
+}
+
+impl Folder {
+    fn new() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    fn picture(&self, name: &str, picture: &GrayImage) -> String {
+        picture.save(self.path(name)).unwrap();
+        self.path(name)
+    }
+
+    fn text(&self, name: &str, text: &str) -> String {
+        fs::write(self.path(name), text).unwrap();
+        self.path(name)
+    }
+
+    /// A picture of the board of [`board`].
+    fn board(&self, name: &str, camera: &PinholeCamera, pose: &Isometry3<f64>) -> String {
+        self.picture(name, &render(&board(), camera, pose, &Exposure::ORDINARY, &mut Random(8)))
+    }
+
+    /// The file of a camera of known intrinsics.
+    fn camera(&self, camera: &PinholeCamera) -> String {
+        let camera = sdg_calibration::CalibratedCamera {
+            name: "known".to_owned(),
+            intrinsics: *camera,
+            table: None,
+            flange_from_camera: None,
+        };
+        self.text("known.yaml", &camera.to_yaml())
+    }
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+fn translation(pose: &Value) -> Vector3<f64> {
+    let values = &pose["translation_m"];
+    Vector3::new(number(&values[0]), number(&values[1]), number(&values[2]))
+}
+
+/// The number of an SVG element's attribute.
+fn attribute(element: &str, name: &str) -> Option<f64> {
+    element.split_once(&format!(" {name}=\""))?.1.split_once('"')?.0.parse().ok()
+}
+
+/// What the SVG's squares and dots print, by places in sides of a square from the first square's lower left corner.
+fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
+    let squares: Vec<[f64; 3]> = svg
+        .lines()
+        .filter(|line| line.starts_with("<rect x"))
+        .map(|line| [attribute(line, "x").unwrap(), attribute(line, "y").unwrap(), attribute(line, "width").unwrap()])
+        .filter(|[.., width]| *width == 25.0)
+        .collect();
+    let dots: Vec<([f64; 3], bool)> = svg
+        .lines()
+        .filter(|line| line.starts_with("<circle"))
+        .map(|line| (["cx", "cy", "r"].map(|name| attribute(line, name).unwrap()), line.contains("fill=\"black\"")))
+        .collect();
+    assert_eq!(squares.len(), 27);
+    let [left, top, side] = squares[0];
+    move |place| {
+        let [x, y] = [left + side * place.x, top + side - side * place.y];
+        let dot = dots.iter().find(|([cx, cy, radius], _)| (x - cx).powi(2) + (y - cy).powi(2) < radius * radius);
+        let is_in = |value: f64, low: f64| (low..low + side).contains(&value);
+        dot.map_or_else(
+            || squares.iter().any(|[left, top, _]| is_in(x, *left) && is_in(y, *top)),
+            |(_, is_dark)| *is_dark,
+        )
+    }
+}
+
+#[test]
+fn from_the_sheet_to_a_camera_file_that_detects() {
+    let files = Folder::new();
+    let (svg, pdf) = (files.path("board.svg"), files.path("board.pdf"));
+    said(&["camera", "board", "--out", &svg, "--pdf", &pdf]);
+    assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF-1.7"));
+    let sheet = printed(&fs::read_to_string(&svg).unwrap());
+
+    let camera = CAMERAS[0].1;
+    let mut random = Random(12);
+    let pictures: Vec<String> = poses(&camera)
+        .iter()
+        .enumerate()
+        .map(|(k, pose)| {
+            let picture = render_with(&sheet, &board(), &camera, pose, &Exposure::ORDINARY, &mut random);
+            files.picture(&format!("{k}.png"), &picture)
+        })
+        .collect();
+    let out = files.text("camera.yaml", "# the one above the bench\nexposure_us: 4000\n");
+    let mut arguments = vec!["camera", "calibrate", "--board", &svg, "--out", &out, "--camera-name", "bench", "--json"];
+    arguments.extend(pictures.iter().map(String::as_str));
+    let found = json(&arguments);
+    assert!((number(&found["intrinsics"]["fx"]) / camera.fx - 1.0).abs() < MAX_FOCAL_ERROR, "{found}");
+    // The file has the first pixel's centre at (0, 0).
+    assert!((number(&found["intrinsics"]["cx"]) - (camera.cx - 0.5)).abs() < 1.0, "{found}");
+    assert!(number(&found["rms_px"]) < 0.06 && number(&found["sigma"]["fx"]) > 0.0, "{found}");
+    assert_eq!(found["pictures"].as_array().unwrap().len(), pictures.len());
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.starts_with("# the one above the bench\nexposure_us: 4000\n") && written.contains("\"bench\""));
+
+    let pose = camera_from_board(&board(), &camera, [330.0, 260.0], 0.3, [0.15, -0.1, 0.3]);
+    let picture = render_with(&sheet, &board(), &camera, &pose, &Exposure::ORDINARY, &mut random);
+    let on_table = files.picture("table.png", &picture);
+    let table = json(&["camera", "table", &on_table, "--camera", &out, "--board", &svg, "--json"]);
+    assert_eq!(table["frame"], "table");
+    let off = (translation(&table["frame_from_camera"]) - pose.inverse().translation.vector).norm();
+    assert!(off < MAX_PLACE_ERROR_M, "{off} m");
+    assert!(number(&table["sigma_height_mm"]) < 0.2 && number(&table["rms_px"]) < 0.1, "{table}");
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.contains("exposure_us: 4000\n") && written.contains("table:\n  frame: table\n"), "{written}");
+
+    // The sheet's x along the base's -y, 400 mm in front of the robot, on a plate of 3 mm.
+    let based = files.path("based.yaml");
+    let common = ["camera", "table", &on_table, "--camera", &out, "--board", &svg, "--json"];
+    let place =
+        ["--sheet-in-base-mm", "400,-50", "--sheet-yaw-deg", "-90", "--sheet-thickness-mm", "3", "--out", &based];
+    let in_base = json(&[&common[..], &place].concat());
+    let at = translation(&table["frame_from_camera"]);
+    let expected = Vector3::new(0.4 + at.y, -0.05 - at.x, 0.003 + at.z);
+    assert_eq!(in_base["frame"], "base");
+    assert!((translation(&in_base["frame_from_camera"]) - expected).norm() < 1e-9, "{in_base}");
+
+    // A printer that prints 100 mm as 98: the camera is nearer.
+    let scaled = json(&[&common[..], &["--measured-mm", "98", "--out", &based]].concat());
+    assert!((translation(&scaled["frame_from_camera"]) - at * 0.98).norm() < 1e-6, "{scaled}");
+
+    let model = files.path("part.sdg");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum");
+    let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped.join(name).display().to_string());
+    let wrist = "image_width: 640\nimage_height: 480\ncamera_name: wrist\n\
+                 camera_matrix: {data: [550.0, 0.0, 319.5, 0.0, 550.0, 239.5, 0.0, 0.0, 1.0]}\n\
+                 distortion_model: plumb_bob\ndistortion_coefficients: {data: [0.0, 0.0, 0.0, 0.0, 0.0]}\n\
+                 table:\n  frame: base\n  frame_from_camera: {translation_m: [0.48, 0.0, 0.58], rotation_xyzw: [1.0, 0.0, 0.0, 0.0]}\n";
+    let wrist = files.text("wrist.yaml", wrist);
+    let demonstration = format!("{photo}:{marks}");
+    let teach = ["teach", "--model", "S", "--demo", &demonstration, "--out", &model, "--camera", &wrist];
+    said(&[&teach[..], &["--mark-height-mm", "16"]].concat());
+    let detected = sdg(&["detect", "--grasp-model", &model, "--camera", &out, "--json", &on_table]);
+    // There is no pendulum on the sheet.
+    assert_eq!(detected.status.code(), Some(3), "{}", String::from_utf8_lossy(&detected.stderr));
+    let line: Value = serde_json::from_slice(&detected.stdout).unwrap();
+    assert_eq!(line["width"], 640, "{line}");
+}
+
+/// As a phone: a straight lens, never calibrated.
+const PHONE: PinholeCamera = PinholeCamera {
+    width: 1280,
+    height: 720,
+    fx: 1000.0,
+    fy: 1000.0,
+    cx: 640.0,
+    cy: 360.0,
+    lens: sdg_geometry::PlumbBob::NONE,
+};
+
+#[test]
+fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
+    let files = Folder::new();
+    let out = files.path("phone.yaml");
+    let table = |name: &str, tilt: f64, further: &[&str]| {
+        let pose = camera_from_board(&board(), &PHONE, [640.0, 360.0], 0.4, [tilt, 0.4 * tilt, 0.1]);
+        let picture = files.board(name, &PHONE, &pose);
+        json(&[&["camera", "table", &picture, "--out", &out, "--json"], further].concat())
+    };
+    let tilted = table("tilted.png", 0.3, &[]);
+    assert_eq!(tilted["focal"]["source"], "perspective");
+    let focal = &tilted["focal"];
+    assert!((number(&focal["px"]) - PHONE.fx).abs() < 3.0 * number(&focal["sigma_px"]), "{tilted}");
+    let above = table("above.png", 0.0, &["--mark-height-mm", "20"]);
+    assert_eq!(above["focal"]["source"], "guess");
+    let cost = &above["focal_cost"];
+    assert_eq!(number(&cost["mark_height_mm"]), 20.0);
+    // From straight above at 0.44 m (1108 px guessed for 1000): 20 mm above the table, 0.294 m beside the foot,
+    // 0.294 · 20 · (1 / (0.9 · 443) - 1 / 443) mm.
+    assert!((number(&cost["at_border_mm"]) - 1.47).abs() < 0.1, "{above}");
+    assert!(number(&cost["at_sheet_mm"]) < 0.2, "{above}");
+    assert_eq!(table("given.png", 0.0, &["--focal-px", "1000"])["focal"]["source"], "given");
+    let told = said(&["camera", "table", &files.path("above.png"), "--out", &out]);
+    assert!(told.contains("guessed for a view of 60 degrees") && told.contains("10 % of focal length cost"), "{told}");
+}
+
+/// `poses.yaml` of a camera on the hand, and its pictures.
+fn hand_eye(files: &Folder, camera: &PinholeCamera, scale: f64) -> (String, Isometry3<f64>) {
+    let flange_from_camera = Isometry3::from_parts(Vector3::new(0.05, -0.02, 0.06).into(), turn([0.0, 0.0, 1.0], 0.4));
+    let base_from_board = Isometry3::from_parts(Vector3::new(0.4, -0.1, 0.0).into(), turn([0.0, 0.0, 1.0], 0.1));
+    let mut text = "poses:\n".to_owned();
+    let tilts =
+        [[0.0, 0.0], [0.25, 0.0], [-0.25, 0.1], [0.1, 0.25], [0.1, -0.25], [0.2, 0.2], [-0.2, -0.2], [0.0, 0.28]];
+    for (k, [x, y]) in tilts.into_iter().enumerate() {
+        let roll = 0.12 * (k as f64 - 3.5);
+        let pose = camera_from_board(&board(), camera, [320.0, 240.0], 0.42 + 0.02 * k as f64, [x, y, roll]);
+        files.board(&format!("{k}.png"), camera, &pose);
+        let base_from_flange = base_from_board * pose.inverse() * flange_from_camera.inverse();
+        let translation: [f64; 3] = (base_from_flange.translation.vector * scale).into();
+        let rotation: [f64; 4] = base_from_flange.rotation.coords.into();
+        writeln!(text, "  - picture: {k}.png\n    base_from_flange: {{translation_m: {translation:?}, rotation_xyzw: {rotation:?}}}").unwrap();
+    }
+    (files.text("poses.yaml", &text), flange_from_camera)
+}
+
+#[test]
+fn a_camera_on_the_hand_is_found_and_written() {
+    let files = Folder::new();
+    let camera = CAMERAS[0].1;
+    let known = files.camera(&camera);
+    let (poses, truth) = hand_eye(&files, &camera, 1.0);
+    let out = files.path("hand.yaml");
+    let common = ["camera", "hand-eye", "--camera", &known, "--poses", &poses];
+    let found = json(&[&common[..], &["--mount", "hand", "--out", &out, "--json"]].concat());
+    let off = (translation(&found["flange_from_camera"]) - truth.translation.vector).norm();
+    assert!(off < 0.0005, "{found}");
+    assert!(
+        number(&found["spread_mm"]) < 0.5 && number(&found["sigma_mm"]) < 0.3 && number(&found["rms_px"]) < 0.1,
+        "{found}"
+    );
+    assert_eq!(found["pictures"].as_array().unwrap().len(), 8);
+    assert!(fs::read_to_string(&out).unwrap().contains("hand_eye:\n  flange_from_camera:\n"));
+    let told = said(&[&common[..], &["--mount", "hand"]].concat());
+    assert!(told.contains("flange_from_camera: (") && told.contains("one picture left out"), "{told}");
+    assert_refused(&[&common[..], &["--mount", "base"]].concat(), 1, &["--mount to be the other one"]);
+
+    let (millimetres, _) = hand_eye(&files, &camera, 1000.0);
+    let arguments = ["camera", "hand-eye", "--camera", &known, "--poses", &millimetres, "--mount", "hand"];
+    assert_refused(&arguments, 1, &["0.png", "millimetres given as metres?"]);
+    let other = files.camera(&CAMERAS[1].1);
+    let (poses, _) = hand_eye(&files, &camera, 1.0);
+    let arguments = ["camera", "hand-eye", "--camera", &other, "--poses", &poses, "--mount", "hand"];
+    assert_refused(&arguments, 1, &["1280 × 720", "640 × 480", "at least 4 pictures"]);
+}
+
+#[test]
+fn pictures_and_files_that_cannot_be_used_are_refused_with_what_is_missing() {
+    let files = Folder::new();
+    let camera = CAMERAS[0].1;
+    let seen = |name: &str, pixel: [f64; 2], tilts: [f64; 3]| {
+        files.board(name, &camera, &camera_from_board(&board(), &camera, pixel, 0.3, tilts))
+    };
+    let out = files.path("camera.yaml");
+    let alike: Vec<String> =
+        (0..4).map(|k| seen(&format!("alike{k}.png"), [310.0 + 5.0 * f64::from(k), 240.0], [0.1, 0.1, 0.0])).collect();
+    let [a, b, c, d] = [0, 1, 2, 3].map(|k| alike[k].as_str());
+    let calibrate = |further: &[&str], code, parts: &[&str]| {
+        assert_refused(&[&["camera", "calibrate", "--out", &out], further].concat(), code, parts);
+        assert!(!Path::new(&out).exists());
+    };
+    calibrate(&[a, b, c, d], 1, &["poses are alike", "tilt the board by 20 to 40 degrees"]);
+    calibrate(&[a, b], 1, &["at least 3 pictures", "found 2"]);
+    calibrate(&[a, b, c, "--squares", "8x6"], 1, &["8 x 6 squares", "at least 9 x 6", "--squares"]);
+    calibrate(&[a, b, c, "--square-mm", "0.025"], 2, &["0.5 to 500 mm", "0.025 mm"]);
+    calibrate(&[a, b, c, "--measured-mm", "9.8"], 2, &["90 to 110 mm"]);
+    calibrate(&[a, b, c, "--squares", "9"], 2, &["such as 9x6"]);
+    let edge_on = seen("edge_on.png", [320.0, 240.0], [0.93, 0.0, 0.0]);
+    let cut = seen("cut.png", [790.0, 240.0], [0.1, 0.0, 0.0]);
+    calibrate(
+        &[&edge_on, &cut, a],
+        1,
+        &["edge_on.png: expected the board", "edge-on, cut off", "cut.png: expected", "found 1"],
+    );
+    let other = files.board("other.png", &PHONE, &camera_from_board(&board(), &PHONE, [640.0, 360.0], 0.5, [0.0; 3]));
+    calibrate(&[a, b, &other], 1, &["other.png", "640 x 480", "1280 x 720"]);
+    let text = files.text("text.png", "no picture");
+    calibrate(&[&text], 1, &["text.png", "found none among 1"]);
+
+    let known = files.camera(&camera);
+    let table = |further: &[&str], code, parts: &[&str]| {
+        assert_refused(&[&["camera", "table"], further].concat(), code, parts);
+    };
+    table(&[&other, "--camera", &known], 1, &["other.png", "640 × 480", "1280 × 720"]);
+    table(&[a], 2, &["--out FILE"]);
+    table(&[a, "--camera", &known, "--sheet-in-base-mm", "400"], 2, &["X,Y"]);
+    table(&[a, "--camera", &known, "--sheet-in-base-mm", "400000,0"], 2, &["5000 mm"]);
+    let nonsense = files.text("nonsense.yaml", &fs::read_to_string(&known).unwrap().replace("450.0", "-450.0"));
+    table(&[a, "--camera", &nonsense], 1, &["nonsense.yaml", "positive focal length"]);
+    let steep =
+        files.board("steep.png", &camera, &camera_from_board(&board(), &camera, [320.0, 240.0], 0.2, [0.78, 0.0, 0.0]));
+    table(&[&steep, "--camera", &known], 1, &["steep.png", "horizon"]);
+}

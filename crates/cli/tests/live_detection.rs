@@ -1,0 +1,155 @@
+//! `sdg detect --from`: parts in live pictures, a line for each frame.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use sdg_calibration::{CalibratedCamera, Frame, TablePose};
+use sdg_simulation::table_camera::TableCamera;
+use serde_json::Value;
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
+}
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
+}
+
+fn path(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).to_str().unwrap().to_owned()
+}
+
+/// Model S of the pendulum.
+fn taught(folder: &tempfile::TempDir, further: &[&str]) -> String {
+    let demonstration = format!("{}:{}", shipped("image.png").display(), shipped("annotation.json").display());
+    let out = path(folder, "part.sdg");
+    let done = sdg(&[&["teach", "--model", "S", "--demo", &demonstration, "--out", &out], further].concat());
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    out
+}
+
+fn lines(output: &Output) -> Vec<Value> {
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("{line}"))).collect()
+}
+
+#[test]
+fn a_folder_is_played_and_its_part_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(&folder, &[]);
+    let pictures = folder.path().join("pictures");
+    fs::create_dir(&pictures).unwrap();
+    fs::copy(shipped("image.png"), pictures.join("a.png")).unwrap();
+    let from = format!("dir:{}?loop", pictures.display());
+    let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "40", "--json"]);
+    assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
+    let lines = lines(&detected);
+    assert_eq!(lines.len(), 40);
+    let last = &lines[39];
+    assert_eq!((&last["frame"], &last["width"]), (&39.into(), &640.into()), "{last}");
+    // The first search takes some frames; the last frame's part is followed.
+    let part = &last["detections"][0];
+    assert_eq!((&part["state"], &part["track"]), (&"followed".into(), &lines[38]["detections"][0]["track"]), "{last}");
+    let alone = sdg(&["detect", "--grasp-model", &model, "--json", shipped("image.png").to_str().unwrap()]);
+    let expected: Value = serde_json::from_slice(&alone.stdout).unwrap();
+    for axis in ["x", "y"] {
+        let [found, expected] =
+            [part, &expected["detections"][0]].map(|detection| detection["grasp"][axis].as_f64().unwrap());
+        assert!((found - expected).abs() < 0.5, "{axis}: {found} and {expected}");
+    }
+
+    let every = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "2", "--every-frame"]);
+    let told = String::from_utf8_lossy(&every.stdout).into_owned();
+    assert!(told.lines().count() == 2 && told.starts_with("frame 0: grasp at ("), "{told}");
+}
+
+#[test]
+fn a_rendered_part_is_followed_in_metres() {
+    const SIM: &str = "pendulum?speed=50&turn=30&seed=3&seconds=1.2";
+    let folder = tempfile::tempdir().unwrap();
+    let mut simulated = TableCamera::new(&SIM.parse().unwrap()).unwrap();
+    let camera = CalibratedCamera {
+        name: "sim".into(),
+        intrinsics: simulated.posed_camera().intrinsics,
+        table: Some(TablePose {
+            frame: Frame::Base,
+            height_m: 0.0,
+            frame_from_camera: simulated.posed_camera().world_from_camera,
+            workspace: None,
+        }),
+        flange_from_camera: None,
+    };
+    let file = path(&folder, "sim.yaml");
+    fs::write(&file, camera.to_yaml()).unwrap();
+    let model = taught(&folder, &["--camera", &file, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+    let from = format!("sim:{SIM}");
+    let detected = sdg(&["detect", "--grasp-model", &model, "--camera", &file, "--from", &from, "--json"]);
+    assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
+    let lines = lines(&detected);
+    assert_eq!(lines.len(), 120);
+    let mut num_followed = 0;
+    for line in &lines {
+        let truth = simulated.next_view().unwrap().unwrap().truths[0].grasp.tcp;
+        let Some(part) = line["detections"].as_array().unwrap().first() else { continue };
+        let at: [f64; 3] = serde_json::from_value(part["pose"]["p_m"].clone()).unwrap();
+        let off = (at[0] - truth.x).hypot(at[1] - truth.y);
+        assert!(off < 0.003, "{off} m: {line}");
+        assert!(part["pose"]["sigma_mm"].as_f64().unwrap() < 5.0, "{part}");
+        num_followed += 1;
+    }
+    // Rendering takes longer than following; the first search is over within some frames.
+    assert!(num_followed > 80, "{num_followed} of 120");
+}
+
+#[test]
+fn drawn_frames_are_served_to_browsers() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(&folder, &[]);
+    let from = format!("file:{}?loop&fps=20", shipped("image.png").display());
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+        .args(["detect", "--grasp-model", &model, "--from", &from, "--frames", "200", "--draw", "0", "--json"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = String::new();
+    BufReader::new(child.stderr.take().unwrap()).read_line(&mut first).unwrap();
+    let url = first.trim().strip_prefix("pictures at http://").unwrap_or_else(|| panic!("{first}"));
+    let host = url.trim_end_matches('/');
+    // Until the first frame is drawn there is none to be had.
+    let picture = (0..100).find_map(|_| {
+        let mut stream = TcpStream::connect(host).ok()?;
+        write!(stream, "GET /snapshot.jpg HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").ok()?;
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).ok()?;
+        let body = answer.windows(4).position(|four| four == b"\r\n\r\n")? + 4;
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        image::load_from_memory(&answer[body..]).ok()
+    });
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(picture.expect("a picture").width(), 640);
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(&folder, &[]);
+    let refused = |arguments: &[&str], code: i32, part: &str| {
+        let output = sdg(&[&["detect", "--grasp-model", &model], arguments].concat());
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}");
+    };
+    refused(&["--from", "ftp://camera"], 2, "ftp://camera");
+    refused(&["--from", "dir:/nowhere"], 1, "/nowhere");
+    refused(&["--from", "sim:teapot"], 1, "teapot");
+    refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "port of 127.0.0.1");
+    refused(&["--frames", "3", "a.png"], 2, "expected live pictures (--from)");
+    refused(&["--from", "sim:pendulum", "a.png"], 2, "found images as well");
+    refused(&[], 2, "<IMAGE>");
+}

@@ -1,0 +1,182 @@
+//! A drawn part that moves, is taken away and comes back; searches end some frames after the one that they read.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::time::Duration;
+
+use image::{Rgb, RgbImage};
+use nalgebra::Point2;
+use sdg_demonstration::{Annotation, Demonstration};
+use sdg_geometry::{Angle, GraspLine, PlanarSimilarity, Polygon};
+
+use super::*;
+use crate::facts::ModelKind;
+use crate::teach::{TeachOptions, teach};
+
+const SIZE: [u32; 2] = [320, 240];
+const MIDDLE: Point2<f64> = Point2::new(90.0, 70.0);
+/// From one frame to the next.
+const PERIOD: Duration = Duration::from_millis(10);
+/// Frames that a search takes.
+const SEARCH_FRAMES: u64 = 7;
+/// The drawn part is flat and its picture without noise: what is left is the raster's.
+const MAX_ERROR_PX: f64 = 0.5;
+const MAX_ERROR_RAD: f64 = 0.01;
+
+/// An L with a bright foot and a hole.
+fn outline() -> Polygon {
+    let corners = [(60.0, 40.0), (80.0, 40.0), (80.0, 84.0), (124.0, 84.0), (124.0, 104.0), (60.0, 104.0)];
+    Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() }
+}
+
+/// The parts on a dim ramp, with smooth edges.
+fn picture(parts: &[PlanarSimilarity]) -> RgbImage {
+    let outline = outline();
+    let inverses: Vec<PlanarSimilarity> = parts.iter().map(PlanarSimilarity::inverse).collect();
+    RgbImage::from_fn(SIZE[0], SIZE[1], |x, y| {
+        let table = [50.0 + f64::from(x) / 8.0, 55.0 + f64::from(y) / 8.0, 70.0];
+        let color_at = |at: Point2<f64>| {
+            let on_part = inverses.iter().map(|inverse| inverse.apply(&at)).find(|own| outline.contains(own));
+            match on_part {
+                Some(own) if (own - Point2::new(70.0, 94.0)).norm() < 5.0 => [30.0, 30.0, 35.0],
+                Some(own) if own.x > 100.0 => [230.0, 200.0, 60.0],
+                Some(_) => [190.0, 40.0, 30.0],
+                None => table,
+            }
+        };
+        let mut sum = [0.0; 3];
+        for k in 0..9 {
+            let [right, down] = [k % 3, k / 3].map(|k| (f64::from(k) + 0.5) / 3.0);
+            let color = color_at(Point2::new(f64::from(x) + right, f64::from(y) + down));
+            (0..3).for_each(|c| sum[c] += color[c] / 9.0);
+        }
+        Rgb(sum.map(|value| value.round() as u8))
+    })
+}
+
+fn at(x: f64, y: f64, angle_deg: f64) -> PlanarSimilarity {
+    PlanarSimilarity::about(MIDDLE, Point2::new(x, y), Angle::from_degrees(angle_deg), 1.0)
+}
+
+fn line() -> GraspLine {
+    GraspLine::new(Point2::new(70.0, 50.0), Point2::new(70.0, 80.0))
+}
+
+fn tracker() -> Tracker {
+    let outline = outline();
+    let annotation = Annotation {
+        label: "L".into(),
+        bbox: outline.bounds(),
+        grasp: Some(line()),
+        jaw_width: None,
+        outline: Some(outline),
+    };
+    let demonstration = Demonstration { image: picture(&[PlanarSimilarity::IDENTITY]), annotation };
+    let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
+    let model = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+    Tracker::new(model.into(), TrackerConfig::default())
+}
+
+/// Feeds pictures of parts that lie where `poses` says in each frame; what is tracked in each.
+fn run(tracker: &mut Tracker, count: u64, poses: impl Fn(u64) -> Vec<PlanarSimilarity>) -> Vec<Vec<TrackedPart>> {
+    let mut pending: Option<(SearchOutcome, u64)> = None;
+    (0..count)
+        .map(|number| {
+            if let Some((outcome, _)) = pending.take_if(|(_, due)| *due == number) {
+                tracker.take_outcome(outcome).unwrap();
+            }
+            let parts = tracker.frame(Arc::new(picture(&poses(number))), PERIOD * number as u32);
+            if let Some(search) = tracker.search_due() {
+                assert!(tracker.search_due().is_none(), "one search at a time");
+                pending = Some((search.run(), number + SEARCH_FRAMES));
+            }
+            parts
+        })
+        .collect()
+}
+
+fn assert_at(part: &TrackedPart, pose: &PlanarSimilarity, about: &str) {
+    let expected = line().transformed(pose);
+    let grasp = part.detection.grasp;
+    let off = (grasp.center() - expected.center()).norm();
+    assert!(off < MAX_ERROR_PX, "{about}: {off} px");
+    assert!(grasp.angle.distance(expected.angle()) < MAX_ERROR_RAD, "{about}: {:?}", grasp.angle);
+}
+
+#[test]
+fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
+    // To the right and turning, gone from frame 30 to 44, then elsewhere, going down.
+    let pose = |number: u64| {
+        let k = number as f64;
+        match number {
+            0..30 => vec![at(80.0 + 1.5 * k, 90.0, 0.4 * k)],
+            30..45 => Vec::new(),
+            _ => vec![at(230.0, 60.0 + 1.5 * (k - 45.0), 200.0)],
+        }
+    };
+    let mut tracker = tracker();
+    let all = run(&mut tracker, 75, pose);
+    let first = all.iter().position(|parts| !parts.is_empty()).unwrap();
+    assert_eq!(first as u64, SEARCH_FRAMES);
+    for (number, parts) in all.iter().enumerate().take(30).skip(first) {
+        assert_eq!((parts.len(), parts[0].state), (1, TrackState::Followed), "{number}");
+        assert_at(&parts[0], &pose(number as u64)[0], &format!("frame {number}"));
+    }
+    assert_eq!(all[29][0].age, PERIOD * 29);
+    for parts in &all[30..45] {
+        assert_eq!((parts[0].state, parts[0].id), (TrackState::Lost, 0));
+    }
+    assert_eq!(all[34][0].unseen_for, PERIOD * 5);
+    let again: Vec<_> =
+        all.iter().enumerate().filter(|(_, parts)| parts.iter().any(|p| p.state == TrackState::FoundAgain)).collect();
+    let [(number, parts)] = again[..] else { panic!("found again {} times", again.len()) };
+    assert!(number <= 45 + 2 * SEARCH_FRAMES as usize, "{number}");
+    assert_eq!((parts.len(), parts[0].id, parts[0].unseen_for), (1, 0, Duration::ZERO));
+    for (number, parts) in all.iter().enumerate().skip(number) {
+        assert_at(&parts[0], &pose(number as u64)[0], &format!("frame {number}"));
+    }
+}
+
+#[test]
+fn two_parts_have_two_ids_and_a_lost_one_is_forgotten() {
+    let pose = |number: u64| {
+        let k = number as f64;
+        let mut parts = vec![at(80.0, 90.0 + k, 0.0)];
+        if number < 40 {
+            parts.push(at(230.0, 160.0 - k, 90.0));
+        }
+        parts
+    };
+    let mut tracker = tracker();
+    tracker.config.forget_after = Duration::from_millis(150);
+    let all = run(&mut tracker, 70, pose);
+    for number in [20, 39] {
+        let ids: Vec<_> = all[number].iter().map(|part| part.id).collect();
+        assert_eq!(ids, [0, 1], "{number}");
+    }
+    assert_eq!(all[50].iter().filter(|part| part.is_followed()).count(), 1);
+    assert_eq!(all[69].len(), 1);
+    assert!(all[69][0].is_followed());
+}
+
+#[test]
+fn frames_of_another_size_begin_a_new_sequence() {
+    let mut tracker = tracker();
+    let all = run(&mut tracker, 12, |_| vec![at(100.0, 100.0, 0.0)]);
+    assert_eq!(all[11].len(), 1);
+    let search = tracker.search_due();
+    let other = Arc::new(RgbImage::new(200, 100));
+    assert!(tracker.frame(other, PERIOD * 12).is_empty());
+    if let Some(search) = search {
+        // What belongs to the old sequence is ignored.
+        tracker.take_outcome(search.run()).unwrap();
+    }
+    assert!(tracker.frame(Arc::new(RgbImage::new(200, 100)), PERIOD * 13).is_empty());
+}
+
+#[test]
+fn the_same_frames_give_the_same_tracks() {
+    let pose = |number: u64| vec![at(90.0 + 1.2 * number as f64, 100.0, 1.0 * number as f64)];
+    let [one, again] = [0; 2].map(|_| run(&mut tracker(), 25, pose));
+    assert_eq!(one, again);
+}
