@@ -70,6 +70,7 @@ fn a_page_without_photos_takes_the_frame_that_was_shown() {
     // The camera goes on; the photo is of what was seen.
     camera.show(8, RgbImage::new(200, 100));
     let jpeg = served.ask("GET", "/api/live/7/picture", b"");
+    assert!(jpeg.head.to_lowercase().contains("content-type: image/jpeg"), "{}", jpeg.head);
     assert_eq!(image::load_from_memory(&jpeg.body).unwrap().into_rgb8().dimensions(), (200, 100));
     let taken = post(&served, "/api/live/7/photo").json();
     assert_eq!((&taken["id"], &taken["name"]), (&json!(0), &json!("photo.png")));

@@ -93,7 +93,7 @@ pub struct AnnotateArgs {
     /// Live pictures, to take photos on the page and to try the model on: v4l:, v4l:/dev/video2, http://HOST/PATH,
     /// 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Photos are written as photo.png, photo-2.png … into the current
     /// folder, or as IMAGE
-    #[arg(long, value_name = "ADDRESS")]
+    #[arg(long, value_name = "ADDRESS", help_heading = "Live pictures")]
     pub from: Option<Address>,
     /// A picture, or a folder of pictures, to try the taught model on; repeat for several. The page takes more
     #[arg(long = "try", value_name = "PATH")]
@@ -116,6 +116,9 @@ pub struct AnnotateArgs {
     /// Print the address as one JSON object
     #[arg(long)]
     pub json: bool,
+    /// What the camera is asked for; with --camera, its size is that file's
+    #[command(flatten)]
+    pub request: RequestArgs,
 }
 
 /// The camera that took the photos to teach from.
@@ -376,6 +379,7 @@ pub struct EvaluateArgs {
         value_delimiter = ',',
         num_args = 0..=1,
         conflicts_with_all = ["unverified"],
+        group = "sheet",
         help_heading = AXES
     )]
     pub axes: Option<Vec<String>>,
@@ -388,6 +392,7 @@ pub struct EvaluateArgs {
         value_delimiter = ',',
         num_args = 0..=1,
         conflicts_with_all = ["unverified", "axes"],
+        group = "sheet",
         help_heading = AXES
     )]
     pub cameras: Option<Vec<String>>,
@@ -397,6 +402,7 @@ pub struct EvaluateArgs {
         default_value_t = 20,
         value_name = "N",
         value_parser = clap::value_parser!(u32).range(1..=10_000),
+        requires = "sheet",
         help_heading = AXES
     )]
     pub axis_views: u32,
@@ -694,7 +700,7 @@ mod tests {
             "sdg demo",
             "sdg demo --json",
             "sdg annotate photo.png",
-            "sdg annotate --from v4l:",
+            "sdg annotate --from v4l: --size 1280x720 --exposure-ms 8",
             "sdg annotate --from dir:pictures?loop part.png --camera c.yaml --mark-height-mm 12",
             "sdg annotate a.png b.png:b.json --try table --out m.sdg --port 8080 --no-browser --json",
             "sdg teach --model C --demo a.png:a.json --demo b.png:b.json --out m.sdg --preset edge --symmetry full --seed 3 --time-budget 60 --report r",

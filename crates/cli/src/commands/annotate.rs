@@ -33,7 +33,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         files::check_writable(out)?;
     }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
-    let open = |(from, photo_path)| open_camera(from, calibration, photo_path);
+    let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;
     let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone(), live };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
@@ -53,8 +53,13 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-fn open_camera(from: Address, calibration: Option<CameraFile>, photo_path: PathBuf) -> Result<LiveOptions> {
-    let (camera, address) = PageCamera::open(from, OpenOptions::default(), calibration)?;
+fn open_camera(
+    from: Address,
+    options: OpenOptions,
+    calibration: Option<CameraFile>,
+    photo_path: PathBuf,
+) -> Result<LiveOptions> {
+    let (camera, address) = PageCamera::open(from, options, calibration)?;
     Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
 }
 
