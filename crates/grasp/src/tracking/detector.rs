@@ -14,20 +14,20 @@ use crate::plan::{PixelRect, PlanDetector, PlanarPose};
 #[derive(Debug, Clone)]
 pub enum PartDetector {
     /// Poses in pixels alone.
-    Picture(GraspModel),
+    Picture(Box<GraspModel>),
     /// Poses in metres, too.
-    Plan(PlanDetector),
+    Plan(Box<PlanDetector>),
 }
 
 impl From<GraspModel> for PartDetector {
     fn from(model: GraspModel) -> Self {
-        Self::Picture(model)
+        Self::Picture(Box::new(model))
     }
 }
 
 impl From<PlanDetector> for PartDetector {
     fn from(detector: PlanDetector) -> Self {
-        Self::Plan(detector)
+        Self::Plan(Box::new(detector))
     }
 }
 
