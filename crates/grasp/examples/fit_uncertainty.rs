@@ -56,8 +56,12 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
         if detector.is_none() {
             let shown = scenes.photo(0);
             let height_m = f64::from(part.grasp().height_mm) * 1e-3;
-            let (seen, lengths) =
-                seen_from_above(&[shown.demonstration.clone()], &over_table(shown.camera), height_m, 0.5 * height_m)?;
+            let (seen, lengths) = seen_from_above(
+                std::slice::from_ref(&shown.demonstration),
+                &over_table(shown.camera),
+                height_m,
+                0.5 * height_m,
+            )?;
             let options = TeachOptions {
                 kind: ModelKind::S,
                 symmetry: part.symmetry(),

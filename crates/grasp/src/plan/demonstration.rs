@@ -5,7 +5,7 @@ use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
 
 use super::picture::PlanMap;
-use super::{CameraOverTable, Lengths, plan_view};
+use super::{CameraOverTable, Lengths, plan_view, slant};
 use crate::error::{GraspError, Result};
 
 /// Photos and their marks in the plan view of the marks' plane, and how fine that is: as the first photo shows the part.
@@ -25,7 +25,9 @@ pub fn seen_from_above(
     let height_m = over_table.table_height_m + mark_height_m;
     let off_plane = || GraspError::OffPlane { x: center.x, y: center.y, height_m };
     let length = over_table.camera.metres_per_pixel(&center, height_m).ok_or_else(off_plane)?;
-    let lengths = Lengths { pixels_per_m: 1.0 / length, mark_height_m, grasp_height_m };
+    let on_plane = over_table.camera.at_height(&center, height_m).ok_or_else(off_plane)?;
+    let slant = slant(&over_table.camera, &on_plane);
+    let lengths = Lengths { pixels_per_m: 1.0 / length, mark_height_m, grasp_height_m, slant };
     let view = plan_view(over_table, &lengths)?;
     let map = PlanMap::new(&over_table.camera, &view);
     let made = demonstrations

@@ -13,7 +13,7 @@ mod picture;
 mod uncertainty;
 
 use image::RgbImage;
-use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 use serde::{Deserialize, Serialize};
 
@@ -33,15 +33,22 @@ pub struct Lengths {
     pub mark_height_m: f64,
     /// Height over the table at which the gripper closes, in metres.
     pub grasp_height_m: f64,
+    /// From where the first photo showed the part: see [`slant`]. 0 in models of before.
+    #[serde(default)]
+    pub slant: [f64; 2],
 }
 
 impl Lengths {
     /// # Errors
     /// [`GraspError::Damaged`] for what no camera and no part has.
     pub(crate) fn check(&self) -> Result<()> {
-        let Self { pixels_per_m, mark_height_m, grasp_height_m } = *self;
+        let Self { pixels_per_m, mark_height_m, grasp_height_m, slant } = *self;
         let is_height = |height: f64| (0.0..MAX_HEIGHT_M).contains(&height);
-        if (1.0..MAX_PIXELS_PER_M).contains(&pixels_per_m) && is_height(mark_height_m) && is_height(grasp_height_m) {
+        if (1.0..MAX_PIXELS_PER_M).contains(&pixels_per_m)
+            && is_height(mark_height_m)
+            && is_height(grasp_height_m)
+            && slant.iter().all(|share| share.is_finite())
+        {
             return Ok(());
         }
         Err(GraspError::Damaged {
@@ -195,11 +202,14 @@ impl PlanDetector {
         seen: &Point2<f64>,
     ) -> Option<Circumstances> {
         let camera = &self.over_table.camera;
-        let sight = on_plane.coords - camera.world_from_camera.translation.vector;
         let BoundingBox { x1, y1, x2, y2 } = detection.bbox;
+        // The photo's slant, turned with the part.
+        let taught = self.model.demonstrations().first()?.marks.grasp.angle();
+        let turn = Rotation2::new(detection.grasp.angle.radians() - taught.radians());
+        let changed = Vector2::from(slant(camera, on_plane)) - turn * Vector2::from(self.lengths.slant);
         Some(Circumstances {
             pixel_m: camera.metres_per_pixel(seen, self.view.height_m)?,
-            slant: sight.xy().norm() / sight.z.abs(),
+            slant: changed.norm(),
             mark_height_m: self.lengths.mark_height_m,
             diagonal_m: (x2 - x1).hypot(y2 - y1) / self.view.pixels_per_m,
             agreement: detection.agreement.unwrap_or(0.0),
@@ -246,6 +256,13 @@ impl PlanDetector {
             width: (self.shown(&one)? - self.shown(&other)?).norm(),
         })
     }
+}
+
+/// The tangent of the angle between a line of sight and the vertical, in the directions x and y of the plan view: how far what
+/// stands a metre above the point appears displaced.
+pub(crate) fn slant(camera: &PosedCamera, point: &Point3<f64>) -> [f64; 2] {
+    let sight = point.coords - camera.world_from_camera.translation.vector;
+    [sight.x / -sight.z, sight.y / sight.z]
 }
 
 /// What the camera sees of the marks' plane, as fine as the model's demonstrations.

@@ -27,7 +27,7 @@ use self::motion::Mover;
 use self::scene::{away, lanes, middle_of, mjcf, renamed, scene};
 use crate::camera::posed_camera;
 use crate::data::Data;
-use crate::error::Result;
+use crate::error::{Result, SimulationError};
 use crate::model::{Camera, Id, Joint, Model};
 use crate::objects::ObjectSpec;
 use crate::render::{RenderConfig, Renderer};
@@ -228,8 +228,9 @@ impl TableCamera {
 
 impl sdg_camera::Camera for TableCamera {
     fn next_frame(&mut self) -> std::result::Result<Option<Frame>, CameraError> {
-        // What the renderer refuses it refuses for good: the sequence ends.
-        let Ok(Some(view)) = self.next_view() else { return Ok(None) };
+        let camera = self.address.to_string();
+        let ended = |error: SimulationError| CameraError::Ended { camera, why: error.to_string() };
+        let Some(view) = self.next_view().map_err(ended)? else { return Ok(None) };
         let (captured, camera) = (self.began + view.time, self.address.clone());
         Ok(Some(Frame { captured, ..Frame::new(view.picture, view.number, camera) }))
     }
