@@ -34,6 +34,7 @@ pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
 pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, draw, other_view};
 pub use table::{Table, TableSurface};
+pub(crate) use views::shows_whole;
 pub use views::{
     DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
     in_picture, test_view, test_views,

@@ -7,12 +7,12 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 
-use super::{GraspTruth, PlacedObject, SceneVariation, VariationConfig, in_picture, pose_attributes};
+use super::{GraspTruth, PlacedObject, SceneVariation, VariationConfig, pose_attributes, shows_whole};
 use crate::camera::CameraView;
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
@@ -80,8 +80,6 @@ pub const OTHER_CAMERAS: [OtherCamera; 3] = [
 const TILTS_DEG: [f64; 2] = [0.0, 25.0];
 /// How far beside the part the camera looks, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.05;
-/// Least distance of the part to the picture's border, in pixels.
-const RIM_PX: f64 = 8.0;
 /// Places that are tried until the whole part is in the picture.
 const MAX_TRIES: usize = 40;
 /// The first joint's angle at which the arm points away from the table, in radians.
@@ -183,15 +181,6 @@ fn looking_at(part: &PlacedObject, distance_m: f64, tilt_deg: f64, rng: &mut Pcg
     let tilted = UnitQuaternion::from_axis_angle(&axis, tilt_deg.to_radians());
     let about_aim = Translation3::from(aim) * tilted * Translation3::from(-aim);
     about_aim * camera_looking_down(aim.x, aim.y, distance_m, yaw_rad)
-}
-
-/// Whether the part's outline, on the table and at the height of its marks, lies in the picture.
-fn shows_whole(camera: &PosedCamera, part: &PlacedObject) -> bool {
-    part.footprint().iter().all(|corner| {
-        [0.0, part.spec.mark_height_m].into_iter().all(|z| {
-            camera.project(&Point3::new(corner.x, corner.y, z)).is_some_and(|pixel| in_picture(camera, &pixel, RIM_PX))
-        })
-    })
 }
 
 fn no_place(camera: &OtherCamera, part: &str) -> SimulationError {

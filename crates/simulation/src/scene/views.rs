@@ -154,6 +154,18 @@ pub fn in_picture(camera: &PosedCamera, point: &Point2<f64>, margin_px: f64) -> 
     (margin_px..=width - margin_px).contains(&point.x) && (margin_px..=height - margin_px).contains(&point.y)
 }
 
+/// Least distance of a part that is shown whole to the picture's border, in pixels.
+const RIM_PX: f64 = 8.0;
+
+/// Whether a part's outline, on the table and at the height of its marks, lies in the picture.
+pub(crate) fn shows_whole(camera: &PosedCamera, part: &PlacedObject) -> bool {
+    part.footprint().iter().all(|corner| {
+        [0.0, part.spec.mark_height_m].into_iter().all(|z| {
+            camera.project(&Point3::new(corner.x, corner.y, z)).is_some_and(|pixel| in_picture(camera, &pixel, RIM_PX))
+        })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::Rng;
 use sdg_geometry::PosedCamera;
 
 use super::{AxisParameter, Drawn, Request};
 use crate::attempt::AttemptConfig;
 use crate::error::{Result, SimulationError};
-use crate::scene::{PlacedObject, in_picture};
+use crate::scene::{PlacedObject, shows_whole};
 use crate::workcell::{Workcell, WorkcellConfig, camera_looking_down};
 
 /// Heights of the camera over the usual one.
@@ -20,9 +20,6 @@ const TILTS_DEG: std::ops::Range<f64> = 5.0..20.0;
 
 /// How far beside the part a tilted camera looks, in metres.
 const MAX_LOOK_OFFSET_M: f64 = 0.06;
-
-/// Least distance of the part to the picture's rim, in pixels.
-const RIM_PX: f64 = 8.0;
 
 /// Directions of tilt that are tried until the arm reaches the camera's pose and the part is in the picture.
 const MAX_TRIES: usize = 40;
@@ -107,13 +104,4 @@ fn first_view(
         expected: "a place that shows the whole part".into(),
         found: format!("none for {} at {}", part.spec.name, part.base_from_object.translation.vector),
     }))
-}
-
-/// Whether the part's outline, on the table and at the height of its marks, lies in the picture.
-fn shows_whole(camera: &PosedCamera, part: &PlacedObject) -> bool {
-    part.footprint().iter().all(|corner| {
-        [0.0, part.spec.mark_height_m].into_iter().all(|z| {
-            camera.project(&Point3::new(corner.x, corner.y, z)).is_some_and(|pixel| in_picture(camera, &pixel, RIM_PX))
-        })
-    })
 }
