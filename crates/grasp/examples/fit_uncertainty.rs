@@ -9,14 +9,15 @@
 
 use std::ops::ControlFlow;
 
-use nalgebra::Point3;
+use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
-use sdg_geometry::RotationalSymmetry;
+use sdg_demonstration::Demonstration;
+use sdg_geometry::{GraspLine, RotationalSymmetry};
 use sdg_grasp::{
     CameraOverTable, Circumstances, ErrorLength, ModelKind, PlanDetector, TeachOptions, Verification, seen_from_above,
     teach,
 };
-use sdg_part_generator::{Condition, Part, PhotoConfig, SceneConfig, Scenes};
+use sdg_part_generator::{Condition, DemonstrationPhoto, Part, PhotoConfig, SceneConfig, Scenes};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -37,6 +38,19 @@ fn over_table(camera: sdg_geometry::PosedCamera) -> CameraOverTable {
     CameraOverTable { camera, table_height_m: 0.0, workspace: None }
 }
 
+/// The photo with its marks straight above where they are, on the part's surface.
+fn marked_on_surface(shown: &DemonstrationPhoto, marked_m: f64, surface_m: f64) -> Result<Demonstration> {
+    let mut demonstration = shown.demonstration.clone();
+    let raised = |mark: Point2<f64>| {
+        let at = shown.camera.at_height(&mark, marked_m)?;
+        shown.camera.project(&Point3::new(at.x, at.y, surface_m))
+    };
+    let line = demonstration.annotation.grasp.ok_or("expected marks")?;
+    let ends = raised(line.start).zip(raised(line.end)).ok_or("expected marks that the camera shows")?;
+    demonstration.annotation.grasp = Some(GraspLine::new(ends.0, ends.1));
+    Ok(demonstration)
+}
+
 fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
     let part = Part::generate(part_seed);
     let [width, height] = size;
@@ -55,13 +69,11 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
         let scenes = Scenes::new(std::slice::from_ref(&part), config, part_seed.wrapping_mul(100) + idx as u64)?;
         if detector.is_none() {
             let shown = scenes.photo(0);
-            let height_m = f64::from(part.grasp().height_mm) * 1e-3;
-            let (seen, lengths) = seen_from_above(
-                std::slice::from_ref(&shown.demonstration),
-                &over_table(shown.camera),
-                height_m,
-                0.5 * height_m,
-            )?;
+            // The generator's marks lie half as high as the part is there; a user measures the surface that he marks.
+            let surface_m = 2e-3 * f64::from(part.grasp().height_mm);
+            let demonstration = marked_on_surface(shown, 0.5 * surface_m, surface_m)?;
+            let (seen, lengths) =
+                seen_from_above(&[demonstration], &over_table(shown.camera), surface_m, 0.5 * surface_m)?;
             let options = TeachOptions {
                 kind: ModelKind::S,
                 symmetry: part.symmetry(),

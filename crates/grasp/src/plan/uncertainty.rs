@@ -54,9 +54,9 @@ pub struct ErrorLength {
 
 impl ErrorLength {
     /// Of the position.
-    pub const POSITION: Self = Self { pixels: 0.228, by_disagreement: 2.3, by_slant: 0.769, by_height: 0.021 };
+    pub const POSITION: Self = Self { pixels: 0.279, by_disagreement: 1.89, by_slant: 0.436, by_height: 0.039 };
     /// Of the turn, at the distance of the part's diagonal.
-    pub const TURN: Self = Self { pixels: 0.17, by_disagreement: 3.3, by_slant: 0.636, by_height: 0.052 };
+    pub const TURN: Self = Self { pixels: 0.133, by_disagreement: 3.85, by_slant: 0.325, by_height: 0.019 };
 
     /// The length in metres.
     pub fn metres(&self, circumstances: &Circumstances) -> f64 {
@@ -84,13 +84,13 @@ mod tests {
     fn each_cause_adds_to_the_errors() {
         let clear = Circumstances { pixel_m: 0.001, slant: 0.0, mark_height_m: 0.0, diagonal_m: 0.1, agreement: 1.0 };
         let error = |circumstances: Circumstances| circumstances.uncertainty();
-        assert!((error(clear).position_m - 0.228e-3).abs() < 1e-12);
-        assert!((error(clear).yaw_rad - 1.7e-3).abs() < 1e-12);
-        // Half the agreement: e^1.15 times the noise.
+        assert!((error(clear).position_m - 0.279e-3).abs() < 1e-12);
+        assert!((error(clear).yaw_rad - 1.33e-3).abs() < 1e-12);
+        // Half the agreement: e^0.945 times the noise.
         let half = error(Circumstances { agreement: 0.5, ..clear });
-        assert!((half.position_m / 0.228e-3 - 1.15f64.exp()).abs() < 1e-9);
+        assert!((half.position_m / 0.279e-3 - 0.945f64.exp()).abs() < 1e-9);
         let high = Circumstances { mark_height_m: 0.02, ..clear };
-        assert!((error(high).position_m - 0.228e-3f64.hypot(0.42e-3)).abs() < 1e-12);
+        assert!((error(high).position_m - 0.279e-3f64.hypot(0.78e-3)).abs() < 1e-12);
         let beside = Circumstances { slant: 0.3, ..high };
         assert!(error(beside).position_m > error(high).position_m && error(beside).yaw_rad > error(high).yaw_rad);
         // A larger part turns less for the same error of its edges.
