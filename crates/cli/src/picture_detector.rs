@@ -32,14 +32,17 @@ pub struct Found {
 }
 
 impl PictureDetector {
-    /// Puts a model behind the camera of a file, if one is given.
+    /// Puts the model of a file behind the camera of a file, if one is given.
     ///
     /// # Errors
-    /// A camera file that cannot be used; a model that was taught without a camera.
-    pub fn new(model: GraspModel, camera: Option<&Path>) -> Result<Self> {
+    /// A camera file that cannot be used; a model that was taught without a camera, with its file's name.
+    pub fn new(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Self> {
         match camera {
             None => Ok(Self::AnyCamera(Box::new(model))),
-            Some(path) => Self::calibrated(model, CameraFile::read(path)?),
+            Some(path) => {
+                let camera = CameraFile::read(path)?;
+                Self::calibrated(model, camera).with_context(|| model_file.display().to_string())
+            }
         }
     }
 
@@ -79,6 +82,14 @@ impl PictureDetector {
         match self {
             Self::AnyCamera(_) => Ok(()),
             Self::Calibrated(camera, _) => camera.check_picture(picture),
+        }
+    }
+
+    /// Width and height of the calibrated camera's pictures.
+    pub fn picture_size(&self) -> Option<[u32; 2]> {
+        match self {
+            Self::AnyCamera(_) => None,
+            Self::Calibrated(camera, _) => Some(camera.size_px()),
         }
     }
 

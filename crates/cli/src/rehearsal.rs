@@ -147,7 +147,7 @@ impl Rehearsal<'_> {
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
         let mut workcell =
             Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
-        let mut perception = ModelPerception { rehearsal: self, told: self.told(number), last: None };
+        let mut perception = ModelPerception { rehearsal: self, told: self.told(number), detector: None, last: None };
         let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
@@ -227,18 +227,24 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
 struct ModelPerception<'a> {
     rehearsal: &'a Rehearsal<'a>,
     told: ObjectSpec,
+    /// With a calibrated camera: ready since the first picture.
+    detector: Option<PlanDetector>,
     last: Option<RgbImage>,
 }
 
 impl ModelPerception<'_> {
     /// What the model finds, in pixels of the picture.
-    fn detect(&self, view: &CameraView) -> std::result::Result<Vec<GraspDetection>, GraspError> {
+    fn detect(&mut self, view: &CameraView) -> std::result::Result<Vec<GraspDetection>, GraspError> {
         let Rehearsal { model, verification, camera, .. } = self.rehearsal;
         if camera.is_none() {
             return model.detect(&view.image, *verification);
         }
         let over_table = CameraOverTable { camera: view.camera, table_height_m: 0.0, workspace: None };
-        let found = PlanDetector::new((*model).clone(), &over_table)?.detect(&view.image, *verification)?;
+        let detector = match self.detector.take() {
+            Some(detector) => detector.moved_to(&over_table)?,
+            None => PlanDetector::new((*model).clone(), &over_table)?,
+        };
+        let found = self.detector.insert(detector).detect(&view.image, *verification)?;
         Ok(found.into_iter().map(|found| found.detection).collect())
     }
 }

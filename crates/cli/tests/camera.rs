@@ -12,19 +12,7 @@ use sdg_simulation::scene::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
-const CAMERA: &str = "\
-image_width: 640
-image_height: 480
-camera_name: wrist
-camera_matrix: {rows: 3, cols: 3, data: [550.0, 0.0, 319.5, 0.0, 550.0, 239.5, 0.0, 0.0, 1.0]}
-distortion_model: plumb_bob
-distortion_coefficients: {rows: 1, cols: 5, data: [0.0, 0.0, 0.0, 0.0, 0.0]}
-table:
-  frame: base
-  frame_from_camera:
-    translation_m: [0.48, 0.0, 0.58]
-    rotation_xyzw: [0.7071067811865475, -0.7071067811865476, 0.0, 0.0]
-";
+const CAMERA: &str = include_str!("wrist.yaml");
 
 fn sdg(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()

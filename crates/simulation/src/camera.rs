@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 use image::RgbImage;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+use sdg_geometry::{PinholeCamera, PosedCamera};
 
 use crate::data::Data;
 use crate::error::Result;
@@ -42,15 +42,7 @@ pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> Pos
     let (width, height) = (renderer.config().width, renderer.config().height);
     let focal_px = 0.5 * f64::from(height) / (0.5 * data.model().vertical_field_of_view_rad(camera)).tan();
     PosedCamera {
-        intrinsics: PinholeCamera {
-            width,
-            height,
-            fx: focal_px,
-            fy: focal_px,
-            cx: 0.5 * f64::from(width),
-            cy: 0.5 * f64::from(height),
-            lens: PlumbBob::NONE,
-        },
+        intrinsics: PinholeCamera::symmetric(width, height, focal_px),
         world_from_camera: data.world_from_mujoco_camera(camera) * mujoco_camera_from_optical(),
     }
 }

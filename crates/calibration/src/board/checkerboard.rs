@@ -144,7 +144,7 @@ mod tests {
         turned.map(|(x, y)| (column + x, row + y)).map(|(x, y)| (Board::is_dark(x, y), Board::has_dot(x, y))).collect()
     }
 
-    fn least_difference(side: u32) -> usize {
+    fn min_difference(side: u32) -> usize {
         let windows: Vec<_> = (0..=6 - side)
             .flat_map(|row| (0..=9 - side).map(move |column| [column, row]))
             .flat_map(|place| (0..4).map(move |turn| window(side, place, turn)))
@@ -157,8 +157,8 @@ mod tests {
 
     #[test]
     fn dots_tell_every_place_and_turn_apart() {
-        assert!(least_difference(3) >= 1);
-        assert!(least_difference(4) >= 4);
+        assert!(min_difference(3) >= 1);
+        assert!(min_difference(4) >= 4);
     }
 
     #[test]

@@ -40,8 +40,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
         model = model.with_max_detections(args.max as usize)?;
     }
-    let detector =
-        PictureDetector::new(model, args.camera.as_deref()).with_context(|| args.grasp_model.display().to_string())?;
+    let detector = PictureDetector::new(model, &args.grasp_model, args.camera.as_deref())?;
     if let Some(address) = &args.from {
         return detect_live::run(args, address, detector);
     }

@@ -40,14 +40,14 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
             Some(server)
         }
     };
-    let mut frames = Frames::open(address, args)?;
-    let mut eyes = Finder::new(args, detector)?;
+    let mut frames = Frames::open(address, args, detector.picture_size())?;
+    let mut finder = Finder::new(args, detector)?;
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
     let mut found_any = false;
     let mut left = args.frames.unwrap_or(u64::MAX);
     while left > 0 && !interrupt.is_requested() {
-        let frame = match frames.next() {
+        let mut frame = match frames.next() {
             Next::Frame(frame) => frame,
             Next::None => continue,
             Next::End => break,
@@ -59,12 +59,11 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         };
         left -= 1;
         let began = Instant::now();
-        let picture = Arc::new(frame.picture);
-        let frame = Frame { picture: image::RgbImage::default(), ..frame };
-        let parts = eyes.find(&picture, frame.captured)?;
+        let picture = Arc::new(std::mem::take(&mut frame.picture));
+        let parts = finder.find(&picture, frame.captured)?;
         let seconds = began.elapsed().as_secs_f64();
         found_any |= parts.iter().any(Part::is_seen);
-        write_line(&mut stdout, args, &eyes.detector, &frame, picture.dimensions(), seconds, &parts)?;
+        write_line(&mut stdout, args, &finder.detector, &frame, picture.dimensions(), seconds, &parts)?;
         if let Some(server) = &server {
             let seen: Vec<GraspDetection> =
                 parts.iter().filter(|part| part.is_seen()).map(|part| part.found.detection.clone()).collect();
@@ -89,8 +88,13 @@ enum Next {
 }
 
 impl Frames {
-    fn open(address: &Address, args: &DetectArgs) -> Result<Self> {
-        let camera = live_pictures::open(address, &args.request.options())?;
+    /// A calibrated camera is asked for the size that it was calibrated with.
+    fn open(address: &Address, args: &DetectArgs, calibrated_size: Option<[u32; 2]>) -> Result<Self> {
+        let mut options = args.request.options();
+        if let Some([width, height]) = calibrated_size {
+            (options.width, options.height) = (width, height);
+        }
+        let camera = live_pictures::open(address, &options)?;
         Ok(match address {
             Address::Folder { .. } | Address::File { .. } | Address::Sim(_) => Self::Each(camera),
             _ => Self::Newest(LatestFrame::spawn(camera)),

@@ -26,7 +26,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         );
     };
     let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
-    let detector = PictureDetector::new(model, args.camera.as_deref())?;
+    let detector = PictureDetector::new(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));

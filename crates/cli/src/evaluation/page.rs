@@ -11,7 +11,7 @@ use super::paper;
 use super::records::{AttemptRecord, LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use super::summary::{Figures, ModelSummary, Summary};
-use super::tables::{Titled, notice, tables};
+use super::tables::{Titled, notice, tables, this_run};
 
 /// Success at a glance, the tables and a picture of every cell, group by group.
 pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
@@ -65,12 +65,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
         }
     }
     Ok(report
-        .section(
-            Section::new("This run")
-                .lead("Everything needed to see the same numbers again.")
-                .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
-                .command(command),
-        )
+        .section(this_run(facts, command))
         .footer("Made by sdg. This page is one file: it fetches nothing and runs no script."))
 }
 

@@ -39,6 +39,12 @@ impl PinholeCamera {
         Self { width, height, fx, fy, cx, cy, lens: PlumbBob::NONE }.checked()
     }
 
+    /// A camera without distortion whose axis is in the middle of its picture, and whose pixels are square.
+    pub fn symmetric(width: u32, height: u32, focal_px: f64) -> Self {
+        let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
+        Self { width, height, fx: focal_px, fy: focal_px, cx, cy, lens: PlumbBob::NONE }
+    }
+
     /// The same camera, if it can be one.
     ///
     /// # Errors

@@ -217,8 +217,8 @@ impl Track {
         time: Duration,
         followed: &Followed,
     ) -> Option<f64> {
-        let least = self.part.demonstration(detector).check().search.least_agreement;
-        if followed.agreement < least {
+        let min_agreement = self.part.demonstration(detector).check().search.least_agreement;
+        if followed.agreement < min_agreement {
             return None;
         }
         let is_the_same = self.likeness.is_some_and(|last| {

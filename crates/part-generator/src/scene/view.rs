@@ -1,7 +1,7 @@
 //! The camera over the table.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
-use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+use sdg_geometry::{PinholeCamera, PosedCamera};
 
 /// A pinhole camera that looks down at the table.
 ///
@@ -136,15 +136,7 @@ impl View {
         let [width, height] = [self.width, self.height].map(|side| side as u32);
         let focal = f64::from(self.focal);
         PosedCamera {
-            intrinsics: PinholeCamera {
-                width,
-                height,
-                fx: focal,
-                fy: focal,
-                cx: 0.5 * f64::from(width),
-                cy: 0.5 * f64::from(height),
-                lens: PlumbBob::NONE,
-            },
+            intrinsics: PinholeCamera::symmetric(width, height, focal),
             world_from_camera: Isometry3::from_parts(
                 (flipped(self.position) * 1e-3).into(),
                 UnitQuaternion::from_rotation_matrix(&axes),

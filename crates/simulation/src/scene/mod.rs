@@ -32,7 +32,7 @@ pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, 
 pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
-pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, draw, other_view};
+pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, other_view};
 pub use table::{Table, TableSurface};
 pub(crate) use views::shows_whole;
 pub use views::{

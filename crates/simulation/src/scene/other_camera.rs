@@ -151,7 +151,7 @@ pub fn other_view(
 ///
 /// # Errors
 /// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens that does not reach its picture's corners.
-pub fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
+fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
     let frustum = Frustum::around(&camera.intrinsics)?;
     // MuJoCo's cameras look along -z with y up.
     let mujoco = camera.world_from_camera * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);

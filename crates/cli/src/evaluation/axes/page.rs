@@ -5,7 +5,7 @@ use sdg_report::{KeyFigure, Report, Section, ShareChart, Tone};
 
 use super::summary::{AxesSummary, AxisFigures, GroupSummary, Way};
 use super::tables::{notice, tables};
-use crate::evaluation::tables::Titled;
+use crate::evaluation::tables::{Titled, this_run};
 
 /// The shares at a glance, then all tables; `more` are tables to follow.
 pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> Report {
@@ -34,12 +34,7 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
         report = report.section(begun(Section::new(title).lead(lead)).table(table));
     }
     report
-        .section(
-            Section::new("This run")
-                .lead("Everything needed to see the same numbers again.")
-                .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
-                .command(command),
-        )
+        .section(this_run(facts, command))
         .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
 }
 

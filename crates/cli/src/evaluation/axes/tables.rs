@@ -6,7 +6,7 @@ use sdg_report::{Cell, Column, Step, Table, Tone};
 use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Way, lowest};
 use super::told::told_from_truth;
 use crate::evaluation::records::AttemptRecord;
-use crate::evaluation::tables::{Titled, number, share};
+use crate::evaluation::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
@@ -47,25 +47,13 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
 
 /// What the reader must know before the first number.
 pub fn notice(summary: &AxesSummary) -> Option<String> {
-    (summary.remaining > 0).then(|| {
-        format!("Not complete: {} units of work are still to do. The same command goes on.", summary.remaining)
-    })
+    incomplete(summary.remaining)
 }
 
 /// The tables as a document of their own; `more` are tables to follow, `facts` what is needed to see the same numbers again.
 pub fn markdown(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], command: &str) -> String {
-    let mut text = String::from("# Axes and grasps under errors\n\n");
-    if let Some(notice) = notice(summary) {
-        text += &format!("**{notice}**\n\n");
-    }
-    for Titled { title, lead, table } in tables(summary).into_iter().chain(more) {
-        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
-    }
-    text += "## This run\n\n";
-    for (name, value) in facts {
-        text += &format!("- {name}: {value}\n");
-    }
-    text + &format!("\n```\n{command}\n```\n")
+    let tables = tables(summary).into_iter().chain(more);
+    document("Axes and grasps under errors", notice(summary), tables, facts, command)
 }
 
 /// Each value once, in the order of first appearance.

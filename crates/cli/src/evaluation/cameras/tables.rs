@@ -3,7 +3,7 @@
 use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 
 use super::summary::{CamerasSummary, HIGH_M, SetFigures};
-use crate::evaluation::tables::Titled;
+use crate::evaluation::tables::{Titled, document, incomplete, this_run};
 
 /// All tables, the most important first.
 pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
@@ -73,26 +73,9 @@ fn table(rows: &[SetFigures], of: &str) -> Table {
     table
 }
 
-fn notice(summary: &CamerasSummary) -> Option<String> {
-    (summary.remaining > 0).then(|| {
-        format!("Not complete: {} units of work are still to do. The same command goes on.", summary.remaining)
-    })
-}
-
 /// The tables as a document; `facts` are what is needed to see the same numbers again.
 pub fn markdown(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -> String {
-    let mut text = String::from("# Calibrated cameras\n\n");
-    if let Some(notice) = notice(summary) {
-        text += &format!("**{notice}**\n\n");
-    }
-    for Titled { title, lead, table } in tables(summary) {
-        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
-    }
-    text += "## This run\n\n";
-    for (name, value) in facts {
-        text += &format!("- {name}: {value}\n");
-    }
-    text + &format!("\n```\n{command}\n```\n")
+    document("Calibrated cameras", incomplete(summary.remaining), tables(summary), facts, command)
 }
 
 /// The tables as a page.
@@ -106,7 +89,7 @@ pub fn page(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -
             report = report.key_figure(KeyFigure::new(format!("{:.2}", errors.median_mm), "mm", label));
         }
     }
-    let mut notice = notice(summary);
+    let mut notice = incomplete(summary.remaining);
     for Titled { title, lead, table } in tables(summary) {
         let mut section = Section::new(title).lead(lead);
         if let Some(notice) = notice.take() {
@@ -115,11 +98,6 @@ pub fn page(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -
         report = report.section(section.table(table));
     }
     report
-        .section(
-            Section::new("This run")
-                .lead("Everything needed to see the same numbers again.")
-                .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
-                .command(command),
-        )
+        .section(this_run(facts, command))
         .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
 }

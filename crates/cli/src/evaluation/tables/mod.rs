@@ -1,5 +1,6 @@
 //! The paper's two tables for this project, and those that say more; as Markdown here, on the page by the same rows.
 
+mod document;
 mod grasping;
 mod looking;
 mod models;
@@ -10,6 +11,8 @@ use super::groups::PartGroup;
 use super::records::TeachingRecord;
 use super::summary::{Figures, ModelSummary, Summary};
 use crate::statistics::Share;
+
+pub(super) use document::{document, incomplete, this_run};
 
 /// A table under its heading.
 pub struct Titled {
@@ -46,25 +49,13 @@ pub fn tables(summary: &Summary) -> Vec<Titled> {
 
 /// The tables as a document of their own, group by group; `facts` are what is needed to see the same numbers again.
 pub fn markdown(summaries: &[Summary], facts: &[(&str, String)], command: &str) -> String {
-    let mut text = String::from("# Evaluation\n\n");
-    if let Some(notice) = summaries.first().and_then(notice) {
-        text += &format!("**{notice}**\n\n");
-    }
-    for Titled { title, lead, table } in summaries.iter().flat_map(tables) {
-        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
-    }
-    text += "## This run\n\n";
-    for (name, value) in facts {
-        text += &format!("- {name}: {value}\n");
-    }
-    text + &format!("\n```\n{command}\n```\n")
+    let notice = summaries.first().and_then(notice);
+    document("Evaluation", notice, summaries.iter().flat_map(tables), facts, command)
 }
 
 /// What the reader must know before the first number.
 pub fn notice(summary: &Summary) -> Option<String> {
-    (summary.remaining > 0).then(|| {
-        format!("Not complete: {} units of work are still to do. The same command goes on.", summary.remaining)
-    })
+    incomplete(summary.remaining)
 }
 
 /// Everything about every cell, in brief.

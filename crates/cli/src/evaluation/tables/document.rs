@@ -1,0 +1,41 @@
+//! What every evaluation's document and page have in common: whether it is complete, and how to see the same numbers again.
+
+use sdg_report::Section;
+
+use super::Titled;
+
+/// What the reader must know before the first number, where units of work are still to do.
+pub fn incomplete(remaining: usize) -> Option<String> {
+    (remaining > 0)
+        .then(|| format!("Not complete: {remaining} units of work are still to do. The same command goes on."))
+}
+
+/// Tables as a document in Markdown; `facts` and `command` are what is needed to see the same numbers again.
+pub fn document(
+    title: &str,
+    notice: Option<String>,
+    tables: impl IntoIterator<Item = Titled>,
+    facts: &[(&str, String)],
+    command: &str,
+) -> String {
+    let mut text = format!("# {title}\n\n");
+    if let Some(notice) = notice {
+        text += &format!("**{notice}**\n\n");
+    }
+    for Titled { title, lead, table } in tables {
+        text += &format!("## {title}\n\n{lead}\n\n{}\n", table.to_markdown());
+    }
+    text += "## This run\n\n";
+    for (name, value) in facts {
+        text += &format!("- {name}: {value}\n");
+    }
+    text + &format!("\n```\n{command}\n```\n")
+}
+
+/// The same at the end of a page.
+pub fn this_run(facts: &[(&str, String)], command: &str) -> Section {
+    Section::new("This run")
+        .lead("Everything needed to see the same numbers again.")
+        .facts(facts.iter().map(|(name, value)| (*name, value.clone())))
+        .command(command)
+}
