@@ -12,32 +12,31 @@ pub fn tables(summary: &CamerasSummary) -> Vec<Titled> {
             title: "By set of pictures".into(),
             lead: "Taught from the wrist camera's photo in its plan view. Webcam, phone and overhead are other cameras with \
                    lenses, heights and tilts to 25 degrees of their own; the other sets are the wrist camera's, harder along \
-                   an axis; in `other-sizes` a part of 0.8, 0.9, 1.1 or 1.25 times the size lies there, which is to be refused. \
+                   an axis; in other-sizes a part of 0.8, 0.9, 1.1 or 1.25 times the size lies there, which is to be refused. \
                    Errors are of what was found, in the marks' plane; within sigma: how many lie within what the detection \
                    itself gave for 68 %."
                 .into(),
-            table: table(&summary.sets, "parts"),
+            table: table(&summary.sets, None),
         },
         Titled {
             title: "By the part's height".into(),
             lead: format!("Low parts have their marks at most {:.0} mm over the table.", 1e3 * HIGH_M),
-            table: table(&summary.by_height, "parts"),
+            table: table(&summary.by_height, Some("parts")),
         },
         Titled {
             title: "By part".into(),
             lead: "The pictures of the three other cameras.".into(),
-            table: table(&summary.by_part, "part"),
+            table: table(&summary.by_part, Some("part")),
         },
     ]
 }
 
-fn table(rows: &[SetFigures], of: &str) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("model"),
-        Column::text("pictures"),
-        Column::text(of),
+/// `of` heads the column that says of which parts a row is, where not all are of all.
+fn table(rows: &[SetFigures], of: Option<&str>) -> Table {
+    let mut columns = vec![Column::text("model"), Column::text("pictures")];
+    columns.extend(of.map(Column::text));
+    columns.extend([
         Column::text("found"),
-        Column::text("accepted without it"),
         Column::number("wrong"),
         Column::number("median").unit("mm").group("place"),
         Column::number("95 %").unit("mm").group("place"),
@@ -46,21 +45,23 @@ fn table(rows: &[SetFigures], of: &str) -> Table {
         Column::number("95 %").unit("°").group("turn"),
         Column::text("within sigma").group("turn"),
     ]);
+    let mut table = Table::new(columns);
     for row in rows {
-        let share = |share: crate::statistics::Share| {
-            if share.of > 0 { Cell::text(share.to_string()) } else { Cell::missing() }
+        // No line break within the share.
+        let whole = |share: crate::statistics::Share| share.to_string().replace(' ', "\u{a0}");
+        let found = match row.found.of {
+            0 => Cell::text(format!("accepted: {}", whole(row.accepted))),
+            _ => Cell::text(whole(row.found)),
         };
         let within = |share: crate::statistics::Share| {
             share.percent().map_or(Cell::missing(), |percent| Cell::text(format!("{percent:.0} %")))
         };
         let number = |value: Option<f64>| value.map_or(Cell::missing(), |value| Cell::number(value, 2));
         let errors = row.errors;
-        table = table.row(vec![
-            Cell::text(row.model.letter()),
-            Cell::text(row.set),
-            Cell::text(row.parts.replace('_', " ")),
-            share(row.found),
-            share(row.accepted),
+        let mut cells = vec![Cell::text(row.model.letter()), Cell::text(row.set)];
+        cells.extend(of.map(|_| Cell::text(row.parts.replace('_', " "))));
+        cells.extend([
+            found,
             Cell::number(row.wrong as f64, 0),
             number(errors.map(|errors| errors.median_mm)),
             number(errors.map(|errors| errors.p95_mm)),
@@ -69,6 +70,7 @@ fn table(rows: &[SetFigures], of: &str) -> Table {
             number(errors.and_then(|errors| errors.p95_deg)),
             errors.map_or(Cell::missing(), |errors| within(errors.within_sigma_deg)),
         ]);
+        table = table.row(cells);
     }
     table
 }
