@@ -349,8 +349,8 @@ impl Placement {
 impl Sighting<'_> {
     /// A detection as the demonstration says, where it lies.
     pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
-        let Overlay { demonstration, image_from_cutout, image_from_marks, agreement, .. } = self.overlay;
-        let outline = demonstration.outline(&image_from_cutout);
+        let Overlay { demonstration, image_from_marks, agreement, .. } = self.overlay;
+        let outline = self.overlay.outline();
         let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
         GraspDetection {
             score,

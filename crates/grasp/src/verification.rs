@@ -10,7 +10,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use image::RgbImage;
-use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_shape::{Evidence, GradientField};
 
 use crate::models::Candidate;
@@ -108,6 +108,13 @@ pub(crate) struct Overlay<'a> {
     pub(crate) log_size: f64,
     /// Mean brightness there over that of the demonstration.
     pub(crate) light: f64,
+}
+
+impl Overlay<'_> {
+    /// The part's outline, in pixels of the image.
+    pub(crate) fn outline(&self) -> Polygon {
+        self.demonstration.outline(&self.image_from_cutout)
+    }
 }
 
 /// How near to an end of the sizes, in ln, a pose may have been kept from going on, and by how much it must then agree better beyond.

@@ -37,6 +37,9 @@ const MOST_LOOKS: usize = 120;
 /// by hand, not measured.
 const LAST_WORD: f64 = 0.005;
 
+/// A pose that agrees less than this is nothing, and not made something by refining it. Chosen by hand, not measured.
+pub(crate) const MIN_POLISHED: f64 = 0.25;
+
 /// A demonstration and an image that it is laid over.
 #[derive(Debug, Clone, Copy)]
 pub struct Comparison<'a> {
@@ -145,7 +148,8 @@ impl Comparison<'_> {
     ) -> PlanarSimilarity {
         let SettlingConfig { sure_agreement, min_restart_agreement, .. } = self.template.config.settling;
         let both = |pose: &PlanarSimilarity| self.agreement(pose).both();
-        if both(&refined) >= sure_agreement {
+        let agreement = both(&refined);
+        if agreement >= sure_agreement || agreement.max(both(start)) < MIN_POLISHED {
             return refined;
         }
         let climbed = [refined, *start].map(|from| self.climbed(from, scales));

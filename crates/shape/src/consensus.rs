@@ -192,22 +192,34 @@ fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
     starts
 }
 
+/// The weighted normal equations of the crests that fit `step` best: the matrix, of which the lower triangle alone is filled
+/// (nothing above it is read), and the right-hand side.
+fn normal_equations(sightings: &[Sighting], step: &Vector4<f64>, width: f64) -> (Matrix4<f64>, Vector4<f64>) {
+    let mut lower = [[0.0; 4]; 4];
+    let mut right = [0.0; 4];
+    for sighting in sightings {
+        let (distance, share) = sighting.best_crest(step, width);
+        let weight = sighting.weight * share;
+        if weight > 0.0 {
+            let rest = distance - sighting.row.dot(step);
+            for i in 0..4 {
+                let weighted = sighting.row[i] * weight;
+                right[i] += weighted * rest;
+                for j in 0..=i {
+                    lower[i][j] += weighted * sighting.row[j];
+                }
+            }
+        }
+    }
+    (Matrix4::from_fn(|i, j| lower[i][j]), Vector4::from(right))
+}
+
 /// Iteratively re-weighted least squares from `start`, narrowing; the step and its consensus.
 fn settle(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, widths: &[f64]) -> (Vector4<f64>, f64) {
     let mut step = start;
     for &width in widths {
         for _ in 0..2 {
-            let mut normal_matrix = Matrix4::<f64>::zeros();
-            let mut right = Vector4::<f64>::zeros();
-            for sighting in sightings {
-                let (distance, share) = sighting.best_crest(&step, width);
-                let w = sighting.weight * share;
-                if w > 0.0 {
-                    let weighted = sighting.row * w;
-                    normal_matrix += weighted * sighting.row.transpose();
-                    right += weighted * (distance - sighting.row.dot(&step));
-                }
-            }
+            let (mut normal_matrix, right) = normal_equations(sightings, &step, width);
             // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.
             normal_matrix += Matrix4::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
             for k in 0..4 {

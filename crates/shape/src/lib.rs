@@ -62,7 +62,7 @@ mod error;
 mod following;
 mod gradient_field;
 mod likeness;
-mod parallel;
+pub mod parallel;
 mod pose;
 mod refinement;
 mod search;

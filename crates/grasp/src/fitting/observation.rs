@@ -135,7 +135,7 @@ pub(super) fn is_right(overlay: &Overlay<'_>, instance: &FitInstance, part: &Fit
 impl FitPicture {
     /// Whether a pose lies on a part of which it is not decided whether it is the part.
     pub(super) fn is_undecided(&self, overlay: &Overlay<'_>) -> bool {
-        let middle = overlay.demonstration.outline(&overlay.image_from_cutout).bounds().center();
+        let middle = overlay.outline().bounds().center();
         self.undecided.iter().any(|bbox| bbox.contains(&middle))
     }
 }

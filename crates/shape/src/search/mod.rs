@@ -22,7 +22,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use crate::comparison::{Agreement, Comparison, Evidence};
+use crate::comparison::{Agreement, Comparison, Evidence, MIN_POLISHED};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
@@ -136,11 +136,8 @@ const FOLLOW_PLACES: f64 = 2.5;
 const FOLLOW_STEPS: f64 = 1.5;
 /// How many matches that agree less than surely are refined again: of those that may be a part, and of all. Chosen by hand,
 /// not measured: more cost time.
-const MAX_POLISHED: usize = 16;
-const MIN_POLISHED: usize = 3;
-/// A match that agrees less than this is nothing, and not made something by refining it. Chosen by hand,
-/// not measured.
-const LEAST_POLISHED: f64 = 0.25;
+const MAX_NUM_POLISHED: usize = 16;
+const MIN_NUM_POLISHED: usize = 3;
 /// Share of the part's area that two matches may both claim. Chosen by hand, not measured.
 const MAX_OVERLAP: f64 = 0.3;
 
@@ -290,8 +287,9 @@ impl InstantSearch {
     fn polish(&self, image: &RgbImage, field: &GradientField, found: Vec<Found>) -> Vec<Found> {
         let sure = self.config.shape.settling.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
-            found.into_iter().partition(|found| (LEAST_POLISHED..sure).contains(&found.agreement));
-        let count = poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_POLISHED, MAX_POLISHED);
+            found.into_iter().partition(|found| (MIN_POLISHED..sure).contains(&found.agreement));
+        let count =
+            poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_NUM_POLISHED, MAX_NUM_POLISHED);
         let (first, rest) = poor.split_at(count.min(poor.len()));
         others.extend(parallel::map(first, |found| self.polished(image, field, found)));
         others.extend(rest);
