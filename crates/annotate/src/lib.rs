@@ -41,6 +41,7 @@ mod preview;
 mod routes;
 mod server;
 mod session;
+mod session_state;
 mod teacher;
 mod teaching;
 mod views;

@@ -8,7 +8,10 @@ use sdg_demonstration::Demonstration;
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 use serde::{Deserialize, Serialize};
 
-use crate::error::TeacherError;
+use crate::error::{Error, TeacherError};
+
+/// More steps than any teaching has.
+const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
@@ -75,6 +78,27 @@ impl TeachRequest {
     /// The time budget, if it is one.
     pub fn time_budget(&self) -> Option<Duration> {
         self.time_budget_secs.and_then(|secs| Duration::try_from_secs_f64(secs).ok())
+    }
+
+    /// # Errors
+    /// A time limit or a number of steps or turns that no teaching can have.
+    pub(crate) fn check(&self) -> crate::error::Result<()> {
+        let refuse =
+            |what, expected: &str, found: String| Err(Error::Request { what, expected: expected.into(), found });
+        if let Some(secs) = self.time_budget_secs
+            && (self.time_budget().is_none() || secs <= 0.0)
+        {
+            return refuse("time limit", "a positive number of seconds", secs.to_string());
+        }
+        if let Some(steps) = self.steps
+            && !(1..=MAX_STEPS).contains(&steps)
+        {
+            return refuse("steps", "1 to 1000000", steps.to_string());
+        }
+        if self.symmetry > 360 {
+            return refuse("symmetry", "0 to 360 equal turns", self.symmetry.to_string());
+        }
+        Ok(())
     }
 }
 

@@ -6,8 +6,8 @@ use anyhow::{Result, bail};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use super::evaluate::{jobs, models, objects, settings};
-use crate::args::EvaluateArgs;
+use super::args::EvaluateArgs;
+use super::selection::{jobs, models, objects, settings};
 use crate::evaluation::axes::{
     Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
 };

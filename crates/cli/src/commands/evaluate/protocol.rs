@@ -1,50 +1,21 @@
-//! `sdg evaluate`: the paper's protocol, and its tables.
+//! The paper's protocol, and its tables.
 
 use std::fmt::Write;
 
 use anyhow::{Result, bail};
-use sdg_grasp::{GraspError, ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use crate::args::EvaluateArgs;
+use super::args::EvaluateArgs;
+use super::selection::{jobs, models, objects, settings};
 use crate::evaluation::{Evaluation, EvaluationProgress, PartGroup, Settings, Store, Summary, markdown, page};
-use crate::exit::{Outcome, Usage};
+use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::machine::machine;
 
-/// The preset, and what the store's results depend on.
-///
-/// # Errors
-/// No preset of that name.
-pub(super) fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
-    let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
-    let settings = Settings {
-        protocol: Settings::PROTOCOL,
-        preset: preset.name().to_owned(),
-        steps: args.steps,
-        seed: args.seed,
-        attempts: args.attempts,
-        views: args.views,
-        scenes: args.scenes,
-    };
-    Ok((preset, settings))
-}
-
-/// Units of work side by side: as asked for, else one for each core.
-pub(super) fn jobs(args: &EvaluateArgs) -> usize {
-    args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
-}
-
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
-    if let Some(names) = &args.axes {
-        return super::evaluate_axes::run(args, names);
-    }
-    if let Some(names) = &args.cameras {
-        return super::evaluate_cameras::run(args, names);
-    }
     let models = models(&args.models)?;
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let (preset, settings) = settings(args)?;
@@ -114,35 +85,6 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         bail!("interrupted with {remaining} units of work to do: the same command goes on");
     }
     Ok(Outcome::Done)
-}
-
-pub(super) fn models(letters: &[String]) -> Result<Vec<ModelKind>> {
-    if letters.is_empty() {
-        return Ok(ModelKind::ALL.to_vec());
-    }
-    let mut models = Vec::new();
-    for letter in letters {
-        let model = letter.trim().parse().map_err(|error: GraspError| Usage(format!("--models: {error}")))?;
-        if models.contains(&model) {
-            return Err(Usage(format!("--models: expected each letter once, found {model} again")).into());
-        }
-        models.push(model);
-    }
-    Ok(models)
-}
-
-/// The parts of these names; without a name, `all`.
-pub(super) fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Result<Vec<ObjectSpec>> {
-    let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
-    let mut objects: Vec<ObjectSpec> = Vec::new();
-    for name in names {
-        let object = ObjectSpec::by_name(name.trim()).map_err(|error| Usage(format!("--objects: {error}")))?;
-        if objects.iter().any(|known| known.name == object.name) {
-            return Err(Usage(format!("--objects: expected each part once, found {} again", object.name)).into());
-        }
-        objects.push(object);
-    }
-    Ok(objects)
 }
 
 /// The command that gives the same results.

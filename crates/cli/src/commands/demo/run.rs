@@ -7,7 +7,7 @@ use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
 use sdg_report::write_atomically;
 use sdg_simulation::objects::ObjectSpec;
 
-use crate::args::DemoArgs;
+use super::DemoArgs;
 use crate::commands::rehearse::{finish, show_attempt};
 use crate::exit::Outcome;
 use crate::files;

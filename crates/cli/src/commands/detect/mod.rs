@@ -1,5 +1,8 @@
 //! `sdg detect`: planar grasps in images.
 
+mod args;
+mod live;
+
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
@@ -11,12 +14,13 @@ use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
-use super::detect_live;
-use crate::args::DetectArgs;
+pub use args::DetectArgs;
+
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
+use crate::found_text::in_words;
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
@@ -42,7 +46,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
     let detector = PictureDetector::new(model, &args.grasp_model, args.camera.as_deref())?;
     if let Some(address) = &args.from {
-        return detect_live::run(args, address, detector);
+        return live::run(args, address, detector);
     }
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
@@ -149,37 +153,7 @@ fn of_other_size(detector: &PictureDetector, (width, height): (u32, u32)) -> Opt
 }
 
 fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Frame>) -> Result<()> {
-    Ok(writeln!(out, "{}: {}", path.display(), told(found, frame))?)
-}
-
-/// A detection in words, in metres as well where positions are in `frame`.
-pub(super) fn told(found: &Found, frame: Option<Frame>) -> String {
-    let Found { detection, pose } = found;
-    let grasp = detection.grasp;
-    let metric = pose.zip(frame).map(|(pose, frame)| {
-        let name = frame.name();
-        let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
-        format!(
-            " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
-            1e3 * pose.uncertainty.position_m,
-            pose.yaw.degrees(),
-            pose.uncertainty.yaw_rad.to_degrees(),
-            1e3 * pose.opening_m
-        )
-    });
-    let metric = metric.unwrap_or_default();
-    let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
-    let refused = detection.refused().map(|why| format!("; refused: {why}")).unwrap_or_default();
-    format!(
-        "grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
-        grasp.x,
-        grasp.y,
-        grasp.angle.degrees(),
-        grasp.width,
-        detection.score,
-        detection.network_score,
-        detection.turn_source.name(),
-    )
+    Ok(writeln!(out, "{}: {}", path.display(), in_words(found, frame))?)
 }
 
 /// Writes the image with its detections as PNG, under its own name.
@@ -191,7 +165,7 @@ fn draw(folder: &Path, path: &Path, image: &RgbImage, detections: &[GraspDetecti
     Ok(write_atomically(&folder.join(name), &png.into_inner())?)
 }
 
-/// A line of `--json`; the names are the contract's.
+/// A line of `--json`; docs/command-line.md describes it.
 #[derive(Serialize)]
 struct ImageLine {
     image: String,

@@ -9,7 +9,7 @@ use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
 use sdg_camera::{Address, OpenOptions};
 use serde_json::json;
 
-use crate::args::AnnotateArgs;
+use super::AnnotateArgs;
 use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};

@@ -14,9 +14,10 @@ use sdg_camera::{Address, Camera, CameraError, Frame, LatestFrame, MjpegServer};
 use sdg_grasp::{GraspDetection, TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
-use crate::args::DetectArgs;
+use super::args::DetectArgs;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_record::FoundRecord;
+use crate::found_text::in_words;
 use crate::interrupt::Interrupt;
 use crate::live_pictures;
 use crate::picture_detector::{Found, PictureDetector};
@@ -219,7 +220,7 @@ fn write_line(
         }
         for part in shown() {
             let of = part.track.map(|(id, state, _)| format!("part {id} {}, ", state_name(state).replace('_', " ")));
-            let text = super::detect::told(&part.found, detector.frame());
+            let text = in_words(&part.found, detector.frame());
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }

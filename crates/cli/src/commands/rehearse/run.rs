@@ -8,7 +8,7 @@ use sdg_report::Attempt;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use crate::args::RehearseArgs;
+use super::RehearseArgs;
 use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::Outcome;

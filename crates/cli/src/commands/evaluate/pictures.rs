@@ -7,13 +7,14 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use sdg_grasp::Verification;
 
-use crate::args::{ComputeArgs, EvaluateArgs};
+use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, Truth, in_words, judge, page, to_json};
 use crate::picture_detector::PictureDetector;
 use crate::progress::EvaluationProgress;
+use crate::shared_args::ComputeArgs;
 
 /// Where the page goes unless `--report` says otherwise; not among the user's pictures.
 const DEFAULT_REPORT: &str = "target/pictures-report";

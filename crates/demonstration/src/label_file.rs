@@ -5,29 +5,11 @@
 
 use serde_json::Value;
 
-use crate::annotation::Border;
+use crate::draft::Border;
 use crate::format::json_format;
 use crate::json::{self, Node, shorten};
-use crate::{Annotation, AnnotationFormat, Error, ImageFacts, Result, coco, labelme};
-
-/// One part on a picture, as it was labelled.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LabelledInstance {
-    /// The marks, in pixels of the picture. Where the picture's border cuts the part, the box is cut and the outline left out.
-    pub annotation: Annotation,
-    /// Neither missed when it is not found nor wrong when it is: mostly covered, or seen from another side. LabelMe: the
-    /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
-    pub optional: bool,
-    /// Where in the file it stands, such as `shapes[3]` or `annotations[0]`; empty for one that is not from a file.
-    pub place: String,
-}
-
-impl LabelledInstance {
-    /// An instance that does not come from a file.
-    pub fn new(annotation: Annotation, optional: bool) -> Self {
-        Self { annotation, optional, place: String::new() }
-    }
-}
+use crate::labelled_instance::LabelledInstance;
+use crate::{AnnotationFormat, Error, ImageFacts, Result, coco, labelme};
 
 /// A label file, LabelMe or COCO JSON, parsed once for however many pictures it labels.
 ///
@@ -104,19 +86,10 @@ impl LabelFile {
     }
 }
 
-/// The flag `optional` of an object that holds flags or attributes; `false` where there is none.
-pub(crate) fn is_optional(flags: Option<&Node>) -> Result<bool> {
-    let Some(flags) = flags.filter(|flags| flags.value.is_object()) else { return Ok(false) };
-    match flags.optional("optional")? {
-        None => Ok(false),
-        Some(flag) => flag.value.as_bool().ok_or_else(|| flag.malformed("true or false")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::CocoFile;
+    use crate::{Annotation, CocoFile};
     use nalgebra::Point2;
     use serde_json::json;
 

@@ -5,8 +5,8 @@ use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
-use super::evaluate::{jobs, models, objects, settings};
-use crate::args::EvaluateArgs;
+use super::args::EvaluateArgs;
+use super::selection::{jobs, models, objects, settings};
 use crate::evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
 use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
