@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, ModelKind};
 use tempfile::TempDir;
 
 use crate::advice::advise;
@@ -17,7 +17,7 @@ use crate::names::{file_name, free_name, free_numbered, safe_stem};
 use crate::picture::{Picture, pictures_in, png};
 use crate::preview::{Previews, SampleKey};
 use crate::session_state::{MarkedPicture, Scene, State};
-use crate::teacher::{GraspTeacher, ModelLetter, TaughtModel, TeachRequest};
+use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SceneView, SessionView};
 
@@ -350,7 +350,7 @@ impl Session {
     ///
     /// # Errors
     /// None is marked, or one only in part.
-    pub fn demonstrations(&self, model: ModelLetter) -> Result<Vec<Demonstration>> {
+    pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
         let (label, marked) = {
             let state = self.state();
             (state.label.clone(), state.images.clone())

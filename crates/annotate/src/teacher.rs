@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use image::RgbImage;
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, ModelKind};
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 use serde::{Deserialize, Serialize};
 
@@ -51,7 +51,7 @@ pub trait TaughtModel: Send + Sync {
 #[serde(deny_unknown_fields)]
 pub struct TeachRequest {
     /// The model's letter.
-    pub model: ModelLetter,
+    pub model: ModelKind,
     /// Seconds that the training may take at most.
     #[serde(default)]
     pub time_budget_secs: Option<f64>,
@@ -102,37 +102,6 @@ impl TeachRequest {
     }
 }
 
-/// The grasp models by their letters; see the project's ARCHITECTURE.md.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ModelLetter {
-    /// Box, turn from its crop.
-    A,
-    /// Box, turn from keypoints.
-    B,
-    /// Keypoints.
-    C,
-    /// Mask, turn from texture or outline.
-    D,
-    /// No network.
-    S,
-}
-
-impl ModelLetter {
-    /// Every model.
-    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::S];
-
-    /// The letter itself.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::C => "C",
-            Self::D => "D",
-            Self::S => "S",
-        }
-    }
-}
-
 /// One piece of news from a teaching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TeachingStep {
@@ -160,7 +129,7 @@ pub enum TeachingStep {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TaughtSummary {
     /// The letter.
-    pub model: ModelLetter,
+    pub model: ModelKind,
     /// The object's name.
     pub object: String,
     /// Wall-clock time of the teaching.

@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, ModelKind};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::teacher::{GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
 
 /// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
 const MOST_POINTS: usize = 240;
@@ -40,7 +40,7 @@ pub struct News {
     /// How it stands.
     pub status: Status,
     /// The model being taught.
-    pub model: Option<ModelLetter>,
+    pub model: Option<ModelKind>,
     /// What is being taught just now.
     pub of: &'static str,
     /// Steps done.

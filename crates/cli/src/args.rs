@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn the_contract_s_calls_parse() {
+    fn documented_calls_parse() {
         for line in [
             "sdg demo",
             "sdg demo --json",

@@ -1,4 +1,4 @@
-//! Wrong input, as a user would give it: one clear line, the contract's exit code, nothing half-written.
+//! Wrong input, as a user would give it: one clear line, the exit code of docs/command-line.md, nothing half-written.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;

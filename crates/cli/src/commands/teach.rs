@@ -1,5 +1,6 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
+use std::fmt::Display;
 use std::io::Write;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -27,9 +28,10 @@ use crate::teaching_progress::TeachingProgress;
 /// `sdg teach`
 #[derive(Debug, ClapArgs)]
 pub struct TeachArgs {
-    /// The grasp model: A (box, turn from its crop), B (box, turn from keypoints), C (keypoints), D (mask, turn from
-    /// texture or outline) or S (no network: the demonstration looked for in the whole image, ready at once)
-    #[arg(long, default_value = "C", value_name = "LETTER")]
+    /// The grasp model, by letter or name: A or crop (box, turn from its crop), B or box (box, turn from keypoints), C or
+    /// keypoints, D or mask (mask, turn from texture or outline), S or shape (no network: a search for the demonstration in
+    /// the whole image, ready at once)
+    #[arg(long, default_value = "C", value_name = "NAME")]
     pub model: String,
     /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
     #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
@@ -251,6 +253,6 @@ fn learnt(taught: &Taught) -> String {
 }
 
 /// An argument that names one of a few things; another name is wrong usage.
-fn parse<T: FromStr<Err = GraspError>>(argument: &str, name: &str) -> Result<T> {
+fn parse<T: FromStr<Err: Display>>(argument: &str, name: &str) -> Result<T> {
     Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
 }

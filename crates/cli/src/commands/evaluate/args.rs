@@ -78,8 +78,8 @@ pub struct EvaluateArgs {
         help_heading = PICTURES
     )]
     pub device: ComputeBackend,
-    /// The grasp models, by their letters; without it, all
-    #[arg(long, value_name = "LETTERS", value_delimiter = ',')]
+    /// The grasp models, by letter or name; without it, all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub models: Vec<String>,
     /// The parts, out of those shipped under datasets/; without it, the paper's eight
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]

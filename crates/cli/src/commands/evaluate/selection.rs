@@ -1,6 +1,7 @@
 //! What all kinds of `sdg evaluate` read from its arguments: models, parts, preset and workers.
 
 use anyhow::Result;
+use sdg_demonstration::UnknownModel;
 use sdg_grasp::{GraspError, ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
@@ -31,16 +32,16 @@ pub fn jobs(args: &EvaluateArgs) -> usize {
     args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
 }
 
-/// The models of these letters; without a letter, all.
-pub fn models(letters: &[String]) -> Result<Vec<ModelKind>> {
-    if letters.is_empty() {
+/// The models of these letters or names; without any, all.
+pub fn models(names: &[String]) -> Result<Vec<ModelKind>> {
+    if names.is_empty() {
         return Ok(ModelKind::ALL.to_vec());
     }
     let mut models = Vec::new();
-    for letter in letters {
-        let model = letter.trim().parse().map_err(|error: GraspError| Usage(format!("--models: {error}")))?;
+    for name in names {
+        let model = name.trim().parse().map_err(|error: UnknownModel| Usage(format!("--models: {error}")))?;
         if models.contains(&model) {
-            return Err(Usage(format!("--models: expected each letter once, found {model} again")).into());
+            return Err(Usage(format!("--models: expected each model once, found {model} again")).into());
         }
         models.push(model);
     }

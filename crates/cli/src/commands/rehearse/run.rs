@@ -68,7 +68,7 @@ pub fn show_attempt(attempt: &Attempt, of: u32, interrupt: &Interrupt) -> Contro
     if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
-/// The closing lines, or the contract's one object.
+/// The closing lines, or the one object of `--json` (docs/command-line.md).
 pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Path, json: bool) -> Result<Outcome> {
     let RunPage { model, object, rehearsed, .. } = page;
     let Rehearsed { attempts, .. } = rehearsed;
