@@ -18,7 +18,7 @@ const BREATH: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.
 pub struct Contestant {
-    /// Who.
+    /// Whose program it is.
     pub side: Side,
     /// What it said of itself.
     pub ready: Ready,

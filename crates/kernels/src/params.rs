@@ -67,7 +67,7 @@ pub struct FusedConv2dParams {
 /// What follows a normalisation or a convolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Activation {
-    /// Nothing.
+    /// `x` itself.
     #[default]
     Identity,
     /// `max(x, 0)`.

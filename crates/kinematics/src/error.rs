@@ -96,7 +96,7 @@ pub enum KinematicsError {
     /// The trajectory generator refused its input or failed.
     #[error("no trajectory within the limits: {reason}")]
     Trajectory {
-        /// Why.
+        /// What the generator says.
         reason: String,
     },
 }

@@ -14,7 +14,7 @@ pub enum Way {
 }
 
 impl Way {
-    /// Both.
+    /// Both, in the order of the tables.
     pub const ALL: [Self; 2] = [Self::WithCheck, Self::NetworkAlone];
 
     /// As tables say it.
