@@ -63,6 +63,12 @@ test-torch: setup ## Tests a whole network against torchvision, losses and gradi
 	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
 	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked -p sdg-detection --test golden -- --ignored
 
+# The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
+PACKAGED = geometry kinematics sift shape grasp kernels detection demonstration training orientation
+
+package: ## Packages the libraries that other programs can use, into target/package
+	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
+
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings

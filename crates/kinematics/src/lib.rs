@@ -48,9 +48,15 @@ pub use limits::{
     ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, POSITION_MAX_RAD, POSITION_MIN_RAD,
     TORQUE_MAX_NM, VELOCITY_MAX_RAD_S,
 };
+pub use nalgebra;
 pub use panda::{
     DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, Frames, HAND_OPENING_MAX_M, HAND_TURN_RAD, Jacobian, Panda,
     TCP_OFFSET_M,
 };
 pub use path::{JointPath, LineOptions, PathPoint};
 pub use trajectory::Trajectory;
+
+/// The README's example, which runs with the other examples.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
