@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-wgpu test-ndarray lint bench bench-browser clean
+.PHONY: help setup build demo web edge test test-browser test-v4l test-wgpu test-ndarray test-torch package lint bench bench-browser clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -55,6 +55,19 @@ test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa'
 test-ndarray: setup ## Tests ndarray against flex (ten minutes to compile, three to run)
 	$(call DEVICE_TESTS,ndarray) --test device_parity --test devices
 	$(call DEVICE_TESTS,ndarray) -p sdg-grasp --lib -- device_parity
+
+# Any Python that has torchvision; without one, the peers' of `make bench` (0.9 GB to fetch, once).
+SDG_TORCH_PYTHON ?= $(CURDIR)/target/bench/venv/bin/python
+
+test-torch: setup ## Tests a whole network against torchvision, losses and gradients included
+	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
+	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked -p sdg-detection --test golden -- --ignored
+
+# The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
+PACKAGED = geometry kinematics sift shape grasp kernels detection demonstration training orientation
+
+package: ## Packages the libraries that other programs can use, into target/package
+	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
 
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check

@@ -27,9 +27,10 @@ mod works;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 use crate::network::Network;
+use crate::works::WorkArgs;
 
 /// Our speed against PyTorch, ONNX Runtime, OpenVINO and albumentations, on the same work in one run.
 #[derive(Debug, Parser)]
@@ -56,25 +57,6 @@ enum Command {
         /// A safetensors file
         out: PathBuf,
     },
-}
-
-/// `sdg-bench work`
-#[derive(Debug, ClapArgs)]
-struct WorkArgs {
-    /// Which work; `compare --help` lists them
-    name: String,
-    /// Weights written by `sdg-bench weights`
-    #[arg(long, value_name = "FILE")]
-    weights: Option<PathBuf>,
-    /// Folder with image.png and annotation.json
-    #[arg(long, value_name = "DIR")]
-    demonstration: Option<PathBuf>,
-    /// The grasp model that the work `teaching` writes and `edge-grasp` reads
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Threads, where a work starts some of its own
-    #[arg(long, default_value_t = 2, value_name = "N")]
-    threads: usize,
 }
 
 fn main() -> ExitCode {

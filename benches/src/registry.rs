@@ -103,6 +103,33 @@ pub const WORKS: &[WorkSpec] = &[
     },
 ];
 
+/// Whose program does a work.
+#[derive(Debug, Clone, Copy)]
+pub enum Side {
+    /// This project's.
+    Ours,
+    /// A peer's.
+    Peer(&'static Peer),
+}
+
+impl Side {
+    /// Name in tables.
+    pub fn title(&self) -> &'static str {
+        match self {
+            Self::Ours => "ours",
+            Self::Peer(peer) => peer.title,
+        }
+    }
+
+    /// Name in files.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Ours => "ours",
+            Self::Peer(peer) => peer.id,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,17 +9,16 @@
 //! of half precision's range.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
+use tempfile::TempPath;
 
 use crate::checkpoint::Checkpoint;
 use crate::conversion::{Conversion, Planned};
@@ -30,9 +29,6 @@ use crate::source::Source;
 
 /// The version of the metadata written here.
 pub const WEIGHTS_VERSION: &str = "1";
-
-/// Names within one process must differ, however many threads write at once.
-static NEXT_TEMPORARY: AtomicU64 = AtomicU64::new(0);
 
 /// Element type of matrices and kernels in the written file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -85,8 +81,8 @@ impl Conversion {
         thread::scope(|scope| {
             let hashing = scope.spawn(|| sha256_of(from));
             // The header comes first in the file and holds the hash, which comes last: its place is kept.
-            let temporary = TemporaryFile::beside(out);
-            let file = BufWriter::with_capacity(1 << 20, temporary.open()?);
+            let (file, temporary) = temporary_beside(out)?;
+            let file = BufWriter::with_capacity(1 << 20, file);
             let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
             let header = self.header(&metadata(&"0".repeat(64)), precision);
             let mut file = self.write_body(source, file, &header, precision)?;
@@ -99,7 +95,8 @@ impl Conversion {
             let bytes = file.metadata().map_err(WeightsError::io("ask for the new file's size"))?.len();
             file.sync_all().map_err(WeightsError::io("flush the new file to the disk"))?;
             drop(file);
-            temporary.rename_to(out)?;
+            let renamed = temporary.persist(out);
+            renamed.map_err(|refused| WeightsError::io("give the new file its name")(refused.error))?;
             Ok(Written { bytes, source_sha256: sha256 })
         })
     }
@@ -220,40 +217,15 @@ fn write_at_start(file: &mut File, header: &[u8]) -> Result<()> {
     written.map_err(WeightsError::io("write the new file's header"))
 }
 
-/// A temporary path that is deleted when it goes out of scope before the rename.
-struct TemporaryFile {
-    path: PathBuf,
-    renamed: bool,
-}
-
-impl TemporaryFile {
-    fn beside(out: &Path) -> Self {
-        // Long names are cut: with the suffix they could pass the file system's limit.
-        let stem: String = out.file_name().unwrap_or_default().to_string_lossy().chars().take(40).collect();
-        let mut name = OsString::from(".");
-        name.push(stem);
-        let serial = NEXT_TEMPORARY.fetch_add(1, Ordering::Relaxed);
-        name.push(format!(".{}-{serial}.tmp", std::process::id()));
-        Self { path: out.with_file_name(name), renamed: false }
-    }
-
-    fn open(&self) -> Result<File> {
-        let opened = OpenOptions::new().write(true).create_new(true).open(&self.path);
-        opened.map_err(WeightsError::io("make a temporary file beside the output"))
-    }
-
-    fn rename_to(mut self, out: &Path) -> Result<()> {
-        fs::rename(&self.path, out).map_err(WeightsError::io("give the new file its name"))?;
-        self.renamed = true;
-        Ok(())
-    }
-}
-
-impl Drop for TemporaryFile {
-    fn drop(&mut self) {
-        if !self.renamed {
-            // Nothing is left to do when even this fails, and the first error is the one to report.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
+/// A file in the folder of `out`, with the permissions that new files have, and its path, which deletes it when it goes out
+/// of scope.
+fn temporary_beside(out: &Path) -> Result<(File, TempPath)> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".sdg-").suffix(".tmp");
+    #[cfg(unix)]
+    // What other programs ask for; the umask takes the rest away.
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let made = builder.tempfile_in(folder).map_err(WeightsError::io("make a temporary file beside the output"))?;
+    Ok(made.into_parts())
 }

@@ -11,40 +11,14 @@ use anyhow::{Context, Result, anyhow, bail};
 
 use crate::compare::prepare::{Files, Paths};
 use crate::protocol::{Answer, Ready, Request};
-use crate::registry::{Peer, WorkSpec};
+use crate::registry::{Side, WorkSpec};
 
 /// Between turns: time for the other side's threads to go to sleep, some of which spin for a while after their work.
 const BREATH: Duration = Duration::from_millis(100);
 
-/// Who works.
-#[derive(Debug, Clone, Copy)]
-pub enum Side {
-    /// We.
-    Ours,
-    /// Somebody else.
-    Peer(&'static Peer),
-}
-
-impl Side {
-    /// Name in tables.
-    pub fn title(&self) -> &'static str {
-        match self {
-            Self::Ours => "ours",
-            Self::Peer(peer) => peer.title,
-        }
-    }
-
-    fn id(&self) -> &'static str {
-        match self {
-            Self::Ours => "ours",
-            Self::Peer(peer) => peer.id,
-        }
-    }
-}
-
 /// One side of a work, ready to run.
 pub struct Contestant {
-    /// Who.
+    /// Whose program it is.
     pub side: Side,
     /// What it said of itself.
     pub ready: Ready,

@@ -12,9 +12,9 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::protocol::Facts;
-use crate::registry::{GEMM, WORKS, WorkSpec};
+use crate::registry::{GEMM, Side, WORKS, WorkSpec};
+use contestant::Contestant;
 pub(crate) use contestant::peak_of_status;
-use contestant::{Contestant, Side};
 use machine::Machine;
 use pace::Pace;
 use prepare::Paths;

@@ -5,9 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::compare::contestant::Side;
 use crate::network::Network;
-use crate::registry::WorkSpec;
+use crate::registry::{Side, WorkSpec};
 
 /// The shipped demonstration that augmentation and teaching work on.
 const DEMONSTRATION: &str = "datasets/demonstrations/pendulum";

@@ -6,9 +6,9 @@ use std::path::Path;
 use anyhow::{Result, bail};
 use serde::Serialize;
 
-use crate::compare::contestant::{Contestant, Side};
+use crate::compare::contestant::Contestant;
 use crate::compare::machine::Machine;
-use crate::registry::{Peer, WorkSpec};
+use crate::registry::{Peer, Side, WorkSpec};
 use crate::results::{duration, median, rewrite, write_whole};
 
 /// One side of a work, measured.

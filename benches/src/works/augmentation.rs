@@ -6,7 +6,8 @@ use anyhow::Result;
 use sdg_demonstration::{AugmentationConfig, Augmenter};
 
 use crate::protocol::Work;
-use crate::works::{facts, read_demonstration};
+use crate::works::demonstration::read_demonstration;
+use crate::works::facts::facts;
 
 /// Samples a run; `peers/augmentation.py` makes as many.
 const SAMPLES: usize = 64;

@@ -13,8 +13,8 @@ use sdg_training::AdamW;
 use crate::network::Network;
 use crate::protocol::{Facts, Work};
 use crate::scene;
+use crate::works::facts::{facts, mean};
 use crate::works::r50::sampled;
-use crate::works::{facts, mean};
 
 /// Parts a picture: more than go through the keypoint head, so that it has the same to do on both sides.
 const GRID: (u32, u32) = (3, 2);

@@ -1,18 +1,20 @@
 //! Our side of every work, by the crates' public interfaces.
 
+mod args;
 mod augmentation;
+mod demonstration;
 mod edge;
+mod facts;
 mod gemm;
 mod r50;
 mod teaching;
 
-use std::path::Path;
-
 use anyhow::{Context, Result, bail};
 
-use crate::WorkArgs;
+pub use args::WorkArgs;
+
 use crate::network::Network;
-use crate::protocol::{Facts, Work};
+use crate::protocol::Work;
 
 /// Builds the work of that name.
 pub fn build(args: &WorkArgs) -> Result<Work> {
@@ -37,27 +39,6 @@ pub fn build(args: &WorkArgs) -> Result<Work> {
     }
 }
 
-/// Facts from names and numbers.
-fn facts<const N: usize>(entries: [(&str, f64); N]) -> Facts {
-    entries.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
-}
-
-fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
-    sum / f64::from(count.max(1))
-}
-
-/// The photo and its marks in a folder of `datasets/demonstrations`.
-fn read_demonstration(folder: &Path) -> Result<sdg_demonstration::Demonstration> {
-    let read = |name: &str| {
-        let path = folder.join(name);
-        std::fs::read(&path).with_context(|| path.display().to_string())
-    };
-    let demonstration =
-        sdg_demonstration::Demonstration::decode(&read("image.png")?, &read("annotation.json")?, Some("image.png"));
-    demonstration.with_context(|| folder.display().to_string())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,11 +53,5 @@ mod tests {
             let refused = build(&args).err().map(|error| error.to_string());
             assert!(refused.is_none_or(|error| !error.contains("expected a work")), "{}", work.name);
         }
-    }
-
-    #[test]
-    fn mean_of_nothing_is_zero() {
-        assert_eq!(mean([]), 0.0);
-        assert_eq!(mean([1.0, 4.0]), 2.5);
     }
 }

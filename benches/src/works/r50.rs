@@ -9,16 +9,16 @@ use burn::optim::{GradientsParams, ModuleOptimizer, SgdConfig};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
+use sdg_detection::ResizedTarget;
 use sdg_detection::image_transform::pad_batch;
-use sdg_detection::roi_heads::ResizedTarget;
-use sdg_detection::roi_heads::box_head::RoiClass;
+use sdg_detection::roi_heads::roi::RoiClass;
 use sdg_detection::rpn::Mode;
 use sdg_detection::{GeneralizedRcnn, Target, TransformedImage};
 
 use crate::network::{NUM_KEYPOINTS, Network};
 use crate::protocol::{Facts, Work};
 use crate::scene;
-use crate::works::{facts, mean};
+use crate::works::facts::{facts, mean};
 
 /// Parts a picture: columns and rows.
 const GRID: (u32, u32) = (8, 4);

@@ -7,7 +7,8 @@ use anyhow::{Context, Result};
 use sdg_grasp::{Device, GraspModel, TeachOptions, Verification, teach};
 
 use crate::protocol::{Facts, Work};
-use crate::works::{facts, read_demonstration};
+use crate::works::demonstration::read_demonstration;
+use crate::works::facts::facts;
 
 /// Teaches once and writes the model, for [`grasp`].
 pub fn teaching(demonstration: &Path, model: &Path) -> Result<Work> {

@@ -8,9 +8,9 @@ const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
   ["C", "Keypoints", "The best all-round. Some two minutes on two cores."],
-  ["S", "Instant", "No network: looks for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
-  ["A", "Box and turn", "A box, and its turn from what is in it. Some three minutes."],
-  ["B", "Box and keypoints", "As C, but goes to the middle of the box. Some two minutes."],
+  ["S", "Shape", "No network: searches for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
+  ["A", "Crop", "A box, and the part’s turn from the crop in it. Some three minutes."],
+  ["B", "Box", "As C, but the gripper goes to the middle of the box. Some two minutes."],
   ["D", "Mask", "Texture or outline of what a mask shows. Some three minutes; needs the outline."],
 ];
 

@@ -1,11 +1,11 @@
 //! What the marks are good for, and what is odd about them: told at once, while they can still be mended.
 
+use sdg_demonstration::ModelKind;
 use sdg_geometry::Polygon;
 use serde::Serialize;
 
 use crate::gripper::Gripper;
 use crate::marks::Marks;
-use crate::teacher::ModelLetter;
 
 /// A mark this near to the picture's border is cut by it.
 const BORDER_PX: f64 = 1.0;
@@ -33,7 +33,7 @@ pub struct Advice {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ModelAdvice {
     /// The letter.
-    pub model: ModelLetter,
+    pub model: ModelKind,
     /// What is missing; empty when nothing is.
     pub lacks: Vec<&'static str>,
 }
@@ -61,7 +61,7 @@ pub enum Fix {
 
 /// Looks the marks over on a picture of `size` pixels.
 pub fn advise(marks: &Marks, size: [u32; 2]) -> Advice {
-    let lacks = |model: ModelLetter| {
+    let lacks = |model: ModelKind| {
         let mut lacks = Vec::new();
         if !marks.has_object() {
             lacks.push("the box");
@@ -69,12 +69,12 @@ pub fn advise(marks: &Marks, size: [u32; 2]) -> Advice {
         if marks.grasp.is_none() {
             lacks.push("the grasp");
         }
-        if model == ModelLetter::D && marks.outline.is_none() {
+        if model.needs_outline() && marks.outline.is_none() {
             lacks.push("the outline");
         }
         lacks
     };
-    let models = ModelLetter::ALL.map(|model| ModelAdvice { model, lacks: lacks(model) }).to_vec();
+    let models = ModelKind::ALL.map(|model| ModelAdvice { model, lacks: lacks(model) }).to_vec();
     let mut remarks = Vec::new();
     about_outline(marks, &mut remarks);
     about_grasp(marks, &mut remarks);

@@ -41,6 +41,7 @@ mod preview;
 mod routes;
 mod server;
 mod session;
+mod session_state;
 mod teacher;
 mod teaching;
 mod views;
@@ -50,10 +51,9 @@ pub use error::{Error, Result, TeacherError};
 pub use gripper::{Gripper, Reach};
 pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictures};
 pub use marks::{GraspMarks, Marks};
+pub use sdg_demonstration::ModelKind;
 pub use server::Server;
 pub use session::{Session, SessionOptions};
-pub use teacher::{
-    FoundGrasp, GraspPose, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep,
-};
+pub use teacher::{FoundGrasp, GraspPose, GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
 pub use teaching::{News, Status};
 pub use views::{ImageView, Saved, SceneView, SessionView};

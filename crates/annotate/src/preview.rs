@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::gripper::Gripper;
 use crate::marks::Marks;
 use crate::picture::jpeg;
-use crate::session::Session;
 
 /// Longer side of a sample on the sheet.
 const SAMPLE_PX: f64 = 400.0;
@@ -21,56 +20,69 @@ const PEN_PX: f64 = 1.6;
 #[derive(Default)]
 pub struct Previews(Mutex<Option<Arc<Prepared>>>);
 
+/// What a sample is made from, besides the picture itself.
+#[derive(PartialEq)]
+pub struct SampleKey {
+    pub image_id: usize,
+    pub marks: Marks,
+    pub seed: u64,
+}
+
 struct Prepared {
-    image_id: usize,
-    marks: Marks,
-    seed: u64,
+    key: SampleKey,
     jaw_width: f64,
     augmenter: Augmenter,
 }
 
-/// Sample `index` of `seed` of a marked picture, with the grasp drawn where the marks went, as JPEG.
-///
-/// # Errors
-/// No such picture, marks that cannot be taught.
-pub fn sample(session: &Session, image_id: usize, seed: u64, index: u64) -> Result<Vec<u8>> {
-    let prepared = prepared(session, image_id, seed)?;
-    let mut sample = prepared.augmenter.sample(index);
-    for object in &sample.objects {
-        if let Some(outline) = &object.outline {
-            draw_polygon(&mut sample.image, outline, &Pen::new(Color::OUTLINE).width(PEN_PX));
+impl Previews {
+    /// Sample `index` of `key`, with the grasp drawn where the marks went, as JPEG. `demonstration` is called only when the
+    /// key differs from the last one.
+    ///
+    /// # Errors
+    /// Those of `demonstration`, and marks that cannot be taught.
+    pub fn sample(
+        &self,
+        key: SampleKey,
+        demonstration: impl FnOnce() -> Result<Demonstration>,
+        index: u64,
+    ) -> Result<Vec<u8>> {
+        let prepared = self.prepare(key, demonstration)?;
+        let mut sample = prepared.augmenter.sample(index);
+        for object in &sample.objects {
+            if let Some(outline) = &object.outline {
+                draw_polygon(&mut sample.image, outline, &Pen::new(Color::OUTLINE).width(PEN_PX));
+            }
+            if let [first, .., last] = object.keypoints[..]
+                && first.is_labelled()
+                && last.is_labelled()
+            {
+                let line = GraspLine::new(first.point(), last.point());
+                let scale = object.image_from_demonstration.scale;
+                let grasp = PlanarGrasp::from_line(&line, prepared.jaw_width * scale);
+                draw_grasp_jaws(&mut sample.image, &grasp, &Pen::new(Color::GRASP).width(PEN_PX));
+            }
         }
-        if let [first, .., last] = object.keypoints[..]
-            && first.is_labelled()
-            && last.is_labelled()
-        {
-            let line = GraspLine::new(first.point(), last.point());
-            let scale = object.image_from_demonstration.scale;
-            let grasp = PlanarGrasp::from_line(&line, prepared.jaw_width * scale);
-            draw_grasp_jaws(&mut sample.image, &grasp, &Pen::new(Color::GRASP).width(PEN_PX));
-        }
+        Ok(jpeg(&sample.image))
     }
-    Ok(jpeg(&sample.image))
-}
 
-fn prepared(session: &Session, image_id: usize, seed: u64) -> Result<Arc<Prepared>> {
-    let mut kept = session.previews.0.lock().unwrap_or_else(PoisonError::into_inner);
-    let marks = session.marks(image_id)?;
-    if let Some(kept) = kept.as_ref().filter(|k| k.image_id == image_id && k.seed == seed && k.marks == marks) {
-        return Ok(Arc::clone(kept));
+    fn prepare(&self, key: SampleKey, demonstration: impl FnOnce() -> Result<Demonstration>) -> Result<Arc<Prepared>> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = kept.as_ref().filter(|kept| kept.key == key) {
+            return Ok(Arc::clone(kept));
+        }
+        let demonstration = demonstration()?;
+        let jaw_width = jaw_width(&demonstration);
+        let (width, height) = demonstration.image.dimensions();
+        let scale = (SAMPLE_PX / f64::from(width.max(height))).min(1.0);
+        let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
+        let config = AugmentationConfig::default().with_output_size(scaled(width), scaled(height));
+        let name = || format!("sample of picture {}", key.image_id);
+        let augmenter = Augmenter::new(&[demonstration], config, key.seed)
+            .map_err(|source| Error::Demonstration { name: name(), source })?;
+        let prepared = Arc::new(Prepared { key, jaw_width, augmenter });
+        *kept = Some(Arc::clone(&prepared));
+        Ok(prepared)
     }
-    let demonstration = session.demonstration(image_id)?;
-    let jaw_width = jaw_width(&demonstration);
-    let (width, height) = demonstration.image.dimensions();
-    let scale = (SAMPLE_PX / f64::from(width.max(height))).min(1.0);
-    let scaled = |side: u32| (f64::from(side) * scale).round().max(1.0) as u32;
-    let config = AugmentationConfig::default().with_output_size(scaled(width), scaled(height));
-    let name = || format!("sample of picture {image_id}");
-    let augmenter = Augmenter::new(&[demonstration], config, seed)
-        .map_err(|source| Error::Demonstration { name: name(), source })?;
-    let prepared = Arc::new(Prepared { image_id, marks, seed, jaw_width, augmenter });
-    *kept = Some(Arc::clone(&prepared));
-    Ok(prepared)
 }
 
 fn jaw_width(demonstration: &Demonstration) -> f64 {

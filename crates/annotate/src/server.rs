@@ -93,7 +93,7 @@ impl Server {
 }
 
 /// Answers the requests of one connection, until either side has enough.
-fn serve(mut stream: TcpStream, guard: &Guard, session: &Arc<Session>) {
+fn serve(mut stream: TcpStream, guard: &Guard, session: &Session) {
     let ready = stream
         .set_nodelay(true)
         .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
@@ -120,7 +120,7 @@ fn next_answer(
     stream: &mut TcpStream,
     buffer: &mut Vec<u8>,
     guard: &Guard,
-    session: &Arc<Session>,
+    session: &Session,
 ) -> std::result::Result<(Response, bool), Unreadable> {
     let head = Head::read(stream, buffer)?;
     if let Err(refusal) = guard.check(&head) {

@@ -1,11 +1,11 @@
-//! One sitting at the page: the pictures given, what is marked on them, and what was tried.
+//! One session of the page: the pictures given, what is marked on them, and what was tried.
 //!
 //! Everything that a request may reach hangs on a number in a list made here. No path comes from the page.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use sdg_demonstration::{Demonstration, ModelKind};
 use tempfile::TempDir;
 
 use crate::advice::advise;
@@ -15,9 +15,10 @@ use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
 use crate::names::{file_name, free_name, free_numbered, safe_stem};
 use crate::picture::{Picture, pictures_in, png};
-use crate::preview::Previews;
-use crate::teacher::{GraspTeacher, ModelLetter};
-use crate::teaching::Teaching;
+use crate::preview::{Previews, SampleKey};
+use crate::session_state::{MarkedPicture, Scene, State};
+use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest};
+use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SceneView, SessionView};
 
 /// Pictures to try that one sitting keeps.
@@ -38,11 +39,13 @@ pub struct SessionOptions {
     pub live: Option<LiveOptions>,
 }
 
-/// One sitting.
+/// One session.
+///
+/// It calls teaching and previews, and they never call it. No other lock is taken while that of `state` is held.
 pub struct Session {
-    pub(crate) teacher: Arc<dyn GraspTeacher>,
-    pub(crate) teaching: Teaching,
-    pub(crate) previews: Previews,
+    teacher: Arc<dyn GraspTeacher>,
+    teaching: Arc<Teaching>,
+    previews: Previews,
     model_path: Option<PathBuf>,
     /// What is written for the person at the page stands beside this: the first picture, or the first photo to be taken.
     home: PathBuf,
@@ -50,31 +53,6 @@ pub struct Session {
     /// Pictures that came from the page, until one is accepted.
     uploads: TempDir,
     state: Mutex<State>,
-}
-
-struct State {
-    label: String,
-    images: Vec<MarkedPicture>,
-    scenes: Vec<Scene>,
-}
-
-/// A picture of the object and what is marked on it.
-#[derive(Clone)]
-struct MarkedPicture {
-    picture: Picture,
-    marks: Marks,
-    file: PathBuf,
-    note: Option<String>,
-    saved: Saved,
-}
-
-/// A picture that a taught model is tried on.
-#[derive(Clone)]
-pub(crate) struct Scene {
-    pub(crate) picture: Picture,
-    uploaded: bool,
-    /// The number of the marked picture that it became.
-    became: Option<usize>,
 }
 
 impl Session {
@@ -115,7 +93,7 @@ impl Session {
         let state = State { label: label.unwrap_or_else(|| "part".to_owned()), images, scenes };
         Ok(Self {
             teacher,
-            teaching: Teaching::default(),
+            teaching: Arc::default(),
             previews: Previews::default(),
             model_path: options.model_path.clone(),
             home,
@@ -139,11 +117,6 @@ impl Session {
             model_path: self.model_path(&state).display().to_string(),
             camera: self.live.as_ref().map(|desk| desk.options.address.clone()),
         }
-    }
-
-    /// Where a model of the present label is written.
-    pub(crate) fn model_file(&self) -> PathBuf {
-        self.model_path(&self.state())
     }
 
     fn model_path(&self, state: &State) -> PathBuf {
@@ -327,14 +300,57 @@ impl Session {
             let state = self.state();
             (state.label.clone(), state.image(id)?.clone())
         };
-        demonstration(&label, &marked)
+        marked.demonstration(&label)
+    }
+
+    /// Sample `index` of `seed` of a marked picture, with the grasp drawn where the marks went, as JPEG.
+    ///
+    /// # Errors
+    /// No such picture, marks that cannot be taught.
+    pub fn sample(&self, id: usize, seed: u64, index: u64) -> Result<Vec<u8>> {
+        let (label, marked) = {
+            let state = self.state();
+            (state.label.clone(), state.image(id)?.clone())
+        };
+        let key = SampleKey { image_id: id, marks: marked.marks.clone(), seed };
+        self.previews.sample(key, || marked.demonstration(&label), index)
+    }
+
+    /// Starts to teach from all marked pictures; [`teaching_news`](Self::teaching_news) tells how it goes.
+    ///
+    /// # Errors
+    /// A request without sense, a teaching that goes on already, marks that do not suffice.
+    pub fn start_teaching(&self, request: TeachRequest) -> Result<News> {
+        request.check()?;
+        self.teaching.check_idle()?;
+        let demonstrations = self.demonstrations(request.model)?;
+        let model_path = self.model_path(&self.state());
+        self.teaching.start(Arc::clone(&self.teacher), request, demonstrations, model_path)
+    }
+
+    /// How the teaching stands.
+    pub fn teaching_news(&self) -> News {
+        self.teaching.news()
+    }
+
+    /// Asks a running teaching to end with what there is.
+    pub fn stop_teaching(&self) {
+        self.teaching.stop();
+    }
+
+    /// The model taught last.
+    ///
+    /// # Errors
+    /// [`Error::NotTaught`].
+    pub fn taught_model(&self) -> Result<Arc<dyn TaughtModel>> {
+        self.teaching.model()
     }
 
     /// Every picture that is marked for `model`. Pictures without any mark are left out.
     ///
     /// # Errors
     /// None is marked, or one only in part.
-    pub fn demonstrations(&self, model: ModelLetter) -> Result<Vec<Demonstration>> {
+    pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
         let (label, marked) = {
             let state = self.state();
             (state.label.clone(), state.images.clone())
@@ -352,58 +368,6 @@ impl Session {
                 return Err(Error::NotMarked { name, expected: missing, found: "none" });
             }
         }
-        begun.into_iter().map(|image| demonstration(&label, image)).collect()
+        begun.into_iter().map(|image| image.demonstration(&label)).collect()
     }
-}
-
-impl State {
-    fn image(&self, id: usize) -> Result<&MarkedPicture> {
-        self.images.get(id).ok_or(Error::NoSuchPicture { id, count: self.images.len() })
-    }
-
-    fn scene(&self, id: usize) -> Result<&Scene> {
-        self.scenes.get(id).ok_or(Error::NoSuchPicture { id, count: self.scenes.len() })
-    }
-
-    /// Adds a picture with marks that are not saved yet, and says its number.
-    fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
-        let opened = annotation_file::open(&picture.path, None, picture.size)?;
-        let (file, note) = (opened.path, opened.note);
-        self.images.push(MarkedPicture { picture, marks, file, note, saved: Saved::Nothing });
-        Ok(self.images.len() - 1)
-    }
-
-    fn save(&mut self, id: usize) {
-        let MarkedPicture { picture, marks, file, .. } = &self.images[id];
-        let written = annotation_file::save(file, marks, &self.label, &picture.name, picture.size);
-        self.images[id].saved = match written {
-            Ok(true) => Saved::Written { file: file_name(&self.images[id].file) },
-            Ok(false) => Saved::Nothing,
-            Err(error) => Saved::Refused { why: error.to_string() },
-        };
-    }
-
-    fn image_view(&self, id: usize) -> ImageView {
-        let MarkedPicture { picture, marks, note, saved, .. } = &self.images[id];
-        let Picture { name, size: [width, height], .. } = picture.clone();
-        let advice = advise(marks, picture.size);
-        ImageView { id, name, width, height, marks: marks.clone(), saved: saved.clone(), advice, note: note.clone() }
-    }
-
-    fn scene_view(&self, id: usize) -> SceneView {
-        let Scene { picture, became, .. } = &self.scenes[id];
-        let Picture { name, size: [width, height], .. } = picture.clone();
-        SceneView { id, name, width, height, became: *became }
-    }
-}
-
-fn demonstration(label: &str, marked: &MarkedPicture) -> Result<Demonstration> {
-    let MarkedPicture { picture, marks, .. } = marked;
-    let [width, height] = picture.size;
-    let facts = ImageFacts { width, height, file_name: Some(&picture.name) };
-    let complain = |source| Error::Demonstration { name: picture.name.clone(), source };
-    let coco = marks.to_coco(label, &facts).map_err(complain)?;
-    let mut objects = Annotation::read(coco.as_bytes(), &facts).map_err(complain)?;
-    // A file without an object is refused on reading, so there is one.
-    Ok(Demonstration { image: picture.pixels()?, annotation: objects.remove(0) })
 }

@@ -4,11 +4,14 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use image::RgbImage;
-use sdg_demonstration::Demonstration;
+use sdg_demonstration::{Demonstration, ModelKind};
 use sdg_geometry::{BoundingBox, PlanarGrasp, Polygon};
 use serde::{Deserialize, Serialize};
 
-use crate::error::TeacherError;
+use crate::error::{Error, TeacherError};
+
+/// More steps than any teaching has.
+const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
@@ -48,7 +51,7 @@ pub trait TaughtModel: Send + Sync {
 #[serde(deny_unknown_fields)]
 pub struct TeachRequest {
     /// The model's letter.
-    pub model: ModelLetter,
+    pub model: ModelKind,
     /// Seconds that the training may take at most.
     #[serde(default)]
     pub time_budget_secs: Option<f64>,
@@ -76,36 +79,26 @@ impl TeachRequest {
     pub fn time_budget(&self) -> Option<Duration> {
         self.time_budget_secs.and_then(|secs| Duration::try_from_secs_f64(secs).ok())
     }
-}
 
-/// The grasp models by their letters; see the project's ARCHITECTURE.md.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ModelLetter {
-    /// Box, turn from its crop.
-    A,
-    /// Box, turn from keypoints.
-    B,
-    /// Keypoints.
-    C,
-    /// Mask, turn from texture or outline.
-    D,
-    /// No network.
-    S,
-}
-
-impl ModelLetter {
-    /// Every model.
-    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::S];
-
-    /// The letter itself.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::C => "C",
-            Self::D => "D",
-            Self::S => "S",
+    /// # Errors
+    /// A time limit or a number of steps or turns that no teaching can have.
+    pub(crate) fn check(&self) -> crate::error::Result<()> {
+        let refuse =
+            |what, expected: &str, found: String| Err(Error::Request { what, expected: expected.into(), found });
+        if let Some(secs) = self.time_budget_secs
+            && (self.time_budget().is_none() || secs <= 0.0)
+        {
+            return refuse("time limit", "a positive number of seconds", secs.to_string());
         }
+        if let Some(steps) = self.steps
+            && !(1..=MAX_STEPS).contains(&steps)
+        {
+            return refuse("steps", "1 to 1000000", steps.to_string());
+        }
+        if self.symmetry > 360 {
+            return refuse("symmetry", "0 to 360 equal turns", self.symmetry.to_string());
+        }
+        Ok(())
     }
 }
 
@@ -136,7 +129,7 @@ pub enum TeachingStep {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TaughtSummary {
     /// The letter.
-    pub model: ModelLetter,
+    pub model: ModelKind,
     /// The object's name.
     pub object: String,
     /// Wall-clock time of the teaching.

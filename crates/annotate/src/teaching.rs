@@ -2,21 +2,20 @@
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use sdg_demonstration::{Demonstration, ModelKind};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::session::Session;
-use crate::teacher::{ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
 
 /// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
 const MOST_POINTS: usize = 240;
-/// More steps than any teaching has.
-const MOST_STEPS: usize = 1_000_000;
 
 /// How a teaching stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -41,7 +40,7 @@ pub struct News {
     /// How it stands.
     pub status: Status,
     /// The model being taught.
-    pub model: Option<ModelLetter>,
+    pub model: Option<ModelKind>,
     /// What is being taught just now.
     pub of: &'static str,
     /// Steps done.
@@ -99,7 +98,7 @@ impl Teaching {
         }
     }
 
-    fn hear(&self, step: TeachingStep, start: Instant, stride: &mut usize) -> ControlFlow<()> {
+    fn record(&self, step: TeachingStep, start: Instant, stride: &mut usize) -> ControlFlow<()> {
         let mut news = locked(&self.news);
         news.elapsed_secs = start.elapsed().as_secs_f64();
         match step {
@@ -125,74 +124,68 @@ impl Teaching {
         }
         if self.stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
-}
-
-/// Starts to teach from all marked pictures; the news tell how it goes.
-///
-/// # Errors
-/// A teaching that goes on already, a request without sense, marks that do not suffice.
-pub fn start(session: &Arc<Session>, request: TeachRequest) -> Result<News> {
-    check(&request)?;
-    let mut news = locked(&session.teaching.news);
-    if matches!(news.status, Status::Running | Status::Stopping) {
-        return Err(Error::Busy("a teaching is going on; stop it first, or wait"));
+    /// # Errors
+    /// [`Error::Busy`] while a teaching goes on.
+    pub fn check_idle(&self) -> Result<()> {
+        idle(&locked(&self.news))
     }
-    let demonstrations = session.demonstrations(request.model)?;
-    *news = News { status: Status::Running, model: Some(request.model), ..News::default() };
-    session.teaching.stop.store(false, Ordering::SeqCst);
-    let begun = news.clone();
-    drop(news);
 
-    let session = Arc::clone(session);
-    std::thread::spawn(move || {
-        let start = Instant::now();
-        let teaching = &session.teaching;
-        let mut stride = 1;
-        let mut observe = |step| teaching.hear(step, start, &mut stride);
-        let taught = catch_unwind(AssertUnwindSafe(|| session.teacher.teach(&demonstrations, &request, &mut observe)));
-        // A page that waited for a teaching which broke off would wait for ever.
-        let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
-        let outcome = taught.map_err(Error::Teacher).and_then(|model| keep(&session, model));
-        let mut news = locked(&teaching.news);
-        news.elapsed_secs = start.elapsed().as_secs_f64();
-        match outcome {
-            Ok((summary, written_to)) => {
-                news.status = Status::Done;
-                news.summary = Some(summary);
-                news.written_to = Some(written_to);
+    /// Starts to teach on a thread; the model is written to `model_path`. The news tell how it goes.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] while a teaching goes on.
+    pub fn start(
+        self: &Arc<Self>,
+        teacher: Arc<dyn GraspTeacher>,
+        request: TeachRequest,
+        demonstrations: Vec<Demonstration>,
+        model_path: PathBuf,
+    ) -> Result<News> {
+        let mut news = locked(&self.news);
+        idle(&news)?;
+        *news = News { status: Status::Running, model: Some(request.model), ..News::default() };
+        self.stop.store(false, Ordering::SeqCst);
+        let begun = news.clone();
+        drop(news);
+
+        let teaching = Arc::clone(self);
+        std::thread::spawn(move || {
+            let start = Instant::now();
+            let mut stride = 1;
+            let mut observe = |step| teaching.record(step, start, &mut stride);
+            let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&demonstrations, &request, &mut observe)));
+            // A page that waited for a teaching which broke off would wait for ever.
+            let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
+            let outcome = taught.map_err(Error::Teacher).and_then(|model| teaching.keep(model, &model_path));
+            let mut news = locked(&teaching.news);
+            news.elapsed_secs = start.elapsed().as_secs_f64();
+            match outcome {
+                Ok(summary) => {
+                    news.status = Status::Done;
+                    news.summary = Some(summary);
+                    news.written_to = Some(model_path.display().to_string());
+                }
+                Err(error) => {
+                    news.status = Status::Failed;
+                    news.error = Some(error.to_string());
+                }
             }
-            Err(error) => {
-                news.status = Status::Failed;
-                news.error = Some(error.to_string());
-            }
-        }
-    });
-    Ok(begun)
+        });
+        Ok(begun)
+    }
+
+    /// Writes the model down and keeps it for the pictures to try.
+    fn keep(&self, model: Box<dyn TaughtModel>, path: &Path) -> Result<TaughtSummary> {
+        write_atomically(path, &model.to_bytes().map_err(Error::Teacher)?)?;
+        let summary = model.summary();
+        *locked(&self.model) = Some(Arc::from(model));
+        Ok(summary)
+    }
 }
 
-/// Writes the model down and keeps it for the pictures to try.
-fn keep(session: &Session, model: Box<dyn TaughtModel>) -> Result<(TaughtSummary, String)> {
-    let path = session.model_file();
-    write_atomically(&path, &model.to_bytes().map_err(Error::Teacher)?)?;
-    let summary = model.summary();
-    *locked(&session.teaching.model) = Some(Arc::from(model));
-    Ok((summary, path.display().to_string()))
-}
-
-fn check(request: &TeachRequest) -> Result<()> {
-    let refuse = |what, expected: &str, found: String| Err(Error::Request { what, expected: expected.into(), found });
-    if let Some(secs) = request.time_budget_secs
-        && (request.time_budget().is_none() || secs <= 0.0)
-    {
-        return refuse("time limit", "a positive number of seconds", secs.to_string());
+fn idle(news: &News) -> Result<()> {
+    match news.status {
+        Status::Running | Status::Stopping => Err(Error::Busy("a teaching is going on; stop it first, or wait")),
+        Status::Idle | Status::Done | Status::Failed => Ok(()),
     }
-    if let Some(steps) = request.steps
-        && !(1..=MOST_STEPS).contains(&steps)
-    {
-        return refuse("steps", "1 to 1000000", steps.to_string());
-    }
-    if request.symmetry > 360 {
-        return refuse("symmetry", "0 to 360 equal turns", request.symmetry.to_string());
-    }
-    Ok(())
 }

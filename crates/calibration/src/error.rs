@@ -31,7 +31,7 @@ pub enum CameraFileError {
         found: Vec<f64>,
         /// Pixels in a row.
         width: u32,
-        /// Rows.
+        /// Pixels down.
         height: u32,
     },
     /// A pose that is none.
@@ -95,9 +95,9 @@ pub enum CalibrationError {
         columns: u32,
         /// Squares along y.
         rows: u32,
-        /// Fewest.
+        /// The smallest number allowed.
         least: u32,
-        /// Most.
+        /// The largest number allowed.
         most: u32,
     },
     /// Squares of a size that none have.
@@ -172,7 +172,7 @@ pub enum CalibrationError {
     /// Fewer pictures than a calibration needs.
     #[error("expected at least {least} pictures that show the board, found {found}{}", .hint)]
     TooFewPictures {
-        /// Fewest.
+        /// The smallest number that suffices.
         least: usize,
         /// How many there are.
         found: usize,

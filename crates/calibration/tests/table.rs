@@ -4,21 +4,13 @@
 mod rendering;
 
 use nalgebra::{Isometry3, Vector2};
+use rendering::cameras::WEBCAM;
 use rendering::{Exposure, Random, camera_from_board, render};
 use sdg_calibration::{
     Board, CalibrationError, SeenCorner, find_board, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet,
 };
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-const CAMERA: PinholeCamera = PinholeCamera {
-    width: 1280,
-    height: 720,
-    fx: 980.0,
-    fy: 978.0,
-    cx: 652.0,
-    cy: 351.0,
-    lens: PlumbBob { k1: 0.08, k2: -0.17, p1: -0.001, p2: 0.0006, k3: 0.0 },
-};
 /// The camera's place is known to this: a twentieth of a pixel at 0.6 m, tilted.
 const MAX_PLACE_ERROR_M: f64 = 0.0005;
 
@@ -37,9 +29,9 @@ fn corners(camera: &PinholeCamera, pose: &Isometry3<f64>, sigma_px: f64, random:
 #[test]
 fn a_rendered_sheet_tells_where_the_camera_is() {
     for tilts in [[0.02, -0.01, 0.3], [0.25, 0.1, -0.8], [0.0, -0.4, 0.0]] {
-        let pose = camera_from_board(&board(), &CAMERA, [640.0, 400.0], 0.6, tilts);
-        let picture = render(&board(), &CAMERA, &pose, &Exposure::ORDINARY, &mut Random(9));
-        let found = locate_sheet(&CAMERA, &board(), &find_board(&picture, &board()).unwrap()).unwrap();
+        let pose = camera_from_board(&board(), &WEBCAM, [640.0, 400.0], 0.6, tilts);
+        let picture = render(&board(), &WEBCAM, &pose, &Exposure::ORDINARY, &mut Random(9));
+        let found = locate_sheet(&WEBCAM, &board(), &find_board(&picture, &board()).unwrap()).unwrap();
         let off = (found.sheet_from_camera.translation.vector - pose.inverse().translation.vector).norm();
         let turn = found.sheet_from_camera.rotation.angle_to(&pose.inverse().rotation).to_degrees();
         println!(
@@ -60,11 +52,11 @@ fn told_errors_are_those_that_repetition_shows() {
     const SEEDS: u64 = 400;
     /// Deviations of 400 numbers are uncertain by 3.5 %; four times that.
     const MAX_RATIO: f64 = 1.14;
-    let pose = camera_from_board(&board(), &CAMERA, [640.0, 400.0], 0.6, [0.2, 0.1, 0.2]);
+    let pose = camera_from_board(&board(), &WEBCAM, [640.0, 400.0], 0.6, [0.2, 0.1, 0.2]);
     let truth = pose.inverse();
     let (mut heights, mut tilts, mut told) = (0.0, 0.0, [0.0; 2]);
     for seed in 0..SEEDS {
-        let found = locate_sheet(&CAMERA, &board(), &corners(&CAMERA, &pose, 0.2, &mut Random(seed))).unwrap();
+        let found = locate_sheet(&WEBCAM, &board(), &corners(&WEBCAM, &pose, 0.2, &mut Random(seed))).unwrap();
         heights += (found.sheet_from_camera.translation.z - truth.translation.z).powi(2);
         let turn = (found.sheet_from_camera.rotation * truth.rotation.inverse()).scaled_axis();
         tilts += 0.5 * (turn.x * turn.x + turn.y * turn.y);
@@ -80,7 +72,7 @@ fn told_errors_are_those_that_repetition_shows() {
 
 /// As a phone's picture: no distortion to speak of.
 const PHONE: PinholeCamera =
-    PinholeCamera { lens: PlumbBob::NONE, fx: 980.0, fy: 980.0, cx: 646.0, cy: 356.0, ..CAMERA };
+    PinholeCamera { lens: PlumbBob::NONE, fx: 980.0, fy: 980.0, cx: 646.0, cy: 356.0, ..WEBCAM };
 
 #[test]
 fn a_tilted_sheet_tells_the_focal_length_and_one_from_above_does_not() {

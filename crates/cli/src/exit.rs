@@ -34,6 +34,14 @@ impl fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
+/// The error of a verb that needs the simulator, in a build without it.
+#[cfg(not(feature = "simulation"))]
+pub fn without_simulator() -> anyhow::Error {
+    let needs = "this sdg was built without the simulator, which demo, rehearse and evaluate (but for --pictures) need: \
+                 expected a build with cargo's feature \"simulation\"";
+    Usage(needs.to_owned()).into()
+}
+
 /// 2 for wrong usage, 1 for everything else.
 pub fn code_of(error: &anyhow::Error) -> ExitCode {
     if error.is::<Usage>() { ExitCode::from(2) } else { ExitCode::FAILURE }

@@ -13,7 +13,7 @@
 //! use clap::Parser;
 //! use sdg_cli::args::{Args, Command};
 //!
-//! let args = Args::try_parse_from(["sdg", "demo", "--attempts", "3"]).expect("a call of the contract");
+//! let args = Args::try_parse_from(["sdg", "demo", "--attempts", "3"]).expect("a call that docs/command-line.md describes");
 //! assert!(matches!(args.command, Command::Demo(demo) if demo.object == "pendulum" && demo.attempts == 3));
 //! ```
 #![forbid(unsafe_code)]
@@ -33,6 +33,7 @@ pub mod evaluation;
 mod exit;
 mod files;
 mod found_record;
+mod found_text;
 mod interrupt;
 pub mod labelled_pictures;
 pub mod live_pictures;
@@ -48,6 +49,7 @@ mod progress;
 pub mod rehearsal;
 #[cfg(feature = "simulation")]
 mod run_page;
+mod shared_args;
 #[cfg(feature = "simulation")]
 pub mod shipped;
 mod statistics;
@@ -58,6 +60,8 @@ pub mod tracking;
 pub mod trial;
 
 use std::process::ExitCode;
+
+use clap::CommandFactory;
 
 use crate::args::{Args, Command};
 use crate::exit::Outcome;
@@ -79,22 +83,15 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Detect(detect) => commands::detect::run(detect),
         #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
-        Command::Evaluate(evaluate) if evaluate.pictures.is_some() => commands::evaluate_pictures::run(evaluate),
-        #[cfg(feature = "simulation")]
-        Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         #[cfg(not(feature = "simulation"))]
-        Command::Demo(_) | Command::Rehearse(_) | Command::Evaluate(_) => Err(exit::Usage(
-            "this sdg was built without the simulator, which demo, rehearse and evaluate (but for --pictures) need: \
-             expected a build with cargo's feature \"simulation\""
-                .to_owned(),
-        )
-        .into()),
+        Command::Demo(_) | Command::Rehearse(_) => Err(exit::without_simulator()),
+        Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),
         Command::Camera(camera) => commands::camera::run(camera),
-        Command::Completions(completions) => commands::completions::run(completions),
-        Command::Man(man) => commands::man::run(man),
+        Command::Completions(completions) => commands::completions::run(completions, Args::command()),
+        Command::Man(man) => commands::man::run(man, Args::command()),
         Command::Devices(devices) => commands::devices::run(devices),
     };
     match done {

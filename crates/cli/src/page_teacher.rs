@@ -5,13 +5,12 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use image::RgbImage;
 use sdg_annotate::{
-    FoundGrasp, GraspPose, GraspTeacher, ModelLetter, TaughtModel, TaughtSummary, TeachRequest, TeacherError,
-    TeachingStep,
+    FoundGrasp, GraspPose, GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingStep,
 };
 use sdg_calibration::Frame;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Event, ModelKind, PlanarPose, Preset, TeachOptions, Verification, teach};
+use sdg_grasp::{Event, PlanarPose, Preset, TeachOptions, Verification, teach};
 
 use crate::camera_files::CameraFile;
 use crate::picture_detector::{Found, PictureDetector};
@@ -32,7 +31,7 @@ impl GraspTeacher for PageTeacher {
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
         let options = TeachOptions {
-            kind: request.model.as_str().parse()?,
+            kind: request.model,
             preset: self.preset,
             symmetry: match request.symmetry {
                 0 => RotationalSymmetry::Full,
@@ -90,13 +89,7 @@ impl TaughtModel for PageModel {
         let model = detector.model();
         let facts = model.facts();
         TaughtSummary {
-            model: match model.kind() {
-                ModelKind::A => ModelLetter::A,
-                ModelKind::B => ModelLetter::B,
-                ModelKind::C => ModelLetter::C,
-                ModelKind::D => ModelLetter::D,
-                ModelKind::S => ModelLetter::S,
-            },
+            model: model.kind(),
             object: model.object().to_owned(),
             seconds: facts.seconds,
             hit_rate: facts.validation.map(|held_back| held_back.hit_rate),

@@ -61,7 +61,7 @@ pub struct Rehearsed {
     pub views: Vec<RgbImage>,
 }
 
-/// A failed attempt, as the contract lists it.
+/// A failed attempt, as `--json` lists it (docs/command-line.md).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Failure {
     attempt: usize,

@@ -131,7 +131,7 @@ pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed:
             sheet(demonstrations, seed)?.into_iter().map(Figure::photo).collect(),
             if model.kind().has_network() {
                 "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
-                 things in the way. Scenes without a box lack the part, so that the model learns to say no."
+                 things in the way. Scenes without a box lack the part, so that the model learns to reject."
             } else {
                 "What a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
                  things in the way. Model S has none; it looks for the photo's part itself."

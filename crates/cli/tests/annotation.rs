@@ -1,19 +1,14 @@
 //! `sdg annotation convert`, and annotations of every format as demonstrations.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
-
-fn sdg(arguments: &[&Path]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/fuel_line").join(name)
-}
+use support::{sdg, shipped};
 
 /// A file that another tool wrote.
 fn foreign(name: &str) -> PathBuf {
@@ -47,7 +42,7 @@ fn assert_refused(done: &Output, code: i32, parts: &[&str]) {
 fn coco_to_labelme_and_back_is_the_same_file() {
     let folder = tempfile::tempdir().unwrap();
     let [coco, labelme, again] = ["a.json", "b.json", "c.json"].map(|name| folder.path().join(name));
-    let first = converted(&shipped("annotation.json"), &coco, &[]);
+    let first = converted(&shipped("fuel_line", "annotation.json"), &coco, &[]);
     assert_eq!((first["in_format"].as_str(), first["left_out"].as_array().unwrap().len()), (Some("coco"), 0));
     let second = converted(&coco, &labelme, &["--format", "labelme"]);
     assert_eq!((second["out_format"].as_str(), second["image"]["width"].as_u64()), (Some("labelme"), Some(640)));
@@ -60,20 +55,24 @@ fn coco_to_labelme_and_back_is_the_same_file() {
 fn yolo_pose_says_what_it_has_no_room_for() {
     let folder = tempfile::tempdir().unwrap();
     let (labels, back) = (folder.path().join("image.txt"), folder.path().join("back.json"));
-    let done = convert(&shipped("annotation.json"), &labels, &[]);
+    let done = convert(&shipped("fuel_line", "annotation.json"), &labels, &[]);
     let stderr = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success() && stderr.starts_with("left out: the outline of `fuel_line`"), "{stderr}");
     let yaml = fs::read_to_string(folder.path().join("data.yaml")).unwrap();
     assert!(yaml.contains("kpt_shape: [2, 3]") && yaml.contains("0: 'fuel_line'"), "{yaml}");
 
-    let image = shipped("image.png");
+    let image = shipped("fuel_line", "image.png");
     let line = converted(&labels, &back, &["--image", image.to_str().unwrap()]);
     assert_eq!((line["in_format"].as_str(), line["objects"][0].as_str()), (Some("yolo-pose"), Some("fuel_line")));
 
     // Labels of another dataset stand there already: class 0 must not change its name.
     fs::write(folder.path().join("data.yaml"), "names: [rod_end]\nkpt_shape: [2, 3]\n").unwrap();
     let other = folder.path().join("other.txt");
-    assert_refused(&convert(&shipped("annotation.json"), &other, &[]), 1, &["data.yaml", "fuel_line", "rod_end"]);
+    assert_refused(
+        &convert(&shipped("fuel_line", "annotation.json"), &other, &[]),
+        1,
+        &["data.yaml", "fuel_line", "rod_end"],
+    );
     assert!(!other.exists());
 }
 
@@ -81,7 +80,7 @@ fn yolo_pose_says_what_it_has_no_room_for() {
 fn opendr_s_row_is_the_image_s_number() {
     let folder = tempfile::tempdir().unwrap();
     let image = folder.path().join("3.png");
-    fs::copy(shipped("image.png"), &image).unwrap();
+    fs::copy(shipped("fuel_line", "image.png"), &image).unwrap();
     let out = folder.path().join("3.json");
     let line = converted(&foreign("boxes_train.npy"), &out, &["--image", image.to_str().unwrap()]);
     assert_eq!(line["in_format"], "opendr");
@@ -94,7 +93,7 @@ fn opendr_s_row_is_the_image_s_number() {
 fn wrong_calls_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let annotation = shipped("annotation.json");
+    let annotation = shipped("fuel_line", "annotation.json");
     let refused = |input: &Path, output: &str, options: &[&str], code: i32, parts: &[&str]| {
         assert_refused(&convert(input, &at(output), options), code, parts);
         assert!(!at(output).exists());
@@ -108,7 +107,7 @@ fn wrong_calls_are_refused_in_one_line() {
     assert_refused(&convert(&at("same.json"), &at("same.json"), &[]), 2, &["another file to write than to read"]);
 
     fs::copy(foreign("boxes_train.npy"), at("boxes_alone.npy")).unwrap();
-    let image = shipped("image.png");
+    let image = shipped("fuel_line", "image.png");
     let with_image = ["--image", image.to_str().unwrap()];
     refused(&at("boxes_alone.npy"), "a.json", &with_image, 1, &["boxes_alone.npy", "together with kps_*.npy"]);
     let cut = fs::read(foreign("boxes_train.npy")).unwrap();
@@ -134,10 +133,10 @@ fn every_format_is_a_demonstration() {
     // OpenDR's row 3 is the part half turned; whatever is on the photo there, model S learns it.
     let folder = tempfile::tempdir().unwrap();
     let numbered = folder.path().join("3.png");
-    fs::copy(shipped("image.png"), &numbered).unwrap();
+    fs::copy(shipped("fuel_line", "image.png"), &numbered).unwrap();
     for (image, annotation) in [
-        (shipped("image.png"), foreign("labelme.json")),
-        (shipped("image.png"), foreign("yolo-pose.txt")),
+        (shipped("fuel_line", "image.png"), foreign("labelme.json")),
+        (shipped("fuel_line", "image.png"), foreign("yolo-pose.txt")),
         (numbered, foreign("boxes_train.npy")),
     ] {
         let out = folder.path().join("samples");

@@ -1,19 +1,13 @@
-//! Wrong input, as a user would give it: one clear line, the contract's exit code, nothing half-written.
+//! Wrong input, as a user would give it: one clear line, the exit code of docs/command-line.md, nothing half-written.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
 
 use sdg_cli::evaluation::{Settings, Store};
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
-}
+use support::{sdg, shipped};
 
 /// Asserts exit code and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
@@ -43,11 +37,11 @@ fn files_in(folder: &Path) -> Vec<String> {
 fn unreadable_images_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("model.sdg");
-    let annotation = shipped("annotation.json");
+    let annotation = shipped("pendulum", "annotation.json");
     teach(&pair(Path::new("/nowhere.png"), &annotation), &out, 1, &["/nowhere.png", "cannot read"]);
 
     let truncated = folder.path().join("truncated.png");
-    let whole = fs::read(shipped("image.png")).unwrap();
+    let whole = fs::read(shipped("pendulum", "image.png")).unwrap();
     fs::write(&truncated, &whole[..whole.len() / 2]).unwrap();
     teach(&pair(&truncated, &annotation), &out, 1, &["truncated.png"]);
 
@@ -61,14 +55,14 @@ fn a_decompression_bomb_is_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let bomb = folder.path().join("bomb.png");
     // A valid header that promises 60000 × 60000 pixels; width and height are bytes 16 to 23, their sum of IHDR follows.
-    let mut bytes = fs::read(shipped("image.png")).unwrap();
+    let mut bytes = fs::read(shipped("pendulum", "image.png")).unwrap();
     bytes[16..20].copy_from_slice(&60_000u32.to_be_bytes());
     bytes[20..24].copy_from_slice(&60_000u32.to_be_bytes());
     let checksum = crc32(&bytes[12..29]);
     bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
     fs::write(&bomb, bytes).unwrap();
     let out = folder.path().join("model.sdg");
-    teach(&pair(&bomb, &shipped("annotation.json")), &out, 1, &["bomb.png", "60000"]);
+    teach(&pair(&bomb, &shipped("pendulum", "annotation.json")), &out, 1, &["bomb.png", "60000"]);
 }
 
 /// PNG's checksum, bit by bit.
@@ -82,7 +76,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 fn annotations_that_mark_nothing_usable_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("model.sdg");
-    let image = shipped("image.png");
+    let image = shipped("pendulum", "image.png");
     let annotated = |name: &str, json: &str| {
         let path = folder.path().join(name);
         fs::write(&path, json).unwrap();
@@ -105,7 +99,7 @@ fn annotations_that_mark_nothing_usable_are_refused() {
 #[test]
 fn what_is_no_model_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let image = shipped("image.png");
+    let image = shipped("pendulum", "image.png");
     let image = image.to_str().unwrap();
     let fake = folder.path().join("fake.sdg");
     fs::write(&fake, b"").unwrap();
@@ -116,7 +110,7 @@ fn what_is_no_model_is_refused() {
 
 #[test]
 fn a_folder_that_cannot_be_written_is_told_before_the_work() {
-    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let missing = Path::new("/nowhere/model.sdg");
     teach(&demonstration, missing, 1, &["/nowhere", "cannot write"]);
     assert_refused(&["demo", "--out", "/proc/report"], 1, &["/proc/report"]);
@@ -128,7 +122,7 @@ fn a_folder_that_cannot_be_written_is_told_before_the_work() {
 fn the_annotation_page_does_not_open_on_what_cannot_be_marked() {
     let folder = tempfile::tempdir().unwrap();
     let photo = folder.path().join("photo.png");
-    fs::copy(shipped("image.png"), &photo).unwrap();
+    fs::copy(shipped("pendulum", "image.png"), &photo).unwrap();
     let photo = photo.to_str().unwrap();
     assert_refused(&["annotate", "/nowhere/photo.png"], 1, &["/nowhere", "cannot"]);
     let text = folder.path().join("text.png");
@@ -176,7 +170,7 @@ fn an_unknown_axis_names_the_known_ones() {
 
 #[test]
 fn wrong_usage_is_exit_code_2() {
-    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     for arguments in [
         vec![],
         vec!["fly"],
@@ -207,7 +201,7 @@ fn wrong_usage_is_exit_code_2() {
 fn augment_writes_pictures_and_their_list() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("samples");
-    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let run = |seed: &str| {
         let output = sdg(&[
             "augment",
@@ -236,7 +230,7 @@ fn augment_writes_pictures_and_their_list() {
 fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
     let folder = tempfile::tempdir().unwrap();
     let (model, picture) = (folder.path().join("model.sdg"), folder.path().join("table.png"));
-    let demonstration = pair(&shipped("image.png"), &shipped("annotation.json"));
+    let demonstration = pair(&shipped("pendulum", "image.png"), &shipped("pendulum", "annotation.json"));
     let taught = sdg(&["teach", "--model", "S", "--demo", &demonstration, "--out", model.to_str().unwrap()]);
     assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
     for (size, advised) in [([320, 200], true), ([640, 480], false), ([480, 640], false)] {

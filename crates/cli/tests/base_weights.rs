@@ -1,6 +1,8 @@
 //! `sdg teach --base-weights` as a user calls it.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -16,10 +18,7 @@ use sdg_detection::presets::{RcnnKind, r50_detectron2, r50_torchvision};
 use sdg_detection::state_dict;
 use sdg_grasp::{BaseWeights, Device};
 use serde_json::{Map, Value, json};
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
+use support::sdg;
 
 /// Runs `sdg` with that much address space and no more.
 fn sdg_within(bytes: u64, arguments: &[&str]) -> Output {

@@ -3,11 +3,11 @@
 
 #[path = "../../calibration/tests/rendering/mod.rs"]
 mod rendering;
+mod support;
 
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use image::GrayImage;
 use nalgebra::{Isometry3, Point2, Vector3};
@@ -15,25 +15,15 @@ use rendering::cameras::{CAMERAS, board, poses};
 use rendering::{Exposure, Random, camera_from_board, render, render_with, turn};
 use sdg_geometry::PinholeCamera;
 use serde_json::Value;
+use support::{Folder, sdg, stdout};
 
 /// The focal length from 15 pictures, as a share: the bound.
 const MAX_FOCAL_ERROR: f64 = 0.002;
 /// The camera over the table with intrinsics that are off by that much, from 0.3 m.
 const MAX_PLACE_ERROR_M: f64 = 0.001;
 
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-/// Standard output of a command that succeeds.
-fn said(arguments: &[&str]) -> String {
-    let output = sdg(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
 fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&said(arguments)).unwrap()
+    serde_json::from_str(&stdout(arguments)).unwrap()
 }
 
 /// Exit code, and a message with every part.
@@ -46,26 +36,9 @@ fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
     }
 }
 
-struct Folder {
-    folder: tempfile::TempDir,
-}
-
 impl Folder {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.folder.path().join(name).to_str().unwrap().to_owned()
-    }
-
     fn picture(&self, name: &str, picture: &GrayImage) -> String {
         picture.save(self.path(name)).unwrap();
-        self.path(name)
-    }
-
-    fn text(&self, name: &str, text: &str) -> String {
-        fs::write(self.path(name), text).unwrap();
         self.path(name)
     }
 
@@ -130,7 +103,7 @@ fn printed(svg: &str) -> impl Fn(&Point2<f64>) -> bool + use<> {
 fn from_the_sheet_to_a_camera_file_that_detects() {
     let files = Folder::new();
     let (svg, pdf) = (files.path("board.svg"), files.path("board.pdf"));
-    said(&["camera", "board", "--out", &svg, "--pdf", &pdf]);
+    stdout(&["camera", "board", "--out", &svg, "--pdf", &pdf]);
     assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF-1.7"));
     let sheet = printed(&fs::read_to_string(&svg).unwrap());
 
@@ -192,7 +165,7 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
     let wrist = files.text("wrist.yaml", wrist);
     let demonstration = format!("{photo}:{marks}");
     let teach = ["teach", "--model", "S", "--demo", &demonstration, "--out", &model, "--camera", &wrist];
-    said(&[&teach[..], &["--mark-height-mm", "16"]].concat());
+    stdout(&[&teach[..], &["--mark-height-mm", "16"]].concat());
     let detected = sdg(&["detect", "--grasp-model", &model, "--camera", &out, "--json", &on_table]);
     // There is no pendulum on the sheet.
     assert_eq!(detected.status.code(), Some(3), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -233,7 +206,7 @@ fn a_camera_without_file_gets_a_plane_and_the_cost_of_its_focal_length() {
     assert!((number(&cost["at_border_mm"]) - 1.47).abs() < 0.1, "{above}");
     assert!(number(&cost["at_sheet_mm"]) < 0.2, "{above}");
     assert_eq!(table("given.png", 0.0, &["--focal-px", "1000"])["focal"]["source"], "given");
-    let told = said(&["camera", "table", &files.path("above.png"), "--out", &out]);
+    let told = stdout(&["camera", "table", &files.path("above.png"), "--out", &out]);
     assert!(told.contains("guessed for a view of 60 degrees") && told.contains("10 % of focal length cost"), "{told}");
 }
 
@@ -273,7 +246,7 @@ fn a_camera_on_the_hand_is_found_and_written() {
     );
     assert_eq!(found["pictures"].as_array().unwrap().len(), 8);
     assert!(fs::read_to_string(&out).unwrap().contains("hand_eye:\n  flange_from_camera:\n"));
-    let told = said(&[&common[..], &["--mount", "hand"]].concat());
+    let told = stdout(&[&common[..], &["--mount", "hand"]].concat());
     assert!(told.contains("flange_from_camera: (") && told.contains("one picture left out"), "{told}");
     assert_refused(&[&common[..], &["--mount", "base"]].concat(), 1, &["--mount to be the other one"]);
 

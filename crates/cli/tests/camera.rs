@@ -1,48 +1,29 @@
 //! `--camera` on the command line: a part taught with one camera, found in metres, and camera files that are none.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
+use support::{Folder, sdg, shipped};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
 const CAMERA: &str = include_str!("wrist.yaml");
 
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
-}
-
-/// A folder with a camera file.
-struct Folder {
-    folder: tempfile::TempDir,
-}
-
 impl Folder {
-    fn new() -> Self {
-        Self { folder: tempfile::tempdir().unwrap() }
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.folder.path().join(name).to_str().unwrap().to_owned()
-    }
-
-    fn camera(&self, name: &str, text: &str) -> String {
-        fs::write(self.path(name), text).unwrap();
-        self.path(name)
-    }
-
     fn teach(&self, out: &str, further: &[&str]) -> Output {
-        let demonstration = format!("{}:{}", shipped("image.png").display(), shipped("annotation.json").display());
+        let demonstration = format!(
+            "{}:{}",
+            shipped("pendulum", "image.png").display(),
+            shipped("pendulum", "annotation.json").display()
+        );
         let out = self.path(out);
         sdg(&[&["teach", "--model", "S", "--demo", &demonstration, "--out", &out], further].concat())
     }
@@ -60,13 +41,13 @@ fn assert_refused(output: &Output, code: i32, parts: &[&str]) {
 #[test]
 fn a_part_taught_with_a_camera_is_found_in_metres() {
     let files = Folder::new();
-    let camera = files.camera("wrist.yaml", CAMERA);
+    let camera = files.text("wrist.yaml", CAMERA);
     let taught = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
     assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
     let told = String::from_utf8_lossy(&taught.stdout).into_owned();
     assert!(told.contains("marks 16.0 mm above the table"), "{told}");
 
-    let (model, photo) = (files.path("part.sdg"), shipped("image.png"));
+    let (model, photo) = (files.path("part.sdg"), shipped("pendulum", "image.png"));
     let detect = |json: &[&str]| {
         let common = ["detect", "--grasp-model", &model, "--camera", &camera];
         let found = sdg(&[&common, json, &[photo.to_str().unwrap()]].concat());
@@ -100,7 +81,7 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     let files = Folder::new();
     let teach = |name: &str, from: &str, to: &str| {
         assert!(CAMERA.contains(from), "{from}");
-        let camera = files.camera(name, &CAMERA.replace(from, to));
+        let camera = files.text(name, &CAMERA.replace(from, to));
         let output = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "16"]);
         assert!(!Path::new(&files.path("part.sdg")).exists());
         output
@@ -114,13 +95,13 @@ fn camera_files_that_are_none_and_pictures_of_other_cameras_are_refused() {
     let alone = teach("alone.yaml", &CAMERA[table..], "");
     assert_refused(&alone, 1, &["alone.yaml", "pose over the table"]);
 
-    let camera = files.camera("wrist.yaml", CAMERA);
+    let camera = files.text("wrist.yaml", CAMERA);
     assert_refused(&files.teach("part.sdg", &["--camera", &camera]), 2, &["--mark-height-mm"]);
     let metres = files.teach("part.sdg", &["--camera", &camera, "--mark-height-mm", "1600"]);
     assert_refused(&metres, 2, &["0 to 500 millimetres", "1600"]);
 
     assert!(files.teach("no_camera.sdg", &[]).status.success());
-    let (model, photo) = (files.path("no_camera.sdg"), shipped("image.png"));
+    let (model, photo) = (files.path("no_camera.sdg"), shipped("pendulum", "image.png"));
     let found = sdg(&["detect", "--grasp-model", &model, "--camera", &camera, photo.to_str().unwrap()]);
     assert_refused(&found, 1, &["no_camera.sdg", "taught with a camera", "--mark-height-mm"]);
 }
@@ -147,7 +128,7 @@ fn second_camera(files: &Folder) -> SecondCamera {
     };
     let line = shown.truth.unwrap().line;
     SecondCamera {
-        file: files.camera("webcam.yaml", &camera.to_yaml()),
+        file: files.text("webcam.yaml", &camera.to_yaml()),
         picture: shown.view.image,
         marks: [line.start, line.end].map(|mark| [mark.x, mark.y]),
     }
@@ -171,13 +152,13 @@ fn labelled(marks: [[f64; 2]; 2], file: &str, [width, height]: [u32; 2]) -> Valu
 #[test]
 fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
     let files = Folder::new();
-    let first = files.camera("wrist.yaml", CAMERA);
+    let first = files.text("wrist.yaml", CAMERA);
     let taught = files.teach("part.sdg", &["--camera", &first, "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
     assert!(taught.status.success(), "{}", String::from_utf8_lossy(&taught.stderr));
     let model = files.path("part.sdg");
     let second = second_camera(&files);
 
-    let folder = files.folder.path().join("pictures");
+    let folder = PathBuf::from(files.path("pictures"));
     fs::create_dir(&folder).unwrap();
     second.picture.save(folder.join("a.png")).unwrap();
     fs::write(folder.join("a.json"), labelled(second.marks, "a.png", [640, 480]).to_string()).unwrap();
@@ -205,7 +186,7 @@ fn a_model_taught_with_one_camera_is_tested_and_rehearsed_with_another() {
 
     // The photo that it was taught from is no test, in the plan view neither.
     for (from, to) in [("image.png", "image.png"), ("annotation.json", "image.json")] {
-        fs::copy(shipped(from), Path::new(&folder).join(to)).unwrap();
+        fs::copy(shipped("pendulum", from), Path::new(&folder).join(to)).unwrap();
     }
     for name in ["a.png", "a.json"] {
         fs::remove_file(Path::new(&folder).join(name)).unwrap();

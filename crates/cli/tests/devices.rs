@@ -1,15 +1,13 @@
 //! `sdg devices`, and `--device` as a user calls it, on whatever this build has.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::path::Path;
-use std::process::{Command, Output};
 
 use sdg_grasp::ComputeBackend;
 use serde_json::Value;
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
+use support::sdg;
 
 #[test]
 fn what_there_is_is_listed() {

@@ -1,28 +1,16 @@
 //! `sdg evaluate --pictures`: what is counted, against a naive reference and in both formats; wrong folders.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
 
 use serde_json::{Value, json};
+use support::{sdg, shipped, stdout};
 
 /// Samples: enough that some lack the part and some show it cut by the border.
 const NUM_SAMPLES: usize = 20;
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-fn stdout(arguments: &[&str]) -> String {
-    let output = sdg(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
-}
 
 fn text(path: &Path) -> &str {
     path.to_str().unwrap()
@@ -31,7 +19,8 @@ fn text(path: &Path) -> &str {
 /// Model S of the shipped pendulum.
 fn teach(folder: &Path) -> PathBuf {
     let model = folder.join("model.sdg");
-    let demonstration = format!("{}:{}", text(&shipped("image.png")), text(&shipped("annotation.json")));
+    let demonstration =
+        format!("{}:{}", text(&shipped("pendulum", "image.png")), text(&shipped("pendulum", "annotation.json")));
     stdout(&["teach", "--model", "S", "--demo", &demonstration, "--out", text(&model)]);
     model
 }
@@ -73,7 +62,7 @@ fn marked(annotation: &Value) -> Marked {
 /// marks as they stand in the file. Samples show one part at most, so that a first hit settles it.
 fn counted_naively(samples: &Path, model: &Path) -> [usize; 5] {
     let file = read_json(&samples.join("annotations.json"));
-    let demonstration = read_json(&shipped("annotation.json"));
+    let demonstration = read_json(&shipped("pendulum", "annotation.json"));
     let points = |kind: &str| {
         let shapes = demonstration["shapes"].as_array().unwrap();
         let points = &shapes.iter().find(|s| s["shape_type"] == kind || s["label"] == kind).unwrap()["points"];
@@ -170,7 +159,8 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     let folder = tempfile::tempdir().unwrap();
     let (samples, report) = (folder.path().join("samples"), folder.path().join("report"));
     let model = teach(folder.path());
-    let demonstration = format!("{}:{}", text(&shipped("image.png")), text(&shipped("annotation.json")));
+    let demonstration =
+        format!("{}:{}", text(&shipped("pendulum", "image.png")), text(&shipped("pendulum", "annotation.json")));
     let num_samples = NUM_SAMPLES.to_string();
     stdout(&["augment", "--demo", &demonstration, "--count", &num_samples, "--out", text(&samples)]);
 
@@ -197,8 +187,8 @@ fn what_augment_writes_is_counted_as_a_naive_reference_does() {
     // The same marks in the other format, beside the photo that the model was taught from and another program's JSON.
     let labelme = folder.path().join("labelme");
     write_labelme(&samples, &labelme);
-    fs::copy(shipped("image.png"), labelme.join("photo.png")).unwrap();
-    fs::copy(shipped("annotation.json"), labelme.join("photo.json")).unwrap();
+    fs::copy(shipped("pendulum", "image.png"), labelme.join("photo.png")).unwrap();
+    fs::copy(shipped("pendulum", "annotation.json"), labelme.join("photo.json")).unwrap();
     fs::write(labelme.join("poses.json"), "[1, 2]").unwrap();
     fs::copy(samples.join("000000.png"), labelme.join("unlabelled.png")).unwrap();
     let again = evaluate(&labelme, &model, &report, &["--min-score", "0.5"]);
@@ -219,7 +209,7 @@ impl Case {
     fn new(name: &str, labels: &str) -> Self {
         let case = Self { folder: tempfile::tempdir().unwrap() };
         // The shipped photo, but for one pixel: the model was not taught from it.
-        let mut picture = image::open(shipped("image.png")).unwrap().into_rgb8();
+        let mut picture = image::open(shipped("pendulum", "image.png")).unwrap().into_rgb8();
         let [width, height] = [picture.width(), picture.height()];
         for x in 0..width {
             picture.put_pixel(x, height / 2, image::Rgb([0, 0, 0]));
@@ -302,12 +292,13 @@ fn wrong_folders_are_refused_with_what_was_expected() {
         &["--label", "screw"],
         &["labelled screw", "bolt, nut"],
     );
-    let photo = Case::new("photo.json", &fs::read_to_string(shipped("annotation.json")).unwrap()).without("a.png");
-    fs::copy(shipped("image.png"), photo.folder.path().join("photo.png")).unwrap();
+    let photo =
+        Case::new("photo.json", &fs::read_to_string(shipped("pendulum", "annotation.json")).unwrap()).without("a.png");
+    fs::copy(shipped("pendulum", "image.png"), photo.folder.path().join("photo.png")).unwrap();
     refused(photo, &["not taught from", "found only photo.png"]);
 
     let picture = Case::new("a.json", &empty);
-    picture.assert_refused(&shipped("image.png"), &[], &["expected a grasp model", "a PNG image"]);
+    picture.assert_refused(&shipped("pendulum", "image.png"), &[], &["expected a grasp model", "a PNG image"]);
     picture.assert_refused(Path::new("/nowhere/model.sdg"), &[], &["/nowhere/model.sdg", "cannot read"]);
 }
 

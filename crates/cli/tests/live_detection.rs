@@ -1,23 +1,18 @@
 //! `sdg detect --from`: parts in live pictures, a line for each frame.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::path::{Path, PathBuf};
+
 use std::process::{Command, Output, Stdio};
 
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::table_camera::TableCamera;
 use serde_json::Value;
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
-
-fn shipped(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/demonstrations/pendulum").join(name)
-}
+use support::{sdg, shipped};
 
 fn path(folder: &tempfile::TempDir, name: &str) -> String {
     folder.path().join(name).to_str().unwrap().to_owned()
@@ -25,7 +20,8 @@ fn path(folder: &tempfile::TempDir, name: &str) -> String {
 
 /// Model S of the pendulum.
 fn taught(folder: &tempfile::TempDir, further: &[&str]) -> String {
-    let demonstration = format!("{}:{}", shipped("image.png").display(), shipped("annotation.json").display());
+    let demonstration =
+        format!("{}:{}", shipped("pendulum", "image.png").display(), shipped("pendulum", "annotation.json").display());
     let out = path(folder, "part.sdg");
     let done = sdg(&[&["teach", "--model", "S", "--demo", &demonstration, "--out", &out], further].concat());
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
@@ -43,7 +39,7 @@ fn a_folder_is_played_and_its_part_followed() {
     let model = taught(&folder, &[]);
     let pictures = folder.path().join("pictures");
     fs::create_dir(&pictures).unwrap();
-    fs::copy(shipped("image.png"), pictures.join("a.png")).unwrap();
+    fs::copy(shipped("pendulum", "image.png"), pictures.join("a.png")).unwrap();
     let from = format!("dir:{}?loop", pictures.display());
     let detected = sdg(&["detect", "--grasp-model", &model, "--from", &from, "--frames", "40", "--json"]);
     assert_eq!(detected.status.code(), Some(0), "{}", String::from_utf8_lossy(&detected.stderr));
@@ -54,7 +50,7 @@ fn a_folder_is_played_and_its_part_followed() {
     // The first search takes some frames; the last frame's part is followed.
     let part = &last["detections"][0];
     assert_eq!((&part["state"], &part["track"]), (&"followed".into(), &lines[38]["detections"][0]["track"]), "{last}");
-    let alone = sdg(&["detect", "--grasp-model", &model, "--json", shipped("image.png").to_str().unwrap()]);
+    let alone = sdg(&["detect", "--grasp-model", &model, "--json", shipped("pendulum", "image.png").to_str().unwrap()]);
     let expected: Value = serde_json::from_slice(&alone.stdout).unwrap();
     for axis in ["x", "y"] {
         let [found, expected] =
@@ -109,7 +105,7 @@ fn a_rendered_part_is_followed_in_metres() {
 fn drawn_frames_are_served_to_browsers() {
     let folder = tempfile::tempdir().unwrap();
     let model = taught(&folder, &[]);
-    let from = format!("file:{}?loop&fps=20", shipped("image.png").display());
+    let from = format!("file:{}?loop&fps=20", shipped("pendulum", "image.png").display());
     let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
         .args(["detect", "--grasp-model", &model, "--from", &from, "--frames", "200", "--draw", "0", "--json"])
         .stdout(Stdio::null())

@@ -1,16 +1,15 @@
 //! `sdg camera list`, `grab` and `watch`, and addresses that are none.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use image::{Rgb, RgbImage};
 use serde_json::Value;
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).output().unwrap()
-}
+use support::sdg;
 
 fn lines(output: &Output) -> Vec<Value> {
     String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()

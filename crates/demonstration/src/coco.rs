@@ -6,9 +6,10 @@
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
-use crate::annotation::{Annotation, Border, Draft, ImageFacts};
+use crate::annotation::{Annotation, ImageFacts};
+use crate::draft::{Border, Draft};
 use crate::json::{Node, describe, shorten};
-use crate::labelled::{LabelledInstance, is_optional};
+use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads the objects of one image of a COCO file, which must have one.

@@ -2,6 +2,7 @@
 
 use crate::json::{self, Node, describe};
 use crate::npy;
+use crate::written::WrittenAnnotation;
 use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, labelme, opendr, yolo_pose};
 
 /// A kind of annotation file.
@@ -26,17 +27,6 @@ pub struct DeclaredImage {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-}
-
-/// An annotation file in the making, and what it had no room for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct WrittenAnnotation {
-    /// The file's text.
-    pub text: String,
-    /// What must stand beside it in a `data.yaml`: the labels of a YOLO-pose file.
-    pub data_yaml: Option<String>,
-    /// What the format cannot hold, in words; empty when nothing was lost.
-    pub left_out: Vec<String>,
 }
 
 impl AnnotationFormat {
@@ -120,6 +110,27 @@ impl AnnotationFormat {
     }
 }
 
+impl Annotation {
+    /// Reads every object that a file marks on the image; the content says which [`AnnotationFormat`] it is.
+    ///
+    /// # Errors
+    /// A file that is none, one made on an image of another size, and whatever a [`Annotation`] may not be:
+    /// outside the image by more than a pixel, without extent, not finite, half a grasp line, an outline of fewer
+    /// than three points or one that crosses itself. Several objects need group ids (LabelMe). The message says where.
+    pub fn read(bytes: &[u8], image: &ImageFacts) -> Result<Vec<Self>> {
+        Self::read_with(bytes, None, image)
+    }
+
+    /// As [`read`](Self::read), with the file that some formats keep `beside`: a YOLO dataset's `data.yaml`, or the other
+    /// one of OpenDR's two files.
+    ///
+    /// # Errors
+    /// Those of [`read`](Self::read), and a file beside it that does not fit.
+    pub fn read_with(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> Result<Vec<Self>> {
+        AnnotationFormat::of(bytes)?.read(bytes, beside, image)
+    }
+}
+
 /// Tells LabelMe from COCO by the lists that they have.
 pub(crate) fn json_format(value: &serde_json::Value) -> Result<AnnotationFormat> {
     let is_list = |name: &str| value.get(name).is_some_and(serde_json::Value::is_array);
@@ -135,6 +146,9 @@ pub(crate) fn json_format(value: &serde_json::Value) -> Result<AnnotationFormat>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    const IMAGE: ImageFacts = ImageFacts { width: 640, height: 480, file_name: None };
 
     #[test]
     fn content_tells_the_format() {
@@ -161,5 +175,13 @@ mod tests {
         assert_eq!(AnnotationFormat::declared_images(b"0 0.5 0.5 0.5 0.5"), Ok(vec![]));
         let spoilt = br#"{"shapes": [], "imageWidth": -3, "imageHeight": 480}"#;
         assert!(AnnotationFormat::declared_images(spoilt).unwrap_err().to_string().contains("imageWidth"));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+        #[test]
+        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..120)) {
+            prop_assert!(Annotation::read(&bytes, &IMAGE).is_err());
+        }
     }
 }

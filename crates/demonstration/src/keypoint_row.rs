@@ -2,7 +2,7 @@
 
 use nalgebra::Point2;
 
-use crate::annotation::Draft;
+use crate::draft::Draft;
 use crate::{Error, Result};
 
 /// How far a keypoint between the ends may stray from its place on the line, as a share of the line's length …

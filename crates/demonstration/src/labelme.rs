@@ -5,9 +5,10 @@ use std::collections::{BTreeSet, HashMap};
 use nalgebra::Point2;
 use serde_json::{Value, json};
 
-use crate::annotation::{Annotation, Border, Draft, ImageFacts};
+use crate::annotation::{Annotation, ImageFacts};
+use crate::draft::{Border, Draft};
 use crate::json::{Node, shorten};
-use crate::labelled::{LabelledInstance, is_optional};
+use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
 /// Reads every object of a LabelMe file, which must have one.

@@ -13,7 +13,7 @@
 
 use nalgebra::Point2;
 
-use crate::annotation::Draft;
+use crate::draft::Draft;
 use crate::keypoint_row::read_grasp;
 use crate::npy::NpyArray;
 use crate::{Annotation, Error, ImageFacts, Result};

@@ -14,10 +14,10 @@ use std::fmt::Write;
 
 use nalgebra::Point2;
 
-use crate::annotation::Draft;
 use crate::data_yaml::DataYaml;
-use crate::format::WrittenAnnotation;
+use crate::draft::Draft;
 use crate::keypoint_row::read_grasp;
+use crate::written::WrittenAnnotation;
 use crate::{Annotation, Error, ImageFacts, Result};
 
 /// Numbers of a line before its keypoints.

@@ -5,10 +5,12 @@
 //! serialises, so a model file can carry the one it was trained with.
 
 mod mask_head;
+mod roi_pooler;
 
 use serde::{Deserialize, Serialize};
 
 pub use mask_head::{MaskBalance, MaskHeadConfig, MaskPasting, MaskTargets};
+pub use roi_pooler::{LevelEpsilon, RoiAlignment, RoiPoolerConfig, SamplingRatio};
 
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -329,50 +331,6 @@ pub enum BoxDeltas {
     ClassSpecific,
     /// 4 outputs.
     ClassAgnostic,
-}
-
-/// Where the samples of ROIAlign lie.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum RoiAlignment {
-    /// Shifted by half a cell so that the pixel model is right: Detectron2's `aligned`.
-    HalfPixel,
-    /// Not shifted: torchvision's detectors.
-    Legacy,
-}
-
-/// Samples a bin of ROIAlign averages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SamplingRatio {
-    /// `ceil(roi size / output size)` along each axis.
-    Adaptive,
-    /// A fixed number along each axis.
-    Fixed(usize),
-}
-
-/// Where the small number stands that keeps `log2` from rounding down on exact powers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum LevelEpsilon {
-    /// `floor(canonical_level + log2(s / canonical_size + eps))`: Detectron2, 1e-8.
-    InsideLog(f64),
-    /// `floor(canonical_level + log2(s / canonical_size) + eps)`: torchvision, 1e-6.
-    OutsideLog(f64),
-}
-
-/// Pools boxes of any size from p2 to p5 into squares.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct RoiPoolerConfig {
-    /// Side of the pooled square.
-    pub output_size: usize,
-    /// Alignment of the samples.
-    pub alignment: RoiAlignment,
-    /// Number of samples.
-    pub sampling_ratio: SamplingRatio,
-    /// Side of the box that belongs on `canonical_level`, pixels.
-    pub canonical_size_px: f64,
-    /// Level of a box of `canonical_size_px`.
-    pub canonical_level: usize,
-    /// Guard against rounding.
-    pub level_epsilon: LevelEpsilon,
 }
 
 /// The second stage.

@@ -13,8 +13,9 @@ use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
 use crate::initialization::Initializer;
 use crate::losses::Losses;
 use crate::resnet::ResNet;
-use crate::roi_heads::{ResizedTarget, RoiDetection, RoiHeads};
+use crate::roi_heads::{RoiDetection, RoiHeads};
 use crate::rpn::{ImageSize, Mode, Proposals, RegionProposalNetwork};
+use crate::target::ResizedTarget;
 use crate::target::Target;
 
 /// Residual network and feature pyramid.

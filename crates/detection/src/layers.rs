@@ -85,7 +85,7 @@ pub struct Conv2dShape {
     pub out_channels: usize,
     /// Side of the kernel, odd.
     pub kernel: usize,
-    /// Step.
+    /// Step of the kernel along both axes.
     pub stride: usize,
 }
 

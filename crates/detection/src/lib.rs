@@ -66,4 +66,4 @@ pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint
 pub use image_transform::{ImageTransform, TransformedImage};
 pub use losses::Losses;
 pub use sdg_kernels::keep_freed_memory;
-pub use target::{ObjectMask, Target};
+pub use target::{ObjectMask, ResizedTarget, Target};

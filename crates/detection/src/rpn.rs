@@ -70,12 +70,12 @@ pub struct Proposals {
 /// Height and width of a resized image, without padding.
 pub type ImageSize = [usize; 2];
 
-/// Whether a network learns or works.
+/// Training or inference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// Learns.
+    /// Training: more proposals are kept, for the second stage to learn from.
     Train,
-    /// Works.
+    /// Inference.
     Test,
 }
 

@@ -2,11 +2,10 @@
 
 use sdg_geometry::{BoundingBox, Keypoint, Mask, Polygon};
 
+use crate::boxes::Corners;
 use crate::config::{MaskTargets, RoiHeadsConfig};
 use crate::error::{DetectionError, Result};
 use crate::image_transform::TransformedImage;
-use crate::roi_heads::ResizedTarget;
-use crate::roi_heads::mask_target::union;
 
 /// What is to be found in one image, in pixels of the original image.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -18,6 +17,19 @@ pub struct Target {
     /// Keypoints of each box; may be empty where the detector has no keypoint head.
     pub keypoints: Vec<Vec<Keypoint>>,
     /// Mask of each box; may be empty where the detector has no mask head.
+    pub masks: Vec<ObjectMask>,
+}
+
+/// The objects of one image, in pixels of the resized image.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ResizedTarget {
+    /// Boxes.
+    pub boxes: Vec<Corners>,
+    /// Class of each box.
+    pub labels: Vec<usize>,
+    /// Keypoints of each box; empty where the detector has no keypoint head.
+    pub keypoints: Vec<Vec<Keypoint>>,
+    /// Mask of each box; empty where the detector has no mask head.
     pub masks: Vec<ObjectMask>,
 }
 
@@ -157,4 +169,10 @@ impl Target {
             },
         }
     }
+}
+
+/// The pixels whose centres lie in any of the polygons.
+pub(crate) fn union(polygons: &[Polygon], width: u32, height: u32) -> Mask {
+    let parts: Vec<Mask> = polygons.iter().map(|polygon| polygon.rasterize(width, height)).collect();
+    Mask::from_fn(width, height, |x, y| parts.iter().any(|part| part.get(x, y)))
 }

@@ -23,10 +23,10 @@ use crate::error::{DetectionError, Result};
 use crate::generalized_rcnn::{Detections, GeneralizedRcnn};
 use crate::host::host_values;
 use crate::image_transform::TransformedImage;
-use crate::roi_heads::ResizedTarget;
 use crate::rpn::Mode;
 use crate::state_dict::{StateDict, WeightTensor};
 use crate::target::ObjectMask;
+use crate::target::ResizedTarget;
 
 /// Samples an image, so many that every anchor and proposal takes part in the reference's losses: nothing is drawn.
 const ALL_SAMPLES: usize = 1_000_000;

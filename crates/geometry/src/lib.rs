@@ -42,8 +42,14 @@ pub use camera::{PinholeCamera, PlanView, PlanViewError, PlumbBob, PosedCamera, 
 pub use error::GeometryError;
 pub use keypoint::{GraspLine, Keypoint, Visibility};
 pub use mask::{Mask, RunLengthMask};
+pub use nalgebra;
 pub use outline::outer_outline;
 pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;
 pub use rotational_symmetry::RotationalSymmetry;
+
+/// The README's example, which runs with the other examples.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,8 +2,8 @@
 //! rests on.
 //!
 //! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
-//! fit_constants` does so on generated parts. docs/decisions/constants.md lists these and all other constants of this
-//! crate with their origin, docs/decisions/score.md how the score was found.
+//! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
+//! crate with their origin, docs/decisions/007-score.md how the score was found.
 
 use std::ops::RangeInclusive;
 
@@ -92,7 +92,7 @@ pub struct Term {
 /// What the evidence is worth; see [`crate::Contributions`] for what each term is.
 ///
 /// Fitted on 160 generated parts, none a shipped part, a photograph or one that the likeness was trained on: `fit_constants
-/// --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/score.md). Ranges, hue, size and bias were set by
+/// --parts 160 --size 640x480,320x240 --seed 11 --only score` (docs/decisions/007-score.md). Ranges, hue, size and bias were set by
 /// hand; the ranges so that no term rejects alone. The network's weight was fitted on models C of ten generated parts: only its
 /// silence counts, because a network proposes look-alikes as well as the part.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,14 +4,9 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GraspError {
-    /// A letter that names no model of this version.
-    #[error("expected a grasp model out of {}, found \"{found}\"", .known.join(", "))]
-    UnknownModel {
-        /// The letters that this version has.
-        known: Vec<&'static str>,
-        /// What was asked for.
-        found: String,
-    },
+    /// A letter or name that is no model's.
+    #[error(transparent)]
+    UnknownModel(#[from] sdg_demonstration::UnknownModel),
     /// A preset that this version lacks.
     #[error("expected a preset out of {}, found \"{found}\"", .known.join(", "))]
     UnknownPreset {

@@ -1,78 +1,10 @@
 //! What a model file tells about itself.
 
-use std::fmt;
-use std::str::FromStr;
-
+pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
-use crate::GraspError;
 use crate::plan::Lengths;
-
-/// The grasp models, by their letters: four of the paper, and one without a network.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum ModelKind {
-    /// Faster R-CNN; position from the box, angle from a CNN on the box's crop (paper, section IV-A).
-    A,
-    /// Keypoint R-CNN; position from the box, angle from the keypoints (paper, section IV-B).
-    B,
-    /// Keypoint R-CNN; position and angle from the keypoints (paper, section IV-C).
-    C,
-    /// Mask R-CNN; position and angle from the mask's texture or outline (paper, section IV-D).
-    D,
-    /// Instant: no network, the demonstration itself is looked for in the whole image.
-    S,
-}
-
-impl ModelKind {
-    /// Every model that this version teaches.
-    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::S];
-
-    /// The letter, as on the command line and in the file.
-    pub fn letter(self) -> &'static str {
-        match self {
-            Self::A => "A",
-            Self::B => "B",
-            Self::C => "C",
-            Self::D => "D",
-            Self::S => "S",
-        }
-    }
-
-    /// Whether its detections come with keypoints.
-    pub fn has_keypoints(self) -> bool {
-        matches!(self, Self::B | Self::C)
-    }
-
-    /// Whether it looks with a network; model S is nothing but the demonstration.
-    pub fn has_network(self) -> bool {
-        self != Self::S
-    }
-
-    /// The model whose network this one reads: B and C are taught alike and read differently, so that C's file serves both.
-    pub fn taught_as(self) -> Self {
-        match self {
-            Self::B => Self::C,
-            other => other,
-        }
-    }
-}
-
-impl fmt::Display for ModelKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.letter())
-    }
-}
-
-impl FromStr for ModelKind {
-    type Err = GraspError;
-
-    fn from_str(text: &str) -> Result<Self, GraspError> {
-        Self::ALL.into_iter().find(|kind| kind.letter().eq_ignore_ascii_case(text)).ok_or_else(|| {
-            GraspError::UnknownModel { known: Self::ALL.map(Self::letter).to_vec(), found: text.to_owned() }
-        })
-    }
-}
 
 /// What a part's turn was first read from, before the demonstration was laid over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -168,13 +100,6 @@ pub struct OrientationFacts {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn letters_round_trip_and_others_are_refused() {
-        assert_eq!("c".parse::<ModelKind>().unwrap(), ModelKind::C);
-        let refused = "Z".parse::<ModelKind>().unwrap_err().to_string();
-        assert_eq!(refused, "expected a grasp model out of A, B, C, D, S, found \"Z\"");
-    }
 
     #[test]
     fn facts_keep_the_names_that_files_have() {

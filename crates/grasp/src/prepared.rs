@@ -71,7 +71,7 @@ pub(crate) struct Prepared {
 
 /// How far the marks may lie from where the whole part puts them, as a share of its diagonal: what is marked stands higher
 /// or lower than the outline, and a camera that does not look straight down on it sees it shifted. Chosen by hand on
-/// photographs of clips 10 mm high; on generated parts the median error stays at 0.88 % of the diagonal (docs/decisions/score.md).
+/// photographs of clips 10 mm high; on generated parts the median error stays at 0.88 % of the diagonal (docs/decisions/007-score.md).
 const MAX_MARKS_SHIFT: f64 = 0.05;
 /// The marks' surroundings reach so many lengths of the grasp line from its middle, which counts as no shorter than this
 /// share of the diagonal. Chosen with the above.

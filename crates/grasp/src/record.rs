@@ -73,7 +73,7 @@ mod tests {
     use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, Polygon};
 
     #[test]
-    fn names_and_units_are_the_contract_s() {
+    fn names_and_units_are_as_documented() {
         let bbox = BoundingBox { x1: 1.0, y1: 2.0, x2: 3.0, y2: 4.0 };
         let detection = GraspDetection {
             score: 0.75,

@@ -12,36 +12,11 @@ use burn::tensor::Tensor;
 
 use crate::extension::KernelBackend;
 use crate::parallel::{Output, for_each_unit};
+use crate::params::AdamWParams;
 use crate::simd::{Isa, widest};
 
 /// Values a unit of work has: what it reads and writes of them is some 300 KB.
 const UNIT: usize = 16 * 1024;
-
-/// One step's numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AdamWParams {
-    /// Step length.
-    pub learning_rate: f32,
-    /// Share of the gradient's running mean that a step keeps.
-    pub beta_1: f32,
-    /// The same for the mean of its squares.
-    pub beta_2: f32,
-    /// Added to the root of the mean square.
-    pub epsilon: f32,
-    /// Share of the value that a step of length 1 takes away.
-    pub weight_decay: f32,
-    /// Gradients whose Euclidean norm is larger are scaled down to it.
-    pub max_norm: Option<f32>,
-    /// Which step it is, from 1.
-    pub step: i32,
-}
-
-impl AdamWParams {
-    /// What the moments are divided by, since they started at zero.
-    pub(crate) fn corrections(&self) -> [f32; 2] {
-        [1.0 - self.beta_1.powi(self.step), 1.0 - self.beta_2.powi(self.step)]
-    }
-}
 
 /// The parameter and its moments after a step.
 ///

@@ -8,10 +8,11 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata, read_sync};
 use burn::tensor::{Shape, Slice, TensorData};
 
-use crate::adamw::AdamWParams;
-use crate::conv::{Conv2dParams, FusedConv2dParams};
-use crate::group_norm::{Activation, FusedGroupNormParams};
-use crate::roi_align::{RoiAlignParams, RoiBins};
+use crate::params::AdamWParams;
+use crate::params::RoiAlignParams;
+use crate::params::{Activation, FusedGroupNormParams};
+use crate::params::{Conv2dParams, FusedConv2dParams};
+use crate::roi_align::bins::RoiBins;
 
 /// [`conv2d_fused`](crate::conv2d_fused) by burn's `conv2d`.
 pub fn conv2d<B: Backend>(

@@ -9,12 +9,13 @@ use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
 use crate::extension::KernelBackend;
-use crate::group_norm::Activation;
+use crate::params::{Activation, Conv2dParams, FusedConv2dParams};
 
 pub(crate) mod direct;
 pub(crate) mod filters;
 pub(crate) mod kernel;
-mod params;
+pub(crate) mod panels;
+pub(crate) mod shape;
 pub(crate) mod weight_gradient;
 mod winograd;
 
@@ -22,8 +23,6 @@ mod winograd;
 mod kernel_tests;
 #[cfg(test)]
 mod tests;
-
-pub use params::{Conv2dParams, FusedConv2dParams};
 
 /// Convolves `x` with `weight` (cross-correlation, as everywhere in deep learning) and adds `bias`.
 ///

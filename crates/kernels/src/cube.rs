@@ -11,7 +11,7 @@ use burn::tensor::DType;
 
 use crate::composed;
 use crate::extension::KernelBackend;
-use crate::roi_align::RoiAlignParams;
+use crate::params::RoiAlignParams;
 
 mod roi_align;
 

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 
-use crate::adamw::AdamWParams;
 use crate::composed;
-use crate::conv::{Conv2dParams, FusedConv2dParams};
-use crate::group_norm::FusedGroupNormParams;
-use crate::resize::MaxPool2dParams;
-use crate::roi_align::RoiAlignParams;
+use crate::params::AdamWParams;
+use crate::params::FusedGroupNormParams;
+use crate::params::MaxPool2dParams;
+use crate::params::RoiAlignParams;
+use crate::params::{Conv2dParams, FusedConv2dParams};
 
 /// Backends that run this crate's operations.
 ///

@@ -2,25 +2,30 @@
 
 use std::sync::Arc;
 
-use burn::backend::flex::{FlexTensor, Layout};
+use burn::backend::flex::FlexTensor;
 use burn::backend::ops::ModuleOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
-use burn::tensor::{Bytes, DType, Shape};
 
-use crate::adamw::{self, AdamWParams};
-use crate::conv::filters::Direction;
-use crate::conv::kernel::{self as conv, ConvShape};
-use crate::conv::{Conv2dParams, FusedConv2dParams};
+use crate::adamw;
+use crate::conv::kernel as conv;
+use crate::conv::panels::Direction;
+use crate::conv::shape::ConvShape;
 use crate::extension::KernelBackend;
-use crate::group_norm::{self, Activation, FusedGroupNormParams};
+use crate::flex_tensor::{all_f32, channels_last, last_values, shape4, tensor, tensor_channels_last, values};
+use crate::group_norm;
 use crate::packed::{self, Keep};
+use crate::params::AdamWParams;
+use crate::params::MaxPool2dParams;
+use crate::params::RoiAlignParams;
+use crate::params::{Activation, FusedGroupNormParams};
+use crate::params::{Conv2dParams, FusedConv2dParams};
 use crate::product::Epilogue;
+use crate::resize;
 use crate::resize::kernel::PoolShape;
-use crate::resize::{self, MaxPool2dParams};
-use crate::roi_align::{self, RoiAlignParams};
+use crate::roi_align;
 use crate::simd::Isa;
-use crate::{composed, elementwise, permute};
+use crate::{composed, permute};
 
 impl KernelBackend for Flex {
     fn kernel_conv2d(
@@ -171,65 +176,4 @@ pub(crate) fn convolved(
         Direction::Forward => tensor_channels_last(output, shape.output()),
         Direction::Backward => tensor_channels_last(output, shape.input()),
     }
-}
-
-/// The kernels are for `f32`; other float types take the composed default.
-pub(crate) fn all_f32<const N: usize>(tensors: [&FlexTensor; N]) -> bool {
-    tensors.iter().all(|tensor| tensor.dtype() == DType::F32)
-}
-
-/// The values of a contiguous `f32` tensor, first to last.
-pub(crate) fn values(tensor: &FlexTensor) -> &[f32] {
-    tensor.as_slice().expect("made contiguous and known to be f32 by the caller")
-}
-
-/// A tensor that takes the values over.
-pub(crate) fn tensor<const D: usize>(values: Vec<f32>, shape: [usize; D]) -> FlexTensor {
-    let layout = Layout::contiguous(Shape::from(shape));
-    FlexTensor::new(Bytes::from_elems(values), layout, DType::F32)
-}
-
-/// The dimensions of a tensor known to have four.
-pub(crate) fn shape4(tensor: &FlexTensor) -> [usize; 4] {
-    let shape = tensor.shape();
-    [shape[0], shape[1], shape[2], shape[3]]
-}
-
-/// Steps between the elements of a `[N, C, H, W]` tensor that stands channels last.
-fn channels_last_strides([_, channels, height, width]: [usize; 4]) -> [usize; 4] {
-    [height * width * channels, 1, width * channels, channels]
-}
-
-fn is_channels_last(tensor: &FlexTensor) -> bool {
-    let shape = shape4(tensor);
-    let strides = tensor.layout().strides();
-    // Along an axis of one element no step is taken.
-    let fits = |axis: usize| shape[axis] == 1 || strides[axis] == channels_last_strides(shape)[axis] as isize;
-    (0..4).all(fits)
-}
-
-/// The same tensor, standing channels last.
-pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
-    if is_channels_last(&tensor) {
-        return tensor;
-    }
-    let shape = shape4(&tensor);
-    let [num_images, channels, height, width] = shape;
-    let tensor = tensor.to_contiguous();
-    let moved = elementwise::channels_last(Isa::detect(), values(&tensor), num_images, channels, height * width);
-    tensor_channels_last(moved, shape)
-}
-
-/// The values of an `f32` tensor that stands channels last, `[N, H, W, C]`.
-pub(crate) fn last_values(tensor: &FlexTensor) -> &[f32] {
-    let start = tensor.layout().start_offset();
-    let len: usize = shape4(tensor).iter().product();
-    &tensor.storage::<f32>()[start..start + len]
-}
-
-/// A tensor of shape `[N, C, H, W]` that takes over values that stand channels last.
-pub(crate) fn tensor_channels_last(values: Vec<f32>, shape: [usize; 4]) -> FlexTensor {
-    let strides = channels_last_strides(shape).map(|stride| stride as isize);
-    let layout = Layout::new(Shape::from(shape), strides.to_vec(), 0);
-    FlexTensor::new(Bytes::from_elems(values), layout, DType::F32)
 }

@@ -9,40 +9,11 @@ use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
 use crate::extension::KernelBackend;
+use crate::params::{FusedGroupNormParams, GroupNormParams};
 
 pub(crate) mod kernel;
 #[cfg(test)]
 mod tests;
-
-/// What follows the normalisation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Activation {
-    /// Nothing.
-    #[default]
-    Identity,
-    /// `max(x, 0)`.
-    Relu,
-}
-
-/// Parameters of [`group_norm`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GroupNormParams {
-    /// Groups the channels are cut into; divides the number of channels.
-    pub num_groups: usize,
-    /// Added to the variance, such as 1e-5.
-    pub epsilon: f32,
-    /// What follows.
-    pub activation: Activation,
-}
-
-/// A group normalisation, and whether there is a residual.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FusedGroupNormParams {
-    /// The normalisation.
-    pub norm: GroupNormParams,
-    /// Whether there is a residual.
-    pub added: bool,
-}
 
 /// Normalises each group of channels of each image to mean 0 and variance 1, then scales by `gamma` and shifts
 /// by `beta`.

@@ -51,6 +51,7 @@ mod cube;
 mod elementwise;
 mod extension;
 mod flex;
+mod flex_tensor;
 mod group_norm;
 mod memory;
 #[cfg(feature = "ndarray")]
@@ -58,6 +59,7 @@ mod ndarray;
 mod nms;
 mod packed;
 mod parallel;
+mod params;
 mod permute;
 mod product;
 #[cfg(test)]
@@ -67,12 +69,17 @@ mod roi_align;
 mod scratch;
 mod simd;
 
-pub use adamw::{AdamWParams, adamw};
-pub use conv::{Conv2dEpilogue, Conv2dParams, FusedConv2dParams, conv_transpose2d, conv2d, conv2d_fused};
+pub use adamw::adamw;
+pub use conv::{Conv2dEpilogue, conv_transpose2d, conv2d, conv2d_fused};
 pub use extension::KernelBackend;
-pub use group_norm::{Activation, FusedGroupNormParams, GroupNormParams, group_norm, group_norm_residual};
+pub use group_norm::{group_norm, group_norm_residual};
 pub use memory::keep_freed_memory;
 pub use nms::{batched_nms, nms};
+pub use params::AdamWParams;
+pub use params::MaxPool2dParams;
+pub use params::{Activation, FusedGroupNormParams, GroupNormParams};
+pub use params::{Conv2dParams, FusedConv2dParams};
+pub use params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 pub use permute::permute_maps;
-pub use resize::{MaxPool2dParams, max_pool2d, upsample_nearest_2x};
-pub use roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};
+pub use resize::{max_pool2d, upsample_nearest_2x};
+pub use roi_align::roi_align;

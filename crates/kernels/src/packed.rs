@@ -11,9 +11,10 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use burn::backend::flex::FlexTensor;
 use burn::tensor::Bytes;
 
-use crate::conv::filters::{Direction, Filters};
-use crate::conv::kernel::ConvShape;
-use crate::flex::values;
+use crate::conv::filters::Filters;
+use crate::conv::panels::Direction;
+use crate::conv::shape::ConvShape;
+use crate::flex_tensor::values;
 use crate::simd::Isa;
 
 /// What a packing depends on.

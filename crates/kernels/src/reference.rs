@@ -3,8 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::conv::kernel::ConvShape;
-use crate::roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio};
+use crate::conv::shape::ConvShape;
+use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 
 /// Values in [-1, 1).
 pub(crate) fn random_values(len: usize, seed: u64) -> Vec<f32> {

@@ -6,29 +6,11 @@ use burn::backend::Dispatch;
 use burn::tensor::Tensor;
 
 use crate::extension::KernelBackend;
+use crate::params::MaxPool2dParams;
 
 pub(crate) mod kernel;
 #[cfg(test)]
 mod tests;
-
-/// How a pooling's window moves. Every pair is `[vertical, horizontal]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MaxPool2dParams {
-    /// Size of the window, at most 255 pixels in all.
-    pub kernel: [usize; 2],
-    /// Step of the window from one output pixel to the next, at least 1.
-    pub stride: [usize; 2],
-    /// Pixels added before and after each axis, which are never the largest; at most half the window.
-    pub padding: [usize; 2],
-}
-
-impl MaxPool2dParams {
-    /// Size of the output map, or `None` where the padded input is smaller than the window.
-    pub(crate) fn output_size(&self, input: [usize; 2]) -> Option<[usize; 2]> {
-        let conv = crate::Conv2dParams { stride: self.stride, padding: self.padding };
-        conv.output_size(input, self.kernel)
-    }
-}
 
 /// The largest value in every window. A NaN is larger than any number; of equals the first gets the gradient.
 ///

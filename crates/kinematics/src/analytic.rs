@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Vector3};
 
-use crate::limits::JointVector;
+use crate::joints::JointVector;
 use crate::panda::{DH_A_M, DH_D_M, FLANGE_OFFSET_M};
 
 /// Number of ways the arm can take for one q7: elbow (2) × turn of the arm plane (2) × shoulder (2).

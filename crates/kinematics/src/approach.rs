@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::error::KinematicsError;
-use crate::inverse::{IkOptions, IkSolution};
-use crate::limits::JointVector;
+use crate::ik::{IkOptions, IkSolution};
+use crate::joints::JointVector;
 use crate::panda::Panda;
 use crate::path::{JointPath, LineOptions};
 
@@ -100,16 +100,9 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
-    use crate::limits::ready_pose;
+    use crate::joints::ready_pose;
     use crate::panda::pose_error;
-
-    fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
-        Isometry3::from_parts(
-            Vector3::new(x, y, z).into(),
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-                * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI),
-        )
-    }
+    use crate::test_poses::top_grasp;
 
     fn approach(
         from: &Isometry3<f64>,

@@ -3,8 +3,8 @@
 use nalgebra::Isometry3;
 
 use crate::error::KinematicsError;
-use crate::inverse::IkOptions;
-use crate::limits::JointVector;
+use crate::ik::IkOptions;
+use crate::joints::JointVector;
 
 pub(crate) fn check_pose(what: &'static str, pose: &Isometry3<f64>) -> Result<(), KinematicsError> {
     const UNIT_TOLERANCE: f64 = 1e-6;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::limits::JointVector;
+use crate::joints::JointVector;
 use crate::panda::{HAND_OPENING_MAX_M, Panda};
 use crate::trajectory::Trajectory;
 
@@ -108,7 +108,8 @@ fn box_heights(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::{JointLimits, ready_pose};
+    use crate::joints::ready_pose;
+    use crate::limits::JointLimits;
 
     #[test]
     fn in_the_ready_pose_the_finger_tips_are_lowest() {

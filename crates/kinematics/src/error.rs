@@ -1,7 +1,7 @@
 //! What can go wrong, with what was expected and what was found.
 
-use crate::inverse::IkSolution;
-use crate::limits::LimitViolation;
+use crate::ik::IkSolution;
+use crate::joints::LimitViolation;
 
 /// Errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -96,7 +96,7 @@ pub enum KinematicsError {
     /// The trajectory generator refused its input or failed.
     #[error("no trajectory within the limits: {reason}")]
     Trajectory {
-        /// Why.
+        /// What the generator says.
         reason: String,
     },
 }

@@ -28,24 +28,35 @@ mod approach;
 mod check;
 mod clearance;
 mod error;
+mod ik;
 mod inverse;
+mod joints;
 mod limits;
 mod nearest;
 mod panda;
 mod path;
+#[cfg(test)]
+mod test_poses;
 mod trajectory;
 
 pub use approach::{Approach, GraspSymmetry, with_fingers_exchanged};
 pub use clearance::{ArmPart, Clearance};
 pub use error::KinematicsError;
-pub use inverse::{IkOptions, IkSolution};
+pub use ik::{IkOptions, IkSolution};
+pub use joints::{JointVector, LimitViolation, NUM_JOINTS, READY_RAD, ready_pose};
 pub use limits::{
-    ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, JointVector, LimitViolation, NUM_JOINTS,
-    POSITION_MAX_RAD, POSITION_MIN_RAD, READY_RAD, TORQUE_MAX_NM, VELOCITY_MAX_RAD_S, ready_pose,
+    ACCELERATION_MAX_RAD_S2, CartesianLimits, JERK_MAX_RAD_S3, JointLimits, POSITION_MAX_RAD, POSITION_MIN_RAD,
+    TORQUE_MAX_NM, VELOCITY_MAX_RAD_S,
 };
+pub use nalgebra;
 pub use panda::{
     DH_A_M, DH_ALPHA_RAD, DH_D_M, FLANGE_OFFSET_M, Frames, HAND_OPENING_MAX_M, HAND_TURN_RAD, Jacobian, Panda,
     TCP_OFFSET_M,
 };
 pub use path::{JointPath, LineOptions, PathPoint};
 pub use trajectory::Trajectory;
+
+/// The README's example, which runs with the other examples.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

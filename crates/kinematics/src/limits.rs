@@ -3,15 +3,8 @@
 //! # Source
 //! Franka Control Interface documentation, "Robot and interface specifications", Franka Emika Robot ("Panda").
 
-use nalgebra::SVector;
-
 use crate::error::KinematicsError;
-
-/// Number of joints of the arm.
-pub const NUM_JOINTS: usize = 7;
-
-/// One number a joint, joint 1 (at the base) first; radians unless said otherwise.
-pub type JointVector = SVector<f64, NUM_JOINTS>;
+use crate::joints::{JointVector, LimitViolation, NUM_JOINTS};
 
 /// Smallest joint positions, rad.
 pub const POSITION_MIN_RAD: [f64; NUM_JOINTS] = [-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973];
@@ -25,37 +18,6 @@ pub const ACCELERATION_MAX_RAD_S2: [f64; NUM_JOINTS] = [15.0, 7.5, 10.0, 12.5, 1
 pub const JERK_MAX_RAD_S3: [f64; NUM_JOINTS] = [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0];
 /// Joint torque limits, N·m.
 pub const TORQUE_MAX_NM: [f64; NUM_JOINTS] = [87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0];
-
-/// Franka's ready pose, rad: elbow up, hand pointing down in front of the base.
-pub const READY_RAD: [f64; NUM_JOINTS] = {
-    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-    [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4]
-};
-
-/// Franka's ready pose as a vector, see [`READY_RAD`].
-pub fn ready_pose() -> JointVector {
-    JointVector::from(READY_RAD)
-}
-
-/// Where a joint leaves its range.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimitViolation {
-    /// Joint number as Franka counts, 1 to 7.
-    pub joint: usize,
-    /// The position asked for, rad.
-    pub found_rad: f64,
-    /// Smallest position allowed, rad.
-    pub min_rad: f64,
-    /// Largest position allowed, rad.
-    pub max_rad: f64,
-}
-
-impl LimitViolation {
-    /// How far outside its range the joint is, rad, positive.
-    pub fn excess_rad(&self) -> f64 {
-        (self.min_rad - self.found_rad).max(self.found_rad - self.max_rad)
-    }
-}
 
 /// Limits of every joint.
 #[derive(Debug, Clone, PartialEq)]
@@ -202,6 +164,7 @@ fn check_factors(factors: &[f64]) -> Result<(), KinematicsError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::joints::ready_pose;
 
     #[test]
     fn the_ready_pose_is_inside_and_margins_are_hand_checkable() {

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 
-use crate::limits::{JointLimits, JointVector, NUM_JOINTS};
+use crate::joints::{JointVector, NUM_JOINTS};
+use crate::limits::JointLimits;
 use crate::panda::{Panda, pose_error};
 
 const MAX_ITERATIONS: usize = 300;
@@ -98,7 +99,7 @@ fn damped_step(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::ready_pose;
+    use crate::joints::ready_pose;
 
     #[test]
     fn descent_recovers_a_pose_close_by() {

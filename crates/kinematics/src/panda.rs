@@ -11,7 +11,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3};
 
-use crate::limits::{JointLimits, JointVector, NUM_JOINTS};
+use crate::joints::{JointVector, NUM_JOINTS};
+use crate::limits::JointLimits;
 
 /// A geometric Jacobian: rows 0–2 the linear velocity (m/s), rows 3–5 the angular velocity (rad/s), per rad/s of a joint.
 pub type Jacobian = SMatrix<f64, 6, NUM_JOINTS>;
@@ -163,14 +164,10 @@ pub(crate) fn pose_error(from: &Isometry3<f64>, to: &Isometry3<f64>) -> nalgebra
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::ready_pose;
-    use rand::{Rng, SeedableRng};
+    use crate::joints::ready_pose;
+    use crate::test_poses::random_configuration;
+    use rand::SeedableRng;
     use rand_pcg::Pcg64Mcg;
-
-    fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
-        let limits = JointLimits::franka();
-        JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
-    }
 
     #[test]
     fn at_zero_the_arm_stands_upright_with_the_hand_down() {

@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3, Vector
 
 use crate::check::{check_joints, check_not_negative, check_pose, check_positive};
 use crate::error::KinematicsError;
-use crate::limits::{JointVector, NUM_JOINTS};
+use crate::joints::{JointVector, NUM_JOINTS};
 use crate::panda::{Jacobian, Panda, pose_error};
 
 /// How a straight path is followed.

@@ -10,7 +10,8 @@ use rsruckig::prelude::{InputParameter, Ruckig, Synchronization, ThrowErrorHandl
 
 use crate::check::check_joints;
 use crate::error::KinematicsError;
-use crate::limits::{CartesianLimits, JointLimits, JointVector, NUM_JOINTS};
+use crate::joints::{JointVector, NUM_JOINTS};
+use crate::limits::{CartesianLimits, JointLimits};
 use crate::path::JointPath;
 
 /// A motion in time that ends at rest.

@@ -39,6 +39,7 @@ mod error;
 mod grasp;
 mod look_alike;
 mod part;
+mod part_kind;
 mod random;
 mod recipe;
 mod relief;
@@ -48,7 +49,8 @@ mod tiles;
 pub use error::{GeneratorError, Result};
 pub use grasp::PartGrasp;
 pub use look_alike::LookAlike;
-pub use part::{Part, PartKind};
+pub use part::Part;
+pub use part_kind::PartKind;
 pub use scene::{
     Condition, Conditions, DemonstrationPhoto, Instance, OtherKind, OtherObject, PhotoConfig, Sample, SceneConfig,
     Scenes, demonstration,

@@ -7,6 +7,7 @@ use sdg_geometry::{Mask, Polygon, RotationalSymmetry, outer_outline};
 
 use crate::comparison::{centroid, symmetry};
 use crate::grasp::{self, PartGrasp};
+use crate::part_kind::PartKind;
 use crate::random::{Draw, Stream, generator};
 use crate::recipe::{self, Recipe};
 use crate::relief::Relief;
@@ -16,39 +17,6 @@ const MAX_TRIES: u64 = 400;
 
 /// Parts smaller than this, in millimetres of diagonal, are refused.
 const MIN_DIAGONAL_MM: f32 = 18.0;
-
-/// How a part is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum PartKind {
-    /// Punched out of sheet or plate.
-    Stamping,
-    /// Turned, lying on its side: shafts, screws, spindles.
-    TurnedLying,
-    /// Turned, standing on its face: rings, flanges, gears, knobs.
-    TurnedStanding,
-    /// Bent from wire or tube.
-    BentWire,
-    /// Bent from sheet.
-    BentSheet,
-    /// Cast.
-    Cast,
-    /// Moulded from plastic.
-    Moulded,
-}
-
-impl PartKind {
-    /// All kinds.
-    pub const ALL: [Self; 7] = [
-        Self::Stamping,
-        Self::TurnedLying,
-        Self::TurnedStanding,
-        Self::BentWire,
-        Self::BentSheet,
-        Self::Cast,
-        Self::Moulded,
-    ];
-}
 
 /// A rigid part, seen from above, in millimetres: x right, y down, z up from the table it lies on.
 #[derive(Debug, Clone)]

@@ -1,14 +1,12 @@
 //! Files that are there whole or not at all.
 
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::path::Path;
+
+use tempfile::NamedTempFile;
 
 use crate::error::ReportError;
-
-/// Names within one process must differ, however many threads write the same file at once.
-static NEXT_TEMPORARY: AtomicU64 = AtomicU64::new(0);
 
 /// Writes `bytes` to `path` so that a reader sees the old contents or the new ones, never a part.
 ///
@@ -36,62 +34,36 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     }
     let failed = |step| move |source| ReportError::Write { path: path.to_owned(), step, source };
 
-    let temporary = TemporaryFile::beside(&target);
-    let mut file = temporary.create().map_err(failed("creating a temporary file in its folder"))?;
+    let mut file = temporary_beside(&target).map_err(failed("creating a temporary file in its folder"))?;
     file.write_all(bytes).map_err(failed("writing"))?;
-    file.sync_all().map_err(failed("flushing to the disk"))?;
-    drop(file);
-    temporary.rename_to(&target).map_err(failed("renaming the temporary file"))?;
+    file.as_file().sync_all().map_err(failed("flushing to the disk"))?;
+    file.persist(&target).map_err(|refused| failed("renaming the temporary file")(refused.error))?;
     sync_folder_of(&target);
     Ok(())
 }
 
-/// A temporary path that is deleted when it goes out of scope before the rename.
-struct TemporaryFile {
-    path: PathBuf,
-    renamed: bool,
-}
-
-impl TemporaryFile {
-    fn beside(target: &Path) -> Self {
-        let mut name = std::ffi::OsString::from(".");
-        // Long names are cut: with the suffix they could pass the file system's limit of 255 bytes.
-        let stem: String = target.file_name().unwrap_or_default().to_string_lossy().chars().take(40).collect();
-        name.push(stem);
-        let serial = NEXT_TEMPORARY.fetch_add(1, Ordering::Relaxed);
-        name.push(format!(".{}-{serial}.tmp", std::process::id()));
-        Self { path: target.with_file_name(name), renamed: false }
-    }
-
-    fn create(&self) -> io::Result<File> {
-        OpenOptions::new().write(true).create_new(true).open(&self.path)
-    }
-
-    fn rename_to(mut self, target: &Path) -> io::Result<()> {
-        fs::rename(&self.path, target)?;
-        self.renamed = true;
-        Ok(())
-    }
-}
-
-impl Drop for TemporaryFile {
-    fn drop(&mut self) {
-        if !self.renamed {
-            // Nothing is left to do when even this fails, and the first error is the one to report.
-            let _ = fs::remove_file(&self.path);
-        }
-    }
+/// A file in the folder of `target`, with the permissions that new files have; deleted when it goes out of scope.
+fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".sdg-").suffix(".tmp");
+    #[cfg(unix)]
+    // What other programs ask for; the umask takes the rest away.
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder_of(target))
 }
 
 /// Makes the rename itself survive a power cut. The file is complete either way, so a file system
 /// that cannot sync a folder is no error.
 fn sync_folder_of(target: &Path) {
-    let folder = match target.parent() {
+    if let Ok(folder) = File::open(folder_of(target)) {
+        let _ = folder.sync_all();
+    }
+}
+
+fn folder_of(target: &Path) -> &Path {
+    match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
-    };
-    if let Ok(folder) = File::open(folder) {
-        let _ = folder.sync_all();
     }
 }
 
@@ -117,6 +89,18 @@ mod tests {
         write_atomically(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
         assert_eq!(names_in(folder.path()), ["a.txt"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_it_as_any_new_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (ours, plain) = (folder.path().join("ours"), folder.path().join("plain"));
+        write_atomically(&ours, b"x").unwrap();
+        fs::write(&plain, b"x").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&ours), mode(&plain));
     }
 
     #[test]

@@ -67,7 +67,7 @@ pub enum ReportError {
     Jpeg {
         /// Columns.
         width: u32,
-        /// Rows.
+        /// Pixels down.
         height: u32,
         /// The encoder's reason.
         source: image::ImageError,

@@ -30,7 +30,7 @@ impl Tone {
 /// What one cell holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell {
-    /// Words.
+    /// Text, aligned left.
     Text(String),
     /// A number with fixed decimals; a dash when it is not finite.
     Number {
@@ -60,7 +60,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Words.
+    /// A column of text.
     #[must_use]
     pub fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())

@@ -1,7 +1,7 @@
 //! What decides how a demonstration is compared with images, and what each value rests on.
 //!
 //! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
-//! fit_constants` does so on generated parts. docs/decisions/constants.md lists these and all other constants of this
+//! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
 //! crate with their origin. "The simulator's pictures" below are 60 pictures of each of the eight shipped parts and 60
 //! without it (seeds from 50000), two starts a picture that are up to 12 px, 9° and 9 % off; the program that fitted on
 //! them was not kept.
@@ -127,7 +127,7 @@ impl Default for SurfaceConfig {
 }
 
 /// How edge directions are compared both ways; see [`crate::Structure`]. Chosen by hand, not measured apart: with them
-/// the score's loss on held-out generated parts fell from 372 to 274 (docs/decisions/score.md).
+/// the score's loss on held-out generated parts fell from 372 to 274 (docs/decisions/007-score.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructureConfig {
     /// Points of the grid over the part.

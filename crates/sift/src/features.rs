@@ -24,7 +24,7 @@ pub type Descriptor = [f32; DESCRIPTOR_LENGTH];
 /// The features of an image: keypoint `i` has descriptor `i`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Features {
-    /// Where.
+    /// The place, size and orientation of each.
     pub keypoints: Vec<SiftKeypoint>,
     /// What it looks like there.
     pub descriptors: Vec<Descriptor>,

@@ -73,3 +73,8 @@ pub use plane::Plane;
 pub use ransac::{KeypointPair, RansacConfig, SimilarityFit, fit_similarity};
 pub use rotation::{RotationConfig, RotationEstimate, RotationEstimator, RotationMethod, RotationTemplate};
 pub use sift::Sift;
+
+/// The README's example, which runs with the other examples.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

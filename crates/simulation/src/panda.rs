@@ -16,7 +16,7 @@ pub type ArmVector = SVector<f64, NUM_ARM_JOINTS>;
 pub const PANDA_FILE: &str = "panda.xml";
 
 /// Travel of each finger in metres; the hand opens twice as far.
-pub const FINGER_TRAVEL_M: f64 = 0.04;
+pub const FINGER_TRAVEL_M: f64 = 0.5 * sdg_kinematics::HAND_OPENING_MAX_M;
 
 /// How far the finger tips reach beyond the tcp, in metres.
 pub const FINGERTIP_BEYOND_TCP_M: f64 = 0.004;

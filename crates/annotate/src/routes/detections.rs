@@ -28,7 +28,7 @@ pub struct DetectionsView {
 
 /// Finds the part with the model taught last.
 pub fn detect(session: &Session, picture: &RgbImage) -> Result<DetectionsView> {
-    let model = session.teaching.model()?;
+    let model = session.taught_model()?;
     let size = [picture.width(), picture.height()];
     let start = Instant::now();
     let found = model.detect(picture).map_err(Error::Teacher)?;

@@ -3,11 +3,11 @@
 use sdg_geometry::BoundingBox;
 use serde::{Deserialize, Serialize};
 
-use super::{json_of, picture_of, read};
+use super::answers::{json_of, picture_of, read};
 use crate::error::{Error, Result};
 use crate::http::{Request, Response};
+use crate::outline;
 use crate::session::Session;
-use crate::{outline, preview};
 
 /// Answers what is asked of picture `id`; `None` where there is no such address.
 pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
@@ -19,7 +19,7 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
         ("GET", ["samples", index]) => {
             let seed = request.head.query_value("seed").and_then(|seed| seed.parse().ok()).unwrap_or(1);
             let index = index.parse::<u64>().ok()?;
-            picture_of(preview::sample(session, id, seed, index).map(|bytes| (bytes, "image/jpeg")))
+            picture_of(session.sample(id, seed, index).map(|bytes| (bytes, "image/jpeg")))
         }
         _ => return None,
     })

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use super::answers::{json_of, picture_of};
 use super::detections::detect;
-use super::{json_of, picture_of};
 use crate::error::Result;
 use crate::http::Response;
 use crate::live::{Live, LiveFault};

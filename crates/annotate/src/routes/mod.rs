@@ -20,26 +20,24 @@
 //! | `POST /api/live/{number}/photo` | writes it as a photo of the part, to be marked |
 //! | `POST /api/live/{number}/keep` | makes it a picture to try |
 
+mod answers;
 mod detections;
 mod images;
 mod live;
 mod scenes;
 
-use std::sync::Arc;
+use serde::Deserialize;
 
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
-use serde_json::json;
+pub use answers::broken;
+use answers::{json_of, read};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::page;
 use crate::picture::MOST_PICTURE_BYTES;
 use crate::session::Session;
-use crate::teaching;
 use crate::views::SessionView;
 
-const JSON: &str = "application/json";
 /// More than the marks of any hand; bounds what a request may make the server hold.
 const MOST_JSON_BYTES: usize = 1 << 20;
 
@@ -49,7 +47,7 @@ pub fn most_body_bytes(path: &str) -> usize {
 }
 
 /// Answers a request that the guard has let pass.
-pub fn answer(session: &Arc<Session>, request: &Request) -> Response {
+pub fn answer(session: &Session, request: &Request) -> Response {
     let head = &request.head;
     let no_such_address = || Response::plain(404, "there is nothing at this address\n");
     let Some(path) = head.path.strip_prefix('/') else { return no_such_address() };
@@ -62,13 +60,13 @@ pub fn answer(session: &Arc<Session>, request: &Request) -> Response {
         },
         ("GET", ["api", "session"]) => json_of(Ok(session.view())),
         ("PUT", ["api", "label"]) => json_of(rename(session, &request.body)),
-        ("GET", ["api", "teaching"]) => json_of(Ok(session.teaching.news())),
+        ("GET", ["api", "teaching"]) => json_of(Ok(session.teaching_news())),
         ("POST", ["api", "teaching"]) => {
-            json_of(read("teaching", &request.body).and_then(|asked| teaching::start(session, asked)))
+            json_of(read("teaching", &request.body).and_then(|asked| session.start_teaching(asked)))
         }
         ("DELETE", ["api", "teaching"]) => {
-            session.teaching.stop();
-            json_of(Ok(session.teaching.news()))
+            session.stop_teaching();
+            json_of(Ok(session.teaching_news()))
         }
         ("POST", ["api", "scenes"]) => json_of(scenes::add(session, request)),
         (method, ["api", "live", rest @ ..]) => live::answer(session, method, rest).unwrap_or_else(no_such_address),
@@ -91,44 +89,4 @@ fn rename(session: &Session, body: &[u8]) -> Result<SessionView> {
     }
     let Rename { label } = read("label", body)?;
     session.set_label(&label)
-}
-
-/// The request's JSON.
-fn read<T: DeserializeOwned>(what: &'static str, body: &[u8]) -> Result<T> {
-    serde_json::from_slice(body).map_err(|error| Error::Request {
-        what,
-        expected: "JSON as the page sends it".into(),
-        found: error.to_string(),
-    })
-}
-
-/// The answer to what broke inside.
-pub fn broken() -> Response {
-    Response::new(500, JSON, json!({"error": "this failed inside; the terminal says more"}).to_string().into_bytes())
-}
-
-fn json_of<T: Serialize>(outcome: Result<T>) -> Response {
-    match outcome.map(|value| serde_json::to_vec(&value)) {
-        Ok(Ok(text)) => Response::new(200, JSON, text),
-        Ok(Err(_)) => broken(),
-        Err(error) => refusal(&error),
-    }
-}
-
-fn picture_of(outcome: Result<(Vec<u8>, &'static str)>) -> Response {
-    match outcome {
-        Ok((bytes, media_type)) => Response::new(200, media_type, bytes),
-        Err(error) => refusal(&error),
-    }
-}
-
-fn refusal(error: &Error) -> Response {
-    let status = match error {
-        Error::NoSuchPicture { .. } | Error::NoSuchFrame { .. } | Error::NoCamera => 404,
-        Error::Demonstration { .. } | Error::NotMarked { .. } | Error::Request { .. } | Error::Teacher(_) => 422,
-        Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } | Error::Camera { .. } => 409,
-        Error::TooLarge { .. } => 413,
-        _ => 500,
-    };
-    Response::new(status, JSON, json!({"error": error.to_string()}).to_string().into_bytes())
 }

@@ -1,7 +1,7 @@
 //! Requests about pictures that a taught model is tried on.
 
+use super::answers::{json_of, picture_of, read};
 use super::detections::detect;
-use super::{json_of, picture_of, read};
 use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::session::Session;

@@ -47,7 +47,7 @@ impl GraspTeacher for InPlace {
 impl TaughtModel for InPlaceModel {
     fn summary(&self) -> TaughtSummary {
         TaughtSummary {
-            model: sdg_annotate::ModelLetter::S,
+            model: sdg_annotate::ModelKind::S,
             object: self.0.annotation.label.clone(),
             seconds: 0.1,
             hit_rate: None,

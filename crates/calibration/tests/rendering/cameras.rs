@@ -7,6 +7,17 @@ use sdg_geometry::{PinholeCamera, PlumbBob};
 
 use super::{Exposure, Random, camera_from_board, render};
 
+/// A webcam of 1280×720 pixels with some distortion.
+pub const WEBCAM: PinholeCamera = PinholeCamera {
+    width: 1280,
+    height: 720,
+    fx: 980.0,
+    fy: 978.0,
+    cx: 652.0,
+    cy: 351.0,
+    lens: PlumbBob { k1: 0.08, k2: -0.17, p1: -0.001, p2: 0.0006, k3: 0.0 },
+};
+
 /// A wide lens of few pixels, a webcam, and a long lens of many pixels.
 pub const CAMERAS: [(&str, PinholeCamera); 3] = [
     (
@@ -21,18 +32,7 @@ pub const CAMERAS: [(&str, PinholeCamera); 3] = [
             lens: PlumbBob { k1: -0.31, k2: 0.12, p1: 0.0012, p2: -0.0008, k3: 0.0 },
         },
     ),
-    (
-        "webcam",
-        PinholeCamera {
-            width: 1280,
-            height: 720,
-            fx: 980.0,
-            fy: 978.0,
-            cx: 652.0,
-            cy: 351.0,
-            lens: PlumbBob { k1: 0.08, k2: -0.17, p1: -0.001, p2: 0.0006, k3: 0.0 },
-        },
-    ),
+    ("webcam", WEBCAM),
     (
         "long",
         PinholeCamera {

@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::Instant;
 
-use super::exchange::{in_words, time_left};
+use super::waiting::{in_words, time_left};
 
 /// A chunk's size in hexadecimal, with extensions.
 const MAX_CHUNK_LINE_BYTES: usize = 1024;

@@ -1,14 +1,15 @@
 //! One request and the head of its answer.
 
-use std::io::{self, Read, Write};
+use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use super::body::{Body, Framing};
 use super::url::Url;
+use super::waiting::{in_words, time_left};
 
 /// More than any camera's head.
 pub(super) const MAX_HEAD_BYTES: usize = 16 << 10;
@@ -92,20 +93,6 @@ fn connect(url: &Url, deadline: Instant) -> Result<TcpStream, String> {
         }
     }
     Err(why)
-}
-
-/// `None` when it is over.
-pub(super) fn time_left(deadline: Instant) -> Option<Duration> {
-    // A read timeout of 0 is refused by the system; less than a millisecond is as good as nothing.
-    deadline.checked_duration_since(Instant::now()).filter(|left| *left >= Duration::from_millis(1))
-}
-
-/// The system's message; that of a timeout depends on the system.
-pub(super) fn in_words(error: io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => "nothing in time".to_owned(),
-        _ => error.to_string(),
-    }
 }
 
 /// What counts of an answer's head.

@@ -13,6 +13,7 @@ mod motion_jpeg;
 mod multipart;
 mod snapshots;
 mod url;
+mod waiting;
 
 use std::time::Instant;
 

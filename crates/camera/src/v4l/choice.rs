@@ -1,37 +1,7 @@
 //! Which of a node's formats and sizes is taken.
 
-use super::Format;
+use super::node::Format;
 use crate::options::{Encoding, OpenOptions};
-
-/// The sizes of a format, in pixels.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Sizes {
-    /// These: width and height.
-    Listed(Vec<(u32, u32)>),
-    /// All from the smallest to the largest; a driver may round.
-    Range {
-        /// The smallest width and height.
-        min: (u32, u32),
-        /// The largest width and height.
-        max: (u32, u32),
-    },
-}
-
-impl Sizes {
-    /// The size next to the wanted one by its number of pixels and its shape, and its place in the list.
-    fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
-        match self {
-            Self::Listed(sizes) => {
-                let differs = |size: &(u32, u32)| size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
-                sizes.iter().enumerate().min_by_key(|(_, size)| differs(size)).map(|(place, size)| (*size, place))
-            }
-            Self::Range { min, max } => {
-                let clamped = |wanted: u32, min: u32, max: u32| wanted.max(min).min(max);
-                Some(((clamped(wanted.0, min.0, max.0), clamped(wanted.1, min.1, max.1)), 0))
-            }
-        }
-    }
-}
 
 /// What is asked of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,6 +29,7 @@ pub(super) fn choose(formats: &[Format], options: &OpenOptions) -> Option<Choice
 
 #[cfg(test)]
 mod tests {
+    use super::super::node::Sizes;
     use super::*;
 
     fn format(encoding: Option<Encoding>, sizes: &[(u32, u32)], max_fps: &[f64]) -> Format {

@@ -8,47 +8,13 @@
 
 #[cfg_attr(not(target_os = "linux"), allow(dead_code))]
 mod choice;
+mod node;
 #[cfg(target_os = "linux")]
 mod nodes;
 #[cfg(target_os = "linux")]
 mod stream;
 
-use std::path::PathBuf;
-
-pub use choice::Sizes;
-
-use crate::options::Encoding;
-
-/// A V4L2 node that captures pictures.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Node {
-    /// As in `/dev/video0`.
-    pub path: PathBuf,
-    /// The card's name.
-    pub name: String,
-    /// The driver's name.
-    pub driver: String,
-    /// Where it is attached.
-    pub bus: String,
-    /// What it offers, in the driver's order.
-    pub formats: Vec<Format>,
-}
-
-/// One way in which a node delivers its pictures.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Format {
-    /// V4L2's four letters.
-    pub fourcc: String,
-    /// The driver's description.
-    pub description: String,
-    /// The encoding, where it is one that is read here.
-    pub encoding: Option<Encoding>,
-    /// The sizes.
-    pub sizes: Sizes,
-    /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say. Empty for an encoding
-    /// that is not read here.
-    pub max_fps: Vec<f64>,
-}
+pub use node::{Format, Node, Sizes};
 
 /// The nodes of this machine that capture pictures, in the order of their numbers; none where V4L2 is missing.
 #[cfg(target_os = "linux")]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use linuxvideo::format::{FrameIntervals, FrameSizes, PixelFormat};
 use linuxvideo::{BufType, Device};
 
-use super::{Format, Node, Sizes};
+use super::node::{Format, Node, Sizes};
 use crate::options::Encoding;
 
 /// All nodes that capture pictures.

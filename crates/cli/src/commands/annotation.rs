@@ -3,14 +3,50 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, Subcommand};
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
 use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::annotation_files::{AnnotationFile, DATA_YAML};
-use crate::args::{AnnotationArgs, AnnotationCommand, ConvertAnnotationArgs};
 use crate::exit::{Outcome, Usage};
 use crate::files;
+
+/// `sdg annotation`
+#[derive(Debug, ClapArgs)]
+#[command(arg_required_else_help = true)]
+pub struct AnnotationArgs {
+    /// What to do with the annotation.
+    #[command(subcommand)]
+    pub command: AnnotationCommand,
+}
+
+/// The verbs of `sdg annotation`.
+#[derive(Debug, Subcommand)]
+pub enum AnnotationCommand {
+    /// What is marked on one image, written in another format
+    Convert(ConvertAnnotationArgs),
+}
+
+/// `sdg annotation convert`
+#[derive(Debug, ClapArgs)]
+pub struct ConvertAnnotationArgs {
+    /// COCO, LabelMe, YOLO-pose (data.yaml beside or above it), OpenDR's boxes_*.npy (kps_*.npy beside it): told by content
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// The image, where IN is of several images or does not say how large its image is
+    #[arg(long, value_name = "IMAGE")]
+    pub image: Option<PathBuf>,
+    /// The format to write: coco, labelme or yolo-pose; without it, coco for .json and yolo-pose for .txt
+    #[arg(long, value_name = "NAME")]
+    pub format: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Runs one of the verbs.
 pub fn run(args: &AnnotationArgs) -> Result<Outcome> {

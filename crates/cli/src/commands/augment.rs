@@ -1,17 +1,41 @@
 //! `sdg augment`: augmented samples as pictures and COCO JSON, to look at.
 
 use std::io::Cursor;
+use std::path::PathBuf;
 
 use anyhow::Result;
+use clap::Args as ClapArgs;
 use image::ImageFormat;
 use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile, LabelledInstance};
 use sdg_report::write_atomically;
 use serde_json::json;
 
-use crate::args::AugmentArgs;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
+
+/// `sdg augment`
+#[derive(Debug, ClapArgs)]
+pub struct AugmentArgs {
+    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    pub demonstrations: Vec<String>,
+    /// Samples to write
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub count: u32,
+    /// Folder to write into; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The augmentation: edge (what teaching uses), or paper (the original's)
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// The file that lists every sample's marks.
 const ANNOTATIONS: &str = "annotations.json";

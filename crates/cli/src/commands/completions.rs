@@ -3,14 +3,20 @@
 use std::io::Write;
 
 use anyhow::Result;
-use clap::CommandFactory;
+use clap::Args as ClapArgs;
 
-use crate::args::{Args, CompletionsArgs};
 use crate::exit::Outcome;
 
+/// `sdg completions`
+#[derive(Debug, ClapArgs)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
 /// Writes the script to standard output.
-pub fn run(args: &CompletionsArgs) -> Result<Outcome> {
-    let mut command = Args::command();
+pub fn run(args: &CompletionsArgs, mut command: clap::Command) -> Result<Outcome> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut command, "sdg", &mut script);
     // Written at once, so that a closed pipe is an error and not a panic of the generator.

@@ -3,11 +3,20 @@
 use std::io::Write;
 
 use anyhow::{Context, Result};
+use clap::Args as ClapArgs;
 use sdg_grasp::{ComputeBackend, Device};
 use serde_json::json;
 
-use crate::args::{ComputeArgs, DevicesArgs};
 use crate::exit::Outcome;
+use crate::shared_args::ComputeArgs;
+
+/// `sdg devices`
+#[derive(Debug, ClapArgs)]
+pub struct DevicesArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// The device of `--device`, ready to compute.
 ///

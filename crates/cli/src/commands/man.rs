@@ -1,19 +1,28 @@
 //! `sdg man`: manual pages, made from the same definition as the help.
 
 use std::io::Write;
+use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Command, CommandFactory};
+use clap::Args as ClapArgs;
+use clap::Command;
 use clap_mangen::Man;
 use sdg_report::write_atomically;
 
-use crate::args::{Args, ManArgs};
 use crate::exit::Outcome;
 use crate::files;
 
+/// `sdg man`
+#[derive(Debug, ClapArgs)]
+pub struct ManArgs {
+    /// Write a page of every command into this folder; without it, the page of sdg goes to standard output
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
 /// The page of `sdg` itself to standard output, or a page of every command into a folder.
-pub fn run(args: &ManArgs) -> Result<Outcome> {
-    let mut root = Args::command().disable_help_subcommand(true);
+pub fn run(args: &ManArgs, root: Command) -> Result<Outcome> {
+    let mut root = root.disable_help_subcommand(true);
     root.build();
     let Some(folder) = &args.out else {
         std::io::stdout().lock().write_all(&render(&root)?)?;

@@ -1,25 +1,15 @@
-//! One file for each verb.
+//! One file or folder for each verb: its arguments, and what it does.
 
-#[cfg(feature = "annotate")]
 pub mod annotate;
 pub mod annotation;
 pub mod augment;
 pub mod camera;
 pub mod completions;
-#[cfg(feature = "simulation")]
 pub mod demo;
 pub mod detect;
-mod detect_live;
 pub mod devices;
-#[cfg(feature = "simulation")]
 pub mod evaluate;
-#[cfg(feature = "simulation")]
-pub mod evaluate_axes;
-#[cfg(feature = "simulation")]
-pub mod evaluate_cameras;
-pub mod evaluate_pictures;
 pub mod man;
-#[cfg(feature = "simulation")]
 pub mod rehearse;
 pub mod teach;
 pub mod weights;

@@ -1,17 +1,19 @@
 //! `sdg teach`: demonstrations to a grasp model in one file.
 
+use std::fmt::Display;
 use std::io::Write;
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
+use clap::Args as ClapArgs;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::json;
 
-use crate::args::TeachArgs;
 use crate::base_weights;
 use crate::camera_files::CameraFile;
 use crate::commands::devices;
@@ -19,8 +21,74 @@ use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
 use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
+
+/// `sdg teach`
+#[derive(Debug, ClapArgs)]
+pub struct TeachArgs {
+    /// The grasp model, by letter or name: A or crop (box, turn from its crop), B or box (box, turn from keypoints), C or
+    /// keypoints, D or mask (mask, turn from texture or outline), S or shape (no network: a search for the demonstration in
+    /// the whole image, ready at once)
+    #[arg(long, default_value = "C", value_name = "NAME")]
+    pub model: String,
+    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    pub demonstrations: Vec<String>,
+    /// The file to write
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Network, training and augmentation: edge; r50-detectron2 or r50-torchvision with --base-weights; paper, which
+    /// takes hours
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Seconds that the network's training may take at most
+    #[arg(long, value_name = "SECS", value_parser = seconds)]
+    pub time_budget: Option<f64>,
+    /// How often the part looks the same in a whole turn: 1 for most, 4 for a square, full for a disc
+    #[arg(long, default_value = "1", value_name = "N|full", value_parser = symmetry)]
+    pub symmetry: RotationalSymmetry,
+    /// Smallest and largest size of the part in a picture, over its size in the photo: 0.95-1.05 where the camera always has
+    /// the same height, which also tells parts that differ in size; more where it does not, or where the photo was both
+    /// cropped and resized
+    #[arg(long, default_value = "0.75-1.35", value_name = "LOW-HIGH", value_parser = size_tolerance)]
+    pub size_tolerance: SizeTolerance,
+    /// The calibrated camera that took the photos
+    #[command(flatten)]
+    pub camera: TaughtCameraArgs,
+    /// Optimiser steps instead of the preset's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub steps: Option<u32>,
+    /// Weights to start from: any file that `sdg weights convert` reads or writes, or a grasp model
+    #[arg(long, value_name = "FILE")]
+    pub base_weights: Option<PathBuf>,
+    /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
+    #[arg(long = "reinit", value_name = "PREFIX", requires = "base_weights")]
+    pub reinitialized: Vec<String>,
+    /// Folder for a page about the teaching: photo and marks, samples, curves
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Equal turns in a whole one, or that no turn can be seen.
+fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
+    match (text, text.parse::<u32>()) {
+        ("full", _) => Ok(RotationalSymmetry::Full),
+        (_, Ok(1)) => Ok(RotationalSymmetry::None),
+        (_, Ok(count @ 2..=360)) => Ok(RotationalSymmetry::Fold(count)),
+        _ => Err("expected 1 to 360 equal turns, or full".to_owned()),
+    }
+}
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
@@ -185,6 +253,6 @@ fn learnt(taught: &Taught) -> String {
 }
 
 /// An argument that names one of a few things; another name is wrong usage.
-fn parse<T: FromStr<Err = GraspError>>(argument: &str, name: &str) -> Result<T> {
+fn parse<T: FromStr<Err: Display>>(argument: &str, name: &str) -> Result<T> {
     Ok(name.parse().map_err(|error| Usage(format!("{argument}: {error}")))?)
 }

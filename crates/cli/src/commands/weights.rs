@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, Subcommand};
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::verification;
@@ -14,12 +15,92 @@ use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Preci
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
 use serde_json::json;
 
-use crate::args::{ConvertArgs, InspectArgs, VerifyArgs, WeightsArgs, WeightsCommand};
 use crate::base_weights::open;
 use crate::commands::devices;
 use crate::detector_config::{architecture_of, preset, preset_for, read_config};
 use crate::exit::Outcome;
 use crate::files;
+use crate::shared_args::ComputeArgs;
+
+/// `sdg weights`
+#[derive(Debug, ClapArgs)]
+#[command(arg_required_else_help = true)]
+pub struct WeightsArgs {
+    /// What to do with the checkpoint.
+    #[command(subcommand)]
+    pub command: WeightsCommand,
+}
+
+/// The verbs of `sdg weights`.
+#[derive(Debug, Subcommand)]
+pub enum WeightsCommand {
+    /// A checkpoint to this project's safetensors, with a report of every name
+    Convert(ConvertArgs),
+    /// What a checkpoint holds, without converting it
+    Inspect(InspectArgs),
+    /// The detector of a checkpoint, stage by stage, against what the original gave
+    Verify(VerifyArgs),
+}
+
+/// `sdg weights convert`
+#[derive(Debug, ClapArgs)]
+pub struct ConvertArgs {
+    /// Detectron2 .pkl or .pth, torchvision .pth, safetensors: told by content, not by name
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// The file to write
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    /// The detector: r50-detectron2, r50-torchvision; without it, as the names of the checkpoint say
+    #[arg(long, value_name = "NAME", conflicts_with = "config")]
+    pub preset: Option<String>,
+    /// The detector's configuration as JSON, for other widths and depths
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Store kernels and matrices in half precision: a file half as large
+    #[arg(long)]
+    pub f16: bool,
+    /// Leave this part as initialised, such as roi_heads.box_predictor; repeat for several
+    #[arg(long = "reinit", value_name = "PREFIX")]
+    pub reinitialized: Vec<String>,
+    /// Print the report as one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg weights inspect`
+#[derive(Debug, ClapArgs)]
+pub struct InspectArgs {
+    /// A checkpoint of any format that convert reads
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `sdg weights verify`
+#[derive(Debug, ClapArgs)]
+pub struct VerifyArgs {
+    /// A checkpoint of any format that convert reads, or a converted file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The detector's configuration as JSON; a converted file brings its own
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The image that the original was given
+    #[arg(long, value_name = "IMAGE")]
+    pub image: PathBuf,
+    /// What the original gave at each stage: safetensors
+    #[arg(long, value_name = "FILE")]
+    pub against: PathBuf,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Runs one of the verbs.
 pub fn run(args: &WeightsArgs) -> Result<Outcome> {

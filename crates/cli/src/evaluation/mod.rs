@@ -18,6 +18,7 @@
 mod attempting;
 pub mod axes;
 pub mod cameras;
+mod caught;
 mod cell;
 mod groups;
 mod looking;

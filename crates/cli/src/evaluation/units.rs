@@ -1,15 +1,15 @@
 //! What there is to do, and the doing of it.
 
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use sdg_grasp::{ModelKind, Preset, Verification};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
 use super::attempting::go_on;
+use super::caught::{NO_MODEL, caught};
 use super::cell::{Cell, Marks, attempts_of};
 use super::looking::{part_seed, picture_seed, scene_without, show};
 use super::records::{LookRecord, SpeedRecord};
@@ -22,9 +22,6 @@ use crate::trial::try_view;
 
 /// Pictures on which speed is measured, for each part.
 const SPEED_VIEWS: usize = 3;
-
-/// What there is to say of a unit whose teaching failed while it waited.
-pub(super) const NO_MODEL: &str = "there is no model";
 
 /// What is kept or lost as a whole.
 #[derive(Debug, Clone, Copy)]
@@ -290,16 +287,6 @@ impl std::fmt::Display for Unit<'_> {
     }
 }
 
-/// Turns a panic into an error, so that the units beside it are kept.
-pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
-    // Unwind safety: whatever the closure was changing is given up with its unit.
-    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
-        let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
-        let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
-        Err(anyhow!("a mistake in this program: {}", said.unwrap_or_else(|| "it panicked".to_owned())))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -366,12 +353,5 @@ mod tests {
             ]
         );
         assert_eq!(evaluation.remaining().unwrap(), 5 + 1);
-    }
-
-    #[test]
-    fn a_panic_becomes_an_error() {
-        let error = caught::<()>(|| panic!("index {}", 7)).unwrap_err();
-        assert_eq!(error.to_string(), "a mistake in this program: index 7");
-        assert!(caught(|| Ok(1)).is_ok());
     }
 }

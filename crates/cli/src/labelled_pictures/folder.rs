@@ -59,7 +59,7 @@ impl LabelledPicture {
 pub struct LeftOut {
     /// The file's name.
     pub file: String,
-    /// Why.
+    /// Why it was left out, for people.
     pub why: String,
 }
 

@@ -1,8 +1,6 @@
 //! Samples by number.
 
-use image::RgbImage;
-use nalgebra::Point2;
-use sdg_geometry::{Angle, BoundingBox, GraspLine, Keypoint, PlanarSimilarity, Polygon, Visibility};
+use sdg_geometry::BoundingBox;
 
 use super::background::NoiseBank;
 use super::config::{AugmentationConfig, AugmentationStyle, check_output_size};
@@ -11,86 +9,9 @@ use super::noise::NormalTable;
 use super::paper::PaperDraw;
 use super::prepared::Prepared;
 use super::random::{Stream, index_below, sample_rng};
+use super::sample::{Sample, SampleObject};
 use super::scene::Studio;
-use crate::{Annotation, Demonstration, Error, Result};
-
-/// A picture to learn from, and what is on it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sample {
-    /// The picture.
-    pub image: RgbImage,
-    /// The parts on it; empty for a scene without the part.
-    pub objects: Vec<SampleObject>,
-}
-
-/// One part on a [`Sample`], in pixels of the sample.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SampleObject {
-    /// The box, cut off at the image's border: tight around the outline, or, without one, around the turned box.
-    pub bbox: BoundingBox,
-    /// The [`NUM_KEYPOINTS`](crate::NUM_KEYPOINTS) keypoints of the grasp line, start to end; unlabelled where they
-    /// are outside the image, occluded where something covers them. Empty where no grasp is marked.
-    pub keypoints: Vec<Keypoint>,
-    /// The outline, not cut off; `None` where none was drawn.
-    pub outline: Option<Polygon>,
-    /// Where the demonstration lies in the sample: the similarity nearest to the warp, which also tilts a little.
-    pub image_from_demonstration: PlanarSimilarity,
-    /// Which demonstration it is.
-    pub demonstration_idx: usize,
-}
-
-impl SampleObject {
-    pub(crate) fn new(part: &Prepared, pose: &Homography, size: [u32; 2], demonstration_idx: usize) -> Self {
-        let [width, height] = size.map(f64::from);
-        let warped = Polygon { vertices: part.region.vertices.iter().map(|vertex| pose.apply(vertex)).collect() };
-        let seen = warped.clip(width, height);
-        // The clipped polygon's box, since the box's own clip would keep what only hidden vertices reach.
-        let bbox = if seen.vertices.is_empty() { warped.bounds().clip(width, height) } else { seen.bounds() };
-        let image = BoundingBox { x1: 0.0, y1: 0.0, x2: width, y2: height };
-        let keypoints = part
-            .keypoints
-            .iter()
-            .map(|keypoint| {
-                let place = pose.apply(&keypoint.point());
-                let visibility = if image.contains(&place) { Visibility::Visible } else { Visibility::Unlabelled };
-                Keypoint { x: place.x, y: place.y, visibility }
-            })
-            .collect();
-        let moved: Vec<Point2<f64>> = part.area_points.iter().map(|point| pose.apply(point)).collect();
-        let image_from_demonstration = PlanarSimilarity::fit(&part.area_points, &moved).unwrap_or_else(|| {
-            PlanarSimilarity::about(part.center, pose.apply(&part.center), Angle::ZERO, part.nominal_scale)
-        });
-        Self {
-            bbox,
-            keypoints,
-            outline: part.has_outline.then_some(warped),
-            image_from_demonstration,
-            demonstration_idx,
-        }
-    }
-
-    /// The object as an annotation of the sample, for writing it down.
-    ///
-    /// The outline is cut off at the border, as the box is; a grasp line that leaves the image is left out.
-    pub fn annotation(&self, label: &str, sample: &RgbImage) -> Annotation {
-        let (width, height) = (f64::from(sample.width()), f64::from(sample.height()));
-        let ends = [self.keypoints.first(), self.keypoints.last()];
-        let grasp = match ends {
-            [Some(start), Some(end)] if start.is_labelled() && end.is_labelled() => {
-                Some(GraspLine::new(start.point(), end.point()))
-            }
-            _ => None,
-        };
-        let outline = self.outline.as_ref().map(|outline| outline.clip(width, height));
-        Annotation {
-            label: label.into(),
-            bbox: self.bbox,
-            grasp,
-            jaw_width: None,
-            outline: outline.filter(|outline| outline.vertices.len() >= 3),
-        }
-    }
-}
+use crate::{Demonstration, Error, Result};
 
 /// Width and height of a window against the part's largest diameter. With less the part fits only at some turns.
 const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];

@@ -22,7 +22,7 @@ pub enum AugmentationStyle {
     Scenes(SceneStyle),
 }
 
-/// The paper's augmentation, in this order; see facts.md of the project for its origin.
+/// The paper's augmentation, in this order; as the published code applies it (OpenDR, `control/single_demo_grasp`).
 ///
 /// # Source
 /// OpenDR, `control/single_demo_grasp`: imgaug's `Affine(rotate)`, `Multiply(per_channel=0.99)`,

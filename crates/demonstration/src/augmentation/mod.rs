@@ -27,13 +27,15 @@ mod pose;
 mod prepared;
 mod random;
 mod raster;
+mod sample;
 mod scene;
 mod sensor;
 #[cfg(test)]
 mod tests;
 mod warp;
 
-pub use augmenter::{Augmenter, Sample, SampleObject, Windows};
+pub use augmenter::{Augmenter, Windows};
 pub use config::{AugmentationConfig, AugmentationStyle, PaperStyle, SceneStyle};
+pub use sample::{Sample, SampleObject};
 
 pub(crate) use erase::erase_parts;

@@ -4,7 +4,6 @@ use image::RgbImage;
 use nalgebra::{Matrix3, Point2};
 use sdg_geometry::Visibility;
 
-use super::augmenter::{Sample, SampleObject};
 use super::background::{NoiseBank, paint_photo, paint_surfaces};
 use super::config::SceneStyle;
 use super::distractor::{Distractor, Lamp, paint_mutant};
@@ -16,6 +15,7 @@ use super::pose::draw_pose;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, index_below, log_uniform, uniform};
 use super::raster::{PixelRect, Raster, blend, smoothstep};
+use super::sample::{Sample, SampleObject};
 use super::sensor::{blur, expose};
 
 /// What every scene is made with.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::RoiPoolerConfig;
+use super::roi_pooler::RoiPoolerConfig;
 
 /// From an object's outline to what its mask logits should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -15,26 +15,13 @@ use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::ImageSize;
 
-use super::{ResizedTarget, RoiDetection, SampledRoi};
+use super::roi::{RoiClass, RoiDetection, SampledRoi};
+use crate::target::ResizedTarget;
 
 /// Standard deviations of the predictors' first weights: small, so that training starts from
 /// undecided classes and unmoved boxes.
 const SCORE_STD: f64 = 0.01;
 const DELTA_STD: f64 = 0.001;
-
-/// What a sampled proposal stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RoiClass {
-    /// No object.
-    Background,
-    /// An object of the image.
-    Object {
-        /// Class.
-        class_idx: usize,
-        /// Index among the image's objects.
-        gt_idx: usize,
-    },
-}
 
 /// Pooling and two fully connected layers.
 #[derive(Module, Debug)]

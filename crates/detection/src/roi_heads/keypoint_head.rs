@@ -16,9 +16,9 @@ use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, upsample_bilinear_2x};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 
-use super::box_head::RoiClass;
 use super::heatmap::{decode, encode};
-use super::{ResizedTarget, RoiDetection, SampledRoi};
+use super::roi::{RoiClass, RoiDetection, SampledRoi};
+use crate::target::ResizedTarget;
 
 /// The keypoint head.
 #[derive(Module, Debug)]

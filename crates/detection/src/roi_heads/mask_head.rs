@@ -17,10 +17,10 @@ use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::ImageSize;
 
-use super::box_head::RoiClass;
 use super::mask_paste::BoxMask;
 use super::mask_target::encode;
-use super::{ResizedTarget, RoiDetection, SampledRoi};
+use super::roi::{RoiClass, RoiDetection, SampledRoi};
+use crate::target::ResizedTarget;
 
 /// Standard deviation of the predictor's first weights: small, so that training starts undecided.
 const PREDICTOR_STD: f64 = 0.001;

@@ -7,7 +7,7 @@ use crate::config::MaskPasting;
 /// The probabilities of one detection's mask, `S×S`, row by row, stretched over its box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoxMask {
-    /// Side.
+    /// Cells along each side.
     pub size: usize,
     /// Values from 0 to 1.
     pub probabilities: Vec<f32>,

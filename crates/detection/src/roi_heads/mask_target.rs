@@ -9,7 +9,7 @@ use sdg_kernels::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};
 use crate::boxes::Corners;
 use crate::config::MaskTargets;
 use crate::host::host_values;
-use crate::target::ObjectMask;
+use crate::target::{ObjectMask, union};
 
 /// Sub-cells of a cell along each axis on which COCO's rasteriser walks.
 const SUBCELLS: f64 = 5.0;
@@ -40,12 +40,6 @@ pub fn encode(mask: &ObjectMask, roi: &Corners, image_size: [usize; 2], size: us
             pool_mask(&union(polygons, width as u32, height as u32), roi, size, RoiAlignment::Legacy)
         }
     }
-}
-
-/// The pixels whose centres lie in any of the polygons.
-pub(crate) fn union(polygons: &[Polygon], width: u32, height: u32) -> Mask {
-    let parts: Vec<Mask> = polygons.iter().map(|polygon| polygon.rasterize(width, height)).collect();
-    Mask::from_fn(width, height, |x, y| parts.iter().any(|part| part.get(x, y)))
 }
 
 fn pool_mask(mask: &Mask, roi: &Corners, size: usize, alignment: RoiAlignment) -> Vec<f32> {

@@ -13,6 +13,7 @@ pub mod keypoint_head;
 pub mod mask_head;
 pub mod mask_paste;
 pub mod mask_target;
+pub mod roi;
 
 use burn::module::Module;
 use burn::tensor::Tensor;
@@ -26,13 +27,14 @@ use crate::matcher::{Match, match_boxes};
 use crate::roi_pooler::Roi;
 use crate::rpn::{ImageSize, Proposals};
 use crate::sampler::{draw, sample};
-use crate::target::ObjectMask;
+use crate::target::ResizedTarget;
 
-use box_head::{BoxHead, BoxPredictor, RoiClass};
-use heatmap::ReadKeypoint;
+use box_head::{BoxHead, BoxPredictor};
 use keypoint_head::KeypointHead;
 use mask_head::MaskHead;
-use mask_paste::BoxMask;
+use roi::{RoiClass, SampledRoi};
+
+pub use roi::RoiDetection;
 
 /// The second stage.
 #[derive(Module, Debug)]
@@ -47,43 +49,6 @@ pub struct RoiHeads {
     pub mask_head: Option<MaskHead>,
     #[module(skip)]
     config: RoiHeadsConfig,
-}
-
-/// The objects of one image, in pixels of the resized image.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct ResizedTarget {
-    /// Boxes.
-    pub boxes: Vec<Corners>,
-    /// Class of each box.
-    pub labels: Vec<usize>,
-    /// Keypoints of each box; empty where the detector has no keypoint head.
-    pub keypoints: Vec<Vec<Keypoint>>,
-    /// Mask of each box; empty where the detector has no mask head.
-    pub masks: Vec<ObjectMask>,
-}
-
-/// A proposal that takes part in the losses.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SampledRoi {
-    /// Box and image.
-    pub roi: Roi,
-    /// Background, or the class and the index of the object in its image.
-    pub class: RoiClass,
-}
-
-/// A detection in pixels of the resized image.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RoiDetection {
-    /// Box.
-    pub corners: Corners,
-    /// Probability of the class.
-    pub score: f32,
-    /// Class.
-    pub class_idx: usize,
-    /// Keypoints, empty without a keypoint head.
-    pub keypoints: Vec<ReadKeypoint>,
-    /// Mask over the box, with a mask head.
-    pub mask: Option<BoxMask>,
 }
 
 /// Losses of the second stage.

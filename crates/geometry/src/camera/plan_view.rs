@@ -40,7 +40,7 @@ pub struct PlanView {
     pub top_m: f64,
     /// Pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Pixels down.
     pub height: u32,
 }
 

@@ -4,7 +4,7 @@
 //! position's begins `stride · C` later: rows of the product are positions, its depth is (row of the kernel, run).
 //! Where the kernel looks past the edges, a unit first copies its rows with zeros around them.
 
-use super::filters::Panels;
+use super::panels::Panels;
 use crate::parallel::{Raw, for_each_unit};
 use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;

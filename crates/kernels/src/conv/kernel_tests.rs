@@ -2,12 +2,14 @@
 
 use proptest::prelude::*;
 
-use super::Conv2dParams;
 use super::direct::Maps;
-use super::filters::{Direction, Filters};
-use super::kernel::{ConvShape, convolve};
+use super::filters::Filters;
+use super::kernel::convolve;
+use super::panels::Direction;
+use super::shape::ConvShape;
 use super::weight_gradient as gradient;
 use crate::elementwise::{channel_sums, channels_last, relu_gradient};
+use crate::params::Conv2dParams;
 use crate::product::Epilogue;
 use crate::reference::{
     assert_close, conv_forward, conv_input_gradient, conv_weight_gradient, random_values, to_first, to_last,

@@ -9,7 +9,7 @@
 //! Sums over positions are cut into chunks by the shapes alone, computed apart and added in order.
 
 use super::direct::{Maps, copy_row};
-use super::kernel::ConvShape;
+use super::shape::ConvShape;
 use crate::parallel::{SharedSlice, for_each_unit};
 use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;

@@ -17,8 +17,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::direct::Maps;
-use super::filters::{Direction, Panels, gather};
-use super::kernel::ConvShape;
+use super::panels::{Direction, Panels, gather};
+use super::shape::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
 use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct, packed_len, panel_width};
 use crate::scratch::Scratch;
@@ -26,17 +26,13 @@ use crate::simd::Isa;
 use crate::simd::lanes::LANES;
 
 mod filter_transform;
+mod tiling;
 pub(super) mod transform;
 mod weight_gradient;
 
+use tiling::{FREQUENCIES, Frequencies, Tiling};
 pub(super) use weight_gradient::weight_gradient;
 
-/// Side of an output tile.
-pub(super) const OUTPUT_TILE: usize = 4;
-/// Side of an input tile.
-pub(super) const INPUT_TILE: usize = 6;
-/// Products of a tile and channel.
-pub(super) const FREQUENCIES: usize = INPUT_TILE * INPUT_TILE;
 /// Tiles a unit of work has: the transformed values of 48 tiles and 64 channels are 442 KB.
 const UNIT_TILES: usize = 48;
 /// Units to aim at, so that no thread waits long for the last. A lone thread waits for nobody: it takes few tiles at a
@@ -56,48 +52,6 @@ pub(crate) fn suits(shape: &ConvShape) -> bool {
         && shape.out_channels.is_multiple_of(LANES)
         && height.min(width) >= 3
         && shape.in_size[0].min(shape.in_size[1]) >= 3
-}
-
-/// The tiles of all output maps in a row: tile t covers pixels from (4·ty, 4·tx) of image n.
-#[derive(Clone, Copy)]
-pub(super) struct Tiling {
-    pub(super) num_images: usize,
-    /// Tiles of an image, down and across.
-    pub(super) tiles: [usize; 2],
-}
-
-impl Tiling {
-    pub(super) fn new(num_images: usize, out_size: [usize; 2]) -> Self {
-        Self { num_images, tiles: out_size.map(|size| size.div_ceil(OUTPUT_TILE)) }
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.num_images * self.tiles[0] * self.tiles[1]
-    }
-
-    /// Image, and pixel of the first output.
-    #[inline(always)]
-    pub(super) fn place(&self, tile: usize) -> (usize, [usize; 2]) {
-        let [down, across] = self.tiles;
-        let (image, tile) = (tile / (down * across), tile % (down * across));
-        (image, [tile / across * OUTPUT_TILE, tile % across * OUTPUT_TILE])
-    }
-}
-
-/// Transformed values of some tiles, `[36, tiles, C]`.
-///
-/// A line of floats stands between frequencies: without it, powers of two would put a tile's 36 values into one
-/// set of the cache.
-pub(super) struct Frequencies {
-    pub(super) values: Scratch,
-    pub(super) step: usize,
-}
-
-impl Frequencies {
-    pub(super) fn new(tiles: usize, channels: usize) -> Self {
-        let step = tiles * channels + LANES;
-        Self { values: Scratch::take(FREQUENCIES * step), step }
-    }
 }
 
 /// Transformed weights: panels for each frequency, `[36, ⌈columns/32⌉, channels, 32]`.

@@ -4,7 +4,7 @@
 //! output (r, c, i, j) = mean over the bin's samples (y, x) of the bilinear feature (image of r, c, y, x)
 //! ```
 //!
-//! The conventions are those of [`AxisBins`](crate::roi_align::AxisBins), sample by sample. What differs: an image index
+//! The conventions are those of [`AxisBins`](crate::roi_align::bins::AxisBins), sample by sample. What differs: an image index
 //! beyond the batch is taken for the last image, since a kernel cannot refuse.
 
 use burn::backend::Cube;
@@ -14,7 +14,7 @@ use burn::cubecl;
 use burn::tensor::{DType, Shape};
 use cubecl::prelude::*;
 
-use crate::roi_align::{RoiAlignParams, RoiAlignment, SamplingRatio};
+use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 
 /// As [`roi_align`](crate::roi_align()), of `f32` tensors whose shapes were checked.
 pub(super) fn launched(

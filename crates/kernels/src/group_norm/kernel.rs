@@ -10,8 +10,8 @@
 
 use std::mem::MaybeUninit;
 
-use super::{Activation, GroupNormParams};
 use crate::parallel::{Output, SharedSlice, for_each_unit};
+use crate::params::{Activation, GroupNormParams};
 use crate::scratch::Scratch;
 use crate::simd::{Isa, widest};
 

@@ -3,7 +3,8 @@
 use burn::tensor::{DType, Device, Tensor};
 
 use super::kernel::{backward, forward};
-use super::{Activation, GroupNormParams, group_norm, group_norm_residual};
+use super::{group_norm, group_norm_residual};
+use crate::params::{Activation, GroupNormParams};
 use crate::reference::{assert_close, random_values, to_first, to_last};
 use crate::simd::Isa;
 

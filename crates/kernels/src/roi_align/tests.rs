@@ -4,9 +4,10 @@ use burn::backend::Flex;
 use burn::tensor::{Device, Tensor};
 use proptest::prelude::*;
 
-use super::{RoiAlignParams, RoiAlignment, SamplingRatio, roi_align};
+use super::roi_align;
 use crate::composed;
-use crate::flex::values;
+use crate::flex_tensor::values;
+use crate::params::{RoiAlignParams, RoiAlignment, SamplingRatio};
 use crate::reference::{assert_close, random_values, roi_align_backward, roi_align_forward, to_first, to_last};
 
 const ALIGNMENTS: [RoiAlignment; 2] = [RoiAlignment::HalfPixel, RoiAlignment::Legacy];
@@ -104,8 +105,8 @@ fn the_composed_default_agrees() {
         for ratio in RATIOS {
             let params = params([3, 4], alignment, ratio);
             let crops = composed::roi_align::<Flex>(
-                crate::flex::tensor(features.clone(), SHAPE),
-                crate::flex::tensor(ROIS.to_vec(), [10, 5]),
+                crate::flex_tensor::tensor(features.clone(), SHAPE),
+                crate::flex_tensor::tensor(ROIS.to_vec(), [10, 5]),
                 params,
             )
             .to_contiguous();

@@ -1,6 +1,6 @@
 //! Transposition, the way between channels first and channels last.
 
-use super::Isa;
+use super::isa::Isa;
 
 /// Transposes `[rows, columns]`, rows `source_step` apart, into rows of `target` that are `target_step` apart.
 pub(crate) fn transpose(

@@ -1,28 +1,16 @@
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::joints::ready_pose;
+use crate::test_poses::{random_configuration, top_grasp};
 
 /// What the closed form and the polish leave.
 const POSITION_TOLERANCE_M: f64 = 1e-6;
 const ANGLE_TOLERANCE_RAD: f64 = 1e-6;
-
-fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
-    let limits = JointLimits::franka();
-    JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
-}
-
-/// The hand straight down, turned by `yaw_rad` about the vertical.
-fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI),
-    )
-}
 
 fn assert_reaches(panda: &Panda, target: &Isometry3<f64>, solution: &IkSolution) {
     let error = pose_error(&panda.forward(&solution.q), target);

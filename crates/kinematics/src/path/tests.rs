@@ -1,20 +1,12 @@
 use std::f64::consts::PI;
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::inverse::IkOptions;
-use crate::limits::ready_pose;
-
-fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI),
-    )
-}
+use crate::ik::IkOptions;
+use crate::joints::ready_pose;
+use crate::test_poses::top_grasp;
 
 fn descent(panda: &Panda) -> JointPath {
     let above = top_grasp(0.5, 0.1, 0.3, 0.4);

@@ -1,30 +1,15 @@
-use std::f64::consts::PI;
-
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::inverse::IkOptions;
-use crate::limits::ready_pose;
+use crate::ik::IkOptions;
+use crate::joints::ready_pose;
 use crate::panda::{Panda, pose_error};
 use crate::path::LineOptions;
+use crate::test_poses::{random_configuration, top_grasp};
 
 /// Rounding of the profiles.
 const LIMIT_TOLERANCE: f64 = 1e-6;
-
-fn random_configuration(rng: &mut Pcg64Mcg) -> JointVector {
-    let limits = JointLimits::franka();
-    JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i]))
-}
-
-fn top_grasp(x: f64, y: f64, z: f64, yaw_rad: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(x, y, z),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI),
-    )
-}
 
 /// Looks at `num` + 1 samples: limits hold, the derivatives belong to the positions, jerk by differences of accelerations.
 fn assert_within_limits(trajectory: &Trajectory, limits: &JointLimits, num: usize) {

@@ -5,9 +5,10 @@ use std::f32::consts::PI;
 use rand_pcg::Pcg64Mcg;
 
 use super::builder::Builder;
+use super::construction::Recipe;
 use super::feature::{Edge, Operation};
 use super::material::Material;
-use super::{Recipe, Shape};
+use super::shape::Shape;
 use crate::random::Draw;
 
 /// Thinnest wire: its radius over the part's size. In a photo thinner ones fall apart into pieces.

@@ -2,9 +2,10 @@
 
 use rand_pcg::Pcg64Mcg;
 
+use super::construction::Recipe;
 use super::feature::{Edge, Feature, Operation, State};
 use super::material::Material;
-use super::{Recipe, Shape};
+use super::shape::Shape;
 use crate::random::Draw;
 
 /// A recipe in the making.

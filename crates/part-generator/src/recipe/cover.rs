@@ -3,9 +3,10 @@
 use rand_pcg::Pcg64Mcg;
 
 use super::builder::Builder;
+use super::construction::Recipe;
 use super::feature::{Edge, Operation};
 use super::material::Material;
-use super::{Recipe, Shape};
+use super::shape::Shape;
 use crate::random::Draw;
 
 /// Draws something of about `size` millimetres that can lie over a part.

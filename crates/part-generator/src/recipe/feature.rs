@@ -14,7 +14,7 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Nothing.
+    /// No material: nothing stands above the table.
     pub const EMPTY: Self = Self { top: 0.0, bottom: 0.0, material: 0 };
 
     /// Whether anything is there.

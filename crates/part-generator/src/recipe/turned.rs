@@ -5,9 +5,10 @@ use std::f32::consts::{PI, TAU};
 use rand_pcg::Pcg64Mcg;
 
 use super::builder::Builder;
+use super::construction::Recipe;
 use super::feature::{Edge, Operation, Ripple, RippleKind};
 use super::material::Material;
-use super::{Recipe, Shape};
+use super::shape::Shape;
 use crate::random::Draw;
 
 /// Draws a stepped shaft with grooves, threads, flats and cross holes, of one or several materials.

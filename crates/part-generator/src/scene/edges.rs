@@ -1,7 +1,7 @@
 //! Pixels on edges, drawn from several samples.
 
+use super::contents::{Scene, TABLE};
 use super::placement::Contact;
-use super::render::{Scene, TABLE};
 use super::shading::{Shading, TableRow};
 
 /// Samples of a pixel on an edge.

@@ -2,6 +2,7 @@
 
 mod blur;
 mod config;
+mod contents;
 mod edges;
 mod ground;
 mod layout;

@@ -6,9 +6,10 @@ use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Mask, PlanarSimilarity, Polygon, PosedCamera, outer_outline};
 
+use super::contents::Scene;
 use super::light::{LightStyle, Lighting};
 use super::placement::Placement;
-use super::render::{Canvas, Footprint, Scene};
+use super::render::{Canvas, Footprint};
 use super::sensor::{self, Sensor};
 use super::table::{Table, TableStyle};
 use super::view::View;

@@ -1,30 +1,15 @@
 //! Draws a scene: what each pixel meets first, and its light.
 
+use super::contents::{Scene, TABLE};
 use super::edges::{Seen, smooth_edges};
-use super::light::Lighting;
-use super::placement::{Contact, Placement};
+use super::placement::Contact;
 use super::shading::{Shading, TableRow};
-use super::table::Table;
-use super::view::View;
-
-/// Marks pixels that meet no body.
-pub(crate) const TABLE: u8 = u8::MAX;
 
 /// Cells of the grid of heights that shadows are made from, in pixels.
 const GROUND_CELL_PX: f32 = 2.0;
 
 /// So many neighbouring pixels of a row are first looked at together.
 const GROUP_PX: i32 = 4;
-
-/// Everything that is drawn.
-pub(crate) struct Scene {
-    pub view: View,
-    pub lighting: Lighting,
-    pub table: Table,
-    pub bodies: Vec<Placement>,
-    /// A shadow of something outside the picture: normal of its edge, distance, width of the edge, strength.
-    pub far_shadow: Option<([f32; 2], f32, f32, f32)>,
-}
 
 /// The pixels of a body as if nothing covered it.
 #[derive(Debug, Clone, PartialEq)]

@@ -101,5 +101,5 @@ pub struct Sample {
 
 impl Sample {
     /// Stands in [`ids`](Self::ids) for pixels that show the table.
-    pub const TABLE: u8 = super::render::TABLE;
+    pub const TABLE: u8 = super::contents::TABLE;
 }

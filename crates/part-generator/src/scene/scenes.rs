@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
 
 use super::config::SceneConfig;
+use super::contents::Scene;
 use super::layout::Layout;
 use super::light::{LightStyle, Lighting};
 use super::photo::{DemonstrationPhoto, FOCAL_OVER_WIDTH, Silhouette, grasp_line, pose};
-use super::render::{Canvas, Footprint, Rendered, Scene};
+use super::render::{Canvas, Footprint, Rendered};
 use super::sample::{Conditions, Instance, OtherKind, OtherObject, Sample};
 use super::sensor::{self, Sensor};
 use super::table::{Table, TableStyle};

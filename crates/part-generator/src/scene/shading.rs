@@ -2,10 +2,10 @@
 
 use crate::recipe::Brushing;
 
+use super::contents::Scene;
 use super::ground::{Ground, Shadow};
 use super::light::Lighting;
 use super::placement::{Contact, Placement};
-use super::render::Scene;
 use super::view::{Sight, View};
 
 /// Mirrored surroundings of a smooth table are found at every so many pixels, and lie on lines between.

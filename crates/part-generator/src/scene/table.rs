@@ -94,7 +94,7 @@ pub(crate) struct Table {
 /// Which tables are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TableStyle {
-    /// Any.
+    /// Any of the others, drawn at random.
     Any,
     /// Plain and light to middle grey, as a careful person chooses for a photo that teaches.
     Plain,

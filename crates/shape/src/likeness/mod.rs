@@ -7,7 +7,7 @@
 //! ```
 //! Agreements of edges and colours count how much differs. This one sees what it is: something lying over the part, its
 //! shadow, a highlight, or a hole that belongs elsewhere. It was trained on generated parts and knows no part in
-//! particular (docs/decisions/likeness.md).
+//! particular (docs/decisions/008-likeness.md).
 
 mod network;
 mod pair;

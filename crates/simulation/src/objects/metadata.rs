@@ -1,9 +1,15 @@
 //! `object.json`: what it says, and the checks that its types leave open.
 
 use nalgebra::Point3;
+use sdg_geometry::RotationalSymmetry;
+use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde::Deserialize;
 
-use super::{LARGEST_JAW_WIDTH_M, OBJECT_FORMAT, RotationalSymmetry};
+/// Version of `object.json` that this reader understands.
+pub const OBJECT_FORMAT: u32 = 1;
+
+/// The widest part that the Panda's hand can take, in metres.
+pub const LARGEST_JAW_WIDTH_M: f64 = HAND_OPENING_MAX_M;
 
 /// `object.json` as it is written.
 #[derive(Deserialize)]

@@ -33,15 +33,11 @@ use crate::scene::pose_attributes;
 use embedded::{EMBEDDED, NUM_PAPER_PARTS};
 use metadata::Metadata;
 
+pub use metadata::{LARGEST_JAW_WIDTH_M, OBJECT_FORMAT};
+
 pub(crate) use height_map::HeightMap;
 pub use look_alike::{LookAlike, LookAlikeKind};
 pub use sdg_geometry::RotationalSymmetry;
-
-/// Version of `object.json` that this reader understands.
-pub const OBJECT_FORMAT: u32 = 1;
-
-/// The widest part that the Panda's hand can take, in metres.
-pub const LARGEST_JAW_WIDTH_M: f64 = 0.08;
 
 /// The body tag that every `object.xml` has once; the part's pose is written into it.
 const BODY_TAG: &str = "<body name=\"object\">";

@@ -17,8 +17,8 @@ const MOST_SCORE: f64 = 0.01;
 /// Which of two proposals of nearly one score is kept hangs on the last bit of either, and so does the network's score (0.036
 /// apart in one of the pictures). What is grasped does not: the demonstration decides that.
 const MOST_NETWORK_SCORE: f64 = 0.05;
-/// A frame of an `edge` model on one core, without WebGPU: five a second.
-const MOST_MILLISECONDS: f64 = 200.0;
+/// A frame of an `edge` model on one core, without WebGPU: five a second. Measured: 54 to 78 ms on shared machines.
+const MAX_MILLISECONDS: f64 = 200.0;
 /// Looks that are timed, after those that had the module's functions compiled.
 const LOOKS: usize = 7;
 /// Longer gaps between two of the page's frames are seen as freezing.
@@ -133,9 +133,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
             let mut ordered = times.clone();
             ordered.sort_by(f64::total_cmp);
             let median = ordered[LOOKS / 2];
-            // Others compute on CI's machines: what took 54 ms once took 78 half an hour later.
-            let most = if std::env::var_os("CI").is_some() { 2.0 } else { 1.0 } * MOST_MILLISECONDS;
-            assert!(median <= most, "{median} ms a frame");
+            assert!(median <= MAX_MILLISECONDS, "{median} ms a frame");
         }
         browser.screenshot(&screenshots().join(format!("web-{letter}.png"))).unwrap();
         assert_quiet(&browser);

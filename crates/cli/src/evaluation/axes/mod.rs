@@ -23,6 +23,7 @@ mod summary;
 mod tables;
 mod told;
 mod units;
+mod way;
 
 pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
 pub use jitter::{MARKS_JITTER_PX, with_jittered_marks};
@@ -33,8 +34,9 @@ pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetect
 pub use selection::{GraspCondition, Selection};
 pub use settings::{AxisSettings, GraspSettings};
 pub use summary::{
-    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, Way, lowest,
+    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
 };
 pub use tables::{markdown, tables};
 pub(super) use units::draw;
 pub use units::{AxesEvaluation, GRASPING_MODELS, RunEnd};
+pub use way::Way;

@@ -3,8 +3,9 @@
 use sdg_grasp::ModelKind;
 use sdg_report::{KeyFigure, Report, Section, ShareChart, Tone};
 
-use super::summary::{AxesSummary, AxisFigures, GroupSummary, Way};
+use super::summary::{AxesSummary, AxisFigures, GroupSummary};
 use super::tables::{notice, tables};
+use super::way::Way;
 use crate::evaluation::tables::{Titled, this_run};
 
 /// The shares at a glance, then all tables; `more` are tables to follow.

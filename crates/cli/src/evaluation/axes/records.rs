@@ -3,7 +3,7 @@
 use sdg_simulation::scene::Axis;
 use serde::{Deserialize, Serialize};
 
-use super::summary::Way;
+use super::way::Way;
 
 /// A detection beside the instance of the part that it lies nearest to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

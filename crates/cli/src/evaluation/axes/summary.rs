@@ -11,38 +11,11 @@ use super::records::{Answer, AxisRecord};
 use super::selection::GraspCondition;
 use super::settings::{AxisSettings, GraspSettings};
 use super::units::{AxesEvaluation, marks_of};
+use super::way::Way;
 use crate::evaluation::cell::{Cell, Marks};
 use crate::evaluation::groups::PartGroup;
 use crate::evaluation::records::{AttemptRecord, TeachingRecord};
 use crate::statistics::{Share, percentile, wilson_interval};
-
-/// With the check against the demonstration, or the network alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Way {
-    /// With the check against the demonstration.
-    WithCheck,
-    /// The network alone.
-    NetworkAlone,
-}
-
-impl Way {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::WithCheck, Self::NetworkAlone];
-
-    /// As tables say it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::WithCheck => "with the check",
-            Self::NetworkAlone => "network alone",
-        }
-    }
-
-    /// Whether a model can be measured so: without a network there is nothing but the check.
-    pub fn is_of(self, model: ModelKind) -> bool {
-        self == Self::WithCheck || model.has_network()
-    }
-}
 
 /// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
 #[derive(Debug, Clone, PartialEq, Serialize)]

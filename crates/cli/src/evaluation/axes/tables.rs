@@ -3,8 +3,9 @@
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Step, Table, Tone};
 
-use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Way, lowest};
+use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, lowest};
 use super::told::told_from_truth;
+use super::way::Way;
 use crate::evaluation::records::AttemptRecord;
 use crate::evaluation::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;

@@ -2,7 +2,7 @@
 
 /// One thing that is told.
 pub(super) struct Told {
-    /// What.
+    /// The quantity that the simulator hands over.
     pub what: &'static str,
     /// Where it comes from.
     pub source: &'static str,

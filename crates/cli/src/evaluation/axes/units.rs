@@ -17,13 +17,13 @@ use super::selection::{GraspCondition, Selection};
 use super::settings::{AxisSettings, GraspSettings};
 use crate::evaluation::EvaluationProgress;
 use crate::evaluation::attempting::go_on;
+use crate::evaluation::caught::{NO_MODEL, caught};
 use crate::evaluation::cell::{Cell, Marks, attempts_of, read_attempts};
 use crate::evaluation::looking::part_seed;
 use crate::evaluation::records::AttemptRecord;
 use crate::evaluation::schedule::{Task, run_all};
 use crate::evaluation::store::Store;
 use crate::evaluation::teaching::Teaching;
-use crate::evaluation::units::{NO_MODEL, caught};
 use crate::exit::one_line;
 use crate::rehearsal::{Rehearsal, RehearsalErrors};
 
@@ -420,7 +420,8 @@ mod tests {
     use crate::evaluation::{PartGroup, Settings};
     use crate::statistics::Share;
 
-    use super::super::summary::{AxesSummary, Way};
+    use super::super::summary::AxesSummary;
+    use super::super::way::Way;
 
     fn settings() -> Settings {
         Settings {

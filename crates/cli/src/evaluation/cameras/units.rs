@@ -14,12 +14,12 @@ use super::sets::{PictureSet, Shown};
 use crate::against_truth::grasp_error;
 use crate::evaluation::EvaluationProgress;
 use crate::evaluation::axes::match_one_to_one;
+use crate::evaluation::caught::{NO_MODEL, caught};
 use crate::evaluation::cell::{Cell, Marks};
 use crate::evaluation::schedule::{Task, run_all};
 use crate::evaluation::settings::TeachingSettings;
 use crate::evaluation::store::Store;
 use crate::evaluation::teaching::Teaching;
-use crate::evaluation::units::{NO_MODEL, caught};
 
 /// What is kept or lost as a whole.
 #[derive(Debug, Clone, Copy)]

@@ -2,7 +2,7 @@
 
 use sdg_report::Section;
 
-use super::Titled;
+use super::titled::Titled;
 
 /// What the reader must know before the first number, where units of work are still to do.
 pub fn incomplete(remaining: usize) -> Option<String> {

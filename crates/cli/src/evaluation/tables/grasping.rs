@@ -2,7 +2,7 @@
 
 use sdg_report::{Cell, Column, Step, Table, Tone};
 
-use super::{Titled, number, share, ways};
+use super::titled::{Titled, number, share, ways};
 use crate::evaluation::paper;
 use crate::evaluation::records::AttemptRecord;
 use crate::evaluation::summary::{Figures, Summary};

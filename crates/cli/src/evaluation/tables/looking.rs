@@ -2,7 +2,7 @@
 
 use sdg_report::{Cell, Column, Table, Tone};
 
-use super::{Titled, number, share, ways};
+use super::titled::{Titled, number, share, ways};
 use crate::evaluation::summary::Summary;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 

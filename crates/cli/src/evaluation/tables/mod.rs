@@ -4,25 +4,19 @@ mod document;
 mod grasping;
 mod looking;
 mod models;
+mod titled;
 
 use sdg_report::{Cell, Column, Table, Tone};
 
 use super::groups::PartGroup;
 use super::records::TeachingRecord;
-use super::summary::{Figures, ModelSummary, Summary};
+use super::summary::{Figures, Summary};
 use crate::statistics::Share;
 
-pub(super) use document::{document, incomplete, this_run};
+pub use titled::Titled;
+pub(super) use titled::{number, share};
 
-/// A table under its heading.
-pub struct Titled {
-    /// The heading.
-    pub title: String,
-    /// What is to be seen, in a sentence or two.
-    pub lead: String,
-    /// The rows.
-    pub table: Table,
-}
+pub(super) use document::{document, incomplete, this_run};
 
 /// All tables, the most important first.
 pub fn tables(summary: &Summary) -> Vec<Titled> {
@@ -98,28 +92,10 @@ fn cells(summary: &Summary) -> Titled {
     Titled { title: "Every part and model".to_owned(), lead: "What the sums above are made of.".to_owned(), table }
 }
 
-/// With the check and, where there is a network, without it.
-fn ways(model: &ModelSummary) -> impl Iterator<Item = (String, &Figures)> {
-    debug_assert_eq!(model.alone.is_some(), model.model.has_network());
-    let alone = model.alone.as_ref().map(|figures| (format!("{}, alone", model.model), figures));
-    std::iter::once((model.model.to_string(), &model.verified)).chain(alone)
-}
-
-pub(super) fn share(share: Share, tone: Tone) -> Cell {
-    match (share.of, tone) {
-        (0, _) => Cell::text("–"),
-        (_, Tone::Plain) => Cell::text(share.to_string()),
-        (_, tone) => Cell::Verdict { tone, text: share.to_string(), note: None },
-    }
-}
-
-pub(super) fn number(value: Option<f64>, decimals: usize) -> Cell {
-    value.map_or(Cell::missing(), |value| Cell::number(value, decimals))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::summary::ModelSummary;
     use crate::evaluation::{CellSummary, Settings, wilson_interval};
     use sdg_grasp::ModelKind;
     use std::collections::BTreeMap;

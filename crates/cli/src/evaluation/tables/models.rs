@@ -3,7 +3,7 @@
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table};
 
-use super::{Titled, number};
+use super::titled::{Titled, number};
 use crate::evaluation::paper;
 use crate::evaluation::records::TeachingRecord;
 use crate::evaluation::summary::{ModelSummary, Summary};

@@ -6,7 +6,7 @@
 
 #![allow(clippy::needless_range_loop)] // Rows and columns of a tile are numbers, here and in the sources.
 
-use super::INPUT_TILE;
+use super::tiling::INPUT_TILE;
 use super::transform::{A, A2, B, B2};
 use crate::product::PANEL;
 use crate::simd::lanes::{LANES, Lanes};

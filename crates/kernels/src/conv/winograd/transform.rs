@@ -13,7 +13,7 @@
 
 use std::ops::Range;
 
-use super::{FREQUENCIES, INPUT_TILE, OUTPUT_TILE, Tiling};
+use super::tiling::{FREQUENCIES, INPUT_TILE, OUTPUT_TILE, Tiling};
 use crate::conv::direct::Maps;
 use crate::parallel::Raw;
 use crate::product::Epilogue;

@@ -1,10 +1,10 @@
 //! The weight's gradient in the frequencies: sums over tiles instead of pixels, then back to 3×3.
 
 use super::filter_transform::filter_gradients;
+use super::tiling::{FREQUENCIES, Frequencies, Tiling};
 use super::transform::{see, see_gradient};
-use super::{FREQUENCIES, Frequencies, Tiling};
 use crate::conv::direct::Maps;
-use crate::conv::kernel::ConvShape;
+use crate::conv::shape::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
 use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
 use crate::scratch::Scratch;

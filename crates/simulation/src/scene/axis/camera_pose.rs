@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::Rng;
 use sdg_geometry::PosedCamera;
 
-use super::{AxisParameter, Drawn, Request};
+use super::request::{AxisParameter, Drawn, Request};
 use crate::attempt::AttemptConfig;
 use crate::error::{Result, SimulationError};
 use crate::scene::{PlacedObject, shows_whole};

@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Isometry2, Point2, Point3, Vector2};
 use rand::Rng;
 
-use super::{AxisParameter, Drawn, Request};
+use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
 use crate::objects::HeightMap;
 use crate::scene::{Distractor, DistractorKind, SceneVariation, VariationConfig, base_from_look_camera};

@@ -6,8 +6,8 @@ use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2, Vector3};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
+use super::request::{AxisParameter, Drawn, Request};
 use super::visible::{hide_distractor, instance_bodies, num_pixels, place_distractor};
-use super::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
 use crate::objects::HeightMap;
 use crate::scene::{Distractor, DistractorKind, PlacedObject, base_from_look_camera, footprint};

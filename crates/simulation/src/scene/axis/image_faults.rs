@@ -9,7 +9,7 @@ use image::RgbImage;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
-use super::{AxisParameter, Request};
+use super::request::{AxisParameter, Request};
 
 /// Light that reaches the sensor, as a share of the usual: the ends of the range, equally likely by ratio.
 const EXPOSURES: [f64; 2] = [0.25, 0.02];

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Point2;
 use rand::Rng;
 
-use super::{AxisParameter, Drawn, Request};
+use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
 use crate::scene::{
     PlacedObject, SceneVariation, VariationConfig, base_from_look_camera, footprint, sample_distractors,

@@ -10,123 +10,27 @@
 //! whole range evenly. The same part, axis, number and seed give the same picture to the bit. All pictures are the wrist
 //! camera's with the arm holding it, as in an attempt.
 
+mod axis_name;
 mod camera_pose;
 mod clutter;
 mod cover;
 mod image_faults;
 mod instances;
+mod request;
 mod visible;
 
-use std::fmt;
-use std::ops::Range;
-use std::str::FromStr;
+use rand::Rng;
 
-use rand::{Rng, SeedableRng};
-use rand_pcg::Pcg64Mcg;
+pub use axis_name::Axis;
+pub use request::{AxisParameter, PICTURES_PER_AXIS};
+use request::{Drawn, Request};
+pub use visible::InstanceTruth;
 
-use super::{GraspTruth, SceneVariation, VariationConfig, base_from_look_camera};
+use super::{SceneVariation, VariationConfig, base_from_look_camera};
 use crate::camera::CameraView;
-use crate::error::{Result, SimulationError};
+use crate::error::Result;
 use crate::objects::{LookAlikeKind, ObjectSpec};
 use crate::workcell::{Workcell, WorkcellConfig};
-
-/// How many pictures an axis has: as many strata.
-pub const PICTURES_PER_AXIS: u64 = 20;
-
-/// What is harder than in an ordinary picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Axis {
-    /// The camera is 0.75 to 1.3 times as high as usual.
-    Height,
-    /// The camera is tilted by 5 to 20 degrees about a random axis in the table and looks at the part.
-    Tilt,
-    /// Another thing lies over 10 to 40 percent of what is seen of the part.
-    Covered,
-    /// Little light: a dark picture with photon and read noise.
-    Dark,
-    /// Motion blur in the even pictures, defocus in the odd ones.
-    Blur,
-    /// Light of another colour than the camera is balanced for.
-    Tint,
-    /// Ten to fifteen other things, pushed against the part and each other.
-    Clutter,
-    /// Three of the part.
-    Instances,
-    /// A part that resembles the part, and not the part.
-    LookAlikes,
-}
-
-impl Axis {
-    /// All axes, in the order in which they are reported.
-    pub const ALL: [Self; 9] = [
-        Self::Height,
-        Self::Tilt,
-        Self::Covered,
-        Self::Dark,
-        Self::Blur,
-        Self::Tint,
-        Self::Clutter,
-        Self::Instances,
-        Self::LookAlikes,
-    ];
-
-    /// The name at the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Height => "height",
-            Self::Tilt => "tilt",
-            Self::Covered => "covered",
-            Self::Dark => "dark",
-            Self::Blur => "blur",
-            Self::Tint => "tint",
-            Self::Clutter => "clutter",
-            Self::Instances => "instances",
-            Self::LookAlikes => "look-alikes",
-        }
-    }
-}
-
-impl fmt::Display for Axis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Axis {
-    type Err = SimulationError;
-
-    /// Reads a name as [`Axis::name`] gives it.
-    ///
-    /// # Errors
-    /// [`SimulationError::UnknownName`] with the names that exist.
-    fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| SimulationError::UnknownName {
-            kind: "axis",
-            name: name.to_owned(),
-            existing: Self::ALL.map(|axis| axis.name().to_owned()).to_vec(),
-        })
-    }
-}
-
-/// How much a picture was changed along its axis.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AxisParameter {
-    /// The number, in `unit`.
-    pub value: f64,
-    /// What the number counts: `of the usual height`, `degrees`, `px`.
-    pub unit: &'static str,
-    /// All of it in words.
-    pub description: String,
-}
-
-/// One of the part's instances in a picture.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InstanceTruth {
-    /// Where it is, and its grasp.
-    pub grasp: GraspTruth,
-    /// Share of its pixels that the picture shows, of those that it would show with nothing else on the table.
-    pub visible_share: f64,
-}
 
 /// A picture of an axis with the truth about it.
 #[derive(Debug, Clone)]
@@ -145,54 +49,6 @@ pub struct AxisView {
     pub parameter: AxisParameter,
     /// In what the part on the table differs from the part that is asked for; only among the look-alikes.
     pub look_alike: Option<LookAlikeKind>,
-}
-
-/// A part, axis, number and seed, as the axes' own modules need them.
-struct Request<'a> {
-    spec: &'a ObjectSpec,
-    number: u64,
-    /// Seed of the ordinary scene.
-    scene_seed: u64,
-    /// Place of the picture in the axis' range, 0 to 1.
-    level: f64,
-    /// What else the axis draws.
-    rng: Pcg64Mcg,
-}
-
-impl<'a> Request<'a> {
-    fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
-        // FNV-1a: parts whose pictures had one seed would share each unlucky lamp.
-        let part = spec
-            .name
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
-        let mut rng = Pcg64Mcg::seed_from_u64(
-            part ^ seed.wrapping_mul(0xd134_2543_de82_ef95)
-                ^ (axis as u64) << 56
-                ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15),
-        );
-        let scene_seed = rng.random();
-        let stratum = (number % PICTURES_PER_AXIS) as f64;
-        let level = (stratum + rng.random_range(0.0..1.0)) / PICTURES_PER_AXIS as f64;
-        Self { spec, number, scene_seed, level, rng }
-    }
-
-    /// The place of the picture in a range.
-    fn between(&self, range: Range<f64>) -> f64 {
-        range.start + self.level * (range.end - range.start)
-    }
-
-    fn ordinary_scene(&self) -> SceneVariation {
-        SceneVariation::sample(Some(self.spec), &VariationConfig::default(), self.scene_seed)
-    }
-}
-
-/// What an axis made: the picture before truths are measured.
-struct Drawn {
-    cell: Workcell,
-    scene: SceneVariation,
-    view: CameraView,
-    parameter: AxisParameter,
 }
 
 /// Draws picture `number` of an axis.

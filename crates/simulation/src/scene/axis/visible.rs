@@ -3,12 +3,20 @@
 use nalgebra::{Isometry3, Translation3};
 use sdg_geometry::PosedCamera;
 
-use super::InstanceTruth;
 use crate::error::Result;
 use crate::model::{Body, Id, Joint};
 use crate::render::Segmentation;
 use crate::scene::{GraspTruth, PlacedObject, SceneVariation};
 use crate::workcell::Workcell;
+
+/// One of the part's instances in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstanceTruth {
+    /// Where it is, and its grasp.
+    pub grasp: GraspTruth,
+    /// Share of its pixels that the picture shows, of those that it would show with nothing else on the table.
+    pub visible_share: f64,
+}
 
 /// Where things are put that shall not be seen: below the floor.
 const OUT_OF_SIGHT_M: f64 = -10.0;

@@ -1,0 +1,218 @@
+//! Which file of a crate imports from which.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+use std::{fs, io};
+
+use crate::paths::{mentions, named_paths};
+use crate::source_text::code_of;
+
+/// A module's path from the crate's root, which is empty.
+type ModulePath = Vec<String>;
+
+/// Files of one crate and what they import. A module's `pub use` of its own child is no import, unless the module also uses
+/// that name itself. What another file takes through such a re-export, it imports from where it is defined.
+#[derive(Debug, Default)]
+pub struct ModuleGraph {
+    files: BTreeMap<ModulePath, String>,
+    imports: BTreeMap<ModulePath, BTreeSet<ModulePath>>,
+}
+
+impl ModuleGraph {
+    /// The graph of all `.rs` files below a crate's `src`.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be read.
+    pub fn read(src: &Path) -> io::Result<Self> {
+        let mut sources = Vec::new();
+        let mut folders = vec![src.to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder)? {
+                let path = entry?.path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|extension| extension == "rs") {
+                    let name = path.strip_prefix(src).unwrap_or(&path).to_string_lossy().replace('\\', "/");
+                    sources.push((name, fs::read_to_string(&path)?));
+                }
+            }
+        }
+        Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
+    }
+
+    /// The graph of sources given with their paths below `src`, with `/` between folders.
+    pub fn new<'a>(sources: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
+        let mut files = BTreeMap::new();
+        let mut codes = BTreeMap::new();
+        for (name, source) in sources {
+            let module = module_path(name);
+            files.insert(module.clone(), name.to_owned());
+            codes.insert(module, code_of(source));
+        }
+        let mut graph = Self { files, imports: BTreeMap::new() };
+
+        let mut exports: BTreeMap<(ModulePath, String), ModulePath> = BTreeMap::new();
+        let mut named = Vec::new();
+        for (module, code) in &codes {
+            for path in named_paths(code) {
+                let Some(target) = graph.absolute(module, &path.segments) else { continue };
+                if let Some(name) = &path.exported_as {
+                    exports.insert((module.clone(), name.clone()), target.clone());
+                    let is_own_child = target.starts_with(module);
+                    if is_own_child && !mentions(code, name) {
+                        continue;
+                    }
+                }
+                named.push((module, target));
+            }
+        }
+        for (module, target) in named {
+            let home = graph.home_of(target, &exports);
+            if home != *module {
+                graph.imports.entry(module.clone()).or_default().insert(home);
+            }
+        }
+        graph
+    }
+
+    /// The path from the crate's root of what `module` calls `segments`; `None` for what is not of this crate.
+    fn absolute(&self, module: &ModulePath, segments: &[String]) -> Option<ModulePath> {
+        let mut base = module.clone();
+        let mut rest = segments;
+        match segments.first()?.as_str() {
+            "crate" => {
+                base.clear();
+                rest = &segments[1..];
+            }
+            "super" | "self" => {
+                while let [first, others @ ..] = rest {
+                    match first.as_str() {
+                        "super" => base.truncate(base.len().saturating_sub(1)),
+                        "self" => {}
+                        _ => break,
+                    }
+                    rest = others;
+                }
+            }
+            first => {
+                let child = [base.as_slice(), &[first.to_owned()]].concat();
+                if !self.files.contains_key(&child) {
+                    return None;
+                }
+            }
+        }
+        base.extend_from_slice(rest);
+        Some(base)
+    }
+
+    /// The module that defines what `path` names, through re-exports.
+    fn home_of(&self, mut path: ModulePath, exports: &BTreeMap<(ModulePath, String), ModulePath>) -> ModulePath {
+        // As many re-exports in a row as there can be without going round.
+        for _ in 0..=exports.len() {
+            let depth =
+                (0..=path.len()).rev().find(|&depth| self.files.contains_key(&path[..depth])).unwrap_or_default();
+            let (module, item) = path.split_at(depth);
+            let exported = item.first().and_then(|name| exports.get(&(module.to_vec(), name.clone())));
+            match exported {
+                Some(target) if *target != path => path = [target.as_slice(), &item[1..]].concat(),
+                _ => return module.to_vec(),
+            }
+        }
+        path
+    }
+
+    /// Groups of files each of which imports, directly or through others, from every other of its group. The files of a
+    /// group, and the groups, are sorted.
+    pub fn cycles(&self) -> Vec<Vec<String>> {
+        let reached: BTreeMap<&ModulePath, BTreeSet<&ModulePath>> =
+            self.files.keys().map(|module| (module, self.reached_from(module))).collect();
+        let mut groups: Vec<Vec<String>> = Vec::new();
+        let mut grouped = BTreeSet::new();
+        for module in self.files.keys() {
+            if !reached[module].contains(module) || !grouped.insert(module) {
+                continue;
+            }
+            let mut group = vec![self.files[module].clone()];
+            for other in self.files.keys() {
+                if other != module && reached[module].contains(other) && reached[other].contains(module) {
+                    grouped.insert(other);
+                    group.push(self.files[other].clone());
+                }
+            }
+            group.sort();
+            groups.push(group);
+        }
+        groups.sort();
+        groups
+    }
+
+    /// The imports among the files of one group, a line each.
+    pub fn imports_within(&self, group: &[String]) -> String {
+        let mut lines = String::new();
+        for (module, imported) in &self.imports {
+            let from = &self.files[module];
+            for to in imported.iter().filter_map(|module| self.files.get(module)) {
+                if group.contains(from) && group.contains(to) {
+                    lines.push_str(&format!("    {from} -> {to}\n"));
+                }
+            }
+        }
+        lines
+    }
+
+    fn reached_from(&self, start: &ModulePath) -> BTreeSet<&ModulePath> {
+        let mut reached = BTreeSet::new();
+        let mut open: Vec<&ModulePath> = self.imports.get(start).into_iter().flatten().collect();
+        while let Some(module) = open.pop() {
+            if reached.insert(module) {
+                open.extend(self.imports.get(module).into_iter().flatten());
+            }
+        }
+        reached
+    }
+}
+
+fn module_path(name: &str) -> ModulePath {
+    let stem = name.strip_suffix(".rs").unwrap_or(name);
+    let mut path: ModulePath = stem.split('/').map(str::to_owned).collect();
+    if path.last().is_some_and(|last| matches!(last.as_str(), "lib" | "main" | "mod")) {
+        path.pop();
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_through_the_root_is_imported_from_its_home() {
+        let graph = ModuleGraph::new([
+            ("lib.rs", "mod a; mod b; pub use a::A; pub use b::B;"),
+            ("a.rs", "use crate::B;"),
+            ("b.rs", "use crate::A;"),
+        ]);
+        assert_eq!(graph.cycles(), [["a.rs", "b.rs"]]);
+    }
+
+    #[test]
+    fn a_re_export_of_a_child_is_no_import_but_its_use_is() {
+        let child = ("a/child.rs", "use super::Parent;");
+        let only_exported = ModuleGraph::new([("a/mod.rs", "mod child; pub use child::C; struct Parent;"), child]);
+        assert!(only_exported.cycles().is_empty());
+        let used = ModuleGraph::new([("a/mod.rs", "mod child; pub use child::C; struct Parent(C);"), child]);
+        assert_eq!(used.cycles(), [["a/child.rs", "a/mod.rs"]]);
+    }
+
+    #[test]
+    fn a_cycle_of_three_is_one_group() {
+        let graph = ModuleGraph::new([
+            ("a.rs", "use crate::b::f;"),
+            ("b.rs", "fn f() { super::c::g() }"),
+            ("c.rs", "use crate::{a::h, d};"),
+            ("d.rs", "// use crate::a;"),
+        ]);
+        assert_eq!(graph.cycles(), [["a.rs", "b.rs", "c.rs"]]);
+        assert_eq!(graph.imports_within(&graph.cycles()[0]).lines().count(), 3);
+    }
+}

@@ -1,0 +1,123 @@
+//! Links of documents lead somewhere, files that they name exist, and ARCHITECTURE.md's table says what cargo says.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use sdg_checks::{crate_rows, headings, links, named_files, names_in_code};
+
+/// Folders of the repository whose files documents name by their path.
+const FOLDERS: [&str; 9] =
+    ["benches", "checks", "crates", "datasets", "docs", "scripts", "tests", "weights-conversion", ".ci"];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap()
+}
+
+/// What git tracks of a kind, as paths from the root.
+fn tracked(pattern: &str) -> Vec<String> {
+    let output = Command::new("git")
+        .args(["ls-files", "--cached", "--others", "--exclude-standard", "--", pattern])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let files: Vec<String> = String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect();
+    assert!(!files.is_empty(), "expected files that match {pattern}, found none: is this a git checkout?");
+    // A file that was deleted and not yet committed is still listed.
+    files.into_iter().filter(|file| root().join(file).exists()).collect()
+}
+
+#[test]
+fn links_lead_to_files_and_headings() {
+    let mut faults = Vec::new();
+    for document in tracked("*.md") {
+        let path = root().join(&document);
+        for link in links(&fs::read_to_string(&path).unwrap()) {
+            if link.starts_with("http://") || link.starts_with("https://") || link.starts_with("mailto:") {
+                continue;
+            }
+            let (file, anchor) =
+                link.split_once('#').map_or((link.as_str(), None), |(file, anchor)| (file, Some(anchor)));
+            let target = if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            if !target.exists() {
+                faults.push(format!("{document}: no file at {link}"));
+            } else if let Some(anchor) =
+                anchor.filter(|_| target.extension().is_some_and(|extension| extension == "md"))
+                && !headings(&fs::read_to_string(&target).unwrap()).iter().any(|heading| heading == anchor)
+            {
+                faults.push(format!("{document}: no heading at {link}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn files_that_documents_name_exist() {
+    let mut faults = Vec::new();
+    for document in tracked("*.md") {
+        let path = root().join(&document);
+        for file in named_files(&fs::read_to_string(&path).unwrap(), &FOLDERS) {
+            // From the repository's root, or from the document's own folder.
+            if !root().join(&file).exists() && !path.with_file_name(&file).exists() {
+                faults.push(format!("{document}: no file {file}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Dependencies by crate, without those of tests and builds; names without `sdg-`.
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    let arguments = ["metadata", "--no-deps", "--offline", "--format-version", "1"];
+    let output = Command::new(cargo).args(arguments).current_dir(root()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let short = |name: &serde_json::Value| name.as_str().unwrap().trim_start_matches("sdg-").to_owned();
+    let packages = metadata["packages"].as_array().unwrap();
+    let normal = |package: &serde_json::Value| {
+        let all = package["dependencies"].as_array().unwrap().iter();
+        all.filter(|dependency| dependency["kind"].is_null()).map(|dependency| short(&dependency["name"])).collect()
+    };
+    packages.iter().map(|package| (short(&package["name"]), normal(package))).collect()
+}
+
+#[test]
+fn the_crate_table_has_cargo_s_arrows_and_they_point_up_the_table() {
+    let rows = crate_rows(&fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap());
+    let dependencies = dependencies();
+    let names: BTreeSet<&String> = rows.iter().map(|row| &row.name).collect();
+    let crates: BTreeSet<&String> = dependencies.keys().collect();
+    assert_eq!(names, crates, "expected the workspace's crates (right) in ARCHITECTURE.md's table (left)");
+    for (place, row) in rows.iter().enumerate() {
+        let told: BTreeSet<String> = row.sees.iter().cloned().collect();
+        let seen: BTreeSet<String> =
+            dependencies[&row.name].iter().filter(|name| crates.contains(name)).cloned().collect();
+        assert_eq!(told, seen, "{}: ARCHITECTURE.md's table (left), cargo metadata (right)", row.name);
+        let below: Vec<_> = rows[place..].iter().map(|row| &row.name).filter(|name| seen.contains(*name)).collect();
+        assert!(below.is_empty(), "{} sees {below:?}, which stand below it in ARCHITECTURE.md's table", row.name);
+    }
+}
+
+#[test]
+fn crates_that_never_see_burn_do_not() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let line = text.lines().find(|line| line.starts_with("- ") && line.contains("never see burn")).unwrap();
+    let dependencies = dependencies();
+    let free = names_in_code(line);
+    assert!(free.len() > 5, "expected the crates that never see burn, found {free:?}");
+    for name in free {
+        let mut open = vec![name.clone()];
+        let mut reached = BTreeSet::new();
+        while let Some(next) = open.pop() {
+            assert!(!next.starts_with("burn"), "{name} sees {next}");
+            if reached.insert(next.clone()) {
+                open.extend(dependencies.get(&next).into_iter().flatten().cloned());
+            }
+        }
+    }
+}

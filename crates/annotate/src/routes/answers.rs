@@ -1,0 +1,50 @@
+//! Bodies of requests read as JSON, and the answers that all addresses give.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::json;
+
+use crate::error::{Error, Result};
+use crate::http::Response;
+
+const JSON: &str = "application/json";
+
+/// The request's JSON.
+pub fn read<T: DeserializeOwned>(what: &'static str, body: &[u8]) -> Result<T> {
+    serde_json::from_slice(body).map_err(|error| Error::Request {
+        what,
+        expected: "JSON as the page sends it".into(),
+        found: error.to_string(),
+    })
+}
+
+/// The answer to what broke inside.
+pub fn broken() -> Response {
+    Response::new(500, JSON, json!({"error": "this failed inside; the terminal says more"}).to_string().into_bytes())
+}
+
+pub fn json_of<T: Serialize>(outcome: Result<T>) -> Response {
+    match outcome.map(|value| serde_json::to_vec(&value)) {
+        Ok(Ok(text)) => Response::new(200, JSON, text),
+        Ok(Err(_)) => broken(),
+        Err(error) => refusal(&error),
+    }
+}
+
+pub fn picture_of(outcome: Result<(Vec<u8>, &'static str)>) -> Response {
+    match outcome {
+        Ok((bytes, media_type)) => Response::new(200, media_type, bytes),
+        Err(error) => refusal(&error),
+    }
+}
+
+fn refusal(error: &Error) -> Response {
+    let status = match error {
+        Error::NoSuchPicture { .. } | Error::NoSuchFrame { .. } | Error::NoCamera => 404,
+        Error::Demonstration { .. } | Error::NotMarked { .. } | Error::Request { .. } | Error::Teacher(_) => 422,
+        Error::Busy(_) | Error::NotTaught | Error::TooManyPictures { .. } | Error::Camera { .. } => 409,
+        Error::TooLarge { .. } => 413,
+        _ => 500,
+    };
+    Response::new(status, JSON, json!({"error": error.to_string()}).to_string().into_bytes())
+}

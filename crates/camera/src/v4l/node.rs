@@ -1,0 +1,66 @@
+//! A V4L2 node: its formats and their sizes.
+
+use std::path::PathBuf;
+
+use crate::options::Encoding;
+
+/// A V4L2 node that captures pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// As in `/dev/video0`.
+    pub path: PathBuf,
+    /// The card's name.
+    pub name: String,
+    /// The driver's name.
+    pub driver: String,
+    /// Where it is attached.
+    pub bus: String,
+    /// What it offers, in the driver's order.
+    pub formats: Vec<Format>,
+}
+
+/// One way in which a node delivers its pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Format {
+    /// V4L2's four letters.
+    pub fourcc: String,
+    /// The driver's description.
+    pub description: String,
+    /// The encoding, where it is one that is read here.
+    pub encoding: Option<Encoding>,
+    /// The sizes.
+    pub sizes: Sizes,
+    /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say. Empty for an encoding
+    /// that is not read here.
+    pub max_fps: Vec<f64>,
+}
+
+/// The sizes of a format, in pixels.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Sizes {
+    /// These: width and height.
+    Listed(Vec<(u32, u32)>),
+    /// All from the smallest to the largest; a driver may round.
+    Range {
+        /// The smallest width and height.
+        min: (u32, u32),
+        /// The largest width and height.
+        max: (u32, u32),
+    },
+}
+
+impl Sizes {
+    /// The size next to the wanted one by its number of pixels and its shape, and its place in the list.
+    pub(super) fn nearest(&self, wanted: (u32, u32)) -> Option<((u32, u32), usize)> {
+        match self {
+            Self::Listed(sizes) => {
+                let differs = |size: &(u32, u32)| size.0.abs_diff(wanted.0) + size.1.abs_diff(wanted.1);
+                sizes.iter().enumerate().min_by_key(|(_, size)| differs(size)).map(|(place, size)| (*size, place))
+            }
+            Self::Range { min, max } => {
+                let clamped = |wanted: u32, min: u32, max: u32| wanted.max(min).min(max);
+                Some(((clamped(wanted.0, min.0, max.0), clamped(wanted.1, min.1, max.1)), 0))
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! `sdg annotate`: the annotation page.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+use anyhow::Result;
+use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
+use sdg_camera::{Address, OpenOptions};
+use serde_json::json;
+
+use super::AnnotateArgs;
+use crate::camera_files::CameraFile;
+use crate::demonstrations;
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::page_camera::PageCamera;
+use crate::page_teacher::PageTeacher;
+
+/// Serves the page until Ctrl-C.
+pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
+    let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
+    let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
+    let camera = camera.map(|camera| (camera, args.camera.heights_m()));
+    let mut images: Vec<(PathBuf, Option<PathBuf>)> = args.images.iter().map(|argument| split(argument)).collect();
+    let photo_path = args.from.is_some().then(|| photo_path(&mut images)).transpose()?;
+    // Marks are made for minutes before the first is written.
+    for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
+        files::check_writable(&written.with_extension("json"))?;
+    }
+    if let Some(out) = &args.out {
+        files::check_writable(out)?;
+    }
+    let calibration = camera.as_ref().map(|(file, _)| file.clone());
+    let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
+    let live = args.from.clone().zip(photo_path).map(open).transpose()?;
+    let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone(), live };
+    let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
+    let server = Server::bind(session, args.port)?;
+    let url = server.url();
+    if args.json {
+        println!("{}", json!({"url": url}));
+    } else {
+        println!("mark the grasp at {url}");
+        println!("Ctrl-C ends it; marks are saved as they are made");
+    }
+    if !args.no_browser {
+        open_browser(&url);
+    }
+    let interrupt = Interrupt::watch();
+    server.run(move || interrupt.is_requested())?;
+    Ok(Outcome::Done)
+}
+
+fn open_camera(
+    from: Address,
+    options: OpenOptions,
+    calibration: Option<CameraFile>,
+    photo_path: PathBuf,
+) -> Result<LiveOptions> {
+    let (camera, address) = PageCamera::open(from, options, calibration)?;
+    Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
+}
+
+/// Takes the one image that is not there yet, which is to be taken with the camera, out of those that are; without one it is
+/// photo.png in the current folder.
+fn photo_path(images: &mut Vec<(PathBuf, Option<PathBuf>)>) -> Result<PathBuf> {
+    let is_new = |(image, annotation): &mut (PathBuf, Option<PathBuf>)| annotation.is_none() && !image.exists();
+    let mut new = images.extract_if(.., is_new).map(|(image, _)| image);
+    let first = new.next();
+    if let (Some(first), Some(second)) = (&first, new.next()) {
+        let (first, second) = (first.display(), second.display());
+        return Err(Usage(format!(
+            "expected at most one IMAGE that is not there yet, for the photo that --from takes, found {first} and {second}"
+        ))
+        .into());
+    }
+    drop(new);
+    let Some(photo) = first else { return Ok("photo.png".into()) };
+    if photo.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
+        let found = photo.display();
+        return Err(Usage(format!(
+            "{found}: expected a name that ends with .png for the photo, which is written as PNG"
+        ))
+        .into());
+    }
+    Ok(photo)
+}
+
+/// `IMAGE`, or `IMAGE:ANNOTATION` where no file has that whole name.
+fn split(argument: &str) -> (PathBuf, Option<PathBuf>) {
+    if Path::new(argument).exists() {
+        return (argument.into(), None);
+    }
+    match demonstrations::split(argument) {
+        Ok((image, annotation)) => (image, Some(annotation)),
+        Err(_) => (argument.into(), None),
+    }
+}
+
+/// Tries to; the address is printed in any case.
+fn open_browser(url: &str) {
+    let opener = if cfg!(target_os = "macos") { "open" } else { "xdg-open" };
+    let _ = Command::new(opener).arg(url).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_image_that_is_not_there_is_the_photo_to_be_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let there = folder.path().join("there.png");
+        std::fs::write(&there, "").unwrap();
+        let new = |name: &str| (folder.path().join(name), None);
+        let path = |mut images: Vec<_>| photo_path(&mut images).map(|path| (path, images.len()));
+        assert_eq!(path(vec![]).unwrap(), ("photo.png".into(), 0));
+        assert_eq!(path(vec![(there.clone(), None)]).unwrap(), ("photo.png".into(), 1));
+        assert_eq!(path(vec![(there, None), new("rod.PNG")]).unwrap(), (folder.path().join("rod.PNG"), 1));
+        let two = path(vec![new("a.png"), new("b.png")]).unwrap_err();
+        assert!(two.is::<Usage>() && two.to_string().contains("at most one IMAGE"), "{two}");
+        let jpeg = path(vec![new("a.jpg")]).unwrap_err();
+        assert!(jpeg.is::<Usage>() && jpeg.to_string().contains(".png"), "{jpeg}");
+    }
+}

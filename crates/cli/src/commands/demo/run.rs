@@ -1,0 +1,79 @@
+//! `sdg demo`: the main job on shipped input, from a photo to grasps.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
+use sdg_report::write_atomically;
+use sdg_simulation::objects::ObjectSpec;
+
+use super::DemoArgs;
+use crate::commands::rehearse::{finish, show_attempt};
+use crate::exit::Outcome;
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::rehearsal::{Rehearsal, RehearsalErrors};
+use crate::run_page::{self, RunPage, TaughtHere};
+use crate::shipped;
+use crate::teaching_progress::TeachingProgress;
+use crate::trial::try_views;
+
+/// Pictures with the part, and without it, on which the model is tried.
+const VIEWS: (usize, usize) = (12, 12);
+/// Seeds of those pictures, far from those of attempts and tests.
+const VIEWS_SEED: u64 = 7_000_000;
+
+/// Teach, try, grasp, report.
+pub fn run(args: &DemoArgs) -> Result<Outcome> {
+    let object = ObjectSpec::by_name(&args.object)?;
+    let demonstration = shipped::demonstration(&args.object)?;
+    files::prepare_folder(&args.out)?;
+
+    let interrupt = Interrupt::watch();
+    eprintln!("teaching the {} from one photo", object.title.to_lowercase());
+    let options = TeachOptions {
+        // The workcell's camera hovers as high as it was for the photo.
+        size_tolerance: CheckConfig::FIXED_HEIGHT_TOLERANCE,
+        time_budget: args.time_budget.map(Duration::from_secs_f64),
+        symmetry: object.symmetry,
+        ..TeachOptions::new(args.seed)
+    };
+    let mut progress = TeachingProgress::new(interrupt.clone());
+    let taught = teach(std::slice::from_ref(&demonstration), &options, &mut |event| progress.show(event));
+    progress.finish();
+    let taught = taught?;
+    let model_file = args.out.join(format!("{}.sdg", object.name));
+    write_atomically(&model_file, &taught.model.to_bytes()?)?;
+    eprintln!("taught in {:.0} s; the model is {}", taught.model.facts().seconds, model_file.display());
+
+    let mut trials = try_views(&taught.model, &object, true, VIEWS.0, VIEWS_SEED, Verification::ByShape)?;
+    trials.extend(try_views(&taught.model, &object, false, VIEWS.1, VIEWS_SEED, Verification::ByShape)?);
+    eprintln!(
+        "tried on unseen pictures: right on {} of {} with the part, {} false alarms on {} without",
+        trials.iter().filter(|trial| trial.is_right()).count(),
+        VIEWS.0,
+        trials.iter().filter(|trial| trial.is_false_alarm()).count(),
+        VIEWS.1
+    );
+
+    let rehearsal = Rehearsal {
+        model: &taught.model,
+        object: &object,
+        attempts: args.attempts,
+        seed: args.seed,
+        verification: Verification::ByShape,
+        errors: RehearsalErrors::default(),
+        camera: None,
+    };
+    let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
+    let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);
+    let page = RunPage { model: &taught.model, object: &object, rehearsed: &rehearsed, command: &command };
+    let taught_here = TaughtHere {
+        demonstration: &demonstration,
+        history: taught.history.as_ref(),
+        trials: &trials,
+        seed: args.seed,
+    };
+    let report = run_page::demo(&page, &taught_here)?.write(&args.out)?;
+    finish(&page, Some(taught.model.facts().seconds), &report, args.json)
+}

@@ -1,0 +1,182 @@
+//! What `sdg evaluate` takes.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+use sdg_grasp::ComputeBackend;
+
+use crate::shared_args::backend;
+
+/// What `sdg evaluate --pictures` reads and writes.
+const PICTURES_HELP: &str = "\
+Labelled pictures (--pictures DIR):
+  DIR holds PNG or JPEG pictures and their labels: LabelMe (a JSON file of the same name beside each picture) or COCO (one
+  JSON file with `images` and `annotations`). Each instance of the part has a box or an outline and the two points of the
+  grasp, grasp_start and grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in
+  `flags`; COCO: in `attributes`) is neither missed nor wrong, and may lack the grasp. A picture whose labels mark nothing is one without the part.
+  A picture that the model was taught from is left out. Folders are not searched for folders: call once for each.
+
+  A hit lies within 4 % of the instance's diagonal and 10 degrees of the marks, but for turns that `sdg teach --symmetry`
+  said look alike; one detection to one instance, the best score first. The diagonal is that of the demonstration's box, as
+  much larger as the instance's marks are longer than the demonstration's. A picture is clean when something on it is right
+  and nothing wrong.
+
+  --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
+  pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
+  pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
+  seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
+  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_min_score [{min_score, found,
+  wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report.
+  The exit code is 3 where parts are marked and nothing at all was detected.";
+
+/// `sdg evaluate`
+#[derive(Debug, ClapArgs)]
+#[command(after_long_help = PICTURES_HELP)]
+pub struct EvaluateArgs {
+    /// Test a taught model on your own labelled pictures instead: a folder of pictures with LabelMe or COCO labels. The
+    /// end of --help says how they are labelled and what is counted
+    #[arg(
+        long,
+        value_name = "DIR",
+        requires = "grasp_model",
+        conflicts_with_all = [
+            "models", "objects", "attempts", "views", "scenes", "unverified", "preset", "steps", "seed", "jobs", "out",
+            "axes", "cameras",
+        ],
+        help_heading = PICTURES
+    )]
+    pub pictures: Option<PathBuf>,
+    /// The grasp model to test, as `sdg teach` wrote it
+    #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
+    pub grasp_model: Option<PathBuf>,
+    /// Leave out the check against the demonstration: the network alone decides and places
+    #[arg(long, requires = "pictures", help_heading = PICTURES)]
+    pub no_verify: bool,
+    /// The calibrated camera that took the pictures, for a model taught with a camera: errors in millimetres, too
+    #[arg(long, value_name = "FILE", requires = "pictures", help_heading = PICTURES)]
+    pub camera: Option<PathBuf>,
+    /// The least score that counts
+    #[arg(
+        long,
+        default_value_t = 0.5,
+        value_name = "X",
+        value_parser = share,
+        requires = "pictures",
+        help_heading = PICTURES
+    )]
+    pub min_score: f64,
+    /// The label of the part, where others are labelled too; without it, the model's object
+    #[arg(long, value_name = "NAME", requires = "pictures", help_heading = PICTURES)]
+    pub label: Option<String>,
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(
+        long,
+        default_value = "flex",
+        value_name = "NAME",
+        value_parser = backend,
+        requires = "pictures",
+        help_heading = PICTURES
+    )]
+    pub device: ComputeBackend,
+    /// The grasp models, by letter or name; without it, all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub models: Vec<String>,
+    /// The parts, out of those shipped under datasets/; without it, the paper's eight
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub objects: Vec<String>,
+    /// Grasp attempts of each model on each part
+    #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub attempts: u32,
+    /// Unseen pictures of each part, for detection against the truth
+    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub views: u32,
+    /// Pictures for each part in which it is not, for false alarms
+    #[arg(long, default_value_t = 25, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub scenes: u32,
+    /// Also try every grasp without the check against the demonstration: twice the attempts
+    #[arg(long)]
+    pub unverified: bool,
+    /// Instead of the paper's protocol: pictures made harder one axis at a time (height, tilt, covered, dark, blur, tint,
+    /// clutter, instances, look-alikes; all: pictures) and grasps under errors (no-error, marks, mark-height, hand-eye,
+    /// friction, shake; all: grasps). Without names, everything, on all parts
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        num_args = 0..=1,
+        conflicts_with_all = ["unverified"],
+        group = "sheet",
+        help_heading = AXES
+    )]
+    pub axes: Option<Vec<String>>,
+    /// Instead of the paper's protocol: parts taught in the plan view of one calibrated camera, on pictures of others (webcam,
+    /// phone, overhead), along the axes, and of parts of other sizes (other-sizes). Without names, everything, by models S and
+    /// C on all parts
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        num_args = 0..=1,
+        conflicts_with_all = ["unverified", "axes"],
+        group = "sheet",
+        help_heading = AXES
+    )]
+    pub cameras: Option<Vec<String>>,
+    /// Pictures of each part and axis, or of each part and camera
+    #[arg(
+        long,
+        default_value_t = 20,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=10_000),
+        requires = "sheet",
+        help_heading = AXES
+    )]
+    pub axis_views: u32,
+    /// Edge points that model S compares at each pose of its search, instead of as taught
+    #[arg(
+        long,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(8..=1024),
+        requires = "axes",
+        help_heading = AXES
+    )]
+    pub search_points: Option<u32>,
+    /// The folder (--out) of another run with --axes, to compare with on the same pictures
+    #[arg(long, value_name = "DIR", requires = "axes", help_heading = AXES)]
+    pub against: Option<PathBuf>,
+    /// Network, training and augmentation
+    #[arg(long, default_value = "edge", value_name = "NAME")]
+    pub preset: String,
+    /// Optimiser steps instead of the preset's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub steps: Option<u32>,
+    /// Decides every random choice
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub seed: u64,
+    /// Teachings and rehearsals side by side; without it, one for each core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub jobs: Option<u32>,
+    /// Folder for models and results; what is in it already is not done again
+    #[arg(long, default_value = "target/evaluation", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Folder for the page; without it, the folder of the results, or target/pictures-report for --pictures
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The heading of the options of `--axes` in the help.
+const AXES: &str = "Axes and errors";
+
+/// The heading of the options of `--pictures` in the help.
+const PICTURES: &str = "Labelled pictures";
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 to 1".to_owned()),
+    }
+}

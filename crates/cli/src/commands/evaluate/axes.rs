@@ -1,0 +1,187 @@
+//! `sdg evaluate --axes`: pictures made harder one axis at a time, and grasps under errors.
+
+use std::fmt::Write;
+
+use anyhow::{Result, bail};
+use sdg_simulation::objects::ObjectSpec;
+use serde_json::json;
+
+use super::args::EvaluateArgs;
+use super::selection::{jobs, models, objects, settings};
+use crate::evaluation::axes::{
+    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
+};
+use crate::evaluation::{EvaluationProgress, Store};
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::machine::machine;
+
+/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
+    let selection = Selection::parse(names).map_err(|error| Usage(format!("--axes: {error}")))?;
+    let models = models(&args.models)?;
+    let objects = objects(&args.objects, ObjectSpec::names())?;
+    let (preset, settings) = settings(args)?;
+    let store = Store::open(&args.out, &settings)?;
+    let against = args.against.as_deref().map(Against::open).transpose()?;
+    // Beside the page of the paper's protocol, not in its place.
+    let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
+    files::prepare_folder(&report_folder)?;
+
+    let jobs = jobs(args);
+    let evaluation = AxesEvaluation {
+        models: &models,
+        objects: &objects,
+        selection: &selection,
+        preset,
+        store: &store,
+        axis_views: args.axis_views,
+        search_points: args.search_points,
+        jobs,
+    };
+    let interrupt = Interrupt::watch();
+    let progress = EvaluationProgress::new();
+    let ended = evaluation.run(&|| interrupt.is_requested(), &progress);
+    progress.finish();
+    let RunEnd { remaining, failures } = ended?;
+
+    let summary = AxesSummary::collect(&evaluation)?;
+    let command = command(args, names);
+    let seconds = summary.seconds;
+    let facts = [
+        ("seed", settings.seed.to_string()),
+        ("preset", settings.preset.clone()),
+        (
+            "seconds of a worker",
+            format!(
+                "{:.0} (teaching {:.0}, pictures {:.0}, grasps {:.0})",
+                seconds.total(),
+                seconds.teaching,
+                seconds.pictures,
+                seconds.grasps
+            ),
+        ),
+        ("side by side", format!("{jobs} units of work")),
+        ("machine", machine()),
+        ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    let comparisons = against.as_ref().map(|against| against.compare(&evaluation)).transpose()?.unwrap_or_default();
+    let other = against.as_ref().map(|against| against.folder().display().to_string()).unwrap_or_default();
+    let more = || comparison_tables(&comparisons, &other);
+    store.write_bytes("axes.md", markdown(&summary, more(), &facts, &command).as_bytes())?;
+    let json = json!({ "summary": summary, "against": comparisons, "machine": machine(), "command": command });
+    store.write_bytes("axes.json", format!("{json:#}\n").as_bytes())?;
+    let report = page(&summary, more(), &facts, &command).write(&report_folder)?;
+
+    let tables = store.path("axes.md");
+    if args.json {
+        let line = json!({
+            "summary": summary,
+            "against": comparisons,
+            "tables": tables.display().to_string(),
+            "report": report.display().to_string(),
+        });
+        println!("{line}");
+    } else {
+        print_lines(&summary);
+        print_comparisons(&comparisons);
+        println!("seconds of a worker: {}", facts[2].1);
+        println!("tables: {}\nreport: {}", tables.display(), report.display());
+    }
+    match (failures.first(), remaining) {
+        (None, 0) => Ok(Outcome::Done),
+        (None, _) => bail!("interrupted with {remaining} units of work to do: the same command goes on"),
+        (Some(first), _) => bail!(
+            "{} units of work failed, {remaining} are to do: the same command tries them again; the first: {first}",
+            failures.len()
+        ),
+    }
+}
+
+/// A line for each model in each group and way, and for each error.
+fn print_lines(summary: &AxesSummary) {
+    for group in &summary.groups {
+        println!("{}:", group.group.title());
+        let mut rows: Vec<_> = group.axes.iter().map(|figures| (figures.model, figures.way)).collect();
+        rows.extend(group.look_alikes.iter().map(|figures| (figures.model, figures.way)));
+        rows.sort_by_key(|(model, way)| (model.letter(), *way == Way::NetworkAlone));
+        rows.dedup();
+        for (model, way) in rows {
+            let mut told: Vec<String> = group
+                .axes
+                .iter()
+                .filter(|figures| (figures.model, figures.way) == (model, way))
+                .map(|figures| format!("{} {}", figures.axis, figures.found))
+                .collect();
+            told.extend(
+                group
+                    .look_alikes
+                    .iter()
+                    .filter(|figures| (figures.model, figures.way) == (model, way) && figures.is_sum())
+                    .map(|figures| format!("look-alikes of {} accepted {}", figures.kind, figures.accepted)),
+            );
+            println!("  {model} {}: {}", way.name(), told.join(", "));
+        }
+        for figures in &group.grasps {
+            println!(
+                "  {} {}: held {}, {} of them at the first look",
+                figures.model,
+                figures.condition.name(),
+                figures.held,
+                figures.held_at_first_look.count
+            );
+        }
+    }
+}
+
+/// A line for each comparison.
+fn print_comparisons(comparisons: &[Comparison]) {
+    for comparison in comparisons {
+        let [low, high] = comparison.interval.map(|bound| 100.0 * bound);
+        println!(
+            "against, {}: {} {}, {}: {} and {}, difference {:.1} points ({low:.1} to {high:.1}), {}, cases needed {}",
+            comparison.group.title().to_lowercase(),
+            comparison.model,
+            comparison.way.name(),
+            comparison.axis,
+            comparison.counts.first(),
+            comparison.counts.second(),
+            100.0 * comparison.difference,
+            if comparison.differs { "differs" } else { "does not differ" },
+            comparison.cases_needed.map_or("none".to_owned(), |cases| cases.to_string()),
+        );
+    }
+}
+
+/// The command that gives the same results.
+fn command(args: &EvaluateArgs, names: &[String]) -> String {
+    let mut command = "sdg evaluate --axes".to_owned();
+    let mut option = |name: &str, value: &dyn std::fmt::Display| {
+        // Writing into a string cannot fail.
+        let _ = write!(command, "{}{value}", if name.is_empty() { " ".to_owned() } else { format!(" --{name} ") });
+    };
+    if !names.is_empty() {
+        option("", &names.join(","));
+    }
+    if !args.models.is_empty() {
+        option("models", &args.models.join(","));
+    }
+    if !args.objects.is_empty() {
+        option("objects", &args.objects.join(","));
+    }
+    option("axis-views", &args.axis_views);
+    option("attempts", &args.attempts);
+    if let Some(points) = args.search_points {
+        option("search-points", &points);
+    }
+    if let Some(folder) = &args.against {
+        option("against", &folder.display());
+    }
+    option("preset", &args.preset);
+    if let Some(steps) = args.steps {
+        option("steps", &steps);
+    }
+    option("seed", &args.seed);
+    command
+}

@@ -1,0 +1,106 @@
+//! `sdg evaluate --cameras`: parts taught with one calibrated camera and found with others.
+
+use anyhow::{Result, bail};
+use sdg_grasp::ModelKind;
+use sdg_simulation::objects::ObjectSpec;
+use serde_json::json;
+
+use super::args::EvaluateArgs;
+use super::selection::{jobs, models, objects, settings};
+use crate::evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
+use crate::evaluation::{EvaluationProgress, Store};
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::machine::machine;
+
+/// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
+pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
+    let sets = sets(names)?;
+    let models = if args.models.is_empty() { vec![ModelKind::S, ModelKind::C] } else { models(&args.models)? };
+    let objects = objects(&args.objects, ObjectSpec::names())?;
+    let (preset, settings) = settings(args)?;
+    let store = Store::open(&args.out, &settings)?;
+    let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("cameras"));
+    files::prepare_folder(&report_folder)?;
+
+    let jobs = jobs(args);
+    let evaluation = CamerasEvaluation {
+        models: &models,
+        objects: &objects,
+        sets: &sets,
+        preset,
+        store: &store,
+        views: args.axis_views,
+        jobs,
+    };
+    let interrupt = Interrupt::watch();
+    let progress = EvaluationProgress::new();
+    let ended = evaluation.run(&|| interrupt.is_requested(), &progress);
+    progress.finish();
+    ended?;
+
+    let summary = CamerasSummary::collect(&evaluation)?;
+    let command = command(args, names);
+    let facts = [
+        ("seed", settings.seed.to_string()),
+        ("preset", settings.preset.clone()),
+        ("seconds of a worker on pictures", format!("{:.0}", summary.seconds)),
+        ("side by side", format!("{jobs} units of work")),
+        ("machine", machine()),
+        ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    let tables = store.path("cameras.md");
+    store.write_bytes("cameras.md", markdown(&summary, &facts, &command).as_bytes())?;
+    let json = json!({ "summary": summary, "machine": machine(), "command": command });
+    store.write_bytes("cameras.json", format!("{json:#}\n").as_bytes())?;
+    let report = page(&summary, &facts, &command).write(&report_folder)?;
+    if args.json {
+        let (tables, report) = (tables.display().to_string(), report.display().to_string());
+        println!("{}", json!({ "summary": summary, "tables": tables, "report": report }));
+    } else {
+        for row in &summary.sets {
+            let of =
+                if row.found.of > 0 { format!("found {}", row.found) } else { format!("accepted {}", row.accepted) };
+            let errors = row.errors.map(|errors| {
+                let turn = errors.median_deg.zip(errors.p95_deg);
+                let turn = turn.map(|(median, p95)| format!(", {median:.2}° ({p95:.2}°)")).unwrap_or_default();
+                let [mm, deg] = [errors.within_sigma_mm, errors.within_sigma_deg]
+                    .map(|share| share.percent().map_or("–".to_owned(), |percent| format!("{percent:.0} %")));
+                format!("; {:.2} mm ({:.2} mm){turn}, within sigma {mm} and {deg}", errors.median_mm, errors.p95_mm)
+            });
+            println!("{} {}: {of}, {} wrong{}", row.model, row.set, row.wrong, errors.unwrap_or_default());
+        }
+        println!("tables: {}\nreport: {}", tables.display(), report.display());
+    }
+    match summary.remaining {
+        0 => Ok(Outcome::Done),
+        remaining => bail!("interrupted with {remaining} units of work to do: the same command goes on"),
+    }
+}
+
+/// The sets of these names; without a name, all.
+fn sets(names: &[String]) -> Result<Vec<PictureSet>> {
+    let all = PictureSet::all();
+    if names.is_empty() {
+        return Ok(all);
+    }
+    let known = || all.iter().map(|set| set.name()).collect::<Vec<_>>().join(", ");
+    let of = |name: &String| {
+        let found = all.iter().copied().find(|set| set.name() == name.trim());
+        found.ok_or_else(|| Usage(format!("--cameras: expected a set out of {}, found {name}", known())).into())
+    };
+    names.iter().map(of).collect()
+}
+
+/// The command that gives the same results.
+fn command(args: &EvaluateArgs, names: &[String]) -> String {
+    let mut words = vec!["sdg evaluate --cameras".to_owned()];
+    words.extend((!names.is_empty()).then(|| names.join(",")));
+    words.extend((!args.models.is_empty()).then(|| format!("--models {}", args.models.join(","))));
+    words.extend((!args.objects.is_empty()).then(|| format!("--objects {}", args.objects.join(","))));
+    words.push(format!("--axis-views {} --preset {}", args.axis_views, args.preset));
+    words.extend(args.steps.map(|steps| format!("--steps {steps}")));
+    words.push(format!("--seed {}", args.seed));
+    words.join(" ")
+}

@@ -1,0 +1,33 @@
+//! `sdg evaluate`: the paper's protocol, pictures along axes, other cameras, or the user's own pictures.
+
+mod args;
+#[cfg(feature = "simulation")]
+mod axes;
+#[cfg(feature = "simulation")]
+mod cameras;
+mod pictures;
+#[cfg(feature = "simulation")]
+mod protocol;
+#[cfg(feature = "simulation")]
+mod selection;
+
+use anyhow::Result;
+
+pub use args::EvaluateArgs;
+
+use crate::exit::Outcome;
+
+/// Runs the kind of evaluation that the arguments name.
+pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
+    if args.pictures.is_some() {
+        return pictures::run(args);
+    }
+    #[cfg(feature = "simulation")]
+    return match (&args.axes, &args.cameras) {
+        (Some(names), _) => axes::run(args, names),
+        (None, Some(names)) => cameras::run(args, names),
+        (None, None) => protocol::run(args),
+    };
+    #[cfg(not(feature = "simulation"))]
+    Err(crate::exit::without_simulator())
+}

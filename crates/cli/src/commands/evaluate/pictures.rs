@@ -1,0 +1,136 @@
+//! `sdg evaluate --pictures`: a taught model on the user's own labelled pictures.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use sdg_grasp::Verification;
+
+use super::args::EvaluateArgs;
+use crate::commands::devices;
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, Truth, in_words, judge, page, to_json};
+use crate::picture_detector::PictureDetector;
+use crate::progress::EvaluationProgress;
+use crate::shared_args::ComputeArgs;
+
+/// Where the page goes unless `--report` says otherwise; not among the user's pictures.
+const DEFAULT_REPORT: &str = "target/pictures-report";
+
+/// Every label is read and checked first, then the model looks at one picture after the other.
+pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
+    let (Some(folder), Some(model_file)) = (&args.pictures, &args.grasp_model) else {
+        return Err(
+            Usage("expected --pictures DIR and --grasp-model FILE, found one without the other".to_owned()).into()
+        );
+    };
+    let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
+    let detector = PictureDetector::new(model, model_file, args.camera.as_deref())?;
+    let model = detector.model();
+    let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
+    let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
+    files::prepare_folder(&report_folder)?;
+
+    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
+    let symmetry = model.facts().symmetry;
+    let progress = EvaluationProgress::new();
+    progress.expect(labelled.pictures.len());
+    let mut tested = Vec::with_capacity(labelled.pictures.len());
+    for picture in labelled.pictures {
+        let image = files::read_image(&picture.path)?;
+        let start = Instant::now();
+        let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
+        let seconds = start.elapsed().as_secs_f64();
+        let truths = picture.instances.iter().map(|instance| Truth::new(instance, &detector)).collect();
+        let detections = found.into_iter().map(|found| found.detection).collect();
+        let of_picture = Tested { picture, truths, detections, seconds };
+        let judged = judge(&of_picture, symmetry, args.min_score);
+        progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
+        tested.push(of_picture);
+    }
+    progress.finish();
+
+    let evaluated = Evaluated {
+        folder,
+        model_file,
+        model,
+        verification,
+        min_score: args.min_score,
+        tested,
+        left_out: labelled.left_out,
+        others: labelled.others,
+    };
+    let report = page(&evaluated, &command(args, folder, model_file))?.write(&report_folder)?;
+    let judged = evaluated.judged();
+    let totals = Totals::of(&judged);
+    if args.json {
+        println!("{}", to_json(&evaluated, &report));
+    } else {
+        print!("{}", summary(&evaluated, &totals));
+        println!("report: {}", report.display());
+    }
+    let found_nothing = totals.found.of > 0 && judged.iter().all(|judged| judged.hits.is_empty());
+    Ok(if found_nothing { Outcome::NothingToGrasp } else { Outcome::Done })
+}
+
+/// The closing lines.
+fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
+    let mut text = String::new();
+    let mut line = |line: String| text += &(line + "\n");
+    let check = if evaluated.verification == Verification::ByShape { "with" } else { "without" };
+    line(format!(
+        "{}: model {}, {check} the check, scores from {} on",
+        evaluated.model.object(),
+        evaluated.model.kind(),
+        evaluated.min_score
+    ));
+    if totals.clean.of > 0 {
+        line(format!(
+            "found {} parts, {} missed, {} wrong; clean {} pictures",
+            totals.found, totals.missed, totals.wrong, totals.clean
+        ));
+    }
+    if totals.optional.of > 0 {
+        line(format!("optional: {} found", totals.optional));
+    }
+    if totals.false_alarms.of > 0 {
+        line(format!("false alarms on {} pictures without the part", totals.false_alarms));
+    }
+    if let Some(errors) = totals.errors {
+        let mm = |mm: Option<f64>| mm.map(|mm| format!(" = {mm:.2} mm")).unwrap_or_default();
+        line(format!(
+            "errors: median {:.2} px{} ({:.2} % of the diagonal), {:.2}°; 95 % within {:.2} px{} ({:.2} %), {:.2}°",
+            errors.median_px,
+            mm(errors.median_mm),
+            errors.median_percent,
+            errors.median_deg,
+            errors.p95_px,
+            mm(errors.p95_mm),
+            errors.p95_percent,
+            errors.p95_deg
+        ));
+    }
+    if evaluated.others > 0 {
+        line(format!("not counted: {} instances of other labels", evaluated.others));
+    }
+    for left_out in &evaluated.left_out {
+        line(format!("left out: {}: {}", left_out.file, left_out.why));
+    }
+    text
+}
+
+/// The command that gives the same results.
+fn command(args: &EvaluateArgs, folder: &Path, model_file: &Path) -> String {
+    let mut command = format!("sdg evaluate --pictures {} --grasp-model {}", folder.display(), model_file.display());
+    // Writing into a string cannot fail.
+    let _ = write!(command, " --min-score {}", args.min_score);
+    if let Some(camera) = &args.camera {
+        let _ = write!(command, " --camera {}", camera.display());
+    }
+    if let Some(label) = &args.label {
+        let _ = write!(command, " --label {label}");
+    }
+    if args.no_verify { command + " --no-verify" } else { command }
+}

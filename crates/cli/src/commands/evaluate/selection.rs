@@ -1,0 +1,63 @@
+//! What all kinds of `sdg evaluate` read from its arguments: models, parts, preset and workers.
+
+use anyhow::Result;
+use sdg_demonstration::UnknownModel;
+use sdg_grasp::{GraspError, ModelKind, Preset};
+use sdg_simulation::objects::ObjectSpec;
+
+use super::args::EvaluateArgs;
+use crate::evaluation::Settings;
+use crate::exit::Usage;
+
+/// The preset, and what the store's results depend on.
+///
+/// # Errors
+/// No preset of that name.
+pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
+    let preset: Preset = args.preset.parse().map_err(|error: GraspError| Usage(format!("--preset: {error}")))?;
+    let settings = Settings {
+        protocol: Settings::PROTOCOL,
+        preset: preset.name().to_owned(),
+        steps: args.steps,
+        seed: args.seed,
+        attempts: args.attempts,
+        views: args.views,
+        scenes: args.scenes,
+    };
+    Ok((preset, settings))
+}
+
+/// Units of work side by side: as asked for, else one for each core.
+pub fn jobs(args: &EvaluateArgs) -> usize {
+    args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
+}
+
+/// The models of these letters or names; without any, all.
+pub fn models(names: &[String]) -> Result<Vec<ModelKind>> {
+    if names.is_empty() {
+        return Ok(ModelKind::ALL.to_vec());
+    }
+    let mut models = Vec::new();
+    for name in names {
+        let model = name.trim().parse().map_err(|error: UnknownModel| Usage(format!("--models: {error}")))?;
+        if models.contains(&model) {
+            return Err(Usage(format!("--models: expected each model once, found {model} again")).into());
+        }
+        models.push(model);
+    }
+    Ok(models)
+}
+
+/// The parts of these names; without a name, `all`.
+pub fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Result<Vec<ObjectSpec>> {
+    let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
+    let mut objects: Vec<ObjectSpec> = Vec::new();
+    for name in names {
+        let object = ObjectSpec::by_name(name.trim()).map_err(|error| Usage(format!("--objects: {error}")))?;
+        if objects.iter().any(|known| known.name == object.name) {
+            return Err(Usage(format!("--objects: expected each part once, found {} again", object.name)).into());
+        }
+        objects.push(object);
+    }
+    Ok(objects)
+}

@@ -1,0 +1,99 @@
+//! Arguments that several verbs take, and the values that they may have.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+use sdg_grasp::ComputeBackend;
+
+/// Where a network computes.
+#[derive(Debug, ClapArgs)]
+pub struct ComputeArgs {
+    /// Where the network computes: flex, or what this build adds; see sdg devices
+    #[arg(long, default_value = "flex", value_name = "NAME", value_parser = backend)]
+    pub device: ComputeBackend,
+}
+
+/// The camera that took the photos to teach from.
+#[derive(Debug, ClapArgs)]
+pub struct TaughtCameraArgs {
+    /// The calibrated camera that took the photos, as ROS's camera_info YAML with the camera's pose over the table: the model
+    /// then knows the part's size and works with every calibrated camera
+    #[arg(id = "camera", long = "camera", value_name = "FILE", requires = "mark_height_mm")]
+    pub file: Option<PathBuf>,
+    /// Height of the marks over the table: of the surface that they lie on, not of the table
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub mark_height_mm: Option<f64>,
+    /// Height over the table at which the gripper closes; without it, half of the marks' height
+    #[arg(long, value_name = "MM", value_parser = height_mm, requires = "camera")]
+    pub grasp_height_mm: Option<f64>,
+}
+
+impl TaughtCameraArgs {
+    /// Heights over the table of the marks and of the grasp, in metres.
+    pub fn heights_m(&self) -> [f64; 2] {
+        let mark = self.mark_height_mm.unwrap_or_default();
+        [mark, self.grasp_height_mm.unwrap_or(0.5 * mark)].map(|height| 1e-3 * height)
+    }
+}
+
+/// Smallest and largest size of a part over the usual one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizeTolerance {
+    /// From 0.5 to 1.
+    pub low: f64,
+    /// From 1 to 2.
+    pub high: f64,
+}
+
+impl SizeTolerance {
+    /// As a range.
+    pub fn range(self) -> std::ops::RangeInclusive<f64> {
+        self.low..=self.high
+    }
+}
+
+/// A device's name.
+pub fn backend(text: &str) -> Result<ComputeBackend, String> {
+    text.parse().map_err(|error: sdg_grasp::GraspError| error.to_string())
+}
+
+/// Two numbers with a hyphen between them: [`SizeTolerance`].
+pub fn size_tolerance(text: &str) -> Result<SizeTolerance, String> {
+    let bounds = text.split_once('-').map(|(low, high)| (low.trim().parse(), high.trim().parse()));
+    match bounds {
+        Some((Ok(low), Ok(high))) if (0.5..=1.0).contains(&low) && (1.0..=2.0).contains(&high) => {
+            Ok(SizeTolerance { low, high })
+        }
+        _ => Err("expected LOW-HIGH with LOW from 0.5 to 1 and HIGH from 1 to 2, such as 0.75-1.35".to_owned()),
+    }
+}
+
+/// A positive, finite number of seconds.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(secs) if secs.is_finite() && secs > 0.0 => Ok(secs),
+        _ => Err("expected a positive number of seconds".to_owned()),
+    }
+}
+
+/// A height over the table. A part higher than half a metre was given in another unit.
+fn height_mm(text: &str) -> Result<f64, String> {
+    const MAX_MM: f64 = 500.0;
+    match text.parse::<f64>() {
+        Ok(height) if (0.0..=MAX_MM).contains(&height) => Ok(height),
+        _ => Err(format!("expected a height of 0 to {MAX_MM} millimetres, found {text}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_tolerance_holds_the_usual_size() {
+        assert_eq!(size_tolerance("0.75-1.35"), Ok(SizeTolerance { low: 0.75, high: 1.35 }));
+        for text in ["", "0.75", "1.1-1.3", "0.9-0.95", "0.1-1.2", "0.9-3", "0.9..1.1"] {
+            assert!(size_tolerance(text).unwrap_err().contains("such as 0.75-1.35"), "{text}");
+        }
+    }
+}

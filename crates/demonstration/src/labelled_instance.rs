@@ -1,0 +1,32 @@
+//! One part on a test picture, as it was labelled.
+
+use crate::json::Node;
+use crate::{Annotation, Result};
+
+/// One part on a picture, as it was labelled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledInstance {
+    /// The marks, in pixels of the picture. Where the picture's border cuts the part, the box is cut and the outline left out.
+    pub annotation: Annotation,
+    /// Neither missed when it is not found nor wrong when it is: mostly covered, or seen from another side. LabelMe: the
+    /// flag `optional` of any shape of the group; COCO: `attributes.optional`.
+    pub optional: bool,
+    /// Where in the file it stands, such as `shapes[3]` or `annotations[0]`; empty for one that is not from a file.
+    pub place: String,
+}
+
+impl LabelledInstance {
+    /// An instance that does not come from a file.
+    pub fn new(annotation: Annotation, optional: bool) -> Self {
+        Self { annotation, optional, place: String::new() }
+    }
+}
+
+/// The flag `optional` of an object that holds flags or attributes; `false` where there is none.
+pub(crate) fn is_optional(flags: Option<&Node>) -> Result<bool> {
+    let Some(flags) = flags.filter(|flags| flags.value.is_object()) else { return Ok(false) };
+    match flags.optional("optional")? {
+        None => Ok(false),
+        Some(flag) => flag.value.as_bool().ok_or_else(|| flag.malformed("true or false")),
+    }
+}

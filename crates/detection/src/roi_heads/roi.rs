@@ -1,0 +1,45 @@
+//! What goes through the heads, and what comes out.
+
+use crate::boxes::Corners;
+use crate::roi_pooler::Roi;
+
+use super::heatmap::ReadKeypoint;
+use super::mask_paste::BoxMask;
+
+/// A proposal that takes part in the losses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampledRoi {
+    /// Box and image.
+    pub roi: Roi,
+    /// Background, or the class and the index of the object in its image.
+    pub class: RoiClass,
+}
+
+/// What a sampled proposal stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RoiClass {
+    /// No object.
+    Background,
+    /// An object of the image.
+    Object {
+        /// Class.
+        class_idx: usize,
+        /// Index among the image's objects.
+        gt_idx: usize,
+    },
+}
+
+/// A detection in pixels of the resized image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoiDetection {
+    /// Box.
+    pub corners: Corners,
+    /// Probability of the class.
+    pub score: f32,
+    /// Class.
+    pub class_idx: usize,
+    /// Keypoints, empty without a keypoint head.
+    pub keypoints: Vec<ReadKeypoint>,
+    /// Mask over the box, with a mask head.
+    pub mask: Option<BoxMask>,
+}

@@ -1,0 +1,53 @@
+//! How maps are cut into tiles, and where their transformed values stand.
+
+use crate::scratch::Scratch;
+use crate::simd::lanes::LANES;
+
+/// Side of an output tile.
+pub(super) const OUTPUT_TILE: usize = 4;
+/// Side of an input tile.
+pub(super) const INPUT_TILE: usize = 6;
+/// Products of a tile and channel.
+pub(super) const FREQUENCIES: usize = INPUT_TILE * INPUT_TILE;
+
+/// The tiles of all output maps in a row: tile t covers pixels from (4·ty, 4·tx) of image n.
+#[derive(Clone, Copy)]
+pub(super) struct Tiling {
+    pub(super) num_images: usize,
+    /// Tiles of an image, down and across.
+    pub(super) tiles: [usize; 2],
+}
+
+impl Tiling {
+    pub(super) fn new(num_images: usize, out_size: [usize; 2]) -> Self {
+        Self { num_images, tiles: out_size.map(|size| size.div_ceil(OUTPUT_TILE)) }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.num_images * self.tiles[0] * self.tiles[1]
+    }
+
+    /// Image, and pixel of the first output.
+    #[inline(always)]
+    pub(super) fn place(&self, tile: usize) -> (usize, [usize; 2]) {
+        let [down, across] = self.tiles;
+        let (image, tile) = (tile / (down * across), tile % (down * across));
+        (image, [tile / across * OUTPUT_TILE, tile % across * OUTPUT_TILE])
+    }
+}
+
+/// Transformed values of some tiles, `[36, tiles, C]`.
+///
+/// A line of floats stands between frequencies: without it, powers of two would put a tile's 36 values into one
+/// set of the cache.
+pub(super) struct Frequencies {
+    pub(super) values: Scratch,
+    pub(super) step: usize,
+}
+
+impl Frequencies {
+    pub(super) fn new(tiles: usize, channels: usize) -> Self {
+        let step = tiles * channels + LANES;
+        Self { values: Scratch::take(FREQUENCIES * step), step }
+    }
+}

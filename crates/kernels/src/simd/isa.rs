@@ -1,0 +1,43 @@
+//! The vector instructions that there are.
+
+use std::sync::OnceLock;
+
+/// The instructions a kernel is computed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Isa {
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// WebAssembly's: a module has them or not when it is compiled, because a page cannot ask inside it.
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    Simd128,
+    Portable,
+}
+
+impl Isa {
+    /// The widest this machine has.
+    pub(crate) fn detect() -> Self {
+        static DETECTED: OnceLock<Isa> = OnceLock::new();
+        *DETECTED.get_or_init(|| Self::available()[0])
+    }
+
+    /// All this machine has, widest first.
+    pub(crate) fn available() -> Vec<Self> {
+        let mut available = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            if avx2 && is_x86_feature_detected!("avx512f") {
+                available.push(Self::Avx512);
+            }
+            if avx2 {
+                available.push(Self::Avx2);
+            }
+        }
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        available.push(Self::Simd128);
+        available.push(Self::Portable);
+        available
+    }
+}

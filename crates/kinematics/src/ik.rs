@@ -1,0 +1,67 @@
+//! What inverse kinematics prefers, and what it finds.
+
+use nalgebra::Isometry3;
+
+use crate::joints::{JointVector, ready_pose};
+
+/// What [`Panda::inverse`](crate::Panda::inverse) prefers among the configurations that reach a pose.
+///
+/// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
+/// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IkOptions {
+    /// Weight of the distance to the seed configuration: short motions.
+    pub seed_weight: f64,
+    /// The preferred posture.
+    pub posture: JointVector,
+    /// Weight of the distance to the preferred posture.
+    pub posture_weight: f64,
+    /// Weight of closeness to joint limits.
+    pub limit_weight: f64,
+    /// A joint nearer than this to one of its limits costs, rad.
+    pub comfortable_margin_rad: f64,
+    /// Joint positions must keep this distance from the limits, rad.
+    pub required_margin_rad: f64,
+    /// Number of angles of joint 7 tried, at least 2.
+    pub num_redundancy_samples: usize,
+    /// A solution may miss the position by this much, m.
+    pub position_tolerance_m: f64,
+    /// A solution may miss the orientation by this much, rad.
+    pub angle_tolerance_rad: f64,
+    /// What a radian is worth in metres when a nearest pose must be found for one out of reach.
+    pub metres_per_rad: f64,
+}
+
+impl Default for IkOptions {
+    fn default() -> Self {
+        Self {
+            seed_weight: 1.0,
+            posture: ready_pose(),
+            posture_weight: 0.3,
+            limit_weight: 2.0,
+            comfortable_margin_rad: 0.3,
+            required_margin_rad: 0.0,
+            num_redundancy_samples: 64,
+            position_tolerance_m: 1e-6,
+            angle_tolerance_rad: 1e-6,
+            metres_per_rad: 0.3,
+        }
+    }
+}
+
+/// A configuration and how well it reaches the pose asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IkSolution {
+    /// Joint positions within the limits, rad.
+    pub q: JointVector,
+    /// The tcp pose that `q` reaches.
+    pub base_from_tcp: Isometry3<f64>,
+    /// Distance between the positions reached and asked for, m.
+    pub position_residual_m: f64,
+    /// Angle between the orientations reached and asked for, rad.
+    pub angle_residual_rad: f64,
+    /// Distance of the joint nearest to one of its limits, rad.
+    pub limit_margin_rad: f64,
+    /// The cost of [`IkOptions`]; lower is better.
+    pub cost: f64,
+}

@@ -1,0 +1,40 @@
+//! Joint positions of the arm: their type, Franka's ready pose, and a position outside its range.
+
+use nalgebra::SVector;
+
+/// Number of joints of the arm.
+pub const NUM_JOINTS: usize = 7;
+
+/// One number a joint, joint 1 (at the base) first; radians unless said otherwise.
+pub type JointVector = SVector<f64, NUM_JOINTS>;
+
+/// Franka's ready pose, rad: elbow up, hand pointing down in front of the base.
+pub const READY_RAD: [f64; NUM_JOINTS] = {
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+    [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4]
+};
+
+/// Franka's ready pose as a vector, see [`READY_RAD`].
+pub fn ready_pose() -> JointVector {
+    JointVector::from(READY_RAD)
+}
+
+/// Where a joint leaves its range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitViolation {
+    /// Joint number as Franka counts, 1 to 7.
+    pub joint: usize,
+    /// The position asked for, rad.
+    pub found_rad: f64,
+    /// Smallest position allowed, rad.
+    pub min_rad: f64,
+    /// Largest position allowed, rad.
+    pub max_rad: f64,
+}
+
+impl LimitViolation {
+    /// How far outside its range the joint is, rad, positive.
+    pub fn excess_rad(&self) -> f64 {
+        (self.min_rad - self.found_rad).max(self.found_rad - self.max_rad)
+    }
+}

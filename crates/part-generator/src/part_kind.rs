@@ -1,0 +1,34 @@
+//! The ways in which parts are made.
+
+/// How a part is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum PartKind {
+    /// Punched out of sheet or plate.
+    Stamping,
+    /// Turned, lying on its side: shafts, screws, spindles.
+    TurnedLying,
+    /// Turned, standing on its face: rings, flanges, gears, knobs.
+    TurnedStanding,
+    /// Bent from wire or tube.
+    BentWire,
+    /// Bent from sheet.
+    BentSheet,
+    /// Cast.
+    Cast,
+    /// Moulded from plastic.
+    Moulded,
+}
+
+impl PartKind {
+    /// All kinds.
+    pub const ALL: [Self; 7] = [
+        Self::Stamping,
+        Self::TurnedLying,
+        Self::TurnedStanding,
+        Self::BentWire,
+        Self::BentSheet,
+        Self::Cast,
+        Self::Moulded,
+    ];
+}

@@ -1,0 +1,81 @@
+//! The axes and their names.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::error::{Result, SimulationError};
+
+/// What is harder than in an ordinary picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Axis {
+    /// The camera is 0.75 to 1.3 times as high as usual.
+    Height,
+    /// The camera is tilted by 5 to 20 degrees about a random axis in the table and looks at the part.
+    Tilt,
+    /// Another thing lies over 10 to 40 percent of what is seen of the part.
+    Covered,
+    /// Little light: a dark picture with photon and read noise.
+    Dark,
+    /// Motion blur in the even pictures, defocus in the odd ones.
+    Blur,
+    /// Light of another colour than the camera is balanced for.
+    Tint,
+    /// Ten to fifteen other things, pushed against the part and each other.
+    Clutter,
+    /// Three of the part.
+    Instances,
+    /// A part that resembles the part, and not the part.
+    LookAlikes,
+}
+
+impl Axis {
+    /// All axes, in the order in which they are reported.
+    pub const ALL: [Self; 9] = [
+        Self::Height,
+        Self::Tilt,
+        Self::Covered,
+        Self::Dark,
+        Self::Blur,
+        Self::Tint,
+        Self::Clutter,
+        Self::Instances,
+        Self::LookAlikes,
+    ];
+
+    /// The name at the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Height => "height",
+            Self::Tilt => "tilt",
+            Self::Covered => "covered",
+            Self::Dark => "dark",
+            Self::Blur => "blur",
+            Self::Tint => "tint",
+            Self::Clutter => "clutter",
+            Self::Instances => "instances",
+            Self::LookAlikes => "look-alikes",
+        }
+    }
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Axis {
+    type Err = SimulationError;
+
+    /// Reads a name as [`Axis::name`] gives it.
+    ///
+    /// # Errors
+    /// [`SimulationError::UnknownName`] with the names that exist.
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|axis| axis.name() == name).ok_or_else(|| SimulationError::UnknownName {
+            kind: "axis",
+            name: name.to_owned(),
+            existing: Self::ALL.map(|axis| axis.name().to_owned()).to_vec(),
+        })
+    }
+}

@@ -1,0 +1,74 @@
+//! What the axes have in common: which picture is asked for, and what is handed back.
+
+use std::ops::Range;
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use super::axis_name::Axis;
+use crate::camera::CameraView;
+use crate::objects::ObjectSpec;
+use crate::scene::{SceneVariation, VariationConfig};
+use crate::workcell::Workcell;
+
+/// How many pictures an axis has: as many strata.
+pub const PICTURES_PER_AXIS: u64 = 20;
+
+/// How much a picture was changed along its axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisParameter {
+    /// The number, in `unit`.
+    pub value: f64,
+    /// What the number counts: `of the usual height`, `degrees`, `px`.
+    pub unit: &'static str,
+    /// All of it in words.
+    pub description: String,
+}
+
+/// A part, axis, number and seed, as the axes' own modules need them.
+pub(super) struct Request<'a> {
+    pub(super) spec: &'a ObjectSpec,
+    pub(super) number: u64,
+    /// Seed of the ordinary scene.
+    pub(super) scene_seed: u64,
+    /// Place of the picture in the axis' range, 0 to 1.
+    pub(super) level: f64,
+    /// What else the axis draws.
+    pub(super) rng: Pcg64Mcg,
+}
+
+impl<'a> Request<'a> {
+    pub(super) fn new(spec: &'a ObjectSpec, axis: Axis, number: u64, seed: u64) -> Self {
+        // FNV-1a: parts whose pictures had one seed would share each unlucky lamp.
+        let part = spec
+            .name
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+        let mut rng = Pcg64Mcg::seed_from_u64(
+            part ^ seed.wrapping_mul(0xd134_2543_de82_ef95)
+                ^ (axis as u64) << 56
+                ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15),
+        );
+        let scene_seed = rng.random();
+        let stratum = (number % PICTURES_PER_AXIS) as f64;
+        let level = (stratum + rng.random_range(0.0..1.0)) / PICTURES_PER_AXIS as f64;
+        Self { spec, number, scene_seed, level, rng }
+    }
+
+    /// The place of the picture in a range.
+    pub(super) fn between(&self, range: Range<f64>) -> f64 {
+        range.start + self.level * (range.end - range.start)
+    }
+
+    pub(super) fn ordinary_scene(&self) -> SceneVariation {
+        SceneVariation::sample(Some(self.spec), &VariationConfig::default(), self.scene_seed)
+    }
+}
+
+/// What an axis made: the picture before truths are measured.
+pub(super) struct Drawn {
+    pub(super) cell: Workcell,
+    pub(super) scene: SceneVariation,
+    pub(super) view: CameraView,
+    pub(super) parameter: AxisParameter,
+}
