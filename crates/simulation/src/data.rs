@@ -160,6 +160,12 @@ impl Data {
         unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
+    /// What the motors are set to, in the units of the actuators.
+    pub fn ctrl(&self) -> &[f64] {
+        // SAFETY: the array has `nu` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().ctrl, self.model.raw().nu as usize) }
+    }
+
     /// Controls, one an actuator, to be set (N·m and N for motors).
     pub fn ctrl_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nu` entries, lives as long as the data, and `self` is borrowed

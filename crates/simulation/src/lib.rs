@@ -3,7 +3,7 @@
 //! ```text
 //! objects ─┐                      ┌─> Renderer ─> CameraView ─> Perception ─> GraspTarget ─┐
 //! scene   ─┴─> Workcell (MJCF) ─> Model, Data                                              │
-//!                                 └<── controller, gripper <── kinematics <── attempt <────┘
+//!                                 └<── controller, gripper <── Arm <── sdg_robot::grasp <──┘
 //! ```
 //!
 //! The picture of an MJCF model takes four lines:
@@ -27,6 +27,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod arm;
 mod attempt;
 mod attempt_errors;
 mod camera;
@@ -50,8 +51,8 @@ mod shake;
 pub mod table_camera;
 mod workcell;
 
-pub use attempt::{AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep};
-pub use attempt_errors::{AttemptErrors, Shake};
+pub use attempt::{AttemptConfig, AttemptReport};
+pub use attempt_errors::{ArmFault, ArmFaultKind, AttemptErrors, Shake};
 pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
 pub use controller::{ArmController, ArmReference};
 pub use data::{Contact, Data};
@@ -63,7 +64,7 @@ pub use oracle::marked_grasp;
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };
-pub use perception::{GraspTarget, Perception};
+pub use perception::Perception;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{MotionEnd, PERIOD_SECS, Workcell, WorkcellConfig, camera_looking_down};
+pub use workcell::{Workcell, WorkcellConfig};

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use image::RgbImage;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use sdg_geometry::{PinholeCamera, PosedCamera};
-use sdg_kinematics::{IkOptions, Panda, Trajectory, ready_pose};
+use sdg_kinematics::{IkOptions, Panda, ready_pose};
+use sdg_robot::{HandCommand, PERIOD_SECS};
 
 use crate::attempt_errors::AttemptErrors;
 use crate::camera::{CameraView, posed_camera};
@@ -20,12 +21,6 @@ use crate::panda::{PANDA_FILE, PandaIds, changed_panda_asset};
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
 use crate::scene::SceneVariation;
-
-/// Control period and timestep of the physics in seconds: 1 kHz.
-pub const PERIOD_SECS: f64 = 1e-3;
-
-/// A joint that is this far from its reference is held up by something, in radians.
-const BLOCKED_RAD: f64 = 0.03;
 
 /// What a workcell is made of.
 #[derive(Debug, Clone)]
@@ -54,15 +49,6 @@ struct PartIds {
     joint: Id<Joint>,
 }
 
-/// How a motion ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MotionEnd {
-    /// The arm is where the motion ends.
-    Arrived,
-    /// Something held the arm up; what touched it, in words.
-    Blocked(String),
-}
-
 /// A Panda at a table with a part, its physics and its cameras.
 pub struct Workcell {
     config: WorkcellConfig,
@@ -77,6 +63,10 @@ pub struct Workcell {
     reference: ArmReference,
     recorder: Option<Recorder>,
     tcp_from_camera: Isometry3<f64>,
+    /// What the hand was asked last.
+    pub(crate) hand_command: Option<HandCommand>,
+    /// Whether the arm has stopped itself.
+    pub(crate) is_in_reflex: bool,
 }
 
 impl Workcell {
@@ -118,6 +108,8 @@ impl Workcell {
             reference: ArmReference::at_rest(ready_pose()),
             recorder: None,
             tcp_from_camera,
+            hand_command: None,
+            is_in_reflex: false,
         };
         workcell.reset(&ready_pose())?;
         Ok(workcell)
@@ -139,6 +131,8 @@ impl Workcell {
         self.panda_ids.set_finger_position_m(&mut self.data, crate::panda::FINGER_TRAVEL_M);
         self.gripper = Gripper::at_opening_m(0.08);
         self.reference = ArmReference::at_rest(*q);
+        self.hand_command = None;
+        self.is_in_reflex = false;
         self.data.forward()
     }
 
@@ -195,6 +189,11 @@ impl Workcell {
     /// Distance between the fingers in metres.
     pub fn opening_m(&self) -> f64 {
         self.panda_ids.finger_position_m(&self.data).iter().sum()
+    }
+
+    /// Where the wrist camera (optical frame) is on the hand.
+    pub fn tcp_from_camera(&self) -> Isometry3<f64> {
+        self.tcp_from_camera
     }
 
     /// The tool centre point's pose for the wrist camera to be at a pose (optical frame).
@@ -286,38 +285,6 @@ impl Workcell {
         }
     }
 
-    /// Stands still for a while.
-    ///
-    /// # Errors
-    /// [`SimulationError::Unstable`] or a renderer's error while recording.
-    pub fn wait(&mut self, duration_secs: f64) -> Result<()> {
-        self.reference = ArmReference::at_rest(self.reference.position);
-        for _ in 0..(duration_secs / PERIOD_SECS).round() as usize {
-            self.tick()?;
-        }
-        Ok(())
-    }
-
-    /// Follows a motion and stops at the first obstacle.
-    ///
-    /// # Errors
-    /// [`SimulationError::Unstable`] or a renderer's error while recording.
-    pub fn follow(&mut self, trajectory: &Trajectory) -> Result<MotionEnd> {
-        let num_periods = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
-        for period in 1..=num_periods {
-            let (position, velocity, acceleration) = trajectory.sample(period as f64 * PERIOD_SECS);
-            self.reference = ArmReference { position, velocity, acceleration };
-            self.tick()?;
-            let error = (self.panda_ids.position(&self.data) - position).amax();
-            if error > BLOCKED_RAD {
-                let obstacle = self.describe_arm_contacts();
-                self.reference = ArmReference::at_rest(self.panda_ids.position(&self.data));
-                return Ok(MotionEnd::Blocked(obstacle));
-            }
-        }
-        Ok(MotionEnd::Arrived)
-    }
-
     /// Sets where the controller wants the arm in the next period.
     pub(crate) fn set_reference(&mut self, reference: ArmReference) {
         self.reference = reference;
@@ -329,7 +296,7 @@ impl Workcell {
     }
 
     /// What touches the arm, in words.
-    fn describe_arm_contacts(&self) -> String {
+    pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
         let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());
         let mut touching: Vec<String> = self
@@ -365,15 +332,4 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
 
 fn is_arm(body: &str) -> bool {
     body.starts_with("link") || body == "hand" || body.ends_with("_finger")
-}
-
-/// A camera pose straight down from `height_m` above the table, over (x, y): with yaw 0 the
-/// picture's up is the base's x and its right is -y; a positive yaw turns it counter-clockwise as
-/// seen from above.
-pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
-    // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
-    let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-        * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(at_yaw_zero));
-    Isometry3::from_parts(Translation3::new(x, y, height_m), rotation)
 }
