@@ -82,7 +82,9 @@ impl Robot {
         mut motion: impl FnMut(&RobotState, Duration) -> Answer<Transform>,
     ) -> Result<RobotState> {
         self.control(controller.into(), MotionGeneratorMode::CartesianPosition, |state, step| {
-            map(motion(state, step), |base_from_ee| with_motion(MotionCommand { base_from_ee, ..MotionCommand::default() }))
+            map(motion(state, step), |base_from_ee| {
+                with_motion(MotionCommand { base_from_ee, ..MotionCommand::default() })
+            })
         })
     }
 
@@ -228,8 +230,7 @@ impl Robot {
         loop {
             self.send(command.clone())?;
             self.receive(false)?;
-            if self.state.robot_mode != RobotMode::Move
-                || self.state.motion_generator_mode == MotionGeneratorMode::Idle
+            if self.state.robot_mode != RobotMode::Move || self.state.motion_generator_mode == MotionGeneratorMode::Idle
             {
                 break;
             }
