@@ -8,6 +8,8 @@ use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::ComputeBackend;
 
 use crate::commands::camera::CameraCommand;
+use crate::commands::grasp::GraspArgs;
+use crate::commands::robot::RobotCommand;
 use crate::live_pictures::RequestArgs;
 
 /// Teach a robot a grasp from one photo, on an ordinary computer.
@@ -34,6 +36,11 @@ pub enum Command {
     Rehearse(RehearseArgs),
     /// The paper's protocol: every model on every part, and the paper's tables; or a model on your own labelled pictures
     Evaluate(EvaluateArgs),
+    /// One grasp, from the picture to the lifted part, with a real arm or a simulated one
+    Grasp(GraspArgs),
+    /// A real arm by hand: state, home, recovery, hand
+    #[command(subcommand)]
+    Robot(RobotCommand),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
     /// Annotation files from one tool's format to another's

@@ -46,6 +46,7 @@ mod pictures;
 mod progress;
 #[cfg(feature = "simulation")]
 pub mod rehearsal;
+pub mod robots;
 #[cfg(feature = "simulation")]
 mod run_page;
 #[cfg(feature = "simulation")]
@@ -89,6 +90,8 @@ pub fn run(args: &Args) -> ExitCode {
                 .to_owned(),
         )
         .into()),
+        Command::Grasp(grasp) => commands::grasp::run(grasp),
+        Command::Robot(robot) => commands::robot::run(robot),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),

@@ -29,6 +29,7 @@ mod error;
 mod franka;
 mod pace;
 mod perception;
+mod planned_arm;
 mod playback;
 mod robot;
 mod safety;
@@ -44,11 +45,12 @@ pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use safety::{Capsule, CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
     CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
-    camera_looking_down, grasp,
+    SURE, camera_looking_down, grasp,
 };
 pub use watch::{HISTORY_SECS, MAX_SILENCE_SECS, StopReason, StopRequest, Watch};

@@ -67,4 +67,4 @@ pub use panda::{
 pub use perception::Perception;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{Workcell, WorkcellConfig};
+pub use workcell::{CameraPlace, Workcell, WorkcellConfig};

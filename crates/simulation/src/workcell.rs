@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use image::RgbImage;
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_geometry::{PinholeCamera, PosedCamera};
-use sdg_kinematics::{IkOptions, Panda, ready_pose};
+use sdg_kinematics::{HAND_TURN_RAD, IkOptions, Panda, ready_pose};
 use sdg_robot::{HandCommand, PERIOD_SECS};
 
 use crate::attempt_errors::AttemptErrors;
-use crate::camera::{CameraView, posed_camera};
+use crate::camera::{
+    CameraView, WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, posed_camera, vertical_field_of_view_rad,
+};
 use crate::controller::{ArmController, ArmReference};
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
@@ -20,7 +22,7 @@ use crate::model::{Body, Camera, Id, Joint, Model};
 use crate::panda::{PANDA_FILE, PandaIds, changed_panda_asset};
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
-use crate::scene::SceneVariation;
+use crate::scene::{SceneVariation, pose_attributes};
 
 /// What a workcell is made of.
 #[derive(Debug, Clone)]
@@ -31,14 +33,25 @@ pub struct WorkcellConfig {
     pub wrist_render: RenderConfig,
     /// What is wrong in attempts.
     pub errors: AttemptErrors,
-    /// The wrist camera, where it is not [`PinholeCamera::WRIST`].
+    /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,
+    /// Where the camera is, if not in its usual place on the hand.
+    pub camera_place: Option<CameraPlace>,
+}
+
+/// Where a workcell's camera is (optical frame), m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraPlace {
+    /// On the robot's flange.
+    OnFlange(Isometry3<f64>),
+    /// Beside the robot, in its base frame.
+    InBase(Isometry3<f64>),
 }
 
 impl WorkcellConfig {
     /// A scene with the wrist camera's usual pictures, without errors.
     pub fn new(scene: SceneVariation) -> Self {
-        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default(), wrist_camera: None }
+        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default(), wrist_camera: None, camera_place: None }
     }
 }
 
@@ -58,6 +71,8 @@ pub struct Workcell {
     part: Option<PartIds>,
     wrist_renderer: Renderer,
     scene_camera: Id<Camera>,
+    /// The camera that perception is shown.
+    camera: Id<Camera>,
     controller: ArmController,
     pub(crate) gripper: Gripper,
     reference: ArmReference,
@@ -89,10 +104,14 @@ impl Workcell {
         };
         let wrist_renderer = Renderer::new(&model, wrist_render)?;
         let scene_camera = model.id("scene")?;
+        let camera = match config.camera_place {
+            Some(CameraPlace::InBase(_)) => model.id(CAMERA_IN_BASE)?,
+            Some(CameraPlace::OnFlange(_)) | None => panda_ids.wrist_camera,
+        };
         let mut data = Data::new(model)?;
         panda_ids.set_position(&mut data, &ready_pose());
         data.forward()?;
-        let world_from_camera = posed_camera(&wrist_renderer, &data, panda_ids.wrist_camera).world_from_camera;
+        let world_from_camera = posed_camera(&wrist_renderer, &data, camera).world_from_camera;
         let tcp_from_camera = panda_ids.base_from_tcp(&data).inverse() * world_from_camera;
 
         let mut workcell = Self {
@@ -103,6 +122,7 @@ impl Workcell {
             part,
             wrist_renderer,
             scene_camera,
+            camera,
             controller: ArmController::default(),
             gripper: Gripper::at_opening_m(0.08),
             reference: ArmReference::at_rest(ready_pose()),
@@ -208,7 +228,7 @@ impl Workcell {
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // A step leaves positions one period behind the joints.
         self.data.forward()?;
-        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.panda_ids.wrist_camera)?;
+        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.camera)?;
         match self.config.wrist_camera {
             None => Ok(drawn),
             Some(intrinsics) => Ok(CameraView {
@@ -223,7 +243,7 @@ impl Workcell {
     /// # Errors
     /// As [`Renderer::segmentation`].
     pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
-        self.wrist_renderer.segmentation(&mut self.data, self.panda_ids.wrist_camera)
+        self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
     /// Puts the arm, without moving through time, where its wrist camera is at a pose, and takes a
@@ -249,6 +269,22 @@ impl Workcell {
         self.panda_ids.set_position(&mut self.data, &solution.q);
         self.reference = ArmReference::at_rest(solution.q);
         self.data.forward()
+    }
+
+    /// A picture of the whole workcell from outside with the arm somewhere else, fingers at an opening (m): for plans.
+    ///
+    /// # Errors
+    /// As [`Workcell::scene_image`].
+    pub fn scene_image_at(
+        &mut self,
+        renderer: &mut Renderer,
+        q: &sdg_kinematics::JointVector,
+        opening_m: f64,
+    ) -> Result<RgbImage> {
+        self.panda_ids.set_position(&mut self.data, q);
+        self.panda_ids.set_finger_position_m(&mut self.data, 0.5 * opening_m);
+        self.data.forward()?;
+        renderer.image(&mut self.data, self.scene_camera)
     }
 
     /// A picture of the whole workcell from outside.
@@ -318,17 +354,37 @@ impl Workcell {
 /// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
     let fragment = config.scene.fragment();
-    let xml = include_str!("../assets/workcell.xml")
-        .replace("PANDA_FILE", PANDA_FILE)
-        .replace("<!-- SCENE -->", &(fragment.sections + sections));
-    let mut assets = fragment.files;
     let fovy_deg = match &config.wrist_camera {
         Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
         None => None,
     };
-    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg));
+    let (mut hand_from_camera, mut camera_in_base) = (None, String::new());
+    match config.camera_place {
+        None => {}
+        Some(CameraPlace::OnFlange(flange_from_camera)) => {
+            let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
+            hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
+        }
+        Some(CameraPlace::InBase(base_from_camera)) => {
+            let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
+            let fovy_deg = fovy_deg.unwrap_or(
+                vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees(),
+            );
+            camera_in_base = format!(
+                "<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>"
+            );
+        }
+    }
+    let xml = include_str!("../assets/workcell.xml")
+        .replace("PANDA_FILE", PANDA_FILE)
+        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
+    let mut assets = fragment.files;
+    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));
     Ok(Arc::new(Model::from_xml(&xml, &assets)?))
 }
+
+/// Name of a camera beside the robot.
+const CAMERA_IN_BASE: &str = "beside";
 
 fn is_arm(body: &str) -> bool {
     body.starts_with("link") || body == "hand" || body.ends_with("_finger")

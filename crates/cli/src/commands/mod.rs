@@ -18,8 +18,10 @@ pub mod evaluate_axes;
 #[cfg(feature = "simulation")]
 pub mod evaluate_cameras;
 pub mod evaluate_pictures;
+pub mod grasp;
 pub mod man;
 #[cfg(feature = "simulation")]
 pub mod rehearse;
+pub mod robot;
 pub mod teach;
 pub mod weights;

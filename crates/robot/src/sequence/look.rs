@@ -10,7 +10,7 @@ use crate::perception::{GraspStep, GraspTarget};
 /// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.
 const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
 /// Score on which perception decides.
-const SURE: f64 = 0.5;
+pub const SURE: f64 = 0.5;
 /// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
 /// radians of that.
 const CONFIRMED: f64 = 0.2;
