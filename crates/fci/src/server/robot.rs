@@ -17,6 +17,8 @@ use crate::wire::{
 
 /// Measured velocities overshoot commanded ones: joints by this much, rad/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
+/// So many cycles of a recovery the arm yields to what it touches, so that the next motion does not start in a collision.
+const RECOVERY_CYCLES: u32 = 200;
 /// A measured joint velocity below this, rad/s, is standing.
 const STANDING: f64 = 0.01;
 
@@ -48,6 +50,8 @@ pub struct RobotCore {
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
     pub(super) torque_rate: JointVector,
+    /// Cycles that the present recovery takes yet.
+    recovery_cycles: u32,
     /// Answers that wait for the arm to stand.
     waiting: Vec<Outgoing>,
     outbox: Vec<Outgoing>,
@@ -79,6 +83,7 @@ impl RobotCore {
             time_ms: 1,
             torque,
             torque_rate: JointVector::zeros(),
+            recovery_cycles: 0,
             waiting: Vec::new(),
             outbox: Vec::new(),
         }
@@ -137,6 +142,7 @@ impl RobotCore {
                     self.errors = RobotErrors::default();
                     self.collisions = Contacts::default();
                     self.mode = RobotMode::AutomaticErrorRecovery;
+                    self.recovery_cycles = RECOVERY_CYCLES;
                     self.answer_when_standing(command_id, command, Status::Success);
                     return;
                 }
@@ -219,6 +225,10 @@ impl RobotCore {
     fn update_references(&mut self, plant: &dyn Plant, command: Option<&RobotCommand>) {
         let flange_from_ee = self.settings.flange_from_ee();
         let at = |q: &JointVector| end_effector_at(plant, &flange_from_ee, q);
+        if self.mode == RobotMode::AutomaticErrorRecovery {
+            self.recovery_cycles = self.recovery_cycles.saturating_sub(1);
+            self.references.joints = JointReference::at_rest(self.observation.q);
+        }
         let Some(motion) = &mut self.motion else {
             let joints = &mut self.references.joints;
             *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
@@ -256,7 +266,10 @@ impl RobotCore {
         self.collisions = self.contacts;
         let is_external = self.motion.as_ref().is_some_and(|motion| motion.controller == ControllerMode::External);
         let is_collision = errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex);
-        if is_external || is_collision {
+        if is_collision {
+            // Braking would press on.
+            self.references.joints = JointReference::at_rest(self.observation.q);
+        } else if is_external {
             // The arm is not where the reference is, and must not go there.
             self.follow_measurement();
         }
@@ -347,12 +360,12 @@ impl RobotCore {
 
     /// Sends what waited for the arm to stand.
     fn settle(&mut self) {
-        if self.motion.is_some() || !self.references.joints.is_at_rest() || self.observation.dq.amax() > STANDING {
+        let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
+        if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {
             return;
         }
         if self.mode == RobotMode::AutomaticErrorRecovery {
             self.mode = RobotMode::Idle;
-            self.references.joints = JointReference::at_rest(self.observation.q);
         }
         self.outbox.append(&mut self.waiting);
     }
