@@ -33,12 +33,15 @@
 
 pub mod client;
 mod error;
+mod limits;
 mod message;
 mod pose;
 mod robot_error;
+pub mod server;
 pub mod wire;
 
 pub use error::{FciError, Result, WireError};
+pub use limits::{Limits, RateLimits};
 pub use message::read_message;
 pub use pose::{is_rigid, isometry, transform};
 pub use robot_error::{NUM_ERRORS, RobotError, RobotErrors};

@@ -185,6 +185,12 @@ impl Data {
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_passive, self.model.raw().nv as usize) }
     }
 
+    /// What contacts and joint limits exerted on the joints in the last step (N·m, N).
+    pub fn qfrc_constraint(&self) -> &[f64] {
+        // SAFETY: the array has `nv` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qfrc_constraint, self.model.raw().nv as usize) }
+    }
+
     /// The joint-space inertia matrix, `nv` x `nv`.
     pub fn mass_matrix(&self) -> DMatrix<f64> {
         let nv = self.model.raw().nv as usize;

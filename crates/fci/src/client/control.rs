@@ -206,13 +206,11 @@ impl Robot {
             Ok(response) => response,
             Err(error) => return error,
         };
-        // The last state has left the motion, and its rate is zero.
-        let success_rate = self
-            .recent
-            .iter()
-            .rev()
-            .find(|state| state.robot_mode == RobotMode::Move)
-            .map_or(0.0, |state| state.control_command_success_rate);
+        // The last state has left the motion, and its rate is zero; what was lost since the one before lowers that one's.
+        let success_rate = self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
+            let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
+            last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
+        });
         FciError::Motion { status: response.status, errors: self.state.reflex_reason, success_rate }
     }
 

@@ -64,7 +64,7 @@ impl StopHandle {
 }
 
 impl Robot {
-    /// Connects to a robot by name or IP address and waits for its first state.
+    /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state.
     ///
     /// # Errors
     /// [`FciError::Socket`], [`FciError::Version`] for a robot of another version, [`FciError::Timeout`] where no state
@@ -86,11 +86,12 @@ impl Robot {
         let mut session = Session::connect(address, HeaderKind::Robot, timeout)?;
         let request = Request::Connect { version: version.number(), udp_port: session.udp_port()? };
         let response = execute(&mut session, &request, version, Some(timeout))?;
-        if response.status != Status::Success {
-            let found = match response.rest[..] {
-                [low, high, ..] => u16::from_le_bytes([low, high]),
-                _ => 0,
-            };
+        let found = match response.rest[..] {
+            [low, high, ..] => u16::from_le_bytes([low, high]),
+            _ => 0,
+        };
+        // There are servers that welcome every version and go on in their own.
+        if response.status != Status::Success || found != version.number() {
             return Err(FciError::Version { peer: "robot", expected: "5 (Panda) or 10 (FR3)".into(), found });
         }
         let mut robot = Self {
@@ -281,8 +282,13 @@ fn accept(response: &Response, command: Command) -> Result<()> {
     }
 }
 
-/// The first address of a host.
+/// The first address of a host, or of a host and a port of its own (`HOST:PORT`).
 pub(super) fn resolve(host: &str, port: u16) -> Result<SocketAddr> {
+    let (host, port) = match host.rsplit_once(':').map(|(name, port)| (name, port.parse())) {
+        // An IPv6 address has more than one colon.
+        Some((name, Ok(own_port))) if !name.contains(':') => (name, own_port),
+        _ => (host, port),
+    };
     let unknown = |source| FciError::Socket { action: "find", address: host.to_owned(), source };
     let mut addresses = (host, port).to_socket_addrs().map_err(unknown)?;
     addresses.next().ok_or_else(|| unknown(std::io::ErrorKind::NotFound.into()))

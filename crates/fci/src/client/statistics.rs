@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+/// A gap between states that is longer is a stall.
+const STALL: Duration = Duration::from_millis(20);
 /// Answers slower than this share the last bin.
 const NUM_BINS: usize = 5000;
 
@@ -14,6 +16,8 @@ pub struct ControlStatistics {
     pub num_skipped: u64,
     /// Longest time between two states, by this computer's clock.
     pub max_gap: Duration,
+    /// How many such times were longer than 20 ms.
+    pub num_stalls: u64,
     /// How many answers took so many microseconds, from receiving the state to having sent the command.
     answer_us: Vec<u32>,
     max_answer: Duration,
@@ -26,6 +30,7 @@ impl Default for ControlStatistics {
             num_answers: 0,
             num_skipped: 0,
             max_gap: Duration::ZERO,
+            num_stalls: 0,
             answer_us: vec![0; NUM_BINS],
             max_answer: Duration::ZERO,
             last_received: None,
@@ -45,6 +50,7 @@ impl ControlStatistics {
         let now = Instant::now();
         if let Some((last, last_id)) = self.last_received {
             self.max_gap = self.max_gap.max(now - last);
+            self.num_stalls += u64::from(now - last > STALL);
             self.num_skipped += message_id.saturating_sub(last_id + 1);
         }
         self.last_received = Some((now, message_id));

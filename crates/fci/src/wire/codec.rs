@@ -160,11 +160,6 @@ impl<'a> Decoder<'a> {
         Self { message, bytes, position: 0, real }
     }
 
-    /// All bytes that were not read.
-    pub fn rest(self) -> &'a [u8] {
-        &self.bytes[self.position..]
-    }
-
     /// Ends the reading.
     ///
     /// # Errors

@@ -1,0 +1,162 @@
+//! Joint references: what a command makes of the last one, and whether the robot would accept it.
+
+use super::plant::JointVector;
+use crate::limits::Limits;
+use crate::robot_error::{RobotError, RobotErrors};
+
+/// One cycle in seconds.
+pub const PERIOD_SECS: f64 = 1e-3;
+/// Differences of doubles are no violations.
+pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
+
+/// Where the robot's controller wants the joints: `q_d`, `dq_d`, `ddq_d`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointReference {
+    /// rad.
+    pub q: JointVector,
+    /// rad/s.
+    pub dq: JointVector,
+    /// rad/s².
+    pub ddq: JointVector,
+}
+
+/// By whose names violations are told: the joint generators', or those that poses and twists lead to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GeneratorKind {
+    /// Joint positions and velocities.
+    Joint,
+    /// Poses and twists.
+    Cartesian,
+}
+
+impl JointReference {
+    /// Standing at a position.
+    pub fn at_rest(q: JointVector) -> Self {
+        Self { q, dq: JointVector::zeros(), ddq: JointVector::zeros() }
+    }
+
+    /// The reference after a commanded position.
+    pub fn to_position(&self, q: JointVector) -> Self {
+        let dq = (q - self.q) / PERIOD_SECS;
+        Self { q, dq, ddq: (dq - self.dq) / PERIOD_SECS }
+    }
+
+    /// The reference after a commanded velocity.
+    pub fn to_velocity(&self, dq: JointVector) -> Self {
+        Self { q: self.q + dq * PERIOD_SECS, dq, ddq: (dq - self.dq) / PERIOD_SECS }
+    }
+
+    /// The reference after a cycle without a command: constant acceleration.
+    pub fn extrapolated(&self) -> Self {
+        let dq = self.dq + self.ddq * PERIOD_SECS;
+        Self { q: self.q + dq * PERIOD_SECS, dq, ddq: self.ddq }
+    }
+
+    /// One cycle of slowing down with the limits' acceleration.
+    pub fn braked(&self, limits: &Limits) -> Self {
+        let dq = JointVector::from_fn(|joint, _| {
+            let step = limits.acceleration[joint] * PERIOD_SECS;
+            self.dq[joint] - self.dq[joint].clamp(-step, step)
+        });
+        self.to_velocity(dq)
+    }
+
+    /// Whether the reference stands.
+    pub fn is_at_rest(&self) -> bool {
+        self.dq.amax() == 0.0
+    }
+
+    /// What the robot would stop for on the way from `previous` to this reference.
+    pub fn violations(&self, previous: &Self, limits: &Limits, kind: GeneratorKind) -> RobotErrors {
+        let jerk = (self.ddq - previous.ddq) / PERIOD_SECS;
+        let exceeds = |values: &JointVector, limits: &[f64; 7]| {
+            values.iter().zip(limits).any(|(value, limit)| value.abs() > limit * ROUNDING)
+        };
+        let out_of_range = (0..7).any(|joint| !(limits.q_min[joint]..=limits.q_max[joint]).contains(&self.q[joint]));
+        let names = match kind {
+            GeneratorKind::Joint => [
+                RobotError::JointMotionGeneratorPositionLimitsViolation,
+                RobotError::JointMotionGeneratorVelocityLimitsViolation,
+                RobotError::JointMotionGeneratorVelocityDiscontinuity,
+                RobotError::JointMotionGeneratorAccelerationDiscontinuity,
+            ],
+            GeneratorKind::Cartesian => [
+                RobotError::CartesianMotionGeneratorJointPositionLimitsViolation,
+                RobotError::CartesianMotionGeneratorJointVelocityLimitsViolation,
+                RobotError::CartesianMotionGeneratorJointVelocityDiscontinuity,
+                RobotError::CartesianMotionGeneratorJointAccelerationDiscontinuity,
+            ],
+        };
+        let violated = [
+            out_of_range,
+            exceeds(&self.dq, &limits.velocity),
+            exceeds(&self.ddq, &limits.acceleration),
+            exceeds(&jerk, &limits.jerk),
+        ];
+        names.into_iter().zip(violated).filter_map(|(name, violated)| violated.then_some(name)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_joint_1(values: [f64; 3]) -> JointReference {
+        let mut reference = JointReference::at_rest(JointVector::from([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0]));
+        [reference.q[0], reference.dq[0], reference.ddq[0]] = values;
+        reference
+    }
+
+    fn names(previous: &JointReference, next: &JointReference) -> Vec<&'static str> {
+        let errors = next.violations(previous, &Limits::PANDA, GeneratorKind::Joint);
+        errors.iter().map(RobotError::name).collect()
+    }
+
+    #[test]
+    fn each_limit_is_told_just_outside_and_not_just_inside() {
+        let rest = with_joint_1([0.0; 3]);
+        // 7500 rad/s³ for a millisecond from rest: 7.5e-6 rad.
+        for (share, expected) in [(0.999, vec![]), (1.001, vec!["joint_motion_generator_acceleration_discontinuity"])] {
+            assert_eq!(names(&rest, &rest.to_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
+        }
+        // At 14.995 rad/s², 15 is reached within the jerk's limit.
+        let accelerating = with_joint_1([0.0, 1.0, 14.995]);
+        for (acceleration, expected) in
+            [(14.999, vec![]), (15.001, vec!["joint_motion_generator_velocity_discontinuity"])]
+        {
+            let dq = with_joint_1([0.0, 1.0 + acceleration * 1e-3, 0.0]).dq;
+            assert_eq!(names(&accelerating, &accelerating.to_velocity(dq)), expected);
+        }
+        let fast = with_joint_1([0.0, 2.1745, 0.0]);
+        for (velocity, expected) in
+            [(2.1749, vec![]), (2.1751, vec!["joint_motion_generator_velocity_limits_violation"])]
+        {
+            assert_eq!(names(&fast, &fast.to_velocity(with_joint_1([0.0, velocity, 0.0]).dq)), expected);
+        }
+        let near_the_end = with_joint_1([2.8972, 0.09, 0.0]);
+        for (q, expected) in [(2.89729, vec![]), (2.89731, vec!["joint_motion_generator_position_limits_violation"])] {
+            assert_eq!(names(&near_the_end, &near_the_end.to_position(with_joint_1([q, 0.0, 0.0]).q)), expected);
+        }
+    }
+
+    #[test]
+    fn a_lost_command_keeps_the_acceleration() {
+        let next = with_joint_1([0.5, 1.0, 2.0]).extrapolated();
+        assert!((next.dq[0] - 1.002).abs() < 1e-12);
+        assert!((next.q[0] - 0.501002).abs() < 1e-12);
+        assert_eq!(next.ddq[0], 2.0);
+    }
+
+    #[test]
+    fn braking_ends_at_rest_within_the_limits() {
+        let mut reference = with_joint_1([0.0, 1.5, 0.0]);
+        let mut num_cycles = 0;
+        while !reference.is_at_rest() {
+            reference = reference.braked(&Limits::PANDA);
+            assert!(reference.ddq[0].abs() <= 15.0 + 1e-9);
+            num_cycles += 1;
+        }
+        // 1.5 rad/s at 15 rad/s².
+        assert!((100..=101).contains(&num_cycles), "{num_cycles}");
+    }
+}
