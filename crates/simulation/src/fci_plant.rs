@@ -5,13 +5,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Isometry3, SMatrix, Vector3};
 use sdg_fci::server::{Jacobian, JointVector, Observation, Plant};
 use sdg_kinematics::{Panda, ready_pose};
+use sdg_robot::PERIOD_SECS;
 
 use crate::data::Data;
 use crate::error::Result;
 use crate::gripper::Gripper;
 use crate::model::Model;
 use crate::panda::{FINGER_TRAVEL_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
-use crate::workcell::{PERIOD_SECS, WorkcellConfig, build_model};
+use crate::workcell::{WorkcellConfig, build_model};
 
 /// The generalised positions of a plant, for others to look at while a server owns it; see [`PandaPlant::positions`].
 #[derive(Debug, Clone, Default)]

@@ -156,6 +156,24 @@ impl Workcell {
         self.data.forward()
     }
 
+    /// Puts everything where another simulation of the same configuration has it ([`Data::qpos`]), at rest.
+    ///
+    /// # Errors
+    /// [`SimulationError::Configuration`] for positions of another scene.
+    pub fn set_positions(&mut self, qpos: &[f64]) -> Result<()> {
+        if qpos.len() != self.data.qpos().len() {
+            return Err(SimulationError::Configuration {
+                field: "positions",
+                expected: format!("{} numbers", self.data.qpos().len()),
+                found: qpos.len().to_string(),
+            });
+        }
+        self.data.qpos_mut().copy_from_slice(qpos);
+        self.data.qvel_mut().fill(0.0);
+        self.reference = ArmReference::at_rest(self.panda_ids.position(&self.data));
+        self.data.forward()
+    }
+
     /// Physics as they stand.
     pub fn data(&self) -> &Data {
         &self.data

@@ -14,12 +14,25 @@ impl Judge {
     pub(super) fn new(success_height_m: f64) -> Self {
         Self { success_height_m, shake_amplitude_m: None }
     }
+}
 
-    /// Is the part up and between both fingers?
-    fn lifted(&self, cell: &Workcell) -> Option<String> {
-        let height = cell.object_height_m().unwrap_or(0.0);
-        let fingers = cell.fingers_on_object();
-        if height >= self.success_height_m && fingers == [true, true] {
+impl Workcell {
+    /// Why the part is not between both fingers; `None` where it is.
+    pub fn why_not_grasped(&self) -> Option<String> {
+        match self.fingers_on_object() {
+            [true, true] => None,
+            [false, false] => {
+                Some(format!("the fingers closed to {:.1} mm without touching the part", self.opening_m() * 1e3))
+            }
+            [left, _] => Some(format!("only the {} finger touches the part", if left { "left" } else { "right" })),
+        }
+    }
+
+    /// Why the part is not up and between both fingers; `None` where it is.
+    pub fn why_not_lifted(&self, success_height_m: f64) -> Option<String> {
+        let height = self.object_height_m().unwrap_or(0.0);
+        let fingers = self.fingers_on_object();
+        if height >= success_height_m && fingers == [true, true] {
             return None;
         }
         let touch = match fingers {
@@ -43,14 +56,8 @@ impl StepObserver<Workcell> for Judge {
     fn after(&mut self, cell: &mut Workcell, step: GraspStep) -> Result<Option<String>> {
         Ok(match step {
             GraspStep::Detect | GraspStep::Hover | GraspStep::Approach => None,
-            GraspStep::Close => match cell.fingers_on_object() {
-                [true, true] => None,
-                [false, false] => {
-                    Some(format!("the fingers closed to {:.1} mm without touching the part", cell.opening_m() * 1e3))
-                }
-                [left, _] => Some(format!("only the {} finger touches the part", if left { "left" } else { "right" })),
-            },
-            GraspStep::Lift | GraspStep::Hold => self.lifted(cell),
+            GraspStep::Close => cell.why_not_grasped(),
+            GraspStep::Lift | GraspStep::Hold => cell.why_not_lifted(self.success_height_m),
         })
     }
 }

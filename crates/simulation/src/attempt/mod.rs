@@ -89,8 +89,7 @@ impl Workcell {
         seed: u64,
     ) -> Result<AttemptReport> {
         let started = Instant::now();
-        let start = self.random_start(&config.grasp, seed)?;
-        self.reset(&start)?;
+        self.reset_for_attempt(&config.grasp, seed)?;
         if let Some(record) = &config.record {
             self.start_recording(record)?;
         }
@@ -118,6 +117,15 @@ impl Workcell {
             perception_secs,
             frames,
         })
+    }
+
+    /// Puts everything back to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
+    ///
+    /// # Errors
+    /// A first look-out pose that the arm cannot reach.
+    pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
+        let start = self.random_start(config, seed)?;
+        self.reset(&start)
     }
 
     /// A configuration around the ready pose, well above the table, from which the first look can be
