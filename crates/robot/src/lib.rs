@@ -50,7 +50,7 @@ pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use safety::{Capsule, CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
-    SURE, camera_looking_down, grasp,
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, SURE,
+    camera_looking_down, grasp,
 };
 pub use watch::{HISTORY_SECS, MAX_SILENCE_SECS, StopReason, StopRequest, Watch};

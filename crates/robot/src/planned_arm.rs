@@ -1,8 +1,6 @@
 //! An arm that moves on paper only: what a sequence would do, before it is done.
 
-use crate::arm::{
-    Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS,
-};
+use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
 use crate::error::Result;
 use crate::safety::CheckedMotion;
 use crate::watch::Watch;
@@ -32,14 +30,7 @@ impl PlannedArm {
     pub fn new(q: JointVector, opening_m: f64) -> Self {
         let zero = JointVector::zeros();
         Self {
-            state: ArmState {
-                time_secs: 0.0,
-                q,
-                dq: zero,
-                q_commanded: q,
-                tau_external_nm: zero,
-                mode: ArmMode::Idle,
-            },
+            state: ArmState { time_secs: 0.0, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Idle },
             hand: HandState { opening_m, is_grasping: false, force_n: None },
             actions: Vec::new(),
         }
@@ -56,7 +47,12 @@ impl PlannedArm {
     }
 
     /// Joint positions (rad) and opening of the hand (m) at regular times, the first at the start.
-    pub fn frames(start: &JointVector, opening_m: f64, actions: &[PlannedAction], period_secs: f64) -> Vec<(JointVector, f64)> {
+    pub fn frames(
+        start: &JointVector,
+        opening_m: f64,
+        actions: &[PlannedAction],
+        period_secs: f64,
+    ) -> Vec<(JointVector, f64)> {
         let mut frames = vec![(*start, opening_m)];
         let (mut q, mut opening_m) = (*start, opening_m);
         let mut rest_secs = period_secs;

@@ -70,7 +70,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 println!("{name} seed {seed}: in one process {:?}, over the network {said} {why}", report.outcome);
             }
         }
-        println!("{name}: {in_process} in one process, {network} over the network, of {num_attempts}; other: {differing:?}");
+        println!(
+            "{name}: {in_process} in one process, {network} over the network, of {num_attempts}; other: {differing:?}"
+        );
     }
     Ok(())
 }

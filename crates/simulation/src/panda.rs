@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, SVector};
 
 use crate::data::Data;
 use crate::error::Result;
-use crate::scene::pose_attributes;
 use crate::model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Model, Site};
+use crate::scene::pose_attributes;
 
 /// Number of the arm's joints.
 pub const NUM_ARM_JOINTS: usize = 7;

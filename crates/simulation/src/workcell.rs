@@ -51,7 +51,13 @@ pub enum CameraPlace {
 impl WorkcellConfig {
     /// A scene with the wrist camera's usual pictures, without errors.
     pub fn new(scene: SceneVariation) -> Self {
-        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default(), wrist_camera: None, camera_place: None }
+        Self {
+            scene,
+            wrist_render: RenderConfig::default(),
+            errors: AttemptErrors::default(),
+            wrist_camera: None,
+            camera_place: None,
+        }
     }
 }
 
@@ -385,12 +391,10 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
         }
         Some(CameraPlace::InBase(base_from_camera)) => {
             let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
-            let fovy_deg = fovy_deg.unwrap_or(
-                vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees(),
-            );
-            camera_in_base = format!(
-                "<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>"
-            );
+            let fovy_deg = fovy_deg
+                .unwrap_or(vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees());
+            camera_in_base =
+                format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
         }
     }
     let xml = include_str!("../assets/workcell.xml")

@@ -125,5 +125,8 @@ fn nobody_at_the_address_is_one_line() {
     let error = sdg_robot::FrankaArm::connect(&"127.0.0.1:9".parse().unwrap(), sdg_robot::Scheduling::Ordinary)
         .unwrap_err()
         .to_string();
-    assert!(error.starts_with("the connection to the robot at 127.0.0.1:9 is lost") && !error.contains('\n'), "{error}");
+    assert!(
+        error.starts_with("the connection to the robot at 127.0.0.1:9 is lost") && !error.contains('\n'),
+        "{error}"
+    );
 }

@@ -9,8 +9,8 @@ use sdg_camera::{Address, LatestFrame};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, Pace, PartFinder,
-    Robot, SafetyLimits,
+    Arm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, PartFinder, Robot,
+    SafetyLimits,
 };
 use serde_json::{Value, json};
 
@@ -104,7 +104,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
 
 fn prepare(args: &GraspArgs) -> Result<Prepared> {
     let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
-    let pace = Pace::at_speed(args.speed).map_err(|error| Usage(format!("--speed: {error}")))?;
+    let pace = robots::pace(args.speed)?;
     if !(args.max_detection_age_secs > 0.0 && args.max_detection_age_secs.is_finite()) {
         let found = args.max_detection_age_secs;
         return Err(Usage(format!("--max-detection-age-secs: expected a positive number, found {found}")).into());
@@ -120,8 +120,7 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
     files::check_writable(&args.states)?;
-    let config =
-        GraspConfig { pace, max_detection_age_secs: args.max_detection_age_secs, ..workcell.grasp_config() };
+    let config = GraspConfig { pace, max_detection_age_secs: args.max_detection_age_secs, ..workcell.grasp_config() };
     Ok(Prepared { workcell, model, camera, config })
 }
 
@@ -132,7 +131,9 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
 
     let Address::Sim(text) = &args.from else {
         let found = &args.from;
-        return Err(Usage(format!("--from: with --robot sim expected sim:PART or sim:PART?seed=N, found {found}")).into());
+        return Err(
+            Usage(format!("--from: with --robot sim expected sim:PART or sim:PART?seed=N, found {found}")).into()
+        );
     };
     let scene = robots::simulated_scene(text)?;
     let (intrinsics, place) = prepared.camera.simulated();
@@ -220,10 +221,13 @@ fn tell(args: &GraspArgs, prepared: &Prepared, report: &GraspReport, secs: f64, 
     match &report.outcome {
         GraspOutcome::Held => {
             let width_mm = report.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
-            eprintln!("the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s); sdg robot open lets it go");
+            eprintln!(
+                "the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s); sdg robot open lets it go"
+            );
             Ok(Outcome::Done)
         }
-        GraspOutcome::Failed { step: GraspStep::Detect, why } if report.targets.iter().all(Option::is_none) => {
+        // A look was taken, and the part was not in it; a motion that was refused before is another matter.
+        GraspOutcome::Failed { step: GraspStep::Detect, why } if report.targets.last() == Some(&None) => {
             eprintln!("{why}");
             Ok(Outcome::NothingToGrasp)
         }

@@ -69,7 +69,9 @@ impl DryRun {
         match &self.outcome {
             GraspOutcome::Held => eprintln!("  {:.0} s in all", self.arm.duration_secs()),
             GraspOutcome::Failed { .. } if !is_seen => {
-                eprintln!("  the part is not seen from where the arm stands: this is the way to the look-out poses only");
+                eprintln!(
+                    "  the part is not seen from where the arm stands: this is the way to the look-out poses only"
+                );
             }
             GraspOutcome::Failed { step, why } => return Err(anyhow!("{step}: {why}")),
         }

@@ -64,9 +64,9 @@ impl PlacedCamera {
     /// The same for the sequence.
     pub(crate) fn mount(&self) -> CameraMount {
         match self.place {
-            Place::OnFlange(flange_from_camera) => CameraMount::Hand {
-                tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera,
-            },
+            Place::OnFlange(flange_from_camera) => {
+                CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
+            }
             Place::InBase(_) => CameraMount::Base,
         }
     }

@@ -11,7 +11,7 @@ mod workcell_file;
 use std::str::FromStr;
 
 use anyhow::Result;
-use sdg_robot::{RobotAddress, Scheduling, StopReason, Watch};
+use sdg_robot::{Pace, RobotAddress, Scheduling, StopReason, Watch};
 
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;
@@ -65,6 +65,14 @@ impl RobotChoice {
 /// How the loop that drives a real arm is scheduled.
 pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
     if no_realtime { Scheduling::Ordinary } else { Scheduling::RealTime }
+}
+
+/// `--speed`.
+///
+/// # Errors
+/// [`Usage`] for what is no share, or too large a one.
+pub(crate) fn pace(speed: f64) -> Result<Pace> {
+    Pace::at_speed(speed).map_err(|error| Usage(format!("--{error}")).into())
 }
 
 /// Stops the arm where Ctrl-C is pressed.

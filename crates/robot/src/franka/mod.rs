@@ -28,8 +28,9 @@ pub use address::RobotAddress;
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
-/// Bounds every wait for the robot.
-const TIMEOUT: Duration = Duration::from_secs(1);
+/// Bounds every wait for the robot. A real one stops by itself after 20 ms; a server in lockstep waits a second for a packet that was
+/// lost, and then goes on.
+const TIMEOUT: Duration = Duration::from_secs(3);
 /// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
 const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
 const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];

@@ -21,8 +21,8 @@ use crate::error::{Result, RobotError};
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;
 
-pub use look::SURE;
 pub use config::{CameraMount, GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
+pub use look::SURE;
 
 /// Least height of the arm over the table on its free motions, m.
 pub const FREE_CLEARANCE_M: f64 = 0.05;

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use sdg_kinematics::HAND_OPENING_MAX_M;
-use sdg_robot::{Arm, HandCommand, HandState, Watch};
+use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load, Watch};
 
 use super::ArmArgs;
 use crate::exit::{Outcome, Usage};
@@ -41,7 +41,10 @@ pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
         let found = args.width_mm;
         return Err(Usage(format!("--width-mm: expected 0 to {:.0}, found {found}", HAND_OPENING_MAX_M * 1e3)).into());
     }
-    let hand = command(&args.arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S })?;
+    let (mut arm, _) = args.arm.connect()?;
+    let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S })?;
+    // What the hand carried is not there any more.
+    arm.set_load(Load::NONE)?;
     eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
@@ -50,15 +53,15 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     if !(1.0..=MAX_FORCE_N).contains(&args.force_n) {
         return Err(Usage(format!("--force-n: expected 1 to {MAX_FORCE_N}, found {}", args.force_n)).into());
     }
-    let command_it = HandCommand::Grasp { width_m: ANY_WIDTH_M, speed_m_s: SPEED_M_S, force_n: args.force_n };
-    let hand = command(&args.arm, command_it)?;
+    let (mut arm, _) = args.arm.connect()?;
+    let close = HandCommand::Grasp { width_m: ANY_WIDTH_M, speed_m_s: SPEED_M_S, force_n: args.force_n };
+    let hand = command(&mut arm, close)?;
     let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
     eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 
-fn command(args: &ArmArgs, command: HandCommand) -> Result<HandState> {
-    let (mut arm, _) = args.connect()?;
+fn command(arm: &mut FrankaArm, command: HandCommand) -> Result<HandState> {
     arm.start_hand(command)?;
     Ok(arm.finish_hand(&mut Watch::default())?)
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use sdg_kinematics::ready_pose;
-use sdg_robot::{DEFAULT_SPEED, FrankaArm, Pace, Robot};
+use sdg_robot::{DEFAULT_SPEED, FrankaArm, Robot};
 
 use super::ArmArgs;
 use crate::exit::{Outcome, Usage};
@@ -45,7 +45,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let Some(path) = &args.arm.workcell else {
         return Err(Usage("expected --workcell FILE, which says where the arm may be".to_owned()).into());
     };
-    let pace = Pace::at_speed(args.speed).map_err(|error| Usage(format!("--speed: {error}")))?;
+    let pace = robots::pace(args.speed)?;
     let (workcell, _) = robots::read_workcell(path)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
