@@ -142,7 +142,7 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
     grasp(&base, &sim, 1, &["camera_at_mm: expected joints_deg"]);
     let no_hand_eye = folder.path().join("camera.yaml");
     let camera = fs::read_to_string(shipped("workcell/camera.yaml")).unwrap();
-    fs::write(&no_hand_eye, camera.split("hand_eye:").next().unwrap()).unwrap();
+    fs::write(&no_hand_eye, camera.split("\nhand_eye:").next().unwrap()).unwrap();
     grasp(&moved, &sim, 1, &["camera.yaml: expected hand_eye: flange_from_camera", "sdg camera hand-eye --mount hand"]);
 
     let without_lengths = taught(folder.path(), false);
