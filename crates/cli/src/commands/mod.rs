@@ -21,5 +21,7 @@ pub mod evaluate_pictures;
 pub mod man;
 #[cfg(feature = "simulation")]
 pub mod rehearse;
+#[cfg(feature = "simulation")]
+pub mod simulate;
 pub mod teach;
 pub mod weights;
