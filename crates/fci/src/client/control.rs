@@ -223,7 +223,8 @@ impl Robot {
             let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
             last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
         });
-        let errors = self.state.reflex_reason.iter().chain(self.state.errors.iter()).collect();
+        // Both tell the same on a Panda; there are servers whose reasons pile up over motions.
+        let errors = if self.state.errors.is_empty() { self.state.reflex_reason } else { self.state.errors };
         FciError::Motion { status: response.status, errors, success_rate }
     }
 

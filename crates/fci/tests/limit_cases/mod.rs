@@ -114,7 +114,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
             outside: Signal::JointPosition { joint: 6, profile: Profile::distance(to_the_end + 0.001, 8000) },
         },
         case("joint velocity, by positions", RobotError::JointMotionGeneratorVelocityLimitsViolation, &|share| {
-            position(Profile::velocity(velocity * share, 400))
+            position(Profile::velocity_burst(velocity * share, 800, 0.4 * acceleration))
         }),
         case("joint acceleration, by positions", RobotError::JointMotionGeneratorVelocityDiscontinuity, &|share| {
             position(Profile::acceleration(acceleration * share))
@@ -123,7 +123,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
             position(Profile::jerk(jerk * share))
         }),
         case("joint velocity, by velocities", RobotError::JointMotionGeneratorVelocityLimitsViolation, &|share| {
-            speed(Profile::velocity(velocity * share, 400))
+            speed(Profile::velocity_burst(velocity * share, 800, 0.4 * acceleration))
         }),
         case("joint acceleration, by velocities", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
             speed(Profile::acceleration(acceleration * share))
@@ -192,8 +192,8 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         Case {
             name: "frame",
             error: RobotError::CartesianPositionMotionGeneratorInvalidFrameFlag,
-            inside: Signal::Frame { scale: 1.0 + 4e-6 },
-            outside: Signal::Frame { scale: 1.0 + 6e-6 },
+            inside: Signal::Frame { scale: 1.0 + 0.9e-5 },
+            outside: Signal::Frame { scale: 1.0 + 1.1e-5 },
         },
         Case {
             name: "unanswered states",
@@ -275,6 +275,8 @@ fn answer<T>(value: T, is_last: bool) -> Answer<T> {
 
 /// How long motions last that command no profile.
 const STANDING_MS: u64 = 100;
+/// Profiles begin after so many cycles of standing.
+const PROFILE_START_MS: u64 = 30;
 /// When those do what they are made for.
 const EVENT_MS: u64 = 20;
 
@@ -324,6 +326,29 @@ impl Signal {
     /// Sets what is commanded in the `ms`th cycle; true in the last.
     fn fill(&self, command: &mut RobotCommand, ms: u64, state: &RobotState, start: &RobotState) -> bool {
         let motion = &mut command.motion;
+        // The first command of a motion is judged by other rules, and torques take over from the internal controller.
+        let since_start = ms.checked_sub(PROFILE_START_MS);
+        match self {
+            Signal::Elbow { .. } if since_start.is_none() => motion.valid_elbow = true,
+            Signal::Torque { .. } | Signal::SpunJoint { .. } if since_start.is_none() => {
+                command.torque = holding_torque(state, start);
+            }
+            _ => {}
+        }
+        let is_profile = !matches!(
+            self,
+            Signal::StartPosition { .. }
+                | Signal::StartPose { .. }
+                | Signal::StartElbow { .. }
+                | Signal::ElbowSign { .. }
+                | Signal::Frame { .. }
+                | Signal::Unanswered { .. }
+        );
+        let ms = match since_start {
+            Some(since_start) if is_profile => since_start,
+            None if is_profile => return false,
+            _ => ms,
+        };
         match self {
             Signal::JointPosition { joint, profile } => {
                 motion.q[*joint] += profile.offset(ms);
@@ -356,9 +381,7 @@ impl Signal {
             }
             Signal::SpunJoint { profile } => {
                 command.torque = holding_torque(state, start);
-                let wanted = 20.0 * (profile.value(ms) - state.dq[6]);
-                // Within the torque's rate and range.
-                command.torque[6] = wanted.clamp(state.torque_desired[6] - 0.9, state.torque_desired[6] + 0.9).clamp(-11.0, 11.0);
+                command.torque[6] = within_rate(20.0 * (profile.value(ms) - state.dq[6]), state, 6).clamp(-11.0, 11.0);
                 return profile.is_over(ms);
             }
             Signal::StartPosition { offset } => motion.q[0] += offset,
@@ -382,7 +405,16 @@ impl Signal {
     }
 }
 
-/// Springs and dampers that keep the joints where they started.
+/// Springs and dampers that keep the joints where they started; joint 7 is let go.
 fn holding_torque(state: &RobotState, start: &RobotState) -> [f64; 7] {
-    std::array::from_fn(|joint| 60.0 * (start.q[joint] - state.q[joint]) - 6.0 * state.dq[joint])
+    std::array::from_fn(|joint| {
+        let spring = 60.0 * (start.q[joint] - state.q[joint]) - 6.0 * state.dq[joint];
+        within_rate(if joint == 6 { 0.0 } else { spring }, state, joint)
+    })
+}
+
+/// A torque that is reached from the last one within the torque's rate.
+fn within_rate(torque: f64, state: &RobotState, joint: usize) -> f64 {
+    let last = state.torque_desired[joint];
+    torque.clamp(last - 0.9, last + 0.9)
 }

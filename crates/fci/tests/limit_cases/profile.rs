@@ -18,6 +18,18 @@ impl Profile {
         Self(up.chain([peak; 3]).chain(down).collect())
     }
 
+    /// As [`Profile::velocity`] to 0.8 of the peak, and from there for a moment to the peak at a constant acceleration: an arm that
+    /// overshoots is not measured beyond the limit.
+    pub fn velocity_burst(peak: f64, ramp_ms: u32, acceleration: f64) -> Self {
+        let base = 0.8 * peak;
+        let num_steps = ((peak - base) / (acceleration * PERIOD_SECS)).ceil();
+        let up = (1..=num_steps as u32).map(move |step| base + (peak - base) * f64::from(step) / num_steps);
+        let burst: Vec<f64> = up.clone().chain([peak; 2]).chain(up.rev()).collect();
+        let slow = Self::velocity(base, ramp_ms).0;
+        let (rising, falling) = slow.split_at(ramp_ms as usize + 1);
+        Self([rising, &burst, falling].concat())
+    }
+
     /// Up to an acceleration in ten steps, held for three cycles; the same the other way round leads back to rest.
     pub fn acceleration(peak: f64) -> Self {
         let up = (1..=10).map(|step| peak * f64::from(step) / 10.0);
