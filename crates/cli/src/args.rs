@@ -34,6 +34,9 @@ pub enum Command {
     Detect(DetectArgs),
     /// Grasp attempts in MuJoCo
     Rehearse(RehearseArgs),
+    /// A simulated robot on the network, for programs of others
+    #[cfg(feature = "simulation")]
+    Simulate(crate::commands::simulate::SimulateArgs),
     /// The paper's protocol: every model on every part, and the paper's tables; or a model on your own labelled pictures
     Evaluate(EvaluateArgs),
     /// One grasp, from the picture to the lifted part, with a real arm or a simulated one

@@ -80,6 +80,8 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Detect(detect) => commands::detect::run(detect),
         #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
+        #[cfg(feature = "simulation")]
+        Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Evaluate(evaluate) if evaluate.pictures.is_some() => commands::evaluate_pictures::run(evaluate),
         #[cfg(feature = "simulation")]
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),

@@ -4,18 +4,21 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 
 use crate::wire::Transform;
 
-/// How far a commanded rotation may be off orthonormal (libfranka's bound).
-const ORTHONORMAL_TOLERANCE: f64 = 1e-5;
+/// How far the lengths of a commanded rotation's columns and rows may be off 1 (libfranka's bound).
+const LENGTH_TOLERANCE: f64 = 1e-5;
 
-/// Whether a matrix is a rotation and a translation, all finite, with the last row 0 0 0 1.
+/// Whether a matrix is a rotation and a translation, all finite, with the last row 0 0 0 1; what libfranka accepts, but no
+/// mirror.
 pub fn is_rigid(transform: &Transform) -> bool {
     if !transform.iter().all(|value| value.is_finite()) {
         return false;
     }
     let bottom = [transform[3], transform[7], transform[11], transform[15]];
     let rotation = rotation_of(transform);
+    let is_long_as_one = |length: f64| (length - 1.0).abs() <= LENGTH_TOLERANCE;
     bottom == [0.0, 0.0, 0.0, 1.0]
-        && (rotation * rotation.transpose() - Matrix3::identity()).amax() < ORTHONORMAL_TOLERANCE
+        && rotation.column_iter().all(|column| is_long_as_one(column.norm()))
+        && rotation.row_iter().all(|row| is_long_as_one(row.norm()))
         && rotation.determinant() > 0.0
 }
 

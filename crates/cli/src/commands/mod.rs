@@ -23,5 +23,7 @@ pub mod man;
 #[cfg(feature = "simulation")]
 pub mod rehearse;
 pub mod robot;
+#[cfg(feature = "simulation")]
+pub mod simulate;
 pub mod teach;
 pub mod weights;

@@ -62,13 +62,16 @@ impl CartesianReference {
         {
             return Err(RobotError::CartesianPositionMotionGeneratorStartPoseInvalid.into());
         }
-        self.to(pose, motion / PERIOD_SECS, command, is_first, limits)
+        let acceleration_error = RobotError::CartesianMotionGeneratorVelocityDiscontinuity;
+        self.to(pose, motion / PERIOD_SECS, acceleration_error, command, is_first, limits)
     }
 
     /// The reference after a commanded twist, or what the robot stops for.
     pub fn to_twist(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         let twist = Vector6::from(command.twist);
-        self.to(moved(&self.pose, &(twist * PERIOD_SECS)), twist, command, is_first, limits)
+        // Named after the interface: what is commanded here is the velocity.
+        let acceleration_error = RobotError::CartesianMotionGeneratorAccelerationDiscontinuity;
+        self.to(moved(&self.pose, &(twist * PERIOD_SECS)), twist, acceleration_error, command, is_first, limits)
     }
 
     /// The reference after a cycle without a command: constant acceleration.
@@ -88,6 +91,7 @@ impl CartesianReference {
         &self,
         pose: Isometry3<f64>,
         twist: Vector6<f64>,
+        acceleration_error: RobotError,
         command: &MotionCommand,
         is_first: bool,
         limits: &Limits,
@@ -101,10 +105,7 @@ impl CartesianReference {
         };
         let violated = [
             (RobotError::CartesianMotionGeneratorVelocityLimitsViolation, exceeds(&next.twist, |rate| rate.velocity)),
-            (
-                RobotError::CartesianMotionGeneratorVelocityDiscontinuity,
-                exceeds(&next.twist_rate, |rate| rate.acceleration),
-            ),
+            (acceleration_error, exceeds(&next.twist_rate, |rate| rate.acceleration)),
             (RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, exceeds(&jerk, |rate| rate.jerk)),
         ];
         let errors: RobotErrors =

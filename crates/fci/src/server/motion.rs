@@ -5,7 +5,7 @@ use nalgebra::Isometry3;
 use super::cartesian::{CartesianReference, elbow_of, joint_step};
 use super::communication::Communication;
 use super::plant::{Jacobian, JointVector};
-use super::reference::{GeneratorKind, JointReference, PERIOD_SECS, ROUNDING};
+use super::reference::{JointReference, PERIOD_SECS, ROUNDING};
 use crate::limits::Limits;
 use crate::pose::difference;
 use crate::robot_error::{RobotError, RobotErrors};
@@ -70,19 +70,12 @@ impl Motion {
         if command.motion.finished {
             // A motion must end at rest: what follows is a standing reference.
             let stopped = next.joints.to_velocity(JointVector::zeros());
-            let errors = stopped.violations(&next.joints, limits, self.kind());
+            let errors = stopped.violations(&next.joints, limits, self.generator);
             if !errors.is_empty() {
                 return Err(errors);
             }
         }
         Ok((next, command.motion.finished))
-    }
-
-    fn kind(&self) -> GeneratorKind {
-        match self.generator {
-            MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => GeneratorKind::Cartesian,
-            _ => GeneratorKind::Joint,
-        }
     }
 
     fn generate(
@@ -115,7 +108,7 @@ impl Motion {
             }
             MotionGeneratorMode::None | MotionGeneratorMode::Idle => *last,
         };
-        let errors = next.joints.violations(&last.joints, limits, self.kind());
+        let errors = next.joints.violations(&last.joints, limits, self.generator);
         if errors.is_empty() { Ok(next) } else { Err(errors) }
     }
 
@@ -162,9 +155,11 @@ impl Motion {
 
     /// A lost motion command goes on at constant acceleration; a lost torque stays.
     fn extrapolate(&self, last: &References, end_effector_at: EndEffectorAt) -> References {
-        match self.kind() {
-            GeneratorKind::Joint => with_joints(last, last.joints.extrapolated(), end_effector_at),
-            GeneratorKind::Cartesian => with_cartesian(last, last.cartesian.extrapolated(), false, end_effector_at),
+        match self.generator {
+            MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => {
+                with_cartesian(last, last.cartesian.extrapolated(), false, end_effector_at)
+            }
+            _ => with_joints(last, last.joints.extrapolated(), end_effector_at),
         }
     }
 }

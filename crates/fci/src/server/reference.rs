@@ -3,6 +3,7 @@
 use super::plant::JointVector;
 use crate::limits::Limits;
 use crate::robot_error::{RobotError, RobotErrors};
+use crate::wire::MotionGeneratorMode;
 
 /// One cycle in seconds.
 pub const PERIOD_SECS: f64 = 1e-3;
@@ -18,15 +19,6 @@ pub struct JointReference {
     pub dq: JointVector,
     /// rad/s².
     pub ddq: JointVector,
-}
-
-/// By whose names violations are told: the joint generators', or those that poses and twists lead to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GeneratorKind {
-    /// Joint positions and velocities.
-    Joint,
-    /// Poses and twists.
-    Cartesian,
 }
 
 impl JointReference {
@@ -67,33 +59,38 @@ impl JointReference {
     }
 
     /// What the robot would stop for on the way from `previous` to this reference.
-    pub fn violations(&self, previous: &Self, limits: &Limits, kind: GeneratorKind) -> RobotErrors {
+    ///
+    /// The names are the interface's: too large an acceleration is a discontinuity of the velocity where positions or poses are
+    /// commanded, and of the acceleration where velocities or twists are.
+    pub fn violations(&self, previous: &Self, limits: &Limits, generator: MotionGeneratorMode) -> RobotErrors {
         let jerk = (self.ddq - previous.ddq) / PERIOD_SECS;
         let exceeds = |values: &JointVector, limits: &[f64; 7]| {
             values.iter().zip(limits).any(|(value, limit)| value.abs() > limit * ROUNDING)
         };
         let out_of_range = (0..7).any(|joint| !(limits.q_min[joint]..=limits.q_max[joint]).contains(&self.q[joint]));
-        let names = match kind {
-            GeneratorKind::Joint => [
-                RobotError::JointMotionGeneratorPositionLimitsViolation,
-                RobotError::JointMotionGeneratorVelocityLimitsViolation,
-                RobotError::JointMotionGeneratorVelocityDiscontinuity,
-                RobotError::JointMotionGeneratorAccelerationDiscontinuity,
-            ],
-            GeneratorKind::Cartesian => [
+        let [position, velocity, velocity_step, acceleration_step] = match generator {
+            MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => [
                 RobotError::CartesianMotionGeneratorJointPositionLimitsViolation,
                 RobotError::CartesianMotionGeneratorJointVelocityLimitsViolation,
                 RobotError::CartesianMotionGeneratorJointVelocityDiscontinuity,
                 RobotError::CartesianMotionGeneratorJointAccelerationDiscontinuity,
             ],
+            _ => [
+                RobotError::JointMotionGeneratorPositionLimitsViolation,
+                RobotError::JointMotionGeneratorVelocityLimitsViolation,
+                RobotError::JointMotionGeneratorVelocityDiscontinuity,
+                RobotError::JointMotionGeneratorAccelerationDiscontinuity,
+            ],
         };
+        let is_velocity =
+            matches!(generator, MotionGeneratorMode::JointVelocity | MotionGeneratorMode::CartesianVelocity);
         let violated = [
-            out_of_range,
-            exceeds(&self.dq, &limits.velocity),
-            exceeds(&self.ddq, &limits.acceleration),
-            exceeds(&jerk, &limits.jerk),
+            (position, out_of_range),
+            (velocity, exceeds(&self.dq, &limits.velocity)),
+            (if is_velocity { acceleration_step } else { velocity_step }, exceeds(&self.ddq, &limits.acceleration)),
+            (acceleration_step, exceeds(&jerk, &limits.jerk)),
         ];
-        names.into_iter().zip(violated).filter_map(|(name, violated)| violated.then_some(name)).collect()
+        violated.into_iter().filter_map(|(name, violated)| violated.then_some(name)).collect()
     }
 }
 
@@ -108,7 +105,7 @@ mod tests {
     }
 
     fn names(previous: &JointReference, next: &JointReference) -> Vec<&'static str> {
-        let errors = next.violations(previous, &Limits::PANDA, GeneratorKind::Joint);
+        let errors = next.violations(previous, &Limits::PANDA, MotionGeneratorMode::JointPosition);
         errors.iter().map(RobotError::name).collect()
     }
 
@@ -133,8 +130,8 @@ mod tests {
         {
             assert_eq!(names(&fast, &fast.to_velocity(with_joint_1([0.0, velocity, 0.0]).dq)), expected);
         }
-        let near_the_end = with_joint_1([2.8972, 0.09, 0.0]);
-        for (q, expected) in [(2.89729, vec![]), (2.89731, vec!["joint_motion_generator_position_limits_violation"])] {
+        let near_the_end = with_joint_1([2.89725, 0.05, 0.0]);
+        for (q, expected) in [(2.897299, vec![]), (2.897301, vec!["joint_motion_generator_position_limits_violation"])] {
             assert_eq!(names(&near_the_end, &near_the_end.to_position(with_joint_1([q, 0.0, 0.0]).q)), expected);
         }
     }

@@ -15,10 +15,16 @@ use crate::wire::{
     Command, ControllerMode, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, Status,
 };
 
-/// Measured velocities overshoot commanded ones: joints by this much, rad/s, before the robot stops.
+/// Measured velocities overshoot commanded ones: by this much, rad/s or m/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
+/// Measured positions may be this far, rad, beyond the range that commanded ones must keep.
+const MEASURED_POSITION_MARGIN: f64 = 0.01;
 /// So many cycles of a recovery the arm yields to what it touches, so that the next motion does not start in a collision.
 const RECOVERY_CYCLES: u32 = 200;
+/// Nothing has to be simulated once the measured velocities are below this, rad/s, or after so many cycles without a motion: an
+/// arm that presses on something may never stand wholly still.
+const STILL: f64 = 1e-3;
+const MAX_SETTLING_CYCLES: u32 = 1000;
 /// A measured joint velocity below this, rad/s, is standing.
 const STANDING: f64 = 0.01;
 
@@ -50,6 +56,8 @@ pub struct RobotCore {
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
     pub(super) torque_rate: JointVector,
+    /// Cycles since the last motion.
+    idle_cycles: u32,
     /// Cycles that the present recovery takes yet.
     recovery_cycles: u32,
     /// Answers that wait for the arm to stand.
@@ -83,6 +91,7 @@ impl RobotCore {
             time_ms: 1,
             torque,
             torque_rate: JointVector::zeros(),
+            idle_cycles: 0,
             recovery_cycles: 0,
             waiting: Vec::new(),
             outbox: Vec::new(),
@@ -101,7 +110,8 @@ impl RobotCore {
 
     /// Whether nothing moves and nobody waits for an answer.
     pub fn is_settled(&self) -> bool {
-        self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest()
+        let is_still = self.observation.dq.amax() < STILL || self.idle_cycles > MAX_SETTLING_CYCLES;
+        self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest() && is_still
     }
 
     /// Lets a millisecond pass for the robot's clock alone.
@@ -178,6 +188,7 @@ impl RobotCore {
     /// # Errors
     /// The plant's.
     pub fn cycle(&mut self, plant: &mut dyn Plant, command: Option<&RobotCommand>) -> Result<(), String> {
+        self.idle_cycles = if self.motion.is_some() { 0 } else { self.idle_cycles.saturating_add(1) };
         self.update_references(plant, command);
         let (flange, flange_jacobian) = plant.flange(&self.observation.q);
         self.references.torque = self.controller_torque(plant, &flange, &flange_jacobian);
@@ -339,11 +350,15 @@ impl RobotCore {
         if (0..7).any(|joint| dq[joint].abs() > self.limits.velocity[joint] + MEASURED_VELOCITY_MARGIN) {
             errors.insert(RobotError::JointVelocityViolation);
         }
-        if (0..7).any(|joint| !(self.limits.q_min[joint]..=self.limits.q_max[joint]).contains(&q[joint])) {
+        let is_out_of_range = |joint: usize| {
+            q[joint] < self.limits.q_min[joint] - MEASURED_POSITION_MARGIN
+                || q[joint] > self.limits.q_max[joint] + MEASURED_POSITION_MARGIN
+        };
+        if (0..7).any(is_out_of_range) {
             errors.insert(RobotError::JointPositionLimitsViolation);
         }
         let twist = shifted(&flange_jacobian, &flange, &flange_from_ee) * dq;
-        if twist.fixed_rows::<3>(0).norm() > self.limits.translation.velocity {
+        if twist.fixed_rows::<3>(0).norm() > self.limits.translation.velocity + MEASURED_VELOCITY_MARGIN {
             errors.insert(RobotError::CartesianVelocityViolation);
         }
         if *self_collision {

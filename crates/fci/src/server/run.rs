@@ -42,8 +42,8 @@ pub enum Pace {
 }
 
 impl Pace {
-    /// Lockstep with a second for each answer.
-    pub const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_secs(1) };
+    /// Lockstep with half a second for each answer: libfranka gives up on a robot that is silent for a second.
+    pub const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(500) };
 }
 
 /// Where and how to serve.
