@@ -10,7 +10,7 @@ use sdg_kinematics::JointVector;
 #[derive(Debug, Clone)]
 pub enum PlannedAction {
     /// A motion, checked as for a real arm.
-    Motion(CheckedMotion),
+    Motion(Box<CheckedMotion>),
     /// Standing still, s.
     Wait(f64),
     /// The hand, as it was told.
@@ -91,7 +91,7 @@ impl Arm for PlannedArm {
     fn follow(&mut self, motion: &CheckedMotion, _watch: &mut Watch) -> Result<MotionEnd> {
         self.state.time_secs += (motion.duration_secs() / PERIOD_SECS).ceil() * PERIOD_SECS;
         (self.state.q, self.state.q_commanded) = (*motion.end(), *motion.end());
-        self.actions.push(PlannedAction::Motion(motion.clone()));
+        self.actions.push(PlannedAction::Motion(Box::new(motion.clone())));
         Ok(MotionEnd::Arrived)
     }
 

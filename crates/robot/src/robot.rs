@@ -118,7 +118,7 @@ impl<'a, A: Arm> Robot<'a, A> {
     pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
         let state = self.ready()?;
         let apart = (trajectory.start() - state.q_commanded).abs();
-        let joint_idx = (0..NUM_JOINTS).find(|&idx| !(apart[idx] <= MAX_START_DISTANCE_RAD));
+        let joint_idx = (0..NUM_JOINTS).find(|&idx| apart[idx].is_nan() || apart[idx] > MAX_START_DISTANCE_RAD);
         if let Some(joint_idx) = joint_idx {
             let (joint, apart_rad, max_rad) = (joint_idx + 1, apart[joint_idx], MAX_START_DISTANCE_RAD);
             return Err(Violation::StartsElsewhere { joint, apart_rad, max_rad }.into());
@@ -220,10 +220,11 @@ impl<'a, A: Arm> Robot<'a, A> {
 
     /// Remembers an error after which nothing moves.
     fn note<T>(&mut self, result: Result<T>) -> Result<T> {
-        if let Err(error) = &result {
-            if error.latches() && self.latched.is_none() {
-                self.latched = Some(error.to_string());
-            }
+        if let Err(error) = &result
+            && error.latches()
+            && self.latched.is_none()
+        {
+            self.latched = Some(error.to_string());
         }
         result
     }

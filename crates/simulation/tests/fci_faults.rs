@@ -14,9 +14,8 @@ use fci_support::{connect, connect_hand, serve, serve_panda};
 use sdg_fci::client::{InternalController, Robot, RobotConfig};
 use sdg_fci::server::{Pace, Server};
 use sdg_fci::wire::{
-    CollisionBehavior, ControllerMode, Deviation, Header, HeaderKind, MotionCommand,
-    MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status,
-    Version,
+    CollisionBehavior, ControllerMode, Deviation, Header, HeaderKind, MotionCommand, MotionGeneratorMode, MoveRequest,
+    Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status, Version,
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 

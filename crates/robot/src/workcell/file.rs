@@ -157,10 +157,10 @@ pub(super) fn read(text: &str) -> Result<Workcell, WorkcellError> {
             return Err(source.expected(&file.robot.model, "model", "\"panda\" or \"fr3\"", format!("\"{other}\"")));
         }
     };
-    if let Some(address) = &file.robot.address {
-        if let Err(why) = address.get_ref().parse::<RobotAddress>() {
-            return Err(source.error(address.span().start, format!("address: {why}")));
-        }
+    if let Some(address) = &file.robot.address
+        && let Err(why) = address.get_ref().parse::<RobotAddress>()
+    {
+        return Err(source.error(address.span().start, format!("address: {why}")));
     }
     let mounting = match file.camera.mounting.get_ref().as_str() {
         "hand" => Mounting::Hand,

@@ -1,5 +1,7 @@
 //! A simulated Panda on the network, and a twin of its workcell that tells the truth about it.
 
+#![allow(clippy::unwrap_used)]
+
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_robot::{FrankaArm, GraspTarget, PartFinder, RobotAddress, Scheduling};
 use sdg_simulation::{AttemptConfig, PandaPlant, SharedPositions, Workcell, marked_grasp};
