@@ -2,9 +2,18 @@
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
+use sdg_calibration::{CalibratedCamera, Frame, TablePose};
+use sdg_geometry::PinholeCamera;
+use sdg_kinematics::ready_pose;
+use sdg_robot::camera_looking_down;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
 use serde_json::Value;
 
 fn sdg(arguments: &[&str]) -> Output {
@@ -183,4 +192,119 @@ fn an_arm_that_is_not_there_is_one_line() {
     assert_refused(&["robot", "close", "--robot", "h", "--force-n", "0"], 2, &["--force-n: expected 1 to 70"]);
     assert_refused(&["robot", "home", "--robot", "h"], 2, &["expected --workcell FILE"]);
     assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);
+}
+
+/// A simulated Panda on the network, as another program would start it; ended when dropped.
+struct Simulated {
+    child: Child,
+    address: String,
+}
+
+impl Simulated {
+    fn start(further: &[&str]) -> Self {
+        // Two neighbouring ports that are free now.
+        let port = (20_000 + std::process::id() as u16 % 20_000..60_000)
+            .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
+            .unwrap()
+            .to_string();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+            .args(["simulate", "--fci", "--lockstep", "--json", "--port", &port])
+            .args(further)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        assert!(line.contains(&port), "{line}");
+        Self { child, address: format!("127.0.0.1:{port}") }
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The command that a real arm is driven by: a live camera beside the robot, detection, the arm over TCP and UDP.
+#[test]
+fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
+    const SEED: u64 = 3;
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let model = taught(folder.path(), true);
+
+    // The camera stands where the demonstration was photographed from, and sees the scene of the simulated Panda.
+    let base_from_camera = camera_looking_down(0.48, 0.0, 0.58, 0.0);
+    let table = TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: base_from_camera, workspace: None };
+    let camera = CalibratedCamera {
+        name: "beside".to_owned(),
+        intrinsics: PinholeCamera::WRIST,
+        table: Some(table),
+        flange_from_camera: None,
+    };
+    fs::write(file("camera.yaml"), camera.to_yaml()).unwrap();
+    let variation = VariationConfig { appearance: false, distractors: 0..=0, ..VariationConfig::default() };
+    let scene = SceneVariation::sample(Some(&ObjectSpec::by_name("pendulum").unwrap()), &variation, SEED);
+    let place = Some(CameraPlace::InBase(base_from_camera));
+    let mut cell = Workcell::new(&WorkcellConfig { camera_place: place, ..WorkcellConfig::new(scene) }).unwrap();
+    let mut aside = ready_pose();
+    aside[0] = 1.6;
+    cell.reset(&aside).unwrap();
+    // Two pictures in turn: a camera that shows the same bits for long is broken.
+    let mut picture = cell.wrist_view().unwrap().image;
+    picture.save(file("0.png")).unwrap();
+    picture.put_pixel(0, 0, image::Rgb([1, 2, 3]));
+    picture.save(file("1.png")).unwrap();
+    let frames = file("frames.sh");
+    let folder_text = text(folder.path());
+    let script = format!("while :; do cat {folder_text}/0.png; sleep 0.1; cat {folder_text}/1.png; sleep 0.1; done\n");
+    fs::write(&frames, script).unwrap();
+
+    let workcell = fs::read_to_string(shipped("workcell/workcell.toml")).unwrap();
+    let head = workcell.split("[[look_out]]").next().unwrap().replace("mounting = \"hand\"", "mounting = \"base\"");
+    let look_out = "[[look_out]]\njoints_deg = [50, -45, 0, -135, 0, 90, 45]\n";
+    fs::write(file("workcell.toml"), format!("{head}{look_out}")).unwrap();
+
+    let simulated = Simulated::start(&["--object", "pendulum", "--seed", "3"]);
+    let from = format!("cmd:sh {}", frames.display());
+    let (workcell, states) = (file("workcell.toml"), file("states.csv"));
+    // A slow machine is no reason to fail: the part does not move.
+    let grasp = [
+        "grasp",
+        "--robot",
+        &simulated.address,
+        "--from",
+        &from,
+        "--grasp-model",
+        text(&model),
+        "--workcell",
+        text(&workcell),
+        "--states",
+        text(&states),
+        "--speed",
+        "0.6",
+        "--max-detection-age-secs",
+        "60",
+        "--no-realtime",
+        "--json",
+    ];
+    let asked = sdg(&grasp);
+    let stderr = String::from_utf8(asked.stderr).unwrap();
+    assert!(asked.status.success() && stderr.ends_with("nothing was moved\n"), "{stderr}");
+
+    let done = sdg(&[&grasp[..], &["--yes"]].concat());
+    let stderr = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{stderr}");
+    let line: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!((&line["held"], &line["looks"]), (&true.into(), &vec![1, 0].into()), "{line}");
+    let width_m = line["closed_width_m"].as_f64().unwrap();
+    assert!((width_m - 0.016).abs() < 0.002, "{line}");
+
+    let state = sdg(&["robot", "state", "--robot", &simulated.address, "--json"]);
+    let line: Value = serde_json::from_slice(&state.stdout).unwrap();
+    assert_eq!((&line["mode"], &line["hand"]["is_grasping"]), (&"idle".into(), &true.into()), "{line}");
+    let opened = sdg(&["robot", "open", "--robot", &simulated.address]);
+    assert!(opened.status.success(), "{}", String::from_utf8_lossy(&opened.stderr));
 }
