@@ -123,9 +123,7 @@ fn torques_move_the_arm_and_gravity_is_the_robots() {
     let start = robot.read_state().unwrap().clone();
     // Nothing commanded: the arm floats where it is.
     let mut clock = Clock::default();
-    let floating = robot
-        .control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0))
-        .unwrap();
+    let floating = robot.control_torques(|state, step| until([0.0; 7], clock.tick(state, step), 1.0)).unwrap();
     let drift = (0..7).map(|joint| (floating.q[joint] - start.q[joint]).abs()).fold(0.0, f64::max);
     assert!(drift < 5e-3, "{drift}");
     // A spring of the client's own.

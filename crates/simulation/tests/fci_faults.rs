@@ -14,9 +14,8 @@ use fci_support::{connect, connect_hand, serve, serve_panda};
 use sdg_fci::client::{InternalController, Robot, RobotConfig};
 use sdg_fci::server::{Pace, Server};
 use sdg_fci::wire::{
-    CollisionBehavior, ControllerMode, Deviation, Header, HeaderKind, MotionCommand,
-    MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status,
-    Version,
+    CollisionBehavior, ControllerMode, Deviation, Header, HeaderKind, MotionCommand, MotionGeneratorMode, MoveRequest,
+    Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status, Version,
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
@@ -166,6 +165,49 @@ fn twenty_lost_commands_stop_the_arm_and_nineteen_are_made_up_for() {
     }
     assert_stands(&mut robot);
     assert_waits_for_recovery(&mut robot);
+}
+
+#[test]
+fn lost_commands_in_the_middle_of_a_motion_are_made_up_for_in_every_generator() {
+    let server = serve(Pace::Lockstep { max_wait: Duration::from_millis(50) }, Limits::PANDA);
+    let mut robot = connect(&server);
+    for generator in [
+        MotionGeneratorMode::JointPosition,
+        MotionGeneratorMode::JointVelocity,
+        MotionGeneratorMode::CartesianPosition,
+        MotionGeneratorMode::CartesianVelocity,
+    ] {
+        for has_elbow in [false, true] {
+            let start = robot.read_state().unwrap().clone();
+            let mut ms = 0;
+            robot
+                .control_unchecked(ControllerMode::JointImpedance, generator, |_, step| {
+                    ms += step.as_millis() as u64;
+                    // Three lost commands in the acceleration, and three where the speed is largest.
+                    if [250, 251, 252, 500, 501, 502].contains(&ms) {
+                        return Ok(None);
+                    }
+                    // There and back in two seconds.
+                    let phase = std::f64::consts::PI * (ms as f64 / 1000.0).min(2.0);
+                    let (shape, rate) = (0.5 * (1.0 - phase.cos()), 0.5 * std::f64::consts::PI * phase.sin());
+                    let mut motion = MotionCommand {
+                        q: start.q_desired,
+                        base_from_ee: start.base_from_ee_commanded,
+                        elbow: start.elbow_commanded,
+                        valid_elbow: has_elbow,
+                        ..MotionCommand::default()
+                    };
+                    motion.q[0] += 0.2 * shape;
+                    motion.dq[0] = 0.2 * rate;
+                    motion.base_from_ee[13] += 0.05 * shape;
+                    motion.twist[1] = 0.05 * rate;
+                    motion.elbow[0] += 0.05 * shape;
+                    let command = RobotCommand { motion, ..RobotCommand::default() };
+                    Ok(Some(if ms < 2000 { ControlFlow::Continue(command) } else { ControlFlow::Break(command) }))
+                })
+                .unwrap_or_else(|error| panic!("{generator:?}, elbow: {has_elbow}: {error}"));
+        }
+    }
 }
 
 #[test]

@@ -130,8 +130,8 @@ impl Hand {
         let command = request.command().name();
         let id = self.session.sending.send(|id| request.encode(id))?;
         let payload = self.session.wait_for(id, command, Some(MOTION_TIMEOUT))?;
-        let status = HandStatus::decode(&payload)
-            .map_err(|source| FciError::Wire { address: self.session.address, source })?;
+        let status =
+            HandStatus::decode(&payload).map_err(|source| FciError::Wire { address: self.session.address, source })?;
         match status {
             HandStatus::Success => Ok(true),
             HandStatus::Unsuccessful => Ok(false),

@@ -68,11 +68,7 @@ impl Session {
             .map_err(|source| socket_error("start a thread for", address, source))?;
         Ok(Self {
             address,
-            sending: Sending {
-                address,
-                stream: Arc::new(Mutex::new(stream)),
-                next_id: Arc::new(AtomicU32::new(0)),
-            },
+            sending: Sending { address, stream: Arc::new(Mutex::new(stream)), next_id: Arc::new(AtomicU32::new(0)) },
             incoming,
             kept: Vec::new(),
             reader: Some(reader),

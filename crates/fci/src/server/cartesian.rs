@@ -135,12 +135,7 @@ impl CartesianReference {
         {
             return Err(RobotError::CartesianMotionGeneratorElbowLimitViolation.into());
         }
-        Ok(Self {
-            elbow: command.elbow,
-            elbow_velocity: velocity,
-            elbow_acceleration: acceleration,
-            ..self
-        })
+        Ok(Self { elbow: command.elbow, elbow_velocity: velocity, elbow_acceleration: acceleration, ..self })
     }
 }
 

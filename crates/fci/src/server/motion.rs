@@ -39,12 +39,14 @@ pub struct Motion {
     pub generator: MotionGeneratorMode,
     /// Which cycles were answered.
     pub communication: Communication,
+    /// Whether the last command gave the elbow.
+    is_elbow_given: bool,
 }
 
 impl Motion {
     /// A motion that has just been asked for.
     pub fn new(command_id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Self {
-        Self { command_id, controller, generator, communication: Communication::default() }
+        Self { command_id, controller, generator, communication: Communication::default(), is_elbow_given: false }
     }
 
     /// The references after a cycle, and whether the motion is at its end; or what stops the robot.
@@ -63,6 +65,7 @@ impl Motion {
         let Some(command) = command else {
             return Ok((if is_first { *last } else { self.extrapolate(last, end_effector_at) }, false));
         };
+        self.is_elbow_given = command.motion.valid_elbow;
         let mut next = self.generate(last, &command.motion, is_first, limits, end_effector_at)?;
         if self.controller == ControllerMode::External {
             next.torque = self.checked_torque(last, command, limits)?;
@@ -157,7 +160,7 @@ impl Motion {
     fn extrapolate(&self, last: &References, end_effector_at: EndEffectorAt) -> References {
         match self.generator {
             MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => {
-                with_cartesian(last, last.cartesian.extrapolated(), false, end_effector_at)
+                with_cartesian(last, last.cartesian.extrapolated(), self.is_elbow_given, end_effector_at)
             }
             _ => with_joints(last, last.joints.extrapolated(), end_effector_at),
         }

@@ -131,7 +131,8 @@ mod tests {
             assert_eq!(names(&fast, &fast.to_velocity(with_joint_1([0.0, velocity, 0.0]).dq)), expected);
         }
         let near_the_end = with_joint_1([2.89725, 0.05, 0.0]);
-        for (q, expected) in [(2.897299, vec![]), (2.897301, vec!["joint_motion_generator_position_limits_violation"])] {
+        for (q, expected) in [(2.897299, vec![]), (2.897301, vec!["joint_motion_generator_position_limits_violation"])]
+        {
             assert_eq!(names(&near_the_end, &near_the_end.to_position(with_joint_1([q, 0.0, 0.0]).q)), expected);
         }
     }

@@ -194,9 +194,8 @@ impl RobotCore {
         self.references.torque = self.controller_torque(plant, &flange, &flange_jacobian);
         let load = self.load_torque(&flange, &flange_jacobian);
         let total = self.references.torque + self.observation.gravity + load;
-        let total = JointVector::from_fn(|joint, _| {
-            total[joint].clamp(-self.limits.torque[joint], self.limits.torque[joint])
-        });
+        let total =
+            JointVector::from_fn(|joint, _| total[joint].clamp(-self.limits.torque[joint], self.limits.torque[joint]));
         plant.step(&total)?;
         self.time_ms += 1;
         self.torque_rate = (total - self.torque) / PERIOD_SECS;
@@ -295,12 +294,7 @@ impl RobotCore {
         self.references.joints = JointReference { q, dq, ddq: JointVector::zeros() };
     }
 
-    fn controller_torque(
-        &self,
-        plant: &dyn Plant,
-        flange: &Isometry3<f64>,
-        flange_jacobian: &Jacobian,
-    ) -> JointVector {
+    fn controller_torque(&self, plant: &dyn Plant, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
         let controller = self.motion.as_ref().map_or(ControllerMode::JointImpedance, |motion| motion.controller);
         let joints = &self.references.joints;
         // Until the first command of a torque motion, the internal controller holds the arm.

@@ -223,8 +223,7 @@ impl Loop {
             self.statistics.num_motion_cycles += 1;
             self.statistics.num_commands += u64::from(command.is_some());
         }
-        let is_frozen =
-            self.config.pace != Pace::RealTime && self.robot.is_settled() && !self.hand.is_busy();
+        let is_frozen = self.config.pace != Pace::RealTime && self.robot.is_settled() && !self.hand.is_busy();
         if is_frozen {
             self.robot.tick_clock();
         } else {

@@ -125,9 +125,11 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         case("joint velocity, by velocities", RobotError::JointMotionGeneratorVelocityLimitsViolation, &|share| {
             speed(Profile::velocity_burst(velocity * share, 800, 0.4 * acceleration))
         }),
-        case("joint acceleration, by velocities", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
-            speed(Profile::acceleration(acceleration * share))
-        }),
+        case(
+            "joint acceleration, by velocities",
+            RobotError::JointMotionGeneratorAccelerationDiscontinuity,
+            &|share| speed(Profile::acceleration(acceleration * share)),
+        ),
         case("joint jerk, by velocities", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
             speed(Profile::jerk(jerk * share))
         }),
@@ -143,9 +145,11 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         case("turning velocity, by twists", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
             Signal::Twist { profile: Profile::velocity(-turn.velocity * share, 500) }
         }),
-        case("turning acceleration, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
-            Signal::Twist { profile: Profile::acceleration(turn.acceleration * share) }
-        }),
+        case(
+            "turning acceleration, by twists",
+            RobotError::CartesianMotionGeneratorAccelerationDiscontinuity,
+            &|share| Signal::Twist { profile: Profile::acceleration(turn.acceleration * share) },
+        ),
         case("turning jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
             Signal::Twist { profile: Profile::jerk(turn.jerk * share) }
         }),
@@ -207,8 +211,12 @@ pub fn all(limits: &Limits) -> Vec<Case> {
 impl Case {
     /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside of its Cartesian limits for what
     /// it needs of the joints, so that the two are told apart only where the joints are allowed more.
+    #[allow(dead_code, reason = "franka-sim is told to allow the joints more")]
     pub fn is_cartesian(&self) -> bool {
-        matches!(self.inside, Signal::Pose { .. } | Signal::Twist { .. } | Signal::Elbow { .. } | Signal::StartElbow { .. })
+        matches!(
+            self.inside,
+            Signal::Pose { .. } | Signal::Twist { .. } | Signal::Elbow { .. } | Signal::StartElbow { .. }
+        )
     }
 
     /// Whether a motion ended as it should.
