@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::gripper::Gripper;
 use crate::model::Model;
 use crate::panda::{FINGER_TRAVEL_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
+use crate::self_distance::LinkCapsules;
 use crate::workcell::{PERIOD_SECS, WorkcellConfig, build_model};
 
 /// The generalised positions of a plant, for others to look at while a server owns it; see [`PandaPlant::positions`].
@@ -36,6 +37,7 @@ pub struct PandaPlant {
     ids: PandaIds,
     panda: Panda,
     gripper: Gripper,
+    capsules: LinkCapsules,
     /// Arm and hand alone, at rest: what gravity takes.
     standing: (Data, PandaIds),
     positions: SharedPositions,
@@ -73,6 +75,7 @@ impl PandaPlant {
         let xml = format!("<mujoco><compiler angle='radian'/><include file='{PANDA_FILE}'/></mujoco>");
         let alone = Arc::new(Model::from_xml(&xml, &[panda_asset()])?);
         let standing_ids = PandaIds::find(&alone)?;
+        let capsules = LinkCapsules::find(data.model());
         let opening_m = ids.finger_position_m(&data).iter().sum();
         let positions = SharedPositions::default();
         positions.set(data.qpos());
@@ -81,6 +84,7 @@ impl PandaPlant {
             ids,
             panda: Panda::new(),
             gripper: Gripper::at_opening_m(opening_m),
+            capsules,
             standing: (Data::new(alone)?, standing_ids),
             positions,
         })
@@ -116,7 +120,7 @@ impl Plant for PandaPlant {
             gravity,
             coriolis: pick(self.data.qfrc_bias()) - gravity,
             contact_torque: pick(self.data.qfrc_constraint()),
-            self_collision: false,
+            self_collision: self.capsules.distance_m(&self.data) <= 0.0,
         }
     }
 
