@@ -72,7 +72,7 @@ impl Motion {
         }
         if command.motion.finished {
             // A motion must end at rest: what follows is a standing reference.
-            let stopped = next.joints.to_velocity(JointVector::zeros());
+            let stopped = next.joints.after_velocity(JointVector::zeros());
             let errors = stopped.violations(&next.joints, limits, self.generator);
             if !errors.is_empty() {
                 return Err(errors);
@@ -96,17 +96,17 @@ impl Motion {
                 if is_first && (q - last.joints.q).amax() > START_POSITION_RAD {
                     return Err(RobotError::JointPositionMotionGeneratorStartPoseInvalid.into());
                 }
-                with_joints(last, last.joints.to_position(q), end_effector_at)
+                with_joints(last, last.joints.after_position(q), end_effector_at)
             }
             MotionGeneratorMode::JointVelocity => {
-                with_joints(last, last.joints.to_velocity(JointVector::from(command.dq)), end_effector_at)
+                with_joints(last, last.joints.after_velocity(JointVector::from(command.dq)), end_effector_at)
             }
             MotionGeneratorMode::CartesianPosition => {
-                let cartesian = last.cartesian.to_pose(command, is_first, limits)?;
+                let cartesian = last.cartesian.after_pose(command, is_first, limits)?;
                 with_cartesian(last, cartesian, command.valid_elbow, end_effector_at)
             }
             MotionGeneratorMode::CartesianVelocity => {
-                let cartesian = last.cartesian.to_twist(command, is_first, limits)?;
+                let cartesian = last.cartesian.after_twist(command, is_first, limits)?;
                 with_cartesian(last, cartesian, command.valid_elbow, end_effector_at)
             }
             MotionGeneratorMode::None | MotionGeneratorMode::Idle => *last,
@@ -192,7 +192,7 @@ fn with_cartesian(
     let (pose, jacobian) = end_effector_at(&last.joints.q);
     let elbow_step = is_elbow_given.then(|| cartesian.elbow[0] - last.joints.q[2]);
     let step = joint_step(&jacobian, &difference(&pose, &cartesian.pose), elbow_step);
-    let joints = last.joints.to_position(last.joints.q + step);
+    let joints = last.joints.after_position(last.joints.q + step);
     let cartesian = if is_elbow_given {
         cartesian
     } else {
