@@ -1,16 +1,18 @@
-#!/bin/sh
+#!/usr/bin/env bash
 # Programs of others against ours: libfranka 0.9.2 (panda-python) drives `sdg simulate --fci`; our client drives franka-sim.
 # `make test-peers` runs this; everything is installed below target/peers.
-set -eu
+set -euo pipefail
 cd "$(dirname "$0")/.."
 
-peers=target/peers
+target=${CARGO_TARGET_DIR:-target}
+peers=$target/peers
+mkdir -p "$peers"
 # franka-sim and panda-python want different versions of numpy: two environments.
 install() {
-    [ -x "$peers/$1/bin/python" ] || python3 -m venv "$peers/$1"
-    environment=$1
+    local environment=$peers/$1
     shift
-    "$peers/$environment/bin/pip" install -q --disable-pip-version-check "$@"
+    [ -x "$environment/bin/python" ] || python3 -m venv "$environment"
+    "$environment/bin/pip" install --quiet --disable-pip-version-check "$@"
 }
 install panda panda-python==1.1.1
 install fr3 franka-sim==1.1.7 pylibfranka==0.21.3
@@ -18,7 +20,7 @@ install fr3 franka-sim==1.1.7 pylibfranka==0.21.3
 cargo=${CARGO:-cargo}
 $cargo build --release --locked --workspace --bins --example try_views
 $cargo build --release --locked -p sdg-fci --example loop_times --example limit_checks
-examples=target/release/examples
+examples=$target/release/examples
 
 # A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
 realtime=
@@ -41,9 +43,9 @@ trap stop_server EXIT
 
 # The last argument is the address: each server has its own, so that none waits for another's ports.
 serve() {
-    address=$1
+    local address=$1
     shift
-    $realtime target/release/sdg simulate --fci --json --address "$address" "$@" >"$peers/server.log" &
+    $realtime "$target/release/sdg" simulate --fci --json --address "$address" "$@" >"$peers/server.log" &
     server=$!
     for _ in $(seq 100); do
         grep -q robot "$peers/server.log" && return
@@ -81,7 +83,7 @@ cat >"$peers/model/fr3.xml" <<'XML'
 <mujoco model="fr3"><compiler angle="radian"/><option timestep="0.001"/><include file="panda.xml"/></mujoco>
 XML
 # Poses within the Cartesian limits need joint accelerations beyond an FR3's; to tell the two apart, those may be larger.
-FR3_MJCF=$PWD/$peers/model/fr3.xml $realtime "$peers/fr3/bin/run-franka-sim-server" --no-gripper --port 11337 \
+FR3_MJCF=$(realpath "$peers/model/fr3.xml") $realtime "$peers/fr3/bin/run-franka-sim-server" --no-gripper --port 11337 \
     --enforce-comm-constraints --enforce-motion-limits --joint-discontinuity-scale 3 >"$peers/franka-sim.log" 2>&1 &
 server=$!
 for _ in $(seq 60); do

@@ -2,15 +2,18 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod mutations;
+
 use std::io::{self, Read};
 
+use mutations::mutate;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::wire::{
     COMMAND_SIZE_V5, COMMAND_SIZE_V10, CollisionBehavior, Command, ControllerMode, Deviation, HAND_HEADER_SIZE,
-    HEADER_SIZE, HandRequest, HandState, HandStatus, Header, HeaderKind, Load, MAX_MESSAGE_SIZE,
-    MotionCommand, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, RobotState,
-    STATE_SIZE_V5, STATE_SIZE_V10, Status, Version,
+    HEADER_SIZE, HandRequest, HandState, HandStatus, Header, HeaderKind, Load, MotionCommand, MotionGeneratorMode,
+    MoveRequest, Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, STATE_SIZE_V10, Status,
+    Version,
 };
 use sdg_fci::{RobotError, RobotErrors, WireError, read_message};
 
@@ -67,7 +70,8 @@ fn state() -> RobotState {
     state.motion_generator_mode = MotionGeneratorMode::CartesianPosition;
     state.controller_mode = ControllerMode::External;
     state.robot_mode = RobotMode::Reflex;
-    state.errors = [RobotError::JointPositionLimitsViolation, RobotError::BaseAccelerationInvalidReading].into_iter().collect();
+    state.errors =
+        [RobotError::JointPositionLimitsViolation, RobotError::BaseAccelerationInvalidReading].into_iter().collect();
     state.reflex_reason = RobotErrors::from(RobotError::CommunicationConstraintsViolation);
     state.control_command_success_rate = 0.75;
     state
@@ -185,31 +189,6 @@ fn a_message_that_ends_early_or_late_says_by_how_much() {
     assert_eq!(long.to_string(), "a state of 2373 bytes was expected, 2374 were found");
 }
 
-/// Changes bytes, cuts, doubles or lengthens, as often as not more than once.
-fn mutate(bytes: &mut Vec<u8>, rng: &mut Pcg64Mcg) {
-    for _ in 0..rng.random_range(1..=4) {
-        let length = bytes.len();
-        match rng.random_range(0..6) {
-            0 if length > 0 => bytes[rng.random_range(0..length)] = rng.random(),
-            1 if length > 0 => bytes[rng.random_range(0..length)] ^= 1 << rng.random_range(0..8),
-            2 => bytes.truncate(rng.random_range(0..=length)),
-            3 => bytes.extend((0..rng.random_range(1..40)).map(|_| rng.random::<u8>())),
-            4 if length >= 4 => {
-                // Numbers at the ends of their ranges.
-                let at = rng.random_range(0..=length - 4);
-                let extreme = [0, 1, 0x7fff_ffff, 0x8000_0000, u32::MAX, MAX_MESSAGE_SIZE, MAX_MESSAGE_SIZE + 1];
-                bytes[at..at + 4].copy_from_slice(&extreme[rng.random_range(0..extreme.len())].to_le_bytes());
-            }
-            _ if length > 0 => {
-                let (from, to) = (rng.random_range(0..length), rng.random_range(0..length));
-                let piece = bytes[from.min(to)..from.max(to)].to_vec();
-                bytes.extend(piece);
-            }
-            _ => {}
-        }
-    }
-}
-
 /// A stream that notes the largest buffer that is offered to it: what its reader has taken memory for.
 struct Watched<'a> {
     bytes: &'a [u8],
@@ -228,7 +207,9 @@ fn mistakes_in_messages_are_errors_and_take_no_memory() {
     let rng = &mut Pcg64Mcg::seed_from_u64(20);
     let robot_messages: Vec<(Version, Vec<u8>)> = VERSIONS
         .into_iter()
-        .flat_map(|version| requests().into_iter().filter_map(move |request| Some((version, request.encode(1, version)?))))
+        .flat_map(|version| {
+            requests().into_iter().filter_map(move |request| Some((version, request.encode(1, version)?)))
+        })
         .collect();
     let hand_messages: Vec<Vec<u8>> = hand_requests().iter().map(|request| request.encode(1)).collect();
     let mut num_accepted = 0;

@@ -12,6 +12,7 @@ use crate::error::Result;
 use crate::gripper::Gripper;
 use crate::model::Model;
 use crate::panda::{FINGER_TRAVEL_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
+use crate::self_distance::LinkCapsules;
 use crate::workcell::{WorkcellConfig, build_model};
 
 /// The generalised positions of a plant, for others to look at while a server owns it; see [`PandaPlant::positions`].
@@ -37,6 +38,7 @@ pub struct PandaPlant {
     ids: PandaIds,
     panda: Panda,
     gripper: Gripper,
+    capsules: LinkCapsules,
     /// Arm and hand alone, at rest: what gravity takes.
     standing: (Data, PandaIds),
     positions: SharedPositions,
@@ -74,6 +76,7 @@ impl PandaPlant {
         let xml = format!("<mujoco><compiler angle='radian'/><include file='{PANDA_FILE}'/></mujoco>");
         let alone = Arc::new(Model::from_xml(&xml, &[panda_asset()])?);
         let standing_ids = PandaIds::find(&alone)?;
+        let capsules = LinkCapsules::find(data.model());
         let opening_m = ids.finger_position_m(&data).iter().sum();
         let positions = SharedPositions::default();
         positions.set(data.qpos());
@@ -82,6 +85,7 @@ impl PandaPlant {
             ids,
             panda: Panda::new(),
             gripper: Gripper::at_opening_m(opening_m),
+            capsules,
             standing: (Data::new(alone)?, standing_ids),
             positions,
         })
@@ -117,7 +121,7 @@ impl Plant for PandaPlant {
             gravity,
             coriolis: pick(self.data.qfrc_bias()) - gravity,
             contact_torque: pick(self.data.qfrc_constraint()),
-            self_collision: false,
+            self_collision: self.capsules.distance_m(&self.data) <= 0.0,
         }
     }
 
@@ -149,6 +153,9 @@ impl Plant for PandaPlant {
     }
 
     fn move_hand(&mut self, width_m: f64, speed_m_s: f64, force_n: f64) {
+        // The fingers set out from where they are: the reference of what pressed before stands up to 14 mm beyond them, and
+        // would have to come back first.
+        self.gripper = Gripper::at_opening_m(self.hand_width().0);
         self.gripper.drive(width_m, speed_m_s, force_n);
     }
 

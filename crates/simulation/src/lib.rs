@@ -48,6 +48,7 @@ mod perception;
 mod record;
 mod render;
 pub mod scene;
+mod self_distance;
 mod shake;
 pub mod table_camera;
 mod workcell;

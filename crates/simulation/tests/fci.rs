@@ -14,7 +14,7 @@ use fci_support::{connect, connect_hand, serve, serve_panda};
 use sdg_fci::client::{Answer, InternalController, Robot};
 use sdg_fci::server::Pace;
 use sdg_fci::wire::{Load, RobotMode, RobotState};
-use sdg_fci::{Limits, isometry};
+use sdg_fci::{FciError, Limits, RobotError, isometry};
 
 /// How far the arm may lag behind its reference in these slow motions: the stiffness of 3000 N·m/rad yields 0.3 mrad to 1 N·m.
 const LAG_RAD: f64 = 2e-3;
@@ -197,4 +197,23 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
             }
         }
     }
+}
+
+#[test]
+fn the_arm_stops_before_it_touches_itself() {
+    let (_server, mut robot) = serve_panda();
+    let home = robot.read_state().unwrap().q_desired;
+    let mut folded = home;
+    (folded[3], folded[5]) = (-3.0, 0.8);
+    let error = limit_cases::go_to(&mut robot, &folded).unwrap_err();
+    let FciError::Motion { errors, .. } = &error else { panic!("{error}") };
+    assert!(errors.contains(RobotError::SelfCollisionAvoidanceViolation), "{error}");
+    let stopped = robot.read_state().unwrap().q;
+    robot.automatic_error_recovery().unwrap();
+    // What touches already cannot move: the simulated robot is taken by hand, which here is a new one.
+    let share = (stopped[3] - home[3]) / (folded[3] - home[3]);
+    assert!((0.5..1.0).contains(&share), "{share}");
+    let (_server, mut robot) = serve_panda();
+    let just_before = std::array::from_fn(|joint| home[joint] + (share - 0.02) * (folded[joint] - home[joint]));
+    limit_cases::go_to(&mut robot, &just_before).unwrap();
 }

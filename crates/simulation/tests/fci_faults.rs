@@ -2,33 +2,28 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "fci_support/bare_client.rs"]
+mod bare_client;
 mod fci_support;
 
 use std::io::Write;
-use std::net::{TcpListener, TcpStream, UdpSocket};
+use std::net::{TcpListener, TcpStream};
 use std::ops::ControlFlow;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use bare_client::{BareClient, SPEED, velocity_after};
 use fci_support::{connect, connect_hand, serve, serve_panda};
 use sdg_fci::client::{InternalController, Robot, RobotConfig};
-use sdg_fci::server::{Pace, Server};
+use sdg_fci::server::Pace;
 use sdg_fci::wire::{
-    CollisionBehavior, ControllerMode, Deviation, Header, HeaderKind, MotionCommand, MotionGeneratorMode, MoveRequest,
-    Request, Response, RobotCommand, RobotMode, RobotState, STATE_SIZE_V5, Status, Version,
+    CollisionBehavior, ControllerMode, Header, HeaderKind, MotionCommand, MotionGeneratorMode, Request, RobotCommand,
+    RobotMode, RobotState, Status, Version,
 };
 use sdg_fci::{FciError, Limits, RobotError, read_message};
 
-/// Joint 1 turns at this speed, rad/s, when a fault comes.
-const SPEED: f64 = 0.5;
 /// The Panda's slowest joint brakes from its full speed in 0.29 s, this one in 0.03 s; with what the controller needs to settle.
 const STOPPING_TIME: Duration = Duration::from_millis(200);
-
-/// Turns joint 1 faster and faster up to [`SPEED`], one millisecond after another.
-fn velocity_after(ms: u64) -> [f64; 7] {
-    let ramp = (ms as f64 / 200.0).min(1.0);
-    [SPEED * 0.5 * (1.0 - (std::f64::consts::PI * ramp).cos()), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
-}
 
 /// Waits for the arm to stand, within the robot's time, and checks that it goes on standing there.
 fn assert_stands(robot: &mut Robot) {
@@ -61,59 +56,6 @@ fn errors_of(error: &FciError) -> Vec<RobotError> {
     match error {
         FciError::Motion { status: Status::ReflexAborted, errors, .. } => errors.iter().collect(),
         other => panic!("{other}"),
-    }
-}
-
-/// A client of bare sockets, which can be cut off at any moment.
-struct BareClient {
-    stream: TcpStream,
-    udp: UdpSocket,
-}
-
-impl BareClient {
-    fn connect(server: &Server, version: u16) -> (Self, Response) {
-        let stream = TcpStream::connect(server.robot_address()).unwrap();
-        let udp = UdpSocket::bind("127.0.0.1:0").unwrap();
-        udp.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-        let mut client = Self { stream, udp };
-        let udp_port = client.udp.local_addr().unwrap().port();
-        let response = client.execute(&Request::Connect { version, udp_port });
-        (client, response)
-    }
-
-    fn execute(&mut self, request: &Request) -> Response {
-        self.stream.write_all(&request.encode(7, Version::V5).unwrap()).unwrap();
-        let (header, payload) = read_message(&mut self.stream, HeaderKind::Robot).unwrap().unwrap();
-        assert_eq!(header.command_id, 7);
-        Response::decode(&payload, request.command(), Version::V5).unwrap()
-    }
-
-    fn state(&self) -> (RobotState, std::net::SocketAddr) {
-        let mut buffer = [0; STATE_SIZE_V5];
-        let (length, from) = self.udp.recv_from(&mut buffer).unwrap();
-        (RobotState::decode(&buffer[..length], Version::V5).unwrap(), from)
-    }
-
-    /// Starts a joint velocity motion and answers so many states of it.
-    fn turn(&mut self, num_states: u64) {
-        let any = Deviation { translation: 1.0, rotation: 1.0, elbow: 1.0 };
-        let response = self.execute(&Request::Move(MoveRequest {
-            controller: ControllerMode::JointImpedance,
-            generator: MotionGeneratorMode::JointVelocity,
-            max_path_deviation: any,
-            max_goal_deviation: any,
-        }));
-        assert_eq!(response.status, Status::MotionStarted);
-        let mut answered = 0;
-        while answered < num_states {
-            let (state, from) = self.state();
-            if state.robot_mode == RobotMode::Move {
-                let motion = MotionCommand { dq: velocity_after(answered), ..MotionCommand::default() };
-                let command = RobotCommand { message_id: state.message_id, motion, ..RobotCommand::default() };
-                self.udp.send_to(&command.encode(Version::V5), from).unwrap();
-                answered += 1;
-            }
-        }
     }
 }
 
@@ -165,6 +107,49 @@ fn twenty_lost_commands_stop_the_arm_and_nineteen_are_made_up_for() {
     }
     assert_stands(&mut robot);
     assert_waits_for_recovery(&mut robot);
+}
+
+#[test]
+fn lost_commands_in_the_middle_of_a_motion_are_made_up_for_in_every_generator() {
+    let server = serve(Pace::Lockstep { max_wait: Duration::from_millis(50) }, Limits::PANDA);
+    let mut robot = connect(&server);
+    for generator in [
+        MotionGeneratorMode::JointPosition,
+        MotionGeneratorMode::JointVelocity,
+        MotionGeneratorMode::CartesianPosition,
+        MotionGeneratorMode::CartesianVelocity,
+    ] {
+        for has_elbow in [false, true] {
+            let start = robot.read_state().unwrap().clone();
+            let mut ms = 0;
+            robot
+                .control_unchecked(ControllerMode::JointImpedance, generator, |_, step| {
+                    ms += step.as_millis() as u64;
+                    // Three lost commands in the acceleration, and three where the speed is largest.
+                    if [250, 251, 252, 500, 501, 502].contains(&ms) {
+                        return Ok(None);
+                    }
+                    // There and back in two seconds.
+                    let phase = std::f64::consts::PI * (ms as f64 / 1000.0).min(2.0);
+                    let (shape, rate) = (0.5 * (1.0 - phase.cos()), 0.5 * std::f64::consts::PI * phase.sin());
+                    let mut motion = MotionCommand {
+                        q: start.q_desired,
+                        base_from_ee: start.base_from_ee_commanded,
+                        elbow: start.elbow_commanded,
+                        valid_elbow: has_elbow,
+                        ..MotionCommand::default()
+                    };
+                    motion.q[0] += 0.2 * shape;
+                    motion.dq[0] = 0.2 * rate;
+                    motion.base_from_ee[13] += 0.05 * shape;
+                    motion.twist[1] = 0.05 * rate;
+                    motion.elbow[0] += 0.05 * shape;
+                    let command = RobotCommand { motion, ..RobotCommand::default() };
+                    Ok(Some(if ms < 2000 { ControlFlow::Continue(command) } else { ControlFlow::Break(command) }))
+                })
+                .unwrap_or_else(|error| panic!("{generator:?}, elbow: {has_elbow}: {error}"));
+        }
+    }
 }
 
 #[test]

@@ -221,10 +221,11 @@ impl Robot {
             Err(error) => return error,
         };
         // The last state has left the motion, and its rate is zero; what was lost since the one before lowers that one's.
-        let success_rate = self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
-            let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
-            last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
-        });
+        let success_rate =
+            self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
+                let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
+                last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
+            });
         // Both tell the same on a Panda; there are servers whose reasons pile up over motions.
         let errors = if self.state.errors.is_empty() { self.state.reflex_reason } else { self.state.errors };
         FciError::Motion { status: response.status, errors, success_rate }

@@ -50,7 +50,7 @@ impl CartesianReference {
     }
 
     /// The reference after a commanded pose, or what the robot stops for.
-    pub fn to_pose(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
+    pub fn after_pose(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         if !is_rigid(&command.base_from_ee) {
             return Err(RobotError::CartesianPositionMotionGeneratorInvalidFrameFlag.into());
         }
@@ -67,7 +67,7 @@ impl CartesianReference {
     }
 
     /// The reference after a commanded twist, or what the robot stops for.
-    pub fn to_twist(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
+    pub fn after_twist(&self, command: &MotionCommand, is_first: bool, limits: &Limits) -> Result<Self, RobotErrors> {
         let twist = Vector6::from(command.twist);
         // Named after the interface: what is commanded here is the velocity.
         let acceleration_error = RobotError::CartesianMotionGeneratorAccelerationDiscontinuity;
@@ -135,12 +135,7 @@ impl CartesianReference {
         {
             return Err(RobotError::CartesianMotionGeneratorElbowLimitViolation.into());
         }
-        Ok(Self {
-            elbow: command.elbow,
-            elbow_velocity: velocity,
-            elbow_acceleration: acceleration,
-            ..self
-        })
+        Ok(Self { elbow: command.elbow, elbow_velocity: velocity, elbow_acceleration: acceleration, ..self })
     }
 }
 

@@ -5,9 +5,12 @@
 
 mod cartesian;
 mod communication;
+mod config;
 mod contact;
+mod frames;
 mod hand;
 mod link;
+mod monitor;
 mod motion;
 mod plant;
 mod reference;
@@ -18,9 +21,10 @@ mod settings;
 mod statistics;
 mod torque;
 
+pub use config::{Pace, ServerConfig};
 pub use hand::{HandCore, HandOutgoing};
 pub use plant::{Jacobian, JointVector, Observation, Plant};
 pub use reference::PERIOD_SECS;
 pub use robot::{Outgoing, RobotCore};
-pub use run::{Pace, Server, ServerConfig};
+pub use run::Server;
 pub use statistics::ServerStatistics;

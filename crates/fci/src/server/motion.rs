@@ -39,12 +39,14 @@ pub struct Motion {
     pub generator: MotionGeneratorMode,
     /// Which cycles were answered.
     pub communication: Communication,
+    /// Whether the last command gave the elbow.
+    is_elbow_given: bool,
 }
 
 impl Motion {
     /// A motion that has just been asked for.
     pub fn new(command_id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Self {
-        Self { command_id, controller, generator, communication: Communication::default() }
+        Self { command_id, controller, generator, communication: Communication::default(), is_elbow_given: false }
     }
 
     /// The references after a cycle, and whether the motion is at its end; or what stops the robot.
@@ -63,13 +65,14 @@ impl Motion {
         let Some(command) = command else {
             return Ok((if is_first { *last } else { self.extrapolate(last, end_effector_at) }, false));
         };
+        self.is_elbow_given = command.motion.valid_elbow;
         let mut next = self.generate(last, &command.motion, is_first, limits, end_effector_at)?;
         if self.controller == ControllerMode::External {
             next.torque = self.checked_torque(last, command, limits)?;
         }
         if command.motion.finished {
             // A motion must end at rest: what follows is a standing reference.
-            let stopped = next.joints.to_velocity(JointVector::zeros());
+            let stopped = next.joints.after_velocity(JointVector::zeros());
             let errors = stopped.violations(&next.joints, limits, self.generator);
             if !errors.is_empty() {
                 return Err(errors);
@@ -93,17 +96,17 @@ impl Motion {
                 if is_first && (q - last.joints.q).amax() > START_POSITION_RAD {
                     return Err(RobotError::JointPositionMotionGeneratorStartPoseInvalid.into());
                 }
-                with_joints(last, last.joints.to_position(q), end_effector_at)
+                with_joints(last, last.joints.after_position(q), end_effector_at)
             }
             MotionGeneratorMode::JointVelocity => {
-                with_joints(last, last.joints.to_velocity(JointVector::from(command.dq)), end_effector_at)
+                with_joints(last, last.joints.after_velocity(JointVector::from(command.dq)), end_effector_at)
             }
             MotionGeneratorMode::CartesianPosition => {
-                let cartesian = last.cartesian.to_pose(command, is_first, limits)?;
+                let cartesian = last.cartesian.after_pose(command, is_first, limits)?;
                 with_cartesian(last, cartesian, command.valid_elbow, end_effector_at)
             }
             MotionGeneratorMode::CartesianVelocity => {
-                let cartesian = last.cartesian.to_twist(command, is_first, limits)?;
+                let cartesian = last.cartesian.after_twist(command, is_first, limits)?;
                 with_cartesian(last, cartesian, command.valid_elbow, end_effector_at)
             }
             MotionGeneratorMode::None | MotionGeneratorMode::Idle => *last,
@@ -157,7 +160,7 @@ impl Motion {
     fn extrapolate(&self, last: &References, end_effector_at: EndEffectorAt) -> References {
         match self.generator {
             MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => {
-                with_cartesian(last, last.cartesian.extrapolated(), false, end_effector_at)
+                with_cartesian(last, last.cartesian.extrapolated(), self.is_elbow_given, end_effector_at)
             }
             _ => with_joints(last, last.joints.extrapolated(), end_effector_at),
         }
@@ -189,7 +192,7 @@ fn with_cartesian(
     let (pose, jacobian) = end_effector_at(&last.joints.q);
     let elbow_step = is_elbow_given.then(|| cartesian.elbow[0] - last.joints.q[2]);
     let step = joint_step(&jacobian, &difference(&pose, &cartesian.pose), elbow_step);
-    let joints = last.joints.to_position(last.joints.q + step);
+    let joints = last.joints.after_position(last.joints.q + step);
     let cartesian = if is_elbow_given {
         cartesian
     } else {

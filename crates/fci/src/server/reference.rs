@@ -28,13 +28,13 @@ impl JointReference {
     }
 
     /// The reference after a commanded position.
-    pub fn to_position(&self, q: JointVector) -> Self {
+    pub fn after_position(&self, q: JointVector) -> Self {
         let dq = (q - self.q) / PERIOD_SECS;
         Self { q, dq, ddq: (dq - self.dq) / PERIOD_SECS }
     }
 
     /// The reference after a commanded velocity.
-    pub fn to_velocity(&self, dq: JointVector) -> Self {
+    pub fn after_velocity(&self, dq: JointVector) -> Self {
         Self { q: self.q + dq * PERIOD_SECS, dq, ddq: (dq - self.dq) / PERIOD_SECS }
     }
 
@@ -50,7 +50,7 @@ impl JointReference {
             let step = limits.acceleration[joint] * PERIOD_SECS;
             self.dq[joint] - self.dq[joint].clamp(-step, step)
         });
-        self.to_velocity(dq)
+        self.after_velocity(dq)
     }
 
     /// Whether the reference stands.
@@ -114,7 +114,7 @@ mod tests {
         let rest = with_joint_1([0.0; 3]);
         // 7500 rad/s³ for a millisecond from rest: 7.5e-6 rad.
         for (share, expected) in [(0.999, vec![]), (1.001, vec!["joint_motion_generator_acceleration_discontinuity"])] {
-            assert_eq!(names(&rest, &rest.to_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
+            assert_eq!(names(&rest, &rest.after_velocity(with_joint_1([0.0, 7.5e-3 * share, 0.0]).dq)), expected);
         }
         // At 14.995 rad/s², 15 is reached within the jerk's limit.
         let accelerating = with_joint_1([0.0, 1.0, 14.995]);
@@ -122,17 +122,18 @@ mod tests {
             [(14.999, vec![]), (15.001, vec!["joint_motion_generator_velocity_discontinuity"])]
         {
             let dq = with_joint_1([0.0, 1.0 + acceleration * 1e-3, 0.0]).dq;
-            assert_eq!(names(&accelerating, &accelerating.to_velocity(dq)), expected);
+            assert_eq!(names(&accelerating, &accelerating.after_velocity(dq)), expected);
         }
         let fast = with_joint_1([0.0, 2.1745, 0.0]);
         for (velocity, expected) in
             [(2.1749, vec![]), (2.1751, vec!["joint_motion_generator_velocity_limits_violation"])]
         {
-            assert_eq!(names(&fast, &fast.to_velocity(with_joint_1([0.0, velocity, 0.0]).dq)), expected);
+            assert_eq!(names(&fast, &fast.after_velocity(with_joint_1([0.0, velocity, 0.0]).dq)), expected);
         }
         let near_the_end = with_joint_1([2.89725, 0.05, 0.0]);
-        for (q, expected) in [(2.897299, vec![]), (2.897301, vec!["joint_motion_generator_position_limits_violation"])] {
-            assert_eq!(names(&near_the_end, &near_the_end.to_position(with_joint_1([q, 0.0, 0.0]).q)), expected);
+        for (q, expected) in [(2.897299, vec![]), (2.897301, vec!["joint_motion_generator_position_limits_violation"])]
+        {
+            assert_eq!(names(&near_the_end, &near_the_end.after_position(with_joint_1([q, 0.0, 0.0]).q)), expected);
         }
     }
 

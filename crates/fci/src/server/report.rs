@@ -2,8 +2,9 @@
 
 use nalgebra::Isometry3;
 
+use super::frames::end_effector_at;
 use super::plant::Plant;
-use super::robot::{RobotCore, end_effector_at};
+use super::robot::RobotCore;
 use super::settings::{HAND_CENTER_M, HAND_INERTIA, HAND_MASS_KG};
 use crate::pose::transform;
 use crate::wire::{ControllerMode, MotionGeneratorMode, RobotState};

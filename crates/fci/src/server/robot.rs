@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 
 use super::cartesian::{CartesianReference, MIN_SINGULAR_VALUE, elbow_of, smallest_singular_value};
 use super::contact::Contacts;
+use super::frames::{end_effector_at, shifted};
 use super::motion::{Motion, References};
 use super::plant::{Jacobian, JointVector, Observation, Plant};
 use super::reference::{JointReference, PERIOD_SECS};
@@ -15,10 +16,6 @@ use crate::wire::{
     Command, ControllerMode, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, Status,
 };
 
-/// Measured velocities overshoot commanded ones: by this much, rad/s or m/s, before the robot stops.
-const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
-/// Measured positions may be this far, rad, beyond the range that commanded ones must keep.
-const MEASURED_POSITION_MARGIN: f64 = 0.01;
 /// So many cycles of a recovery the arm yields to what it touches, so that the next motion does not start in a collision.
 const RECOVERY_CYCLES: u32 = 200;
 /// Nothing has to be simulated once the measured velocities are below this, rad/s, or after so many cycles without a motion: an
@@ -194,9 +191,8 @@ impl RobotCore {
         self.references.torque = self.controller_torque(plant, &flange, &flange_jacobian);
         let load = self.load_torque(&flange, &flange_jacobian);
         let total = self.references.torque + self.observation.gravity + load;
-        let total = JointVector::from_fn(|joint, _| {
-            total[joint].clamp(-self.limits.torque[joint], self.limits.torque[joint])
-        });
+        let total =
+            JointVector::from_fn(|joint, _| total[joint].clamp(-self.limits.torque[joint], self.limits.torque[joint]));
         plant.step(&total)?;
         self.time_ms += 1;
         self.torque_rate = (total - self.torque) / PERIOD_SECS;
@@ -271,7 +267,7 @@ impl RobotCore {
     }
 
     /// Stops for errors: the motion ends, the arm brakes, and nothing moves until the recovery.
-    fn abort(&mut self, errors: RobotErrors) {
+    pub(super) fn abort(&mut self, errors: RobotErrors) {
         self.errors = errors;
         self.reflex_reason = errors;
         self.collisions = self.contacts;
@@ -295,12 +291,7 @@ impl RobotCore {
         self.references.joints = JointReference { q, dq, ddq: JointVector::zeros() };
     }
 
-    fn controller_torque(
-        &self,
-        plant: &dyn Plant,
-        flange: &Isometry3<f64>,
-        flange_jacobian: &Jacobian,
-    ) -> JointVector {
+    fn controller_torque(&self, plant: &dyn Plant, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
         let controller = self.motion.as_ref().map_or(ControllerMode::JointImpedance, |motion| motion.controller);
         let joints = &self.references.joints;
         // Until the first command of a torque motion, the internal controller holds the arm.
@@ -322,51 +313,10 @@ impl RobotCore {
         }
     }
 
-    fn load_torque(&self, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
+    pub(super) fn load_torque(&self, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
         let load = &self.settings.load;
         let lever = flange.rotation * nalgebra::Vector3::from(load.center);
         load_gravity(load.mass, flange_jacobian, &lever)
-    }
-
-    /// Contacts, and what is measured against its limits.
-    fn feel(&mut self, plant: &dyn Plant) {
-        let (flange, flange_jacobian) = plant.flange(&self.observation.q);
-        let flange_from_ee = self.settings.flange_from_ee();
-        let flange_from_stiffness = flange_from_ee * self.settings.ee_from_stiffness;
-        // The load's weight is known; what else acts is a contact.
-        let external = self.observation.contact_torque + self.load_torque(&flange, &flange_jacobian);
-        self.contacts.update(
-            &external,
-            &shifted(&flange_jacobian, &flange, &flange_from_stiffness),
-            &(flange * flange_from_stiffness),
-            &self.references.joints.ddq,
-            &self.settings.collision,
-        );
-        if self.motion.is_none() {
-            return;
-        }
-        let Observation { q, dq, self_collision, .. } = &self.observation;
-        let mut errors = self.contacts.reflexes();
-        if (0..7).any(|joint| dq[joint].abs() > self.limits.velocity[joint] + MEASURED_VELOCITY_MARGIN) {
-            errors.insert(RobotError::JointVelocityViolation);
-        }
-        let is_out_of_range = |joint: usize| {
-            q[joint] < self.limits.q_min[joint] - MEASURED_POSITION_MARGIN
-                || q[joint] > self.limits.q_max[joint] + MEASURED_POSITION_MARGIN
-        };
-        if (0..7).any(is_out_of_range) {
-            errors.insert(RobotError::JointPositionLimitsViolation);
-        }
-        let twist = shifted(&flange_jacobian, &flange, &flange_from_ee) * dq;
-        if twist.fixed_rows::<3>(0).norm() > self.limits.translation.velocity + MEASURED_VELOCITY_MARGIN {
-            errors.insert(RobotError::CartesianVelocityViolation);
-        }
-        if *self_collision {
-            errors.insert(RobotError::SelfCollisionAvoidanceViolation);
-        }
-        if !errors.is_empty() {
-            self.abort(errors);
-        }
     }
 
     fn answer_when_standing(&mut self, command_id: u32, command: Command, status: Status) {
@@ -393,30 +343,4 @@ impl RobotCore {
 
 fn outgoing(command_id: u32, command: Command, status: Status) -> Outgoing {
     Outgoing { command_id, command, response: Response { status, rest: Vec::new() } }
-}
-
-/// Pose and Jacobian of an end effector on the flange.
-pub(super) fn end_effector_at(
-    plant: &dyn Plant,
-    flange_from_ee: &Isometry3<f64>,
-    q: &JointVector,
-) -> (Isometry3<f64>, Jacobian) {
-    let (flange, jacobian) = plant.flange(q);
-    (flange * flange_from_ee, shifted(&jacobian, &flange, flange_from_ee))
-}
-
-/// The Jacobian of a point that stands on the flange.
-pub(super) fn shifted(
-    flange_jacobian: &Jacobian,
-    base_from_flange: &Isometry3<f64>,
-    flange_from_point: &Isometry3<f64>,
-) -> Jacobian {
-    let lever = base_from_flange.rotation * flange_from_point.translation.vector;
-    let mut jacobian = *flange_jacobian;
-    for joint in 0..7 {
-        let angular = flange_jacobian.fixed_view::<3, 1>(3, joint).into_owned();
-        let linear = flange_jacobian.fixed_view::<3, 1>(0, joint) + angular.cross(&lever);
-        jacobian.fixed_view_mut::<3, 1>(0, joint).copy_from(&linear);
-    }
-    jacobian
 }

@@ -1,21 +1,21 @@
 //! The server's loop: a thousand cycles a second, or one for each answer of the client.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use super::config::{Pace, ServerConfig};
 use super::hand::HandCore;
 use super::link::{Incoming, Link};
 use super::plant::Plant;
 use super::robot::RobotCore;
 use super::statistics::{STALL, ServerStatistics};
 use crate::error::{FciError, Result};
-use crate::limits::Limits;
 use crate::wire::{
-    COMMAND_SIZE_V5, Command, HAND_PORT, HAND_VERSION, HandCommand, HandRequest, HandStatus, Header, HeaderKind,
-    ROBOT_PORT, Request, RobotCommand, Status, Version,
+    COMMAND_SIZE_V5, Command, HAND_VERSION, HandCommand, HandRequest, HandStatus, Header, HeaderKind, Request,
+    RobotCommand, Status, Version,
 };
 
 /// The version that the server speaks.
@@ -27,52 +27,6 @@ const HAND_STATE_CYCLES: u64 = 20;
 /// In lockstep, a state is answered within this time or counts as not answered while a motion begins: libfranka leaves the
 /// first one or two without an answer.
 const START_WAIT: Duration = Duration::from_millis(50);
-
-/// When a cycle begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pace {
-    /// A thousand times a second, as a robot does; a command that comes later is lost.
-    RealTime,
-    /// In motions after the client's answer, or after `max_wait` as a lost command. Time passes in motions and while arm
-    /// or fingers move, so that a run is the same on every machine.
-    Lockstep {
-        /// How long a client may take for an answer.
-        max_wait: Duration,
-    },
-}
-
-impl Pace {
-    /// Lockstep with half a second for each answer: libfranka gives up on a robot that is silent for a second.
-    pub const LOCKSTEP: Pace = Pace::Lockstep { max_wait: Duration::from_millis(500) };
-}
-
-/// Where and how to serve.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ServerConfig {
-    /// Address to listen on.
-    pub ip: IpAddr,
-    /// TCP port of the robot; 0 for a free one.
-    pub robot_port: u16,
-    /// TCP port of the hand; 0 for a free one.
-    pub hand_port: u16,
-    /// When a cycle begins.
-    pub pace: Pace,
-    /// What the client is held to.
-    pub limits: Limits,
-}
-
-impl Default for ServerConfig {
-    /// A Panda on this computer alone, in real time, on the robot's own ports.
-    fn default() -> Self {
-        Self {
-            ip: Ipv4Addr::LOCALHOST.into(),
-            robot_port: ROBOT_PORT,
-            hand_port: HAND_PORT,
-            pace: Pace::RealTime,
-            limits: Limits::PANDA,
-        }
-    }
-}
 
 /// What the server's owner and its loop share.
 #[derive(Debug, Default)]
@@ -223,8 +177,7 @@ impl Loop {
             self.statistics.num_motion_cycles += 1;
             self.statistics.num_commands += u64::from(command.is_some());
         }
-        let is_frozen =
-            self.config.pace != Pace::RealTime && self.robot.is_settled() && !self.hand.is_busy();
+        let is_frozen = self.config.pace != Pace::RealTime && self.robot.is_settled() && !self.hand.is_busy();
         if is_frozen {
             self.robot.tick_clock();
         } else {

@@ -16,9 +16,8 @@ const NULLSPACE_STIFFNESS: f64 = 20.0;
 /// `D` damps each joint with its own inertia.
 pub fn joint_impedance(robot: &Observation, reference: &JointReference, stiffness: &JointVector) -> JointVector {
     let spring = stiffness.component_mul(&(reference.q - robot.q));
-    let damping = JointVector::from_fn(|joint, _| {
-        2.0 * DAMPING_RATIO * (stiffness[joint] * robot.mass[(joint, joint)]).sqrt()
-    });
+    let damping =
+        JointVector::from_fn(|joint, _| 2.0 * DAMPING_RATIO * (stiffness[joint] * robot.mass[(joint, joint)]).sqrt());
     spring + damping.component_mul(&(reference.dq - robot.dq)) + robot.mass * reference.ddq + robot.coriolis
 }
 
@@ -51,8 +50,8 @@ pub fn cartesian_impedance(
         let damping = 2.0 * DAMPING_RATIO * (stiffness[axis] * felt_inertia[(axis, axis)].max(0.0)).sqrt();
         stiffness[axis] * error[axis] + damping * rate[axis]
     });
-    let elbow = (reference.q - robot.q) * NULLSPACE_STIFFNESS
-        + (reference.dq - robot.dq) * (2.0 * NULLSPACE_STIFFNESS.sqrt());
+    let elbow =
+        (reference.q - robot.q) * NULLSPACE_STIFFNESS + (reference.dq - robot.dq) * (2.0 * NULLSPACE_STIFFNESS.sqrt());
     // The part of the elbow's torque that does not accelerate the end effector.
     let inverse = robot.mass.try_inverse().unwrap_or_else(SMatrix::identity);
     let felt_by_ee = jacobian.transpose() * (felt_inertia * (jacobian * (inverse * elbow)));

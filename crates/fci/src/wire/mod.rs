@@ -5,20 +5,22 @@
 //! [`RobotCommand`] the other, each a whole datagram.
 
 pub(crate) mod codec;
-mod command;
+mod commands;
 mod hand;
 mod header;
 mod modes;
 mod requests;
+mod robot_command;
 mod state;
 mod status;
 mod version;
 
-pub use command::{COMMAND_SIZE_V5, COMMAND_SIZE_V10, MotionCommand, RobotCommand};
+pub use commands::Command;
 pub use hand::{HAND_VERSION, HandCommand, HandRequest, HandState, HandStatus};
 pub use header::{HAND_HEADER_SIZE, HEADER_SIZE, Header, HeaderKind, MAX_MESSAGE_SIZE};
 pub use modes::{ControllerMode, MotionGeneratorMode, RobotMode};
-pub use requests::{CollisionBehavior, Command, Deviation, Load, MoveRequest, Request};
+pub use requests::{CollisionBehavior, Deviation, Load, MoveRequest, Request};
+pub use robot_command::{COMMAND_SIZE_V5, COMMAND_SIZE_V10, MotionCommand, RobotCommand};
 pub use state::{RobotState, STATE_SIZE_V5, STATE_SIZE_V10, Transform};
 pub use status::{Response, Status};
 pub use version::Version;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::requests::Command;
+use super::commands::Command;
 use super::version::Version;
 use crate::error::WireError;
 
