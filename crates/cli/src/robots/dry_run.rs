@@ -9,6 +9,7 @@ use sdg_robot::{
 };
 
 /// A grasp on paper.
+#[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs the start"))]
 pub(crate) struct DryRun {
     start: ArmState,
     opening_m: f64,
