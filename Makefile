@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-wgpu test-ndarray test-torch package lint bench bench-browser clean
+.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint bench bench-browser clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -43,6 +43,9 @@ test-browser: build web ## Tests our pages in headless Chromium
 
 test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB camera of our own (no root, no camera)
 	@scripts/test-v4l.sh
+
+test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated Panda, our client drives franka-sim
+	@scripts/test-peers.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)

@@ -11,8 +11,10 @@ use crate::commands::demo::DemoArgs;
 use crate::commands::detect::DetectArgs;
 use crate::commands::devices::DevicesArgs;
 use crate::commands::evaluate::EvaluateArgs;
+use crate::commands::grasp::GraspArgs;
 use crate::commands::man::ManArgs;
 use crate::commands::rehearse::RehearseArgs;
+use crate::commands::robot::RobotCommand;
 use crate::commands::teach::TeachArgs;
 use crate::commands::weights::WeightsArgs;
 
@@ -38,8 +40,16 @@ pub enum Command {
     Detect(DetectArgs),
     /// Grasp attempts in MuJoCo
     Rehearse(RehearseArgs),
+    /// A simulated robot on the network, for programs of others
+    #[cfg(feature = "simulation")]
+    Simulate(crate::commands::simulate::SimulateArgs),
     /// The paper's protocol: every model on every part, and the paper's tables; or a model on your own labelled pictures
     Evaluate(EvaluateArgs),
+    /// One grasp, from the picture to the lifted part, with a real arm or a simulated one
+    Grasp(GraspArgs),
+    /// A real arm by hand: state, home, recovery, hand
+    #[command(subcommand)]
+    Robot(RobotCommand),
     /// Augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
     /// Annotation files from one tool's format to another's

@@ -47,6 +47,7 @@ mod pictures;
 mod progress;
 #[cfg(feature = "simulation")]
 pub mod rehearsal;
+pub mod robots;
 #[cfg(feature = "simulation")]
 mod run_page;
 mod shared_args;
@@ -85,7 +86,11 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),
         #[cfg(not(feature = "simulation"))]
         Command::Demo(_) | Command::Rehearse(_) => Err(exit::without_simulator()),
+        #[cfg(feature = "simulation")]
+        Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
+        Command::Grasp(grasp) => commands::grasp::run(grasp),
+        Command::Robot(robot) => commands::robot::run(robot),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),

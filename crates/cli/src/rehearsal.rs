@@ -9,11 +9,12 @@ use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
 use sdg_report::{Attempt, Step};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspTarget};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptConfig, AttemptErrors, AttemptOutcome, AttemptReport, CameraView, GraspTarget, Perception, RecordConfig,
-    SimulationError, Workcell, WorkcellConfig,
+    AttemptConfig, AttemptErrors, AttemptReport, CameraView, Perception, RecordConfig, SimulationError, Workcell,
+    WorkcellConfig,
 };
 use serde::{Deserialize, Serialize};
 
@@ -148,7 +149,8 @@ impl Rehearsal<'_> {
         let mut workcell =
             Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
         let mut perception = ModelPerception { rehearsal: self, told: self.told(number), detector: None, last: None };
-        let config = AttemptConfig { record, hover_height_m: DEMONSTRATION_HEIGHT_M, ..AttemptConfig::default() };
+        let grasp = GraspConfig { hover_height_m: DEMONSTRATION_HEIGHT_M, ..GraspConfig::default() };
+        let config = AttemptConfig { record, grasp, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
             Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
@@ -172,10 +174,8 @@ impl Rehearsal<'_> {
 
     fn record(&self, number: usize, report: &AttemptReport) -> Attempt {
         let (step, why) = match &report.outcome {
-            AttemptOutcome::Success => (Step::Hold, String::new()),
-            AttemptOutcome::Failure { step, why } => {
-                (Step::from_name(&step.to_string()).unwrap_or(Step::Detect), why.clone())
-            }
+            GraspOutcome::Held => (Step::Hold, String::new()),
+            GraspOutcome::Failed { step, why } => (Step::from_name(step.name()).unwrap_or(Step::Detect), why.clone()),
         };
         // The last look decides where the hand goes.
         let last_target = report.targets.iter().rev().flatten().next();
@@ -186,7 +186,7 @@ impl Rehearsal<'_> {
         Attempt {
             detection_error,
             step,
-            success: report.outcome.is_success(),
+            success: report.outcome.is_held(),
             why,
             duration_secs: report.wall_secs,
             ..self.begun(number, report.base_from_object)

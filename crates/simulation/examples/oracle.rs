@@ -5,9 +5,10 @@
 
 use std::time::Instant;
 
+use sdg_robot::GraspOutcome;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
-use sdg_simulation::{AttemptConfig, AttemptOutcome, RecordConfig, Workcell, WorkcellConfig};
+use sdg_simulation::{AttemptConfig, RecordConfig, Workcell, WorkcellConfig};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -26,10 +27,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let report = cell.run_oracle_attempt(&AttemptConfig { record, ..AttemptConfig::default() }, seed)?;
         wall_secs += report.wall_secs;
         simulated_secs += report.simulated_secs;
-        if report.outcome.is_success() {
+        if report.outcome.is_held() {
             successes += 1;
         }
-        if let AttemptOutcome::Failure { step, why } = &report.outcome {
+        for (step, why) in &report.hand_verdicts {
+            // The last verdict is right where it says what became of the grasp, those before where the part was held.
+            let is_last = Some(step) == report.hand_verdicts.last().map(|(step, _)| step);
+            if why.is_none() != (!is_last || report.outcome.is_held()) {
+                println!("{name} seed {seed}: after {step} the hand says {why:?}, the truth {:?}", report.outcome);
+            }
+        }
+        if let GraspOutcome::Failed { step, why } = &report.outcome {
             println!("{name} seed {seed}: {step}: {why}");
         }
         if let (true, Some(folder)) = (seed == first_seed, &folder) {

@@ -31,6 +31,28 @@ pub struct Shake {
     pub direction_rad: f64,
 }
 
+/// What goes wrong with the arm or its hand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArmFaultKind {
+    /// A joint's position is reported as no number.
+    NotANumber,
+    /// A joint's position is reported a radian beside.
+    Jump,
+    /// The arm stops itself, as after a contact.
+    Reflex,
+    /// The hand does not do what it is told any more.
+    HandStuck,
+}
+
+/// A fault of the arm from a time on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArmFault {
+    /// From when on, in seconds of simulated time.
+    pub at_secs: f64,
+    /// What.
+    pub kind: ArmFaultKind,
+}
+
 /// Errors of a workcell; by default there is none, and nothing changes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AttemptErrors {
@@ -40,6 +62,8 @@ pub struct AttemptErrors {
     pub pad_friction: Option<f64>,
     /// What the arm does between lifting and holding.
     pub shake: Option<Shake>,
+    /// What goes wrong with the arm.
+    pub arm_fault: Option<ArmFault>,
 }
 
 impl AttemptErrors {

@@ -43,7 +43,7 @@ pub fn posed_camera(renderer: &Renderer, data: &Data, camera: Id<Camera>) -> Pos
     let focal_px = 0.5 * f64::from(height) / (0.5 * data.model().vertical_field_of_view_rad(camera)).tan();
     PosedCamera {
         intrinsics: PinholeCamera::symmetric(width, height, focal_px),
-        world_from_camera: data.world_from_mujoco_camera(camera) * mujoco_camera_from_optical(),
+        world_from_camera: data.world_from_mujoco_camera(camera) * optical_from_mujoco_camera(),
     }
 }
 
@@ -52,7 +52,8 @@ pub fn vertical_field_of_view_rad(focal_px: f64, height_px: u32) -> f64 {
     2.0 * (0.5 * f64::from(height_px) / focal_px).atan()
 }
 
-fn mujoco_camera_from_optical() -> Isometry3<f64> {
+/// From MuJoCo's camera frame to the optical one, or back: half a turn is its own inverse.
+pub(crate) fn optical_from_mujoco_camera() -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI))
 }
 

@@ -160,6 +160,12 @@ impl Data {
         unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
+    /// What the motors are set to, in the units of the actuators.
+    pub fn ctrl(&self) -> &[f64] {
+        // SAFETY: the array has `nu` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().ctrl, self.model.raw().nu as usize) }
+    }
+
     /// Controls, one an actuator, to be set (N·m and N for motors).
     pub fn ctrl_mut(&mut self) -> &mut [f64] {
         // SAFETY: the array has `nu` entries, lives as long as the data, and `self` is borrowed
@@ -177,6 +183,12 @@ impl Data {
     pub fn qfrc_passive(&self) -> &[f64] {
         // SAFETY: the array has `nv` entries and lives as long as the data.
         unsafe { std::slice::from_raw_parts(self.raw().qfrc_passive, self.model.raw().nv as usize) }
+    }
+
+    /// What contacts and joint limits exerted on the joints in the last step (N·m, N).
+    pub fn qfrc_constraint(&self) -> &[f64] {
+        // SAFETY: the array has `nv` entries and lives as long as the data.
+        unsafe { std::slice::from_raw_parts(self.raw().qfrc_constraint, self.model.raw().nv as usize) }
     }
 
     /// The joint-space inertia matrix, `nv` x `nv`.

@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
-/// An error of the simulation; a grasp that fails is not one of them (see `AttemptOutcome`).
+use sdg_robot::RobotError;
+
+/// An error of the simulation; a grasp that fails is not one of them (see `sdg_robot::GraspOutcome`).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulationError {
@@ -85,6 +87,23 @@ pub enum SimulationError {
     /// Perception itself failed (which is not the same as seeing nothing).
     #[error("perception failed: {0}")]
     Perception(String),
+
+    /// The arm was stopped, stopped itself, or does not move.
+    #[error("{0}")]
+    Robot(String),
+}
+
+impl From<RobotError> for SimulationError {
+    fn from(error: RobotError) -> Self {
+        match error {
+            RobotError::Perception(why) => Self::Perception(why),
+            RobotError::Device(device) => match device.downcast::<Self>() {
+                Ok(own) => *own,
+                Err(other) => Self::Robot(other.to_string()),
+            },
+            other => Self::Robot(other.to_string()),
+        }
+    }
 }
 
 /// Shorthand of this crate.

@@ -90,4 +90,55 @@ mod tests {
             assert!((lowest(geom) - expected).abs() < 1e-9, "{geom}: {} is not {expected}", lowest(geom));
         }
     }
+
+    /// Every visible shape of the arm lies within one capsule of its link, so that links whose capsules are apart are apart.
+    #[test]
+    fn the_capsules_of_the_robot_hold_the_simulated_arm() {
+        use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};
+        use sdg_robot::{Capsule, LinkCapsules};
+
+        // Directions on a spiral over the sphere, some three degrees apart.
+        let directions: Vec<Vector3<f64>> = (0..4000)
+            .map(|i| {
+                let z = 1.0 - (2 * i + 1) as f64 / 4000.0;
+                let around = f64::from(i) * 2.399_963_229_728_653;
+                Vector3::new((1.0 - z * z).sqrt() * around.cos(), (1.0 - z * z).sqrt() * around.sin(), z)
+            })
+            .collect();
+        let xml = "<mujoco><compiler angle='radian'/><include file='panda.xml'/></mujoco>";
+        let model = Arc::new(Model::from_xml(xml, &[panda_asset()]).unwrap());
+        let ids = PandaIds::find(&model).unwrap();
+        let mut data = Data::new(model.clone()).unwrap();
+        let capsules = LinkCapsules::panda();
+        let mut num_held = 0;
+        for finger_m in [0.0, FINGER_TRAVEL_M] {
+            ids.set_finger_position_m(&mut data, finger_m);
+            data.forward().unwrap();
+            for geom in model.ids::<Geom>() {
+                // SAFETY: the array has `ngeom` entries.
+                let is_seen = unsafe { *model.raw().geom_contype.add(geom.index()) == 0 };
+                let name = model.name(model.body_of(geom)).unwrap();
+                if !is_seen {
+                    continue;
+                }
+                let body = match name.strip_prefix("link") {
+                    Some(number) => number.parse().unwrap(),
+                    None => 8,
+                };
+                let frame: Id<Body> = model.id(if body == 8 { "hand" } else { &name }).unwrap();
+                let link_from_geom = data.world_from_body(frame).inverse() * data.world_from_geom(geom);
+                let is_held = |capsule: &Capsule| {
+                    directions.iter().all(|direction| {
+                        let along = |point: &nalgebra::Point3<f64>| point.coords.dot(direction);
+                        let own = link_from_geom.translation.vector.dot(direction)
+                            + reach(model.raw(), geom.index(), &(link_from_geom.rotation.inverse() * direction));
+                        own <= along(&capsule.from).max(along(&capsule.to)) + capsule.radius_m
+                    })
+                };
+                assert!(capsules.of_body(body).iter().any(is_held), "geom {} of {name} sticks out", geom.index());
+                num_held += 1;
+            }
+        }
+        assert!(num_held > 100, "{num_held} shapes were looked at");
+    }
 }

@@ -48,6 +48,18 @@ impl Gripper {
             Self { target_m: -beyond, speed_m_s: 0.05, max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N), ..*self };
     }
 
+    /// Starts to move to an opening (m) at a speed of the opening (m/s), each finger pressing with `force_n` at most; openings
+    /// below zero press on what is between the fingers.
+    pub fn drive(&mut self, opening_m: f64, speed_m_s: f64, force_n: f64) {
+        let beyond = MAX_FINGER_FORCE_N / STIFFNESS_N_M;
+        *self = Self {
+            target_m: (0.5 * opening_m).clamp(-beyond, FINGER_TRAVEL_M),
+            speed_m_s: 0.5 * speed_m_s,
+            max_force_n: force_n.clamp(0.0, MAX_FINGER_FORCE_N),
+            ..*self
+        };
+    }
+
     /// Sets the fingers' motors for this instant and moves the reference on by `period_secs`.
     pub fn apply(&mut self, data: &mut Data, panda: &PandaIds, period_secs: f64) {
         let step = self.speed_m_s * period_secs;

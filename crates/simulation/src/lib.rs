@@ -3,7 +3,7 @@
 //! ```text
 //! objects ─┐                      ┌─> Renderer ─> CameraView ─> Perception ─> GraspTarget ─┐
 //! scene   ─┴─> Workcell (MJCF) ─> Model, Data                                              │
-//!                                 └<── controller, gripper <── kinematics <── attempt <────┘
+//!                                 └<── controller, gripper <── Arm <── sdg_robot::grasp <──┘
 //! ```
 //!
 //! The picture of an MJCF model takes four lines:
@@ -27,6 +27,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod arm;
 mod attempt;
 mod attempt_errors;
 mod camera;
@@ -35,6 +36,7 @@ mod data;
 mod egl;
 mod error;
 mod extent;
+mod fci_plant;
 mod gripper;
 mod guard;
 mod lens;
@@ -46,24 +48,26 @@ mod perception;
 mod record;
 mod render;
 pub mod scene;
+mod self_distance;
 mod shake;
 pub mod table_camera;
 mod workcell;
 
-pub use attempt::{AttemptConfig, AttemptOutcome, AttemptReport, AttemptStep};
-pub use attempt_errors::{AttemptErrors, Shake};
+pub use attempt::{AttemptConfig, AttemptReport};
+pub use attempt_errors::{ArmFault, ArmFaultKind, AttemptErrors, Shake};
 pub use camera::{CameraView, WRIST_FOCAL_LENGTH_PX, posed_camera, vertical_field_of_view_rad};
 pub use controller::{ArmController, ArmReference};
 pub use data::{Contact, Data};
 pub use error::{Result, SimulationError};
 pub use extent::lowest_point_m;
+pub use fci_plant::{PandaPlant, SharedPositions};
 pub use gripper::{Gripper, MAX_FINGER_FORCE_N};
 pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
 pub use oracle::marked_grasp;
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };
-pub use perception::{GraspTarget, Perception};
+pub use perception::Perception;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{MotionEnd, PERIOD_SECS, Workcell, WorkcellConfig, camera_looking_down};
+pub use workcell::{CameraPlace, Workcell, WorkcellConfig};

@@ -209,6 +209,23 @@ impl Model {
         Id::new(unsafe { *self.raw().geom_bodyid.add(geom.index) } as usize)
     }
 
+    /// Radius and half the length of a capsule in metres, its axis along the geom's z; `None` for other shapes.
+    pub fn capsule_m(&self, geom: Id<Geom>) -> Option<(f64, f64)> {
+        assert!(geom.index < Geom::count(self), "{geom:?} is not of this model");
+        // SAFETY: the arrays have `ngeom` entries, and three for each.
+        let (kind, size) = unsafe {
+            (*self.raw().geom_type.add(geom.index), *self.raw().geom_size.add(3 * geom.index).cast::<[f64; 3]>())
+        };
+        (kind == mj::mjGEOM_CAPSULE as i32).then_some((size[0], size[1]))
+    }
+
+    /// Whether a geom is in MuJoCo's visual group of a number.
+    pub fn is_in_group(&self, geom: Id<Geom>, group: i32) -> bool {
+        assert!(geom.index < Geom::count(self), "{geom:?} is not of this model");
+        // SAFETY: the array has `ngeom` entries.
+        unsafe { *self.raw().geom_group.add(geom.index) == group }
+    }
+
     /// Index of a joint's first position in `qpos`.
     pub fn qpos_index(&self, joint: Id<Joint>) -> usize {
         assert!(joint.index < Joint::count(self), "{joint:?} is not of this model");

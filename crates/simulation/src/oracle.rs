@@ -1,11 +1,11 @@
 //! A perception that knows where the part is, to tell what the robot alone can do.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_robot::GraspTarget;
 
 use crate::attempt::{AttemptConfig, AttemptReport};
 use crate::error::Result;
 use crate::objects::ObjectSpec;
-use crate::perception::GraspTarget;
 use crate::workcell::Workcell;
 
 /// The grasp that a part's marks ask for, with the part at a pose: x of the tcp along the marks, y

@@ -5,6 +5,7 @@ use nalgebra::{Isometry3, SVector};
 use crate::data::Data;
 use crate::error::Result;
 use crate::model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Model, Site};
+use crate::scene::pose_attributes;
 
 /// Number of the arm's joints.
 pub const NUM_ARM_JOINTS: usize = 7;
@@ -27,22 +28,31 @@ pub fn panda_asset() -> Asset {
     Asset { name: PANDA_FILE.to_owned(), bytes: include_bytes!("../assets/panda.xml").to_vec() }
 }
 
-/// The pads' priority and friction, and the wrist camera's field of view, as the MJCF has them.
+/// The pads' priority and friction, and the wrist camera's field of view and place, as the MJCF has them.
 const PAD_PRIORITY: &str = " priority=\"1\"";
 const PAD_FRICTION: &str = "friction=\"1.0 ";
+const WRIST_PLACE: &str = "pos=\"0.072 0 0.050\" xyaxes=\"0 1 0 1 0 0\"";
 const WRIST_FOVY: &str = "fovy=\"47.149412403825\"";
 
 /// As [`panda_asset`] with changes:
 /// - `pad_friction`: pads of another sliding friction and without priority, so that MuJoCo combines it with the part's by its
 ///   usual rule, the larger of the two;
-/// - `wrist_fovy_deg`: another vertical field of view of the wrist camera.
-pub(crate) fn changed_panda_asset(pad_friction: Option<f64>, wrist_fovy_deg: Option<f64>) -> Asset {
+/// - `wrist_fovy_deg`: another vertical field of view of the wrist camera;
+/// - `hand_from_camera`: another place of it, in MuJoCo's camera frame.
+pub(crate) fn changed_panda_asset(
+    pad_friction: Option<f64>,
+    wrist_fovy_deg: Option<f64>,
+    hand_from_camera: Option<&Isometry3<f64>>,
+) -> Asset {
     let mut text = include_str!("../assets/panda.xml").to_owned();
     if let Some(friction) = pad_friction {
         text = text.replace(PAD_PRIORITY, "").replace(PAD_FRICTION, &format!("friction=\"{friction} "));
     }
     if let Some(fovy) = wrist_fovy_deg {
         text = text.replace(WRIST_FOVY, &format!("fovy=\"{fovy:.12}\""));
+    }
+    if let Some(hand_from_camera) = hand_from_camera {
+        text = text.replace(WRIST_PLACE, &pose_attributes(hand_from_camera));
     }
     Asset { name: PANDA_FILE.to_owned(), bytes: text.into_bytes() }
 }
@@ -225,7 +235,7 @@ mod tests {
             found
         };
         assert_eq!(pads(panda_asset()), [(1, 1.0); 8]);
-        assert_eq!(pads(changed_panda_asset(Some(0.7), None)), [(0, 0.7); 8]);
+        assert_eq!(pads(changed_panda_asset(Some(0.7), None, None)), [(0, 0.7); 8]);
     }
 
     #[test]
@@ -236,7 +246,7 @@ mod tests {
         assert!((optical_axis - approach_axis).norm() < 1e-9);
         let fovy = data.model().vertical_field_of_view_rad(ids.wrist_camera);
         assert!((fovy - vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, 480)).abs() < 1e-12);
-        let changed = String::from_utf8(changed_panda_asset(None, Some(60.0)).bytes).unwrap();
+        let changed = String::from_utf8(changed_panda_asset(None, Some(60.0), None).bytes).unwrap();
         assert!(changed.contains("fovy=\"60.000000000000\"") && !changed.contains(WRIST_FOVY));
     }
 

@@ -4,11 +4,12 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use nalgebra::{Vector3, Vector6};
 use sdg_kinematics::{ACCELERATION_MAX_RAD_S2, JointVector, VELOCITY_MAX_RAD_S};
+use sdg_robot::PERIOD_SECS;
 
 use crate::attempt_errors::Shake;
 use crate::controller::ArmReference;
 use crate::error::Result;
-use crate::workcell::{PERIOD_SECS, Workcell};
+use crate::workcell::Workcell;
 
 /// How long the swinging takes to build up and to end, in seconds.
 const RAMP_SECS: f64 = 0.2;

@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use image::RgbImage;
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_geometry::{PinholeCamera, PosedCamera};
-use sdg_kinematics::{IkOptions, Panda, Trajectory, ready_pose};
+use sdg_kinematics::{HAND_TURN_RAD, IkOptions, Panda, ready_pose};
+use sdg_robot::{HandCommand, PERIOD_SECS};
 
 use crate::attempt_errors::AttemptErrors;
-use crate::camera::{CameraView, posed_camera};
+use crate::camera::{
+    CameraView, WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, posed_camera, vertical_field_of_view_rad,
+};
 use crate::controller::{ArmController, ArmReference};
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
@@ -19,13 +22,7 @@ use crate::model::{Body, Camera, Id, Joint, Model};
 use crate::panda::{PANDA_FILE, PandaIds, changed_panda_asset};
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
-use crate::scene::SceneVariation;
-
-/// Control period and timestep of the physics in seconds: 1 kHz.
-pub const PERIOD_SECS: f64 = 1e-3;
-
-/// A joint that is this far from its reference is held up by something, in radians.
-const BLOCKED_RAD: f64 = 0.03;
+use crate::scene::{SceneVariation, pose_attributes};
 
 /// What a workcell is made of.
 #[derive(Debug, Clone)]
@@ -36,14 +33,31 @@ pub struct WorkcellConfig {
     pub wrist_render: RenderConfig,
     /// What is wrong in attempts.
     pub errors: AttemptErrors,
-    /// The wrist camera, where it is not [`PinholeCamera::WRIST`].
+    /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,
+    /// Where the camera is, if not in its usual place on the hand.
+    pub camera_place: Option<CameraPlace>,
+}
+
+/// Where a workcell's camera is (optical frame), m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraPlace {
+    /// On the robot's flange.
+    OnFlange(Isometry3<f64>),
+    /// Beside the robot, in its base frame.
+    InBase(Isometry3<f64>),
 }
 
 impl WorkcellConfig {
     /// A scene with the wrist camera's usual pictures, without errors.
     pub fn new(scene: SceneVariation) -> Self {
-        Self { scene, wrist_render: RenderConfig::default(), errors: AttemptErrors::default(), wrist_camera: None }
+        Self {
+            scene,
+            wrist_render: RenderConfig::default(),
+            errors: AttemptErrors::default(),
+            wrist_camera: None,
+            camera_place: None,
+        }
     }
 }
 
@@ -52,15 +66,6 @@ impl WorkcellConfig {
 struct PartIds {
     body: Id<Body>,
     joint: Id<Joint>,
-}
-
-/// How a motion ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MotionEnd {
-    /// The arm is where the motion ends.
-    Arrived,
-    /// Something held the arm up; what touched it, in words.
-    Blocked(String),
 }
 
 /// A Panda at a table with a part, its physics and its cameras.
@@ -72,11 +77,17 @@ pub struct Workcell {
     part: Option<PartIds>,
     wrist_renderer: Renderer,
     scene_camera: Id<Camera>,
+    /// The camera that perception is shown.
+    camera: Id<Camera>,
     controller: ArmController,
     pub(crate) gripper: Gripper,
     reference: ArmReference,
     recorder: Option<Recorder>,
     tcp_from_camera: Isometry3<f64>,
+    /// What the hand was asked last.
+    pub(crate) hand_command: Option<HandCommand>,
+    /// Whether the arm has stopped itself.
+    pub(crate) is_in_reflex: bool,
 }
 
 impl Workcell {
@@ -99,10 +110,14 @@ impl Workcell {
         };
         let wrist_renderer = Renderer::new(&model, wrist_render)?;
         let scene_camera = model.id("scene")?;
+        let camera = match config.camera_place {
+            Some(CameraPlace::InBase(_)) => model.id(CAMERA_IN_BASE)?,
+            Some(CameraPlace::OnFlange(_)) | None => panda_ids.wrist_camera,
+        };
         let mut data = Data::new(model)?;
         panda_ids.set_position(&mut data, &ready_pose());
         data.forward()?;
-        let world_from_camera = posed_camera(&wrist_renderer, &data, panda_ids.wrist_camera).world_from_camera;
+        let world_from_camera = posed_camera(&wrist_renderer, &data, camera).world_from_camera;
         let tcp_from_camera = panda_ids.base_from_tcp(&data).inverse() * world_from_camera;
 
         let mut workcell = Self {
@@ -113,11 +128,14 @@ impl Workcell {
             part,
             wrist_renderer,
             scene_camera,
+            camera,
             controller: ArmController::default(),
             gripper: Gripper::at_opening_m(0.08),
             reference: ArmReference::at_rest(ready_pose()),
             recorder: None,
             tcp_from_camera,
+            hand_command: None,
+            is_in_reflex: false,
         };
         workcell.reset(&ready_pose())?;
         Ok(workcell)
@@ -139,6 +157,26 @@ impl Workcell {
         self.panda_ids.set_finger_position_m(&mut self.data, crate::panda::FINGER_TRAVEL_M);
         self.gripper = Gripper::at_opening_m(0.08);
         self.reference = ArmReference::at_rest(*q);
+        self.hand_command = None;
+        self.is_in_reflex = false;
+        self.data.forward()
+    }
+
+    /// Puts everything where another simulation of the same configuration has it ([`Data::qpos`]), at rest.
+    ///
+    /// # Errors
+    /// [`SimulationError::Configuration`] for positions of another scene.
+    pub fn set_positions(&mut self, qpos: &[f64]) -> Result<()> {
+        if qpos.len() != self.data.qpos().len() {
+            return Err(SimulationError::Configuration {
+                field: "positions",
+                expected: format!("{} numbers", self.data.qpos().len()),
+                found: qpos.len().to_string(),
+            });
+        }
+        self.data.qpos_mut().copy_from_slice(qpos);
+        self.data.qvel_mut().fill(0.0);
+        self.reference = ArmReference::at_rest(self.panda_ids.position(&self.data));
         self.data.forward()
     }
 
@@ -197,6 +235,11 @@ impl Workcell {
         self.panda_ids.finger_position_m(&self.data).iter().sum()
     }
 
+    /// Where the wrist camera (optical frame) is on the hand.
+    pub fn tcp_from_camera(&self) -> Isometry3<f64> {
+        self.tcp_from_camera
+    }
+
     /// The tool centre point's pose for the wrist camera to be at a pose (optical frame).
     pub fn base_from_tcp_for_camera(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         base_from_camera * self.tcp_from_camera.inverse()
@@ -209,7 +252,7 @@ impl Workcell {
     pub fn wrist_view(&mut self) -> Result<CameraView> {
         // A step leaves positions one period behind the joints.
         self.data.forward()?;
-        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.panda_ids.wrist_camera)?;
+        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.camera)?;
         match self.config.wrist_camera {
             None => Ok(drawn),
             Some(intrinsics) => Ok(CameraView {
@@ -224,7 +267,7 @@ impl Workcell {
     /// # Errors
     /// As [`Renderer::segmentation`].
     pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
-        self.wrist_renderer.segmentation(&mut self.data, self.panda_ids.wrist_camera)
+        self.wrist_renderer.segmentation(&mut self.data, self.camera)
     }
 
     /// Puts the arm, without moving through time, where its wrist camera is at a pose, and takes a
@@ -250,6 +293,22 @@ impl Workcell {
         self.panda_ids.set_position(&mut self.data, &solution.q);
         self.reference = ArmReference::at_rest(solution.q);
         self.data.forward()
+    }
+
+    /// A picture of the whole workcell from outside with the arm somewhere else, fingers at an opening (m): for plans.
+    ///
+    /// # Errors
+    /// As [`Workcell::scene_image`].
+    pub fn scene_image_at(
+        &mut self,
+        renderer: &mut Renderer,
+        q: &sdg_kinematics::JointVector,
+        opening_m: f64,
+    ) -> Result<RgbImage> {
+        self.panda_ids.set_position(&mut self.data, q);
+        self.panda_ids.set_finger_position_m(&mut self.data, 0.5 * opening_m);
+        self.data.forward()?;
+        renderer.image(&mut self.data, self.scene_camera)
     }
 
     /// A picture of the whole workcell from outside.
@@ -286,38 +345,6 @@ impl Workcell {
         }
     }
 
-    /// Stands still for a while.
-    ///
-    /// # Errors
-    /// [`SimulationError::Unstable`] or a renderer's error while recording.
-    pub fn wait(&mut self, duration_secs: f64) -> Result<()> {
-        self.reference = ArmReference::at_rest(self.reference.position);
-        for _ in 0..(duration_secs / PERIOD_SECS).round() as usize {
-            self.tick()?;
-        }
-        Ok(())
-    }
-
-    /// Follows a motion and stops at the first obstacle.
-    ///
-    /// # Errors
-    /// [`SimulationError::Unstable`] or a renderer's error while recording.
-    pub fn follow(&mut self, trajectory: &Trajectory) -> Result<MotionEnd> {
-        let num_periods = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
-        for period in 1..=num_periods {
-            let (position, velocity, acceleration) = trajectory.sample(period as f64 * PERIOD_SECS);
-            self.reference = ArmReference { position, velocity, acceleration };
-            self.tick()?;
-            let error = (self.panda_ids.position(&self.data) - position).amax();
-            if error > BLOCKED_RAD {
-                let obstacle = self.describe_arm_contacts();
-                self.reference = ArmReference::at_rest(self.panda_ids.position(&self.data));
-                return Ok(MotionEnd::Blocked(obstacle));
-            }
-        }
-        Ok(MotionEnd::Arrived)
-    }
-
     /// Sets where the controller wants the arm in the next period.
     pub(crate) fn set_reference(&mut self, reference: ArmReference) {
         self.reference = reference;
@@ -329,7 +356,7 @@ impl Workcell {
     }
 
     /// What touches the arm, in words.
-    fn describe_arm_contacts(&self) -> String {
+    pub(crate) fn describe_arm_contacts(&self) -> String {
         let model = self.data.model();
         let name_of = |body: Id<Body>| model.name(body).unwrap_or_else(|| "the table".into());
         let mut touching: Vec<String> = self
@@ -351,29 +378,36 @@ impl Workcell {
 /// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
     let fragment = config.scene.fragment();
-    let xml = include_str!("../assets/workcell.xml")
-        .replace("PANDA_FILE", PANDA_FILE)
-        .replace("<!-- SCENE -->", &(fragment.sections + sections));
-    let mut assets = fragment.files;
     let fovy_deg = match &config.wrist_camera {
         Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
         None => None,
     };
-    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg));
+    let (mut hand_from_camera, mut camera_in_base) = (None, String::new());
+    match config.camera_place {
+        None => {}
+        Some(CameraPlace::OnFlange(flange_from_camera)) => {
+            let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
+            hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
+        }
+        Some(CameraPlace::InBase(base_from_camera)) => {
+            let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
+            let fovy_deg = fovy_deg
+                .unwrap_or(vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees());
+            camera_in_base =
+                format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
+        }
+    }
+    let xml = include_str!("../assets/workcell.xml")
+        .replace("PANDA_FILE", PANDA_FILE)
+        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
+    let mut assets = fragment.files;
+    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));
     Ok(Arc::new(Model::from_xml(&xml, &assets)?))
 }
 
+/// Name of a camera beside the robot.
+const CAMERA_IN_BASE: &str = "beside";
+
 fn is_arm(body: &str) -> bool {
     body.starts_with("link") || body == "hand" || body.ends_with("_finger")
-}
-
-/// A camera pose straight down from `height_m` above the table, over (x, y): with yaw 0 the
-/// picture's up is the base's x and its right is -y; a positive yaw turns it counter-clockwise as
-/// seen from above.
-pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
-    // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
-    let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);
-    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
-        * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(at_yaw_zero));
-    Isometry3::from_parts(Translation3::new(x, y, height_m), rotation)
 }

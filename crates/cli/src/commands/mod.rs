@@ -9,7 +9,11 @@ pub mod demo;
 pub mod detect;
 pub mod devices;
 pub mod evaluate;
+pub mod grasp;
 pub mod man;
 pub mod rehearse;
+pub mod robot;
+#[cfg(feature = "simulation")]
+pub mod simulate;
 pub mod teach;
 pub mod weights;

@@ -1,69 +1,16 @@
 //! What came of a grasp attempt.
 
-use std::fmt;
-
 use image::RgbImage;
 use nalgebra::Isometry3;
+use sdg_robot::{GraspOutcome, GraspStep, GraspTarget};
 
 use crate::camera::CameraView;
-use crate::perception::GraspTarget;
-
-/// A step of an attempt.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum AttemptStep {
-    /// Perception finds the part.
-    Detect,
-    /// The arm goes over the part and turns to it.
-    Hover,
-    /// The hand comes down to the part.
-    Approach,
-    /// The fingers close on it.
-    Close,
-    /// The arm lifts it.
-    Lift,
-    /// The part stays between the fingers.
-    Hold,
-}
-
-impl fmt::Display for AttemptStep {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Detect => "detect",
-            Self::Hover => "hover",
-            Self::Approach => "approach",
-            Self::Close => "close",
-            Self::Lift => "lift",
-            Self::Hold => "hold",
-        })
-    }
-}
-
-/// How an attempt ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum AttemptOutcome {
-    /// One second after lifting, the part hung high enough between both fingers.
-    Success,
-    /// It did not come so far.
-    Failure {
-        /// The step that failed.
-        step: AttemptStep,
-        /// Why, in one sentence.
-        why: String,
-    },
-}
-
-impl AttemptOutcome {
-    /// Whether the part was grasped.
-    pub fn is_success(&self) -> bool {
-        *self == Self::Success
-    }
-}
 
 /// All that happened in an attempt.
 #[derive(Debug, Clone)]
 pub struct AttemptReport {
-    /// How it ended.
-    pub outcome: AttemptOutcome,
+    /// How it ended: held where, after lifting and waiting, the part hung high enough between both fingers.
+    pub outcome: GraspOutcome,
     /// The seed of the start configuration.
     pub seed: u64,
     /// Where the part lay at the start, in the base frame.
@@ -77,6 +24,8 @@ pub struct AttemptReport {
     pub looks: [usize; 2],
     /// How far the hand swung to either side after lifting, in metres; `None` where it was not shaken.
     pub shake_amplitude_m: Option<f64>,
+    /// What the hand's width and force said of the same, after each of the last steps; see [`sdg_robot::GraspReport`].
+    pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// Height of the part's lowest point above the table at the end, in metres.
     pub object_height_m: Option<f64>,
     /// Simulated time in seconds.

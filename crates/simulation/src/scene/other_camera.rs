@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+use sdg_robot::camera_looking_down;
 
 use super::{GraspTruth, PlacedObject, SceneVariation, VariationConfig, pose_attributes, shows_whole};
 use crate::camera::CameraView;
@@ -20,7 +21,7 @@ use crate::lens::Frustum;
 use crate::objects::{LookAlikeKind, ObjectSpec};
 use crate::panda::PandaIds;
 use crate::render::{RenderConfig, Renderer};
-use crate::workcell::{WorkcellConfig, build_model, camera_looking_down};
+use crate::workcell::{WorkcellConfig, build_model};
 
 /// A camera model and where it may hang.
 #[derive(Debug, Clone, Copy, PartialEq)]

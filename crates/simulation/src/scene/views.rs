@@ -4,14 +4,14 @@
 
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera, outer_outline};
+use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
 
 use super::{PlacedObject, SceneVariation, VariationConfig};
-use crate::attempt::AttemptConfig;
 use crate::camera::CameraView;
 use crate::error::{Result, SimulationError};
 use crate::model::Body;
 use crate::objects::ObjectSpec;
-use crate::workcell::{Workcell, WorkcellConfig, camera_looking_down};
+use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Where the parts lie when they are shown to the system: x, y in metres and yaw in radians, in the base frame.
 ///
@@ -20,8 +20,8 @@ pub const DEMONSTRATION_PLACE: (f64, f64, f64) = (0.5, 0.0, 0.9);
 
 /// Where the wrist camera looks from in an attempt: straight down on the middle of the table's part in reach.
 pub fn base_from_look_camera() -> Isometry3<f64> {
-    let AttemptConfig { look_at_m: [x, y], look_height_m, .. } = AttemptConfig::default();
-    camera_looking_down(x, y, look_height_m, 0.0)
+    let [x, y] = LOOK_AT_M;
+    camera_looking_down(x, y, LOOK_HEIGHT_M, 0.0)
 }
 
 /// Where a part truly is, and where its grasp therefore is in a picture.

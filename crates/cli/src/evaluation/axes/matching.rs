@@ -87,7 +87,7 @@ mod tests {
     use nalgebra::Point2;
     use sdg_geometry::{Angle, BoundingBox, PlanarGrasp};
     use sdg_grasp::TurnSource;
-    use sdg_simulation::camera_looking_down;
+    use sdg_robot::camera_looking_down;
 
     fn error(distance_mm: f64, angle_deg: f64) -> Option<DetectionError> {
         Some(DetectionError { distance_mm, angle_deg })

@@ -5,12 +5,12 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use rand::Rng;
 use sdg_geometry::PosedCamera;
+use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
 
 use super::request::{AxisParameter, Drawn, Request};
-use crate::attempt::AttemptConfig;
 use crate::error::{Result, SimulationError};
 use crate::scene::{PlacedObject, shows_whole};
-use crate::workcell::{Workcell, WorkcellConfig, camera_looking_down};
+use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Heights of the camera over the usual one.
 const HEIGHT_FACTORS: std::ops::Range<f64> = 0.75..1.3;
@@ -29,8 +29,8 @@ pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Draw
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
     let factor = request.between(HEIGHT_FACTORS);
-    let AttemptConfig { look_at_m: [x, y], look_height_m, .. } = AttemptConfig::default();
-    let height_m = look_height_m * factor;
+    let [x, y] = LOOK_AT_M;
+    let height_m = LOOK_HEIGHT_M * factor;
     let part = part_in(&cell)?;
     let above = part.base_from_object.translation.vector;
     // From the usual place to straight above the part.
@@ -53,7 +53,7 @@ pub(super) fn draw_tilted(request: &mut Request<'_>) -> Result<Drawn> {
     let scene = request.ordinary_scene();
     let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
     let tilt_deg = request.between(TILTS_DEG);
-    let distance_m = AttemptConfig::default().look_height_m;
+    let distance_m = LOOK_HEIGHT_M;
     let part = part_in(&cell)?;
     let at = part.base_from_object.translation.vector;
     let rng = &mut request.rng;

@@ -1,0 +1,266 @@
+//! `sdg grasp`: one grasp, from the picture to the lifted part, with a real arm or a simulated one.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use sdg_camera::{Address, LatestFrame};
+use sdg_grasp::{GraspError, GraspModel};
+use sdg_robot::workcell::Workcell;
+use sdg_robot::{
+    Arm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, PartFinder, Robot,
+    SafetyLimits,
+};
+use serde_json::{Value, json};
+
+use crate::camera_files;
+use crate::commands::devices;
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::interrupt::Interrupt;
+use crate::live_pictures::{self, RequestArgs};
+use crate::robots::{
+    self, Consent, DryRun, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, confirm, write_states,
+};
+use crate::shared_args::ComputeArgs;
+
+/// `sdg grasp`
+#[derive(Debug, Args)]
+pub struct GraspArgs {
+    /// The arm: HOST or HOST:PORT of a Franka, or sim for a simulated one; without it, the address in the workcell's file
+    #[arg(long, value_name = "ADDRESS|sim")]
+    pub robot: Option<RobotChoice>,
+    /// Where pictures come from, as for sdg detect --from. With --robot sim: sim:PART or sim:PART?seed=N, a part on the table of
+    /// the simulated arm
+    #[arg(long, value_name = "ADDRESS")]
+    pub from: Address,
+    /// The camera's file; without it, the one that the workcell's file names
+    #[arg(long, value_name = "FILE")]
+    pub camera: Option<PathBuf>,
+    /// A grasp model that sdg teach wrote from photos of a calibrated camera
+    #[arg(long, value_name = "FILE")]
+    pub grasp_model: PathBuf,
+    /// The workcell's file: robot, tool, camera, table, where the arm may be, where it looks out from
+    #[arg(long, value_name = "FILE")]
+    pub workcell: PathBuf,
+    /// Plan the grasp from where the arm stands, draw it, and ask before anything moves
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Do not ask, for programs
+    #[arg(long)]
+    pub yes: bool,
+    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
+    pub speed: f64,
+    /// The oldest picture on which a motion may rest
+    #[arg(long, value_name = "SECS", default_value_t = 1.0)]
+    pub max_detection_age_secs: f64,
+    /// Drive a real arm from a thread that the kernel may delay; for simulated ones
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Folder for what --dry-run draws
+    #[arg(long, value_name = "DIR", default_value = "dry-run")]
+    pub out: PathBuf,
+    /// Where the arm's last second is written after an error, as CSV
+    #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
+    pub states: PathBuf,
+    /// Where the network computes
+    #[command(flatten)]
+    pub compute: ComputeArgs,
+    /// End with one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// What the camera is asked for; its size is that of the camera's file
+    #[command(flatten)]
+    pub request: RequestArgs,
+}
+
+/// What a grasp needs besides an arm.
+struct Prepared {
+    workcell: Workcell,
+    model: GraspModel,
+    camera: PlacedCamera,
+    config: GraspConfig,
+}
+
+/// Reads and checks everything, then connects to the arm and grasps.
+pub fn run(args: &GraspArgs) -> Result<Outcome> {
+    let prepared = prepare(args)?;
+    let choice = RobotChoice::named(args.robot.as_ref(), prepared.workcell.address.as_deref())?;
+    let interrupt = Interrupt::watch();
+    match choice {
+        RobotChoice::Sim => simulated(args, &prepared, &interrupt),
+        RobotChoice::Network(address) => {
+            let mut options = args.request.options();
+            [options.width, options.height] = prepared.camera.size_px();
+            let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
+            let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
+            let limits = prepared.workcell.safety_limits();
+            attempt(args, &prepared, &mut arm, limits, LivePictures(camera), &interrupt, Some(&address.to_string()))
+        }
+    }
+}
+
+fn prepare(args: &GraspArgs) -> Result<Prepared> {
+    let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
+    let pace = robots::pace(args.speed)?;
+    if !(args.max_detection_age_secs > 0.0 && args.max_detection_age_secs.is_finite()) {
+        let found = args.max_detection_age_secs;
+        return Err(Usage(format!("--max-detection-age-secs: expected a positive number, found {found}")).into());
+    }
+    let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| {
+        Usage(format!("expected --camera FILE, or a file under [camera] in {}", args.workcell.display()))
+    })?;
+    let (calibrated, _) = camera_files::read(&camera_path)?;
+    let camera = PlacedCamera::new(&calibrated, workcell.mounting, workcell.table_height_m)
+        .with_context(|| camera_path.display().to_string())?;
+    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    if model.facts().lengths.is_none() {
+        return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
+    }
+    files::check_writable(&args.states)?;
+    let config = GraspConfig { pace, max_detection_age_secs: args.max_detection_age_secs, ..workcell.grasp_config() };
+    Ok(Prepared { workcell, model, camera, config })
+}
+
+/// Grasps with an arm in MuJoCo.
+#[cfg(feature = "simulation")]
+fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Result<Outcome> {
+    use sdg_simulation::WorkcellConfig;
+
+    let Address::Sim(text) = &args.from else {
+        let found = &args.from;
+        return Err(
+            Usage(format!("--from: with --robot sim expected sim:PART or sim:PART?seed=N, found {found}")).into()
+        );
+    };
+    let scene = robots::simulated_scene(text)?;
+    let (intrinsics, place) = prepared.camera.simulated();
+    let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
+        wrist_camera: Some(intrinsics),
+        camera_place: Some(place),
+        ..WorkcellConfig::new(scene)
+    })?;
+    let limits = SafetyLimits {
+        fingertip_beyond_tcp_m: sdg_simulation::FINGERTIP_BEYOND_TCP_M,
+        ..prepared.workcell.safety_limits()
+    };
+    attempt(args, prepared, &mut cell, limits, robots::SimulatedPictures, interrupt, None)
+}
+
+#[cfg(not(feature = "simulation"))]
+fn simulated(_args: &GraspArgs, _prepared: &Prepared, _interrupt: &Interrupt) -> Result<Outcome> {
+    Err(Usage(
+        "--robot sim: this sdg was built without the simulator: expected a build with cargo's feature \"simulation\""
+            .to_owned(),
+    )
+    .into())
+}
+
+/// One grasp with any arm; a real one, which has an address, moves after a person has agreed.
+fn attempt<A: Arm, P: Pictures<A>>(
+    args: &GraspArgs,
+    prepared: &Prepared,
+    arm: &mut A,
+    limits: SafetyLimits,
+    pictures: P,
+    interrupt: &Interrupt,
+    address: Option<&str>,
+) -> Result<Outcome> {
+    let mut finder = ModelFinder::new(prepared.model.clone(), prepared.camera, pictures);
+    if args.dry_run {
+        let target = finder.find(arm)?.filter(|target| target.score >= sdg_robot::SURE);
+        dry_run(args, prepared, arm, limits.clone(), target)?;
+    }
+    if args.dry_run || address.is_some() {
+        let question = match address {
+            Some(address) => format!("Move the arm at {address} at {:.0} % of its speed?", args.speed * 100.0),
+            None => "Move the simulated arm?".to_owned(),
+        };
+        if confirm(&question, args.yes)? == Consent::Refused {
+            eprintln!("nothing was moved");
+            return Ok(Outcome::Done);
+        }
+    }
+    let started = Instant::now();
+    let mount = prepared.camera.mount();
+    let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
+    let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut (), mount, &prepared.config);
+    if ended.is_err() || robot.latched().is_some() {
+        write_states(&args.states, robot.watch())?;
+    }
+    let report = ended?;
+    tell(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
+}
+
+/// Plans from where the arm stands, draws, tells.
+fn dry_run<A: Arm>(
+    args: &GraspArgs,
+    prepared: &Prepared,
+    arm: &mut A,
+    limits: SafetyLimits,
+    target: Option<GraspTarget>,
+) -> Result<()> {
+    let (state, hand) = (arm.state()?, arm.hand()?);
+    let mount = prepared.camera.mount();
+    let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config)?;
+    eprintln!("what would be done:");
+    plan.tell(target.is_some())?;
+    for file in plan.draw(&args.out)? {
+        eprintln!("  {}", file.display());
+    }
+    Ok(())
+}
+
+/// The closing lines, or the one object.
+fn tell(args: &GraspArgs, prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Result<Outcome> {
+    if args.json {
+        println!("{}", to_json(prepared, report, secs, robot));
+    }
+    match &report.outcome {
+        GraspOutcome::Held => {
+            let width_mm = report.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
+            eprintln!(
+                "the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s); sdg robot open lets it go"
+            );
+            Ok(Outcome::Done)
+        }
+        // A look was taken, and the part was not in it; a motion that was refused before is another matter.
+        GraspOutcome::Failed { step: GraspStep::Detect, why } if report.targets.last() == Some(&None) => {
+            eprintln!("{why}");
+            Ok(Outcome::NothingToGrasp)
+        }
+        GraspOutcome::Failed { step, why } => Err(anyhow!("{step}: {why}")),
+    }
+}
+
+fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Value {
+    let target = report.targets.iter().rev().flatten().next().map(|target| {
+        let p = target.base_from_tcp.translation.vector;
+        let along = target.base_from_tcp.rotation * nalgebra::Vector3::x();
+        json!({
+            "frame": "base",
+            "p_m": [p.x, p.y, p.z],
+            "yaw_deg": along.y.atan2(along.x).to_degrees(),
+            "opening_m": target.jaw_width_m,
+            "score": target.score,
+        })
+    });
+    let (step, why) = match &report.outcome {
+        GraspOutcome::Held => (GraspStep::Hold, None),
+        GraspOutcome::Failed { step, why } => (*step, Some(why)),
+    };
+    json!({
+        "robot": robot,
+        "model": prepared.model.kind().letter(),
+        "object": prepared.model.object(),
+        "held": report.outcome.is_held(),
+        "step": step.name(),
+        "why": why,
+        "looks": report.looks,
+        "target": target,
+        "closed_width_m": report.closed.map(|hand| hand.opening_m),
+        "seconds": secs,
+    })
+}

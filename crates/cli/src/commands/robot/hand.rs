@@ -1,0 +1,67 @@
+//! `sdg robot open` and `close`.
+
+use anyhow::Result;
+use clap::Args;
+use sdg_kinematics::HAND_OPENING_MAX_M;
+use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load, Watch};
+
+use super::ArmArgs;
+use crate::exit::{Outcome, Usage};
+
+/// Speed of the fingers against each other, m/s.
+const SPEED_M_S: f64 = 0.05;
+/// Any width between the fingers may be that of what is closed on.
+const ANY_WIDTH_M: f64 = 0.5 * HAND_OPENING_MAX_M;
+/// What the hand holds for long, N.
+const MAX_FORCE_N: f64 = 70.0;
+
+/// `sdg robot open`
+#[derive(Debug, Args)]
+pub struct OpenArgs {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Distance between the fingers, 0 to 80
+    #[arg(long, value_name = "MM", default_value_t = 80.0)]
+    width_mm: f64,
+}
+
+/// `sdg robot close`
+#[derive(Debug, Args)]
+pub struct CloseArgs {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Force of each finger, 1 to 70
+    #[arg(long, value_name = "N", default_value_t = 20.0)]
+    force_n: f64,
+}
+
+pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
+    let opening_m = args.width_mm * 1e-3;
+    if !(0.0..=HAND_OPENING_MAX_M).contains(&opening_m) {
+        let found = args.width_mm;
+        return Err(Usage(format!("--width-mm: expected 0 to {:.0}, found {found}", HAND_OPENING_MAX_M * 1e3)).into());
+    }
+    let (mut arm, _) = args.arm.connect()?;
+    let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S })?;
+    // What the hand carried is not there any more.
+    arm.set_load(Load::NONE)?;
+    eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
+    Ok(Outcome::Done)
+}
+
+pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
+    if !(1.0..=MAX_FORCE_N).contains(&args.force_n) {
+        return Err(Usage(format!("--force-n: expected 1 to {MAX_FORCE_N}, found {}", args.force_n)).into());
+    }
+    let (mut arm, _) = args.arm.connect()?;
+    let close = HandCommand::Grasp { width_m: ANY_WIDTH_M, speed_m_s: SPEED_M_S, force_n: args.force_n };
+    let hand = command(&mut arm, close)?;
+    let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
+    eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
+    Ok(Outcome::Done)
+}
+
+fn command(arm: &mut FrankaArm, command: HandCommand) -> Result<HandState> {
+    arm.start_hand(command)?;
+    Ok(arm.finish_hand(&mut Watch::default())?)
+}

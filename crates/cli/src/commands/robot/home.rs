@@ -1,0 +1,68 @@
+//! `sdg robot home`.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use sdg_kinematics::ready_pose;
+use sdg_robot::{DEFAULT_SPEED, FrankaArm, Robot};
+
+use super::ArmArgs;
+use crate::exit::{Outcome, Usage};
+use crate::interrupt::Interrupt;
+use crate::robots::{self, Consent, confirm, write_states};
+
+/// `sdg robot home`
+#[derive(Debug, Args)]
+pub struct HomeArgs {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Move the fingers through their range, once after the hand was switched on; the arm stands still
+    #[arg(long)]
+    hand: bool,
+    /// Do not ask, for programs
+    #[arg(long)]
+    yes: bool,
+    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
+    speed: f64,
+    /// Drive a real arm from a thread that the kernel may delay; for simulated ones
+    #[arg(long)]
+    no_realtime: bool,
+    /// Where the arm's last second is written after an error, as CSV
+    #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
+    states: PathBuf,
+}
+
+pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
+    if args.hand {
+        let (mut arm, address) = args.arm.connect()?;
+        if confirm(&format!("Move the fingers of the hand at {address}?"), args.yes)? == Consent::Given {
+            arm.home_hand()?;
+        }
+        return Ok(Outcome::Done);
+    }
+    let Some(path) = &args.arm.workcell else {
+        return Err(Usage("expected --workcell FILE, which says where the arm may be".to_owned()).into());
+    };
+    let pace = robots::pace(args.speed)?;
+    let (workcell, _) = robots::read_workcell(path)?;
+    let address = args.arm.address()?;
+    let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
+    let interrupt = Interrupt::watch();
+    let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
+    let home = workcell.home().unwrap_or_else(ready_pose);
+    let motion = robot.plan_free(&home, &pace.free_limits())?;
+    // Refused before anybody is asked.
+    robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
+    let secs = motion.duration_secs();
+    if confirm(&format!("Move the arm at {address} home, in {secs:.1} s?"), args.yes)? == Consent::Refused {
+        return Ok(Outcome::Done);
+    }
+    let moved = robot.follow(motion);
+    if moved.is_err() {
+        write_states(&args.states, robot.watch())?;
+    }
+    moved?;
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,96 @@
+//! `sdg robot`: a real arm by hand. Each verb's arguments stand beside what it does.
+
+mod hand;
+mod home;
+mod state;
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+use sdg_robot::{Arm, FrankaArm, RobotAddress, Scheduling};
+
+use crate::exit::{Outcome, Usage};
+use crate::robots::{self, Consent, RobotChoice, confirm};
+
+/// The verbs of `sdg robot`.
+#[derive(Debug, Subcommand)]
+pub enum RobotCommand {
+    /// Where arm and hand are, and whether they can move
+    State(state::StateArgs),
+    /// The arm to its first look-out pose that is given as joint angles, or to Franka's ready pose; or the hand's fingers through their range
+    Home(home::HomeArgs),
+    /// After a reflex: clears the error, once a person has looked. Nothing moves by it
+    Recover(RecoverArgs),
+    /// Opens the hand
+    Open(hand::OpenArgs),
+    /// Closes the hand on what is between its fingers
+    Close(hand::CloseArgs),
+}
+
+/// Which arm.
+#[derive(Debug, Args)]
+pub struct ArmArgs {
+    /// HOST or HOST:PORT; without it, the address in the workcell's file
+    #[arg(long, value_name = "ADDRESS")]
+    pub robot: Option<RobotChoice>,
+    /// The workcell's file
+    #[arg(long, value_name = "FILE")]
+    pub workcell: Option<PathBuf>,
+}
+
+impl ArmArgs {
+    fn address(&self) -> Result<RobotAddress> {
+        let of_workcell = match &self.workcell {
+            Some(path) => robots::read_workcell(path)?.0.address,
+            None => None,
+        };
+        match RobotChoice::named(self.robot.as_ref(), of_workcell.as_deref())? {
+            RobotChoice::Network(address) => Ok(address),
+            RobotChoice::Sim => Err(Usage(
+                "--robot: expected the address of an arm; a simulated one lives only as long as sdg grasp, or as sdg \
+                 simulate --fci, whose address is 127.0.0.1"
+                    .to_owned(),
+            )
+            .into()),
+        }
+    }
+
+    /// Connects; what is asked of the arm without a control loop needs no real time.
+    fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
+        let address = self.address()?;
+        Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))
+    }
+}
+
+/// `sdg robot recover`
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// A person has looked at the cell; do not ask
+    #[arg(long)]
+    yes: bool,
+}
+
+/// Runs one of them.
+pub fn run(command: &RobotCommand) -> Result<Outcome> {
+    match command {
+        RobotCommand::State(args) => state::run(args),
+        RobotCommand::Home(args) => home::run(args),
+        RobotCommand::Recover(args) => recover(args),
+        RobotCommand::Open(args) => hand::open(args),
+        RobotCommand::Close(args) => hand::close(args),
+    }
+}
+
+fn recover(args: &RecoverArgs) -> Result<Outcome> {
+    let (mut arm, address) = args.arm.connect()?;
+    let question = format!("Is nothing in the way of the arm at {address}, and may it move again when it is told?");
+    if confirm(&question, args.yes)? == Consent::Refused {
+        return Ok(Outcome::Done);
+    }
+    arm.recover()?;
+    eprintln!("the arm is in mode \"{}\"", arm.state()?.mode.name());
+    Ok(Outcome::Done)
+}

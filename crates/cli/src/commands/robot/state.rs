@@ -1,0 +1,56 @@
+//! `sdg robot state`.
+
+use anyhow::Result;
+use clap::Args;
+use nalgebra::Isometry3;
+use sdg_kinematics::Panda;
+use sdg_robot::Arm;
+use serde_json::{Value, json};
+
+use super::ArmArgs;
+use crate::exit::Outcome;
+
+/// `sdg robot state`
+#[derive(Debug, Args)]
+pub struct StateArgs {
+    #[command(flatten)]
+    arm: ArmArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
+    let (mut arm, address) = args.arm.connect()?;
+    let (state, hand) = (arm.state()?, arm.hand()?);
+    let panda = Panda::new();
+    let base_from_tcp = panda.forward(&state.q);
+    let p = base_from_tcp.translation.vector;
+    let joints_deg: Vec<f64> = state.q.iter().map(|q| q.to_degrees()).collect();
+    if args.json {
+        let line = json!({
+            "robot": address.to_string(),
+            "mode": state.mode.name(),
+            "joints_rad": state.q.as_slice(),
+            "base_from_tcp": pose(&base_from_tcp),
+            "base_from_flange": pose(&panda.base_from_flange(&state.q)),
+            "external_torques_nm": state.tau_external_nm.as_slice(),
+            "hand": {"opening_m": hand.opening_m, "is_grasping": hand.is_grasping},
+        });
+        println!("{line}");
+    } else {
+        println!("arm    {address}, {}", state.mode.name());
+        let joints: Vec<String> = joints_deg.iter().map(|angle| format!("{angle:.2}")).collect();
+        println!("joints {} degrees", joints.join(", "));
+        println!("tcp    ({:.1}, {:.1}, {:.1}) mm", p.x * 1e3, p.y * 1e3, p.z * 1e3);
+        let holds = if hand.is_grasping { ", holds something" } else { "" };
+        println!("hand   {:.1} mm open{holds}", hand.opening_m * 1e3);
+    }
+    Ok(Outcome::Done)
+}
+
+/// As the poses' file of `sdg camera hand-eye` has it.
+fn pose(base_from_frame: &Isometry3<f64>) -> Value {
+    let (p, r) = (base_from_frame.translation.vector, base_from_frame.rotation.coords);
+    json!({"translation_m": p.as_slice(), "rotation_xyzw": r.as_slice()})
+}

@@ -1,0 +1,197 @@
+//! A grasp model as the eyes of an arm.
+//!
+//! ```text
+//! Pictures ─ picture, when it was taken ─ PlanDetector over the table ─ best pose in the base frame ─ GraspTarget
+//! Arm ─ state ─ where a camera on the hand is ──────┘
+//! ```
+
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::{Result, bail};
+use image::RgbImage;
+use nalgebra::Isometry3;
+use sdg_calibration::{CalibratedCamera, Frame};
+use sdg_camera::LatestFrame;
+use sdg_geometry::PosedCamera;
+use sdg_grasp::{CameraOverTable, GraspModel, PlanDetector, Verification};
+use sdg_kinematics::Panda;
+use sdg_robot::workcell::Mounting;
+use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, RobotError};
+
+/// How long a picture that was taken after the arm stopped is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A calibrated camera and where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlacedCamera {
+    intrinsics: sdg_geometry::PinholeCamera,
+    place: Place,
+    table_height_m: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Place {
+    OnFlange(Isometry3<f64>),
+    InBase(Isometry3<f64>),
+}
+
+impl PlacedCamera {
+    /// The camera of a file, mounted as the workcell says.
+    ///
+    /// # Errors
+    /// A file without what the mounting needs: `hand_eye:`, or `table:` in the robot's base.
+    pub(crate) fn new(camera: &CalibratedCamera, mounting: Mounting, table_height_m: f64) -> Result<Self> {
+        let place = match (mounting, camera.flange_from_camera, &camera.table) {
+            (Mounting::Hand, Some(flange_from_camera), _) => Place::OnFlange(flange_from_camera),
+            (Mounting::Hand, None, _) => bail!(
+                "expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand; \
+                 sdg camera hand-eye --mount hand measures it"
+            ),
+            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => Place::InBase(table.frame_from_camera),
+            (Mounting::Base, ..) => bail!(
+                "expected table: with frame: base, since the workcell mounts the camera beside the robot; \
+                 sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it"
+            ),
+        };
+        Ok(Self { intrinsics: camera.intrinsics, place, table_height_m })
+    }
+
+    /// Width and height of its pictures.
+    pub(crate) fn size_px(&self) -> [u32; 2] {
+        [self.intrinsics.width, self.intrinsics.height]
+    }
+
+    /// The same for the sequence.
+    pub(crate) fn mount(&self) -> CameraMount {
+        match self.place {
+            Place::OnFlange(flange_from_camera) => {
+                CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
+            }
+            Place::InBase(_) => CameraMount::Base,
+        }
+    }
+
+    /// The same for the simulator.
+    #[cfg(feature = "simulation")]
+    pub(crate) fn simulated(&self) -> (sdg_geometry::PinholeCamera, sdg_simulation::CameraPlace) {
+        let place = match self.place {
+            Place::OnFlange(flange_from_camera) => sdg_simulation::CameraPlace::OnFlange(flange_from_camera),
+            Place::InBase(base_from_camera) => sdg_simulation::CameraPlace::InBase(base_from_camera),
+        };
+        (self.intrinsics, place)
+    }
+
+    fn over_table(&self, base_from_flange: &Isometry3<f64>) -> CameraOverTable {
+        let world_from_camera = match self.place {
+            Place::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
+            Place::InBase(base_from_camera) => base_from_camera,
+        };
+        let camera = PosedCamera { intrinsics: self.intrinsics, world_from_camera };
+        CameraOverTable { camera, table_height_m: self.table_height_m, workspace: None }
+    }
+}
+
+/// A picture, and when it was taken where time passes by a clock.
+pub(crate) struct TakenPicture {
+    pub(crate) picture: RgbImage,
+    pub(crate) taken: Option<Instant>,
+}
+
+/// Where pictures come from.
+pub(crate) trait Pictures<A: Arm> {
+    /// A picture that was taken after the arm came to rest, which is before this call.
+    fn take(&mut self, arm: &mut A) -> sdg_robot::Result<TakenPicture>;
+}
+
+/// A live camera.
+pub(crate) struct LivePictures(pub(crate) LatestFrame);
+
+impl<A: Arm> Pictures<A> for LivePictures {
+    fn take(&mut self, _arm: &mut A) -> sdg_robot::Result<TakenPicture> {
+        let (now, called) = (SystemTime::now(), Instant::now());
+        let failed = |why: String| RobotError::Perception(why);
+        loop {
+            let left = PATIENCE.saturating_sub(called.elapsed());
+            let frame = match self.0.take(left) {
+                Ok(Some(frame)) => frame,
+                Ok(None) if self.0.has_ended() => return Err(failed("the camera has no more pictures".to_owned())),
+                Ok(None) => {
+                    let secs = PATIENCE.as_secs();
+                    return Err(failed(format!("no picture for {secs} s that was taken after the arm stopped")));
+                }
+                Err(error) if error.is_passing() && called.elapsed() < PATIENCE => continue,
+                Err(error) => return Err(failed(error.to_string())),
+            };
+            if frame.captured < now {
+                continue;
+            }
+            if let Some(fault) = frame.faults.first() {
+                return Err(failed(format!("{}: {fault}", frame.camera)));
+            }
+            let age = SystemTime::now().duration_since(frame.captured).unwrap_or_default();
+            return Ok(TakenPicture { picture: frame.picture, taken: Instant::now().checked_sub(age) });
+        }
+    }
+}
+
+/// The camera of the simulated workcell.
+#[cfg(feature = "simulation")]
+pub(crate) struct SimulatedPictures;
+
+#[cfg(feature = "simulation")]
+impl Pictures<sdg_simulation::Workcell> for SimulatedPictures {
+    fn take(&mut self, cell: &mut sdg_simulation::Workcell) -> sdg_robot::Result<TakenPicture> {
+        Ok(TakenPicture { picture: cell.wrist_view()?.image, taken: None })
+    }
+}
+
+/// A model behind a calibrated camera on or beside an arm.
+pub(crate) struct ModelFinder<P> {
+    pub(crate) pictures: P,
+    pub(crate) camera: PlacedCamera,
+    model: GraspModel,
+    detector: Option<PlanDetector>,
+    taken: Option<Instant>,
+    /// The last picture with what was found in it.
+    pub(crate) last: Option<RgbImage>,
+}
+
+impl<P> ModelFinder<P> {
+    pub(crate) fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
+        Self { pictures, camera, model, detector: None, taken: None, last: None }
+    }
+}
+
+impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
+    fn find(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>> {
+        let state = arm.state()?;
+        let TakenPicture { picture, taken } = self.pictures.take(arm)?;
+        self.taken = taken;
+        let over_table = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
+        let (width, height) = picture.dimensions();
+        let expected = (over_table.camera.intrinsics.width, over_table.camera.intrinsics.height);
+        if (width, height) != expected {
+            let (w, h) = expected;
+            return Err(RobotError::Perception(format!("expected pictures of {w}x{h} pixels, found {width}x{height}")));
+        }
+        let failed = |error: sdg_grasp::GraspError| RobotError::Perception(error.to_string());
+        let detector = match self.detector.take() {
+            Some(detector) => detector.moved_to(&over_table),
+            None => PlanDetector::new(self.model.clone(), &over_table),
+        }
+        .map_err(failed)?;
+        let detector = self.detector.insert(detector);
+        let found = detector.detect(&picture, Verification::ByShape).map_err(failed)?;
+        let detections: Vec<_> = found.iter().map(|found| found.detection.clone()).collect();
+        self.last = Some(crate::pictures::with_detections(&picture, &detections));
+        Ok(found.first().map(|best| GraspTarget {
+            base_from_tcp: best.pose.frame_from_tcp(),
+            jaw_width_m: best.pose.opening_m,
+            score: best.detection.score,
+        }))
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        self.taken
+    }
+}

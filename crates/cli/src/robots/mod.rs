@@ -1,0 +1,97 @@
+//! Arms as commands use them: which one, what it sees, whether a person agrees, and what is kept after an error.
+
+mod confirm;
+mod dry_run;
+mod finder;
+#[cfg(feature = "simulation")]
+mod simulated_scene;
+mod states_file;
+mod workcell_file;
+
+use std::str::FromStr;
+
+use anyhow::Result;
+use sdg_robot::{Pace, RobotAddress, Scheduling, StopReason, Watch};
+
+use crate::exit::Usage;
+use crate::interrupt::Interrupt;
+
+pub(crate) use confirm::{Consent, confirm};
+pub(crate) use dry_run::DryRun;
+#[cfg(feature = "simulation")]
+pub(crate) use finder::SimulatedPictures;
+pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera};
+#[cfg(feature = "simulation")]
+pub(crate) use simulated_scene::simulated_scene;
+pub(crate) use states_file::write_states;
+pub(crate) use workcell_file::read_workcell;
+
+/// `--robot`: an address, or the simulated arm of this program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RobotChoice {
+    /// An arm in MuJoCo that lives as long as the command.
+    Sim,
+    /// A Franka on the network.
+    Network(RobotAddress),
+}
+
+impl FromStr for RobotChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "sim" => Ok(Self::Sim),
+            address => Ok(Self::Network(address.parse()?)),
+        }
+    }
+}
+
+impl RobotChoice {
+    /// The arm that the command line names, or else the workcell's file.
+    ///
+    /// # Errors
+    /// [`Usage`] where neither does.
+    pub(crate) fn named(option: Option<&Self>, of_workcell: Option<&str>) -> Result<Self> {
+        match (option, of_workcell) {
+            (Some(choice), _) => Ok(choice.clone()),
+            (None, Some(address)) => Ok(Self::Network(address.parse().map_err(Usage)?)),
+            (None, None) => {
+                Err(Usage("expected --robot ADDRESS, or a workcell file with address under [robot]".to_owned()).into())
+            }
+        }
+    }
+}
+
+/// How the loop that drives a real arm is scheduled.
+pub(crate) fn scheduling(no_realtime: bool) -> Scheduling {
+    if no_realtime { Scheduling::Ordinary } else { Scheduling::RealTime }
+}
+
+/// `--speed`.
+///
+/// # Errors
+/// [`Usage`] for what is no share, or too large a one.
+pub(crate) fn pace(speed: f64) -> Result<Pace> {
+    Pace::at_speed(speed).map_err(|error| Usage(format!("--{error}")).into())
+}
+
+/// Stops the arm where Ctrl-C is pressed.
+pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
+    let interrupt = interrupt.clone();
+    Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arm_is_simulated_or_on_the_network() {
+        assert_eq!("sim".parse(), Ok(RobotChoice::Sim));
+        let named = RobotChoice::named(None, Some("172.16.0.2")).unwrap();
+        assert_eq!(named, "172.16.0.2".parse().unwrap());
+        let error = RobotChoice::named(None, None).unwrap_err();
+        assert!(error.is::<Usage>() && error.to_string().contains("--robot ADDRESS"), "{error}");
+        assert!("tcp://x".parse::<RobotChoice>().is_err());
+    }
+}

@@ -1,0 +1,310 @@
+//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and who is asked before anything moves.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+
+use sdg_calibration::{CalibratedCamera, Frame, TablePose};
+use sdg_geometry::PinholeCamera;
+use sdg_kinematics::ready_pose;
+use sdg_robot::camera_looking_down;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
+use serde_json::Value;
+
+fn sdg(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).stdin(Stdio::null()).output().unwrap()
+}
+
+fn shipped(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// The pendulum taught with the shipped camera, whose marks lie 16 mm above the table.
+fn taught(folder: &Path, with_camera: bool) -> PathBuf {
+    let out = folder.join("model.sdg");
+    let photo = shipped("demonstrations/pendulum");
+    let demonstration = format!("{}:{}", photo.join("image.png").display(), photo.join("annotation.json").display());
+    let camera = shipped("workcell/camera.yaml");
+    let mut arguments = vec!["teach", "--model", "S", "--demo", &demonstration, "--out", text(&out)];
+    if with_camera {
+        arguments.extend(["--camera", text(&camera), "--mark-height-mm", "16", "--grasp-height-mm", "9"]);
+    }
+    assert!(sdg(&arguments).status.success());
+    out
+}
+
+fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {
+    let output = sdg(arguments);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "{arguments:?}: expected \"{part}\" in: {stderr}");
+    }
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
+fn the_simulated_arm_grasps_what_the_shipped_workcell_shows_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(folder.path(), true);
+    let workcell = shipped("workcell/workcell.toml");
+    let states = folder.path().join("states.csv");
+    let base = ["grasp", "--robot", "sim", "--grasp-model", text(&model), "--workcell", text(&workcell)];
+    let from = ["--from", "sim:pendulum?seed=3", "--states", text(&states)];
+
+    let out = folder.path().join("drawn");
+    let dry = sdg(&[&base[..], &from, &["--dry-run", "--out", text(&out)]].concat());
+    let stderr = String::from_utf8(dry.stderr).unwrap();
+    assert!(dry.status.success(), "{stderr}");
+    assert!(stderr.contains("hand close on about 16 mm with 40 N"), "{stderr}");
+    assert!(stderr.ends_with("nothing was moved\n"), "{stderr}");
+    assert_eq!(&fs::read(out.join("dry-run.gif")).unwrap()[..6], b"GIF89a");
+    assert!(out.join("dry-run.png").exists());
+
+    let done = sdg(&[&base[..], &from, &["--speed", "0.6", "--json"]].concat());
+    let stderr = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{stderr}");
+    let line: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!((&line["held"], &line["step"], &line["looks"]), (&true.into(), &"hold".into(), &vec![1, 1].into()));
+    let width_m = line["closed_width_m"].as_f64().unwrap();
+    assert!((width_m - 0.0158).abs() < 0.002, "{line}");
+    assert!(!states.exists(), "nothing went wrong");
+
+    // A part that is not the taught one is not grasped.
+    let other = sdg(&[&base[..], &["--from", "sim:key?seed=3", "--speed", "0.6", "--states", text(&states)]].concat());
+    assert_eq!(other.status.code(), Some(3), "{}", String::from_utf8_lossy(&other.stderr));
+}
+
+#[test]
+fn a_motion_outside_the_workspace_is_not_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(folder.path(), true);
+    let camera = shipped("workcell/camera.yaml");
+    let narrow = fs::read_to_string(shipped("workcell/workcell.toml")).unwrap();
+    let narrow = narrow.replace("x_mm = [150, 800]", "x_mm = [150, 320]");
+    let workcell = folder.path().join("narrow.toml");
+    fs::write(&workcell, narrow).unwrap();
+    assert_refused(
+        &[
+            "grasp",
+            "--robot",
+            "sim",
+            "--from",
+            "sim:pendulum",
+            "--grasp-model",
+            text(&model),
+            "--camera",
+            text(&camera),
+            "--workcell",
+            text(&workcell),
+        ],
+        1,
+        &["detect: the motion was not begun: at ", "outside the workspace of 0.150 to 0.320 m"],
+    );
+}
+
+#[test]
+fn wrong_files_and_options_are_refused_before_anything_moves() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = taught(folder.path(), true);
+    let workcell = shipped("workcell/workcell.toml");
+    let whole = fs::read_to_string(&workcell).unwrap();
+    let grasp = |workcell: &Path, further: &[&str], code: i32, parts: &[&str]| {
+        let arguments = ["grasp", "--grasp-model", text(&model), "--workcell", text(workcell)];
+        assert_refused(&[&arguments[..], further].concat(), code, parts);
+    };
+    let sim = ["--robot", "sim", "--from", "sim:pendulum"];
+    grasp(Path::new("/nowhere.toml"), &sim, 1, &["/nowhere.toml"]);
+    grasp(&workcell, &["--from", "sim:pendulum"], 2, &["--robot ADDRESS"]);
+    grasp(&workcell, &["--robot", "sim", "--from", "dir:/tmp"], 2, &["expected sim:PART"]);
+    grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulum?speed=5"], 2, &["\"speed=5\""]);
+    grasp(&workcell, &["--robot", "sim", "--from", "sim:pendulums"], 1, &["pendulums"]);
+    for speed in ["0", "0.7", "-1", "NaN"] {
+        let speed = format!("--speed={speed}");
+        grasp(&workcell, &[&sim[..], &[&speed]].concat(), 2, &["--speed: expected a share", "at most 0.6"]);
+    }
+
+    let write = |name: &str, from: &str, to: &str| {
+        let path = folder.path().join(name);
+        assert!(whole.contains(from), "{from}");
+        fs::write(&path, whole.replace(from, to)).unwrap();
+        path
+    };
+    let obstacle =
+        write("obstacle.toml", "[[look_out]]\ncamera_at_mm = [480, 100, 580]", "[[obstacle]]\nname = \"post\"");
+    grasp(&obstacle, &sim, 1, &["obstacle.toml: line 30: obstacle: no motion is planned around it"]);
+    let model_name = write("robot.toml", "\"panda\"", "\"ur5\"");
+    grasp(&model_name, &sim, 1, &["robot.toml: line 6: model: expected \"panda\" or \"fr3\", found \"ur5\""]);
+    // The camera's file is looked for beside the workcell's.
+    let moved = write("moved.toml", "format = 1", "format = 1");
+    grasp(&moved, &sim, 1, &["camera.yaml"]);
+    let base = write("base.toml", "\"hand\"", "\"base\"");
+    grasp(&base, &sim, 1, &["camera_at_mm: expected joints_deg"]);
+    let no_hand_eye = folder.path().join("camera.yaml");
+    let camera = fs::read_to_string(shipped("workcell/camera.yaml")).unwrap();
+    fs::write(&no_hand_eye, camera.split("\nhand_eye:").next().unwrap()).unwrap();
+    grasp(&moved, &sim, 1, &["camera.yaml: expected hand_eye: flange_from_camera", "sdg camera hand-eye --mount hand"]);
+
+    let without_lengths = taught(folder.path(), false);
+    assert_refused(
+        &[
+            "grasp",
+            "--grasp-model",
+            text(&without_lengths),
+            "--workcell",
+            text(&workcell),
+            "--robot",
+            "sim",
+            "--from",
+            "sim:key",
+        ],
+        1,
+        &["taught with a camera"],
+    );
+}
+
+#[test]
+fn an_arm_that_is_not_there_is_one_line() {
+    // Port 9 of this computer answers nobody.
+    for verb in [&["state"][..], &["recover", "--yes"], &["open"], &["close"]] {
+        let output = sdg(&[&["robot"], verb, &["--robot", "127.0.0.1:9"]].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{verb:?}: {stderr}");
+        assert!(stderr.contains("the connection to the robot at 127.0.0.1:9 is lost"), "{stderr}");
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    }
+    assert_refused(&["robot", "state"], 2, &["expected --robot ADDRESS"]);
+    assert_refused(&["robot", "open", "--robot", "sim"], 2, &["expected the address of an arm"]);
+    assert_refused(
+        &["robot", "open", "--robot", "h", "--width-mm", "90"],
+        2,
+        &["--width-mm: expected 0 to 80, found 90"],
+    );
+    assert_refused(&["robot", "close", "--robot", "h", "--force-n", "0"], 2, &["--force-n: expected 1 to 70"]);
+    assert_refused(&["robot", "home", "--robot", "h"], 2, &["expected --workcell FILE"]);
+    assert_refused(&["robot", "state", "--robot", "a b"], 2, &["expected HOST or HOST:PORT"]);
+}
+
+/// A simulated Panda on the network, as another program would start it; ended when dropped.
+struct Simulated {
+    child: Child,
+    address: String,
+}
+
+impl Simulated {
+    fn start(further: &[&str]) -> Self {
+        // Two neighbouring ports that are free now.
+        let port = (20_000 + std::process::id() as u16 % 20_000..60_000)
+            .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
+            .unwrap()
+            .to_string();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+            .args(["simulate", "--fci", "--lockstep", "--json", "--port", &port])
+            .args(further)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        assert!(line.contains(&port), "{line}");
+        Self { child, address: format!("127.0.0.1:{port}") }
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The command that a real arm is driven by: a live camera beside the robot, detection, the arm over TCP and UDP.
+#[test]
+fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
+    const SEED: u64 = 3;
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let model = taught(folder.path(), true);
+
+    // The camera stands where the demonstration was photographed from, and sees the scene of the simulated Panda.
+    let base_from_camera = camera_looking_down(0.48, 0.0, 0.58, 0.0);
+    let table = TablePose { frame: Frame::Base, height_m: 0.0, frame_from_camera: base_from_camera, workspace: None };
+    let camera = CalibratedCamera {
+        name: "beside".to_owned(),
+        intrinsics: PinholeCamera::WRIST,
+        table: Some(table),
+        flange_from_camera: None,
+    };
+    fs::write(file("camera.yaml"), camera.to_yaml()).unwrap();
+    let variation = VariationConfig { appearance: false, distractors: 0..=0, ..VariationConfig::default() };
+    let scene = SceneVariation::sample(Some(&ObjectSpec::by_name("pendulum").unwrap()), &variation, SEED);
+    let place = Some(CameraPlace::InBase(base_from_camera));
+    let mut cell = Workcell::new(&WorkcellConfig { camera_place: place, ..WorkcellConfig::new(scene) }).unwrap();
+    let mut aside = ready_pose();
+    aside[0] = 1.6;
+    cell.reset(&aside).unwrap();
+    // Two pictures in turn: a camera that shows the same bits for long is broken.
+    let mut picture = cell.wrist_view().unwrap().image;
+    picture.save(file("0.png")).unwrap();
+    picture.put_pixel(0, 0, image::Rgb([1, 2, 3]));
+    picture.save(file("1.png")).unwrap();
+    let frames = file("frames.sh");
+    let folder_text = text(folder.path());
+    let script = format!("while :; do cat {folder_text}/0.png; sleep 0.1; cat {folder_text}/1.png; sleep 0.1; done\n");
+    fs::write(&frames, script).unwrap();
+
+    let workcell = fs::read_to_string(shipped("workcell/workcell.toml")).unwrap();
+    let head = workcell.split("[[look_out]]").next().unwrap().replace("mounting = \"hand\"", "mounting = \"base\"");
+    let look_out = "[[look_out]]\njoints_deg = [50, -45, 0, -135, 0, 90, 45]\n";
+    fs::write(file("workcell.toml"), format!("{head}{look_out}")).unwrap();
+
+    let simulated = Simulated::start(&["--object", "pendulum", "--seed", "3"]);
+    let from = format!("cmd:sh {}", frames.display());
+    let (workcell, states) = (file("workcell.toml"), file("states.csv"));
+    // A slow machine is no reason to fail: the part does not move.
+    let grasp = [
+        "grasp",
+        "--robot",
+        &simulated.address,
+        "--from",
+        &from,
+        "--grasp-model",
+        text(&model),
+        "--workcell",
+        text(&workcell),
+        "--states",
+        text(&states),
+        "--speed",
+        "0.6",
+        "--max-detection-age-secs",
+        "60",
+        "--no-realtime",
+        "--json",
+    ];
+    let asked = sdg(&grasp);
+    let stderr = String::from_utf8(asked.stderr).unwrap();
+    assert!(asked.status.success() && stderr.ends_with("nothing was moved\n"), "{stderr}");
+
+    let done = sdg(&[&grasp[..], &["--yes"]].concat());
+    let stderr = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{stderr}");
+    let line: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!((&line["held"], &line["looks"]), (&true.into(), &vec![1, 0].into()), "{line}");
+    let width_m = line["closed_width_m"].as_f64().unwrap();
+    assert!((width_m - 0.016).abs() < 0.002, "{line}");
+
+    let state = sdg(&["robot", "state", "--robot", &simulated.address, "--json"]);
+    let line: Value = serde_json::from_slice(&state.stdout).unwrap();
+    assert_eq!((&line["mode"], &line["hand"]["is_grasping"]), (&"idle".into(), &true.into()), "{line}");
+    let opened = sdg(&["robot", "open", "--robot", &simulated.address]);
+    assert!(opened.status.success(), "{}", String::from_utf8_lossy(&opened.stderr));
+}

@@ -1,0 +1,304 @@
+//! Control loops: a closure that answers every state, once a millisecond.
+//!
+//! A closure returns [`ControlFlow::Continue`] with the next command, or [`ControlFlow::Break`] with the last one, which
+//! should leave the arm at rest: the robot ends a motion that still moves with an error.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use super::robot::{Robot, decode_response};
+use crate::error::{FciError, Result};
+use crate::pose::is_rigid;
+use crate::wire::{
+    Command, ControllerMode, Deviation, MotionCommand, MotionGeneratorMode, MoveRequest, Request, RobotCommand,
+    RobotMode, RobotState, Status, Transform, Version,
+};
+
+/// Deviations that no motion of ours comes near: 10 m, 3.12 rad (libfranka's own default).
+const ANY_DEVIATION: Deviation = Deviation { translation: 10.0, rotation: 3.12, elbow: 2.0 * std::f64::consts::PI };
+
+/// Which of the robot's own controllers follows the references.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InternalController {
+    /// Impedance in the joints.
+    JointImpedance,
+    /// Impedance of the end effector.
+    CartesianImpedance,
+}
+
+impl From<InternalController> for ControllerMode {
+    fn from(controller: InternalController) -> Self {
+        match controller {
+            InternalController::JointImpedance => ControllerMode::JointImpedance,
+            InternalController::CartesianImpedance => ControllerMode::CartesianImpedance,
+        }
+    }
+}
+
+/// What a closure answers: the next value or the last one.
+pub type Answer<T> = ControlFlow<T, T>;
+
+impl Robot {
+    /// Follows joint positions (rad), one for each state.
+    ///
+    /// The closure gets the state and the robot's time since the last one (zero at first); the first command must be
+    /// `state.q_desired` but for a small step.
+    ///
+    /// # Errors
+    /// [`FciError::Motion`] where the robot ended the motion, with its errors; [`FciError::Refused`] where it did not start;
+    /// [`FciError::Command`] for a command that is not finite, which ends the motion; the errors of the connection.
+    pub fn control_joint_positions(
+        &mut self,
+        controller: InternalController,
+        mut motion: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
+    ) -> Result<RobotState> {
+        self.control(controller.into(), MotionGeneratorMode::JointPosition, |state, step| {
+            map(motion(state, step), |q| with_motion(MotionCommand { q, ..MotionCommand::default() }))
+        })
+    }
+
+    /// Follows joint velocities (rad/s); see [`Robot::control_joint_positions`].
+    ///
+    /// # Errors
+    /// As [`Robot::control_joint_positions`].
+    pub fn control_joint_velocities(
+        &mut self,
+        controller: InternalController,
+        mut motion: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
+    ) -> Result<RobotState> {
+        self.control(controller.into(), MotionGeneratorMode::JointVelocity, |state, step| {
+            map(motion(state, step), |dq| with_motion(MotionCommand { dq, ..MotionCommand::default() }))
+        })
+    }
+
+    /// Follows poses of the end effector in the base frame, from `state.base_from_ee_commanded` on; see
+    /// [`Robot::control_joint_positions`].
+    ///
+    /// # Errors
+    /// As [`Robot::control_joint_positions`], and [`FciError::Command`] for a matrix that is no pose.
+    pub fn control_poses(
+        &mut self,
+        controller: InternalController,
+        mut motion: impl FnMut(&RobotState, Duration) -> Answer<Transform>,
+    ) -> Result<RobotState> {
+        self.control(controller.into(), MotionGeneratorMode::CartesianPosition, |state, step| {
+            map(motion(state, step), |base_from_ee| {
+                with_motion(MotionCommand { base_from_ee, ..MotionCommand::default() })
+            })
+        })
+    }
+
+    /// Follows twists of the end effector in the base frame (m/s, rad/s); see [`Robot::control_joint_positions`].
+    ///
+    /// # Errors
+    /// As [`Robot::control_joint_positions`].
+    pub fn control_twists(
+        &mut self,
+        controller: InternalController,
+        mut motion: impl FnMut(&RobotState, Duration) -> Answer<[f64; 6]>,
+    ) -> Result<RobotState> {
+        self.control(controller.into(), MotionGeneratorMode::CartesianVelocity, |state, step| {
+            map(motion(state, step), |twist| with_motion(MotionCommand { twist, ..MotionCommand::default() }))
+        })
+    }
+
+    /// Commands torques (N·m), to which the robot adds what gravity needs; see [`Robot::control_joint_positions`].
+    ///
+    /// # Errors
+    /// As [`Robot::control_joint_positions`].
+    pub fn control_torques(
+        &mut self,
+        mut controller: impl FnMut(&RobotState, Duration) -> Answer<[f64; 7]>,
+    ) -> Result<RobotState> {
+        // Version 5 has no torques alone: a generator of zero velocities runs beside them.
+        let generator = match self.version {
+            Version::V5 => MotionGeneratorMode::JointVelocity,
+            Version::V10 => MotionGeneratorMode::None,
+        };
+        self.control(ControllerMode::External, generator, |state, step| {
+            map(controller(state, step), |torque| RobotCommand { torque, ..RobotCommand::default() })
+        })
+    }
+
+    /// Any generator with any controller; the closure fills the fields that they read. `message_id` and the flags of the end
+    /// are set here.
+    ///
+    /// # Errors
+    /// As [`Robot::control_joint_positions`].
+    pub fn control(
+        &mut self,
+        controller: ControllerMode,
+        generator: MotionGeneratorMode,
+        mut answer: impl FnMut(&RobotState, Duration) -> Answer<RobotCommand>,
+    ) -> Result<RobotState> {
+        self.control_unchecked(controller, generator, |state, step| {
+            let answer = answer(state, step);
+            let (ControlFlow::Continue(command) | ControlFlow::Break(command)) = &answer;
+            check(command, controller, generator)?;
+            Ok(Some(answer))
+        })
+    }
+
+    /// As [`Robot::control`] without a look at the commands, and `None` leaves a state without an answer: for tests of servers.
+    /// An error of the closure ends the motion.
+    #[doc(hidden)]
+    pub fn control_unchecked(
+        &mut self,
+        controller: ControllerMode,
+        generator: MotionGeneratorMode,
+        mut answer: impl FnMut(&RobotState, Duration) -> Result<Option<Answer<RobotCommand>>>,
+    ) -> Result<RobotState> {
+        self.statistics.reset();
+        let id = self.start_motion(controller, generator)?;
+        let mut last_id = self.state.message_id;
+        loop {
+            let step = Duration::from_millis(self.state.message_id - last_id);
+            last_id = self.state.message_id;
+            match answer(&self.state, step) {
+                Ok(Some(ControlFlow::Continue(command))) => self.send(command)?,
+                Ok(Some(ControlFlow::Break(command))) => return self.finish_motion(id, command),
+                Ok(None) => {}
+                Err(error) => {
+                    self.cancel_motion(id);
+                    return Err(error);
+                }
+            }
+            self.receive(false)?;
+            self.statistics.received(self.state.message_id);
+            self.check_motion(id, controller, generator)?;
+        }
+    }
+
+    /// Sends the Move, and waits for its start and the first state that shows it.
+    fn start_motion(&mut self, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<u32> {
+        self.session.forget_responses();
+        let request = Request::Move(MoveRequest {
+            controller,
+            generator,
+            max_path_deviation: ANY_DEVIATION,
+            max_goal_deviation: ANY_DEVIATION,
+        });
+        let version = self.version;
+        if request.encode(0, version).is_none() {
+            return Err(FciError::Refused { command: Command::Move.name(), status: Status::InvalidArgument });
+        }
+        let id = self.session.sending.send(|id| request.encode(id, version).unwrap_or_default())?;
+        let payload = self.session.wait_for(id, "answer to the start of a motion", Some(self.session.timeout()))?;
+        match decode_response(&self.session, &payload, Command::Move, version)?.status {
+            Status::MotionStarted => {}
+            status => return Err(FciError::Refused { command: Command::Move.name(), status }),
+        }
+        self.receive(false)?;
+        while !self.runs(controller, generator) {
+            if let Some(payload) = self.session.poll(id)? {
+                return Err(self.motion_error(&payload));
+            }
+            self.receive(false)?;
+        }
+        self.statistics.received(self.state.message_id);
+        Ok(id)
+    }
+
+    fn runs(&self, controller: ControllerMode, generator: MotionGeneratorMode) -> bool {
+        let state = &self.state;
+        state.robot_mode == RobotMode::Move
+            && state.controller_mode == controller
+            && state.motion_generator_mode == generator
+    }
+
+    /// A robot that has left the motion tells why in a second answer to the Move.
+    fn check_motion(&mut self, id: u32, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
+        if self.runs(controller, generator) {
+            return Ok(());
+        }
+        let payload = self.session.wait_for(id, "answer to the end of a motion", Some(self.session.timeout()))?;
+        Err(self.motion_error(&payload))
+    }
+
+    fn motion_error(&self, payload: &[u8]) -> FciError {
+        let response = match decode_response(&self.session, payload, Command::Move, self.version) {
+            Ok(response) => response,
+            Err(error) => return error,
+        };
+        // The last state has left the motion, and its rate is zero; what was lost since the one before lowers that one's.
+        let success_rate =
+            self.recent.iter().rev().find(|state| state.robot_mode == RobotMode::Move).map_or(0.0, |last| {
+                let num_lost = self.state.message_id.saturating_sub(last.message_id + 1);
+                last.control_command_success_rate * (1.0 - num_lost as f64 / 100.0).max(0.0)
+            });
+        // Both tell the same on a Panda; there are servers whose reasons pile up over motions.
+        let errors = if self.state.errors.is_empty() { self.state.reflex_reason } else { self.state.errors };
+        FciError::Motion { status: response.status, errors, success_rate }
+    }
+
+    fn send(&mut self, command: RobotCommand) -> Result<()> {
+        let command = RobotCommand { message_id: self.state.message_id, ..command };
+        self.session.answer(&command.encode(self.version))?;
+        self.statistics.answered();
+        Ok(())
+    }
+
+    /// Repeats the last command, marked as such, until the robot has left the motion.
+    fn finish_motion(&mut self, id: u32, mut command: RobotCommand) -> Result<RobotState> {
+        command.motion.finished = true;
+        command.torque_finished = true;
+        loop {
+            self.send(command.clone())?;
+            self.receive(false)?;
+            if self.state.robot_mode != RobotMode::Move || self.state.motion_generator_mode == MotionGeneratorMode::Idle
+            {
+                break;
+            }
+            self.statistics.received(self.state.message_id);
+        }
+        let payload = self.session.wait_for(id, "answer to the end of a motion", Some(self.session.timeout()))?;
+        match decode_response(&self.session, &payload, Command::Move, self.version)?.status {
+            Status::Success => Ok(self.state.clone()),
+            _ => Err(self.motion_error(&payload)),
+        }
+    }
+
+    /// Ends a motion whose closure failed; what the robot says to it does not matter beside that failure.
+    fn cancel_motion(&mut self, id: u32) {
+        if self.stop().is_ok() {
+            let _ = self.session.wait_for(id, "answer to the end of a motion", Some(self.session.timeout()));
+        }
+    }
+}
+
+fn map<T, U>(answer: Answer<T>, mut change: impl FnMut(T) -> U) -> Answer<U> {
+    match answer {
+        ControlFlow::Continue(value) => ControlFlow::Continue(change(value)),
+        ControlFlow::Break(value) => ControlFlow::Break(change(value)),
+    }
+}
+
+fn with_motion(motion: MotionCommand) -> RobotCommand {
+    RobotCommand { motion, ..RobotCommand::default() }
+}
+
+/// Refuses what no robot must be sent.
+fn check(command: &RobotCommand, controller: ControllerMode, generator: MotionGeneratorMode) -> Result<()> {
+    let finite = |field: &'static str, values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(value) => Err(FciError::Command { field, expected: "finite numbers", found: value.to_string() }),
+    };
+    let motion = &command.motion;
+    if controller == ControllerMode::External {
+        finite("torque", &command.torque)?;
+    }
+    match generator {
+        MotionGeneratorMode::JointPosition => finite("q", &motion.q),
+        MotionGeneratorMode::JointVelocity => finite("dq", &motion.dq),
+        MotionGeneratorMode::CartesianVelocity => finite("twist", &motion.twist),
+        MotionGeneratorMode::CartesianPosition => {
+            finite("pose", &motion.base_from_ee)?;
+            if is_rigid(&motion.base_from_ee) {
+                return Ok(());
+            }
+            let found = format!("{:?}", motion.base_from_ee);
+            Err(FciError::Command { field: "pose", expected: "a rotation and a translation, column by column", found })
+        }
+        MotionGeneratorMode::None | MotionGeneratorMode::Idle => Ok(()),
+    }
+}

@@ -1,0 +1,12 @@
+//! The client: a program that drives a robot and its hand.
+
+mod control;
+mod hand;
+mod robot;
+mod session;
+mod statistics;
+
+pub use control::{Answer, InternalController};
+pub use hand::{Hand, HandConfig, HandStopHandle};
+pub use robot::{Robot, RobotConfig, StopHandle};
+pub use statistics::ControlStatistics;

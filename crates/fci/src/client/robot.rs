@@ -1,0 +1,295 @@
+//! A connection to a robot: its state, what can be set, stop and recovery.
+
+use std::collections::VecDeque;
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::time::Duration;
+
+use super::session::{Sending, Session};
+use super::statistics::ControlStatistics;
+use crate::error::{FciError, Result};
+use crate::wire::{
+    CollisionBehavior, Command, HeaderKind, Load, ROBOT_PORT, Request, Response, RobotState, STATE_SIZE_V5,
+    STATE_SIZE_V10, Status, Transform, Version,
+};
+
+/// Number of states that are kept for a look back: a second of them.
+const NUM_RECENT_STATES: usize = 1000;
+/// How long a recovery may take.
+const RECOVERY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How to connect.
+#[derive(Debug, Clone)]
+pub struct RobotConfig {
+    /// TCP port of the robot.
+    pub port: u16,
+    /// The version to speak; `None` asks the robot, first with 5, then with what it says.
+    pub version: Option<Version>,
+    /// Bounds every wait for a response or a state.
+    pub timeout: Duration,
+}
+
+impl Default for RobotConfig {
+    fn default() -> Self {
+        Self { port: ROBOT_PORT, version: None, timeout: Duration::from_secs(1) }
+    }
+}
+
+/// A robot, connected. Motions stand in `control`: [`Robot::control_joint_positions`] and those beside it.
+///
+/// Dropping it closes the connection, and the robot stops a motion that runs.
+#[derive(Debug)]
+pub struct Robot {
+    pub(super) session: Session,
+    pub(super) version: Version,
+    pub(super) state: RobotState,
+    pub(super) recent: VecDeque<RobotState>,
+    pub(super) statistics: ControlStatistics,
+}
+
+/// Stops a motion from another thread.
+#[derive(Debug, Clone)]
+pub struct StopHandle {
+    sending: Sending,
+    version: Version,
+}
+
+impl StopHandle {
+    /// Asks the robot to stop; the control loop that runs ends with [`Status::Preempted`].
+    ///
+    /// # Errors
+    /// [`FciError::Socket`] where the robot is gone.
+    pub fn stop(&self) -> Result<()> {
+        self.sending.send(|id| Request::StopMove.encode(id, self.version).unwrap_or_default()).map(drop)
+    }
+}
+
+impl Robot {
+    /// Connects to a robot by name or IP address (`HOST` or `HOST:PORT`) and waits for its first state.
+    ///
+    /// # Errors
+    /// [`FciError::Socket`], [`FciError::Version`] for a robot of another version, [`FciError::Timeout`] where no state
+    /// arrives (often a firewall before UDP).
+    pub fn connect(host: &str, config: &RobotConfig) -> Result<Self> {
+        let address = resolve(host, config.port)?;
+        match config.version {
+            Some(version) => Self::connect_as(address, version, config.timeout),
+            None => match Self::connect_as(address, Version::V5, config.timeout) {
+                Err(FciError::Version { found, .. }) if found == Version::V10.number() => {
+                    Self::connect_as(address, Version::V10, config.timeout)
+                }
+                other => other,
+            },
+        }
+    }
+
+    fn connect_as(address: SocketAddr, version: Version, timeout: Duration) -> Result<Self> {
+        let mut session = Session::connect(address, HeaderKind::Robot, timeout)?;
+        let request = Request::Connect { version: version.number(), udp_port: session.udp_port()? };
+        let response = execute(&mut session, &request, version, Some(timeout))?;
+        let found = match response.rest[..] {
+            [low, high, ..] => u16::from_le_bytes([low, high]),
+            _ => 0,
+        };
+        // There are servers that welcome every version and go on in their own.
+        if response.status != Status::Success || found != version.number() {
+            return Err(FciError::Version { peer: "robot", expected: "5 (Panda) or 10 (FR3)".into(), found });
+        }
+        let mut robot = Self {
+            session,
+            version,
+            state: RobotState::default(),
+            recent: VecDeque::with_capacity(NUM_RECENT_STATES),
+            statistics: ControlStatistics::default(),
+        };
+        robot.receive(false)?;
+        Ok(robot)
+    }
+
+    /// The version that is spoken.
+    pub fn version(&self) -> Version {
+        self.version
+    }
+
+    /// The last state that was received.
+    pub fn state(&self) -> &RobotState {
+        &self.state
+    }
+
+    /// The states of the last second of control and reading, oldest first.
+    pub fn recent_states(&self) -> impl Iterator<Item = &RobotState> {
+        self.recent.iter()
+    }
+
+    /// How the last motion's loop kept its time.
+    pub fn statistics(&self) -> &ControlStatistics {
+        &self.statistics
+    }
+
+    /// Waits for the next state.
+    ///
+    /// # Errors
+    /// [`FciError::Timeout`] or [`FciError::Closed`] where the robot is gone, [`FciError::Wire`] for a state that is none.
+    pub fn read_state(&mut self) -> Result<&RobotState> {
+        self.receive(true)?;
+        Ok(&self.state)
+    }
+
+    /// For another thread, to stop the motion that this one controls.
+    pub fn stop_handle(&self) -> StopHandle {
+        StopHandle { sending: self.session.sending.clone(), version: self.version }
+    }
+
+    /// Stops whatever moves.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn stop(&mut self) -> Result<()> {
+        self.execute(&Request::StopMove, Some(RECOVERY_TIMEOUT))
+    }
+
+    /// Clears the errors after a reflex, as a person has said; nothing moves by it.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn automatic_error_recovery(&mut self) -> Result<()> {
+        self.execute(&Request::AutomaticErrorRecovery, Some(RECOVERY_TIMEOUT))
+    }
+
+    /// Sets when contacts are told and collisions stop the robot; not during a motion.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_collision_behavior(&mut self, behavior: &CollisionBehavior) -> Result<()> {
+        self.set(&Request::SetCollisionBehavior(*behavior))
+    }
+
+    /// Sets the stiffness of the internal joint impedance, N·m/rad (0 to 14250).
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_joint_impedance(&mut self, stiffness: &[f64; 7]) -> Result<()> {
+        self.set(&Request::SetJointImpedance(*stiffness))
+    }
+
+    /// Sets the stiffness of the internal Cartesian impedance, N/m (10 to 3000) and N·m/rad (1 to 300).
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_cartesian_impedance(&mut self, stiffness: &[f64; 6]) -> Result<()> {
+        self.set(&Request::SetCartesianImpedance(*stiffness))
+    }
+
+    /// Tells the robot what it carries besides its end effector.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_load(&mut self, load: &Load) -> Result<()> {
+        self.set(&Request::SetLoad(*load))
+    }
+
+    /// Sets the end effector's frame on the nominal one.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_ee(&mut self, ne_from_ee: &Transform) -> Result<()> {
+        self.set(&Request::SetNeToEe(*ne_from_ee))
+    }
+
+    /// Sets the frame that external forces and Cartesian stiffness are told in, on the end effector.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_stiffness_frame(&mut self, ee_from_stiffness: &Transform) -> Result<()> {
+        self.set(&Request::SetEeToStiffness(*ee_from_stiffness))
+    }
+
+    /// Sets what a person may lead by hand: x, y, z, roll, pitch, yaw, elbow.
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] and the errors of the connection.
+    pub fn set_guiding_mode(&mut self, axes: &[bool; 7]) -> Result<()> {
+        self.set(&Request::SetGuidingMode(*axes))
+    }
+
+    /// The robot's description, a URDF (version 10 alone).
+    ///
+    /// # Errors
+    /// [`FciError::Refused`] in version 5, and the errors of the connection.
+    pub fn robot_model(&mut self) -> Result<String> {
+        let response = execute(&mut self.session, &Request::GetRobotModel, self.version, Some(RECOVERY_TIMEOUT))?;
+        accept(&response, Command::GetRobotModel)?;
+        Ok(String::from_utf8_lossy(&response.rest).into_owned())
+    }
+
+    fn set(&mut self, request: &Request) -> Result<()> {
+        let timeout = self.session.timeout();
+        self.execute(request, Some(timeout))
+    }
+
+    fn execute(&mut self, request: &Request, timeout: Option<Duration>) -> Result<()> {
+        let response = execute(&mut self.session, request, self.version, timeout)?;
+        accept(&response, request.command())
+    }
+
+    /// Takes the newest state that is newer than the last one.
+    pub(super) fn receive(&mut self, discard_waiting: bool) -> Result<()> {
+        let version = self.version;
+        let size = match version {
+            Version::V5 => STATE_SIZE_V5,
+            Version::V10 => STATE_SIZE_V10,
+        };
+        let mut discard_waiting = discard_waiting;
+        loop {
+            let state = self.session.receive(size, discard_waiting, |bytes| RobotState::decode(bytes, version))?;
+            discard_waiting = false;
+            if state.message_id > self.state.message_id || self.recent.is_empty() {
+                self.state = state;
+                break;
+            }
+        }
+        if self.recent.len() == NUM_RECENT_STATES {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(self.state.clone());
+        Ok(())
+    }
+}
+
+/// Sends a request and waits for its response.
+fn execute(session: &mut Session, request: &Request, version: Version, timeout: Option<Duration>) -> Result<Response> {
+    let command = request.command();
+    if command.number(version).is_none() {
+        return Err(FciError::Refused { command: command.name(), status: Status::NotPossible });
+    }
+    let id = session.sending.send(|id| request.encode(id, version).unwrap_or_default())?;
+    let payload = session.wait_for(id, command.name(), timeout)?;
+    decode_response(session, &payload, command, version)
+}
+
+pub(super) fn decode_response(
+    session: &Session,
+    payload: &[u8],
+    command: Command,
+    version: Version,
+) -> Result<Response> {
+    Response::decode(payload, command, version).map_err(|source| FciError::Wire { address: session.address, source })
+}
+
+fn accept(response: &Response, command: Command) -> Result<()> {
+    match response.status {
+        Status::Success => Ok(()),
+        status => Err(FciError::Refused { command: command.name(), status }),
+    }
+}
+
+/// The first address of a host, or of a host and a port of its own (`HOST:PORT`).
+pub(super) fn resolve(host: &str, port: u16) -> Result<SocketAddr> {
+    let (host, port) = match host.rsplit_once(':').map(|(name, port)| (name, port.parse())) {
+        // An IPv6 address has more than one colon.
+        Some((name, Ok(own_port))) if !name.contains(':') => (name, own_port),
+        _ => (host, port),
+    };
+    let unknown = |source| FciError::Socket { action: "find", address: host.to_owned(), source };
+    let mut addresses = (host, port).to_socket_addrs().map_err(unknown)?;
+    addresses.next().ok_or_else(|| unknown(std::io::ErrorKind::NotFound.into()))
+}

@@ -1,0 +1,254 @@
+//! One connection to a robot or a hand: requests and responses over TCP, states over UDP.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpStream, UdpSocket};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use crate::error::{FciError, Result, WireError};
+use crate::message::read_message;
+use crate::wire::{Header, HeaderKind};
+
+/// The sending half, which any thread may use.
+#[derive(Debug, Clone)]
+pub(crate) struct Sending {
+    address: SocketAddr,
+    stream: Arc<Mutex<TcpStream>>,
+    next_id: Arc<AtomicU32>,
+}
+
+impl Sending {
+    /// Sends the message that `encode` makes of a fresh command number, and returns the number.
+    pub(crate) fn send(&self, encode: impl FnOnce(u32) -> Vec<u8>) -> Result<u32> {
+        let id = self.next_id.fetch_add(1, Ordering::Relaxed);
+        let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
+        stream.write_all(&encode(id)).map_err(|source| socket_error("send to", self.address, source))?;
+        Ok(id)
+    }
+}
+
+/// What the reading thread hands over: a response, or why there will be no more.
+type Incoming = std::result::Result<(Header, Vec<u8>), WireError>;
+
+/// A connection; dropping it ends the connection.
+#[derive(Debug)]
+pub(crate) struct Session {
+    pub(crate) address: SocketAddr,
+    pub(crate) sending: Sending,
+    incoming: Receiver<Incoming>,
+    kept: Vec<(Header, Vec<u8>)>,
+    reader: Option<JoinHandle<()>>,
+    udp: UdpSocket,
+    udp_peer: Option<SocketAddr>,
+    timeout: Duration,
+}
+
+impl Session {
+    /// Connects; `timeout` bounds every wait for a response or a state.
+    pub(crate) fn connect(address: SocketAddr, kind: HeaderKind, timeout: Duration) -> Result<Self> {
+        let stream = TcpStream::connect_timeout(&address, timeout)
+            .map_err(|source| socket_error("connect to", address, source))?;
+        let settings = || -> std::io::Result<(TcpStream, UdpSocket)> {
+            stream.set_nodelay(true)?;
+            stream.set_write_timeout(Some(timeout))?;
+            let any: IpAddr =
+                if address.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
+            let udp = UdpSocket::bind((any, 0))?;
+            udp.set_read_timeout(Some(timeout))?;
+            Ok((stream.try_clone()?, udp))
+        };
+        let (reading, udp) = settings().map_err(|source| socket_error("open sockets for", address, source))?;
+        let (sender, incoming) = channel();
+        let reader = thread::Builder::new()
+            .name("fci responses".into())
+            .spawn(move || read_responses(reading, kind, &sender))
+            .map_err(|source| socket_error("start a thread for", address, source))?;
+        Ok(Self {
+            address,
+            sending: Sending { address, stream: Arc::new(Mutex::new(stream)), next_id: Arc::new(AtomicU32::new(0)) },
+            incoming,
+            kept: Vec::new(),
+            reader: Some(reader),
+            udp,
+            udp_peer: None,
+            timeout,
+        })
+    }
+
+    /// The port that states shall be sent to.
+    pub(crate) fn udp_port(&self) -> Result<u16> {
+        let local = self.udp.local_addr().map_err(|source| socket_error("open sockets for", self.address, source))?;
+        Ok(local.port())
+    }
+
+    /// Waits for the response of a command.
+    pub(crate) fn wait_for(&mut self, id: u32, what: &'static str, timeout: Option<Duration>) -> Result<Vec<u8>> {
+        let deadline = timeout.map(|timeout| Instant::now() + timeout);
+        loop {
+            if let Some(payload) = self.take_kept(id) {
+                return Ok(payload);
+            }
+            let received = match deadline {
+                None => self.incoming.recv().map_err(|_| RecvTimeoutError::Disconnected),
+                Some(deadline) => self.incoming.recv_timeout(deadline.saturating_duration_since(Instant::now())),
+            };
+            match received {
+                Ok(Ok(response)) => self.kept.push(response),
+                Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
+                Err(RecvTimeoutError::Disconnected) => return Err(FciError::Closed { address: self.address }),
+                Err(RecvTimeoutError::Timeout) => {
+                    let waited = timeout.unwrap_or_default();
+                    return Err(FciError::Timeout { what, address: self.address, waited });
+                }
+            }
+        }
+    }
+
+    /// How long to wait for a response that takes no motion.
+    pub(crate) fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
+    /// The response of a command, if it is there.
+    pub(crate) fn poll(&mut self, id: u32) -> Result<Option<Vec<u8>>> {
+        self.fetch()?;
+        Ok(self.take_kept(id))
+    }
+
+    /// Forgets responses that nobody waits for.
+    pub(crate) fn forget_responses(&mut self) {
+        self.kept.clear();
+    }
+
+    /// Takes over what has arrived.
+    ///
+    /// # Errors
+    /// [`FciError::Closed`] where the peer is gone.
+    fn fetch(&mut self) -> Result<()> {
+        loop {
+            match self.incoming.try_recv() {
+                Ok(Ok(response)) => self.kept.push(response),
+                Ok(Err(source)) => return Err(FciError::Wire { address: self.address, source }),
+                Err(TryRecvError::Empty) => return Ok(()),
+                Err(TryRecvError::Disconnected) => return Err(FciError::Closed { address: self.address }),
+            }
+        }
+    }
+
+    fn take_kept(&mut self, id: u32) -> Option<Vec<u8>> {
+        let index = self.kept.iter().position(|(header, _)| header.command_id == id)?;
+        Some(self.kept.remove(index).1)
+    }
+
+    /// Waits for a datagram of the peer and hands the newest one out.
+    ///
+    /// `decode` turns bytes into a state; a datagram that it refuses is an error. Where `discard_waiting` is set,
+    /// datagrams that lay waiting before the call do not count.
+    pub(crate) fn receive<T>(
+        &mut self,
+        size: usize,
+        discard_waiting: bool,
+        mut decode: impl FnMut(&[u8]) -> std::result::Result<T, WireError>,
+    ) -> Result<T> {
+        // One byte more than a state shows those that are too long.
+        let mut buffer = vec![0; size + 1];
+        if discard_waiting {
+            while self.receive_waiting(&mut buffer)?.is_some() {}
+        }
+        let deadline = Instant::now() + self.timeout;
+        let mut newest = None;
+        while newest.is_none() {
+            match self.udp.recv_from(&mut buffer) {
+                Ok((length, from)) => newest = self.accept(length, from),
+                Err(error) if is_timeout(&error) => {}
+                Err(source) => return Err(socket_error("receive from", self.address, source)),
+            }
+            if newest.is_none() && Instant::now() >= deadline {
+                // The robot's end is told as such.
+                self.fetch()?;
+                return Err(FciError::Timeout { what: "state", address: self.address, waited: self.timeout });
+            }
+        }
+        let mut length = newest.unwrap_or_default();
+        let mut state = decode(&buffer[..length]);
+        while let Some(newer) = self.receive_waiting(&mut buffer)? {
+            length = newer;
+            state = decode(&buffer[..length]);
+        }
+        state.map_err(|source| FciError::Wire { address: self.address, source })
+    }
+
+    /// A datagram that is there already.
+    fn receive_waiting(&mut self, buffer: &mut [u8]) -> Result<Option<usize>> {
+        let address = self.address;
+        let failed = |source| socket_error("receive from", address, source);
+        self.udp.set_nonblocking(true).map_err(failed)?;
+        let received = loop {
+            match self.udp.recv_from(buffer) {
+                Ok((length, from)) => {
+                    if let Some(length) = self.accept(length, from) {
+                        break Ok(Some(length));
+                    }
+                }
+                Err(error) if is_timeout(&error) => break Ok(None),
+                Err(source) => break Err(failed(source)),
+            }
+        };
+        self.udp.set_nonblocking(false).map_err(failed)?;
+        received
+    }
+
+    /// The length of a datagram that came from the peer.
+    fn accept(&mut self, length: usize, from: SocketAddr) -> Option<usize> {
+        if from.ip() != self.address.ip() {
+            return None;
+        }
+        self.udp_peer = Some(from);
+        Some(length)
+    }
+
+    /// Answers where the states come from.
+    pub(crate) fn answer(&self, datagram: &[u8]) -> Result<()> {
+        let peer = self.udp_peer.unwrap_or(self.address);
+        self.udp.send_to(datagram, peer).map_err(|source| socket_error("send to", peer, source))?;
+        Ok(())
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let stream = self.sending.stream.lock().unwrap_or_else(PoisonError::into_inner);
+        // Where the peer is gone there is nothing left to end.
+        let _ = stream.shutdown(Shutdown::Both);
+        drop(stream);
+        if let Some(reader) = self.reader.take() {
+            let _ = reader.join();
+        }
+    }
+}
+
+fn read_responses(mut stream: impl Read, kind: HeaderKind, sender: &Sender<Incoming>) {
+    loop {
+        match read_message(&mut stream, kind) {
+            // An error of the socket is its end, as its closing is.
+            Err(_) => return,
+            Ok(message) => {
+                let is_end = message.is_err();
+                if sender.send(message).is_err() || is_end {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+pub(crate) fn is_timeout(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+pub(crate) fn socket_error(action: &'static str, address: SocketAddr, source: std::io::Error) -> FciError {
+    FciError::Socket { action, address: address.to_string(), source }
+}

@@ -1,0 +1,47 @@
+//! Franka Control Interface: a client that drives a robot, and a server that makes a simulation one.
+//!
+//! ```text
+//!  client::Robot ──requests, TCP 1337──>  server ── torques ──> Plant (a simulation)
+//!        <── states, UDP, 1 kHz ──         checks, references,  <── positions, velocities
+//!        ── commands, UDP ──>              impedance control
+//!  client::Hand  ──requests, TCP 1338──>  hand
+//! ```
+//!
+//! Version 5 of the protocol is the Panda's (libfranka 0.9), version 10 the FR3's (libfranka 0.18 and later). The server speaks 5, the
+//! client both. Nothing here knows of kinematics beyond what a [`server::Plant`] tells, and there is no asynchronous runtime:
+//! threads do.
+//!
+//! ```no_run
+//! use std::ops::ControlFlow;
+//! use sdg_fci::client::{InternalController, Robot, RobotConfig};
+//!
+//! # fn main() -> Result<(), sdg_fci::FciError> {
+//! let mut robot = Robot::connect("172.16.0.2", &RobotConfig::default())?;
+//! let (start, mut time) = (robot.read_state()?.q_desired, 0.0);
+//! // A joint swings once, 0.2 rad, in 4 s.
+//! robot.control_joint_positions(InternalController::JointImpedance, |_, step| {
+//!     time += step.as_secs_f64();
+//!     let mut q = start;
+//!     q[3] += 0.1 * (1.0 - (std::f64::consts::FRAC_PI_2 * time).cos());
+//!     if time < 4.0 { ControlFlow::Continue(q) } else { ControlFlow::Break(start) }
+//! })?;
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod client;
+mod error;
+mod limits;
+mod message;
+mod pose;
+mod robot_error;
+pub mod server;
+pub mod wire;
+
+pub use error::{FciError, Result, WireError};
+pub use limits::{Limits, RateLimits};
+pub use message::read_message;
+pub use pose::{is_rigid, isometry, transform};
+pub use robot_error::{NUM_ERRORS, RobotError, RobotErrors};

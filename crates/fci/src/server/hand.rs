@@ -1,0 +1,183 @@
+//! The simulated hand: requests in, responses and states out, a cycle at a time. No socket, no clock.
+
+use super::plant::Plant;
+use crate::wire::{HandCommand, HandRequest, HandState, HandStatus};
+
+/// Franka's hand: largest width, speed and continuous force.
+const MAX_WIDTH_M: f64 = 0.08;
+const MAX_SPEED_M_S: f64 = 0.1;
+const MAX_FORCE_N: f64 = 70.0;
+/// Force of motions that grasp nothing.
+const MOVING_FORCE_N: f64 = 30.0;
+/// A width this near is reached.
+const WIDTH_TOLERANCE_M: f64 = 1e-3;
+/// Fingers slower than this for so many cycles have stopped.
+const STANDING_M_S: f64 = 2e-3;
+const STANDING_CYCLES: u32 = 100;
+/// No motion takes longer than this many cycles.
+const MAX_CYCLES: u32 = 20_000;
+/// Homing moves at its own speed.
+const HOMING_SPEED_M_S: f64 = 0.05;
+/// A target beyond this presses on whatever is there.
+const PRESSING_WIDTH_M: f64 = -0.03;
+/// °C.
+const TEMPERATURE: u16 = 30;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Task {
+    HomingClose,
+    HomingOpen,
+    Move { width: f64 },
+    Grasp { range: (f64, f64) },
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Running {
+    command_id: u32,
+    command: HandCommand,
+    task: Task,
+    num_cycles: u32,
+    num_standing: u32,
+}
+
+/// A response to be sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HandOutgoing {
+    /// The request's number.
+    pub command_id: u32,
+    /// The request's command.
+    pub command: HandCommand,
+    /// The response.
+    pub status: HandStatus,
+}
+
+/// A hand and what it does.
+#[derive(Debug, Default)]
+pub struct HandCore {
+    running: Option<Running>,
+    /// Between these widths the last grasp holds a part.
+    grasped: Option<(f64, f64)>,
+    time_ms: u32,
+    fails: bool,
+    outbox: Vec<HandOutgoing>,
+}
+
+impl HandCore {
+    /// Lets the hand fail from now on, as a broken one does, or work again.
+    pub fn set_failing(&mut self, fails: bool) {
+        self.fails = fails;
+    }
+
+    /// Responses that are due.
+    pub fn take_responses(&mut self) -> Vec<HandOutgoing> {
+        std::mem::take(&mut self.outbox)
+    }
+
+    /// Whether the fingers move for a client.
+    pub fn is_busy(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// Starts what a client asks, all but Connect; what ran before is aborted.
+    pub fn request(&mut self, plant: &mut dyn Plant, command_id: u32, request: &HandRequest) {
+        let command = request.command();
+        if let Some(running) = self.running.take() {
+            self.respond(running.command_id, running.command, HandStatus::Aborted);
+        }
+        self.grasped = None;
+        let is_speed = |speed: f64| speed > 0.0 && speed.is_finite();
+        let task = match *request {
+            _ if self.fails => None,
+            HandRequest::Homing => {
+                plant.move_hand(PRESSING_WIDTH_M, HOMING_SPEED_M_S, MOVING_FORCE_N);
+                Some(Task::HomingClose)
+            }
+            HandRequest::Move { width, speed } if (0.0..=MAX_WIDTH_M).contains(&width) && is_speed(speed) => {
+                plant.move_hand(width, speed.min(MAX_SPEED_M_S), MOVING_FORCE_N);
+                Some(Task::Move { width })
+            }
+            HandRequest::Grasp { width, epsilon_inner, epsilon_outer, speed, force }
+                if (0.0..=MAX_WIDTH_M).contains(&width)
+                    && is_speed(speed)
+                    && (0.0..=2.0 * MAX_FORCE_N).contains(&force)
+                    && epsilon_inner >= 0.0
+                    && epsilon_outer >= 0.0 =>
+            {
+                plant.move_hand(PRESSING_WIDTH_M, speed.min(MAX_SPEED_M_S), force.min(MAX_FORCE_N));
+                Some(Task::Grasp { range: (width - epsilon_inner, width + epsilon_outer) })
+            }
+            HandRequest::Stop => {
+                plant.move_hand(plant.hand_width().0, MAX_SPEED_M_S, MOVING_FORCE_N);
+                self.respond(command_id, command, HandStatus::Success);
+                return;
+            }
+            _ => None,
+        };
+        match task {
+            Some(task) => {
+                self.running = Some(Running { command_id, command, task, num_cycles: 0, num_standing: 0 });
+            }
+            None => self.respond(command_id, command, HandStatus::Fail),
+        }
+    }
+
+    /// The client is gone: the fingers stop.
+    pub fn disconnect(&mut self, plant: &mut dyn Plant) {
+        if self.running.take().is_some() {
+            plant.move_hand(plant.hand_width().0, MAX_SPEED_M_S, MOVING_FORCE_N);
+        }
+        self.outbox.clear();
+    }
+
+    /// Looks at the fingers after a millisecond.
+    pub fn cycle(&mut self, plant: &mut dyn Plant) {
+        self.time_ms = self.time_ms.wrapping_add(1);
+        let (width, speed) = plant.hand_width();
+        if self.grasped.is_some_and(|(narrowest, widest)| !(narrowest < width && width < widest)) {
+            self.grasped = None;
+        }
+        let Some(mut running) = self.running else { return };
+        running.num_cycles += 1;
+        running.num_standing = if speed.abs() < STANDING_M_S { running.num_standing + 1 } else { 0 };
+        self.running = Some(running);
+        let is_standing = running.num_standing >= STANDING_CYCLES;
+        let is_reached = |target: f64| (width - target).abs() < WIDTH_TOLERANCE_M;
+        let status = match running.task {
+            _ if self.fails || running.num_cycles > MAX_CYCLES => HandStatus::Fail,
+            Task::Move { width: target } if is_reached(target) && speed.abs() < 10.0 * STANDING_M_S => {
+                HandStatus::Success
+            }
+            _ if !is_standing => return,
+            Task::HomingClose => {
+                plant.move_hand(MAX_WIDTH_M, HOMING_SPEED_M_S, MOVING_FORCE_N);
+                self.running = Some(Running { task: Task::HomingOpen, num_standing: 0, ..running });
+                return;
+            }
+            Task::HomingOpen if is_reached(MAX_WIDTH_M) => HandStatus::Success,
+            Task::HomingOpen => HandStatus::Fail,
+            Task::Move { .. } => HandStatus::Unsuccessful,
+            Task::Grasp { range: (narrowest, widest) } if narrowest < width && width < widest => {
+                self.grasped = Some((narrowest, widest));
+                HandStatus::Success
+            }
+            Task::Grasp { .. } => HandStatus::Unsuccessful,
+        };
+        self.running = None;
+        self.respond(running.command_id, running.command, status);
+    }
+
+    /// The present state.
+    pub fn state(&self, plant: &dyn Plant) -> HandState {
+        HandState {
+            message_id: self.time_ms,
+            width: plant.hand_width().0,
+            max_width: MAX_WIDTH_M,
+            is_grasped: self.grasped.is_some(),
+            temperature: TEMPERATURE,
+        }
+    }
+
+    fn respond(&mut self, command_id: u32, command: HandCommand, status: HandStatus) {
+        self.outbox.push(HandOutgoing { command_id, command, status });
+    }
+}

@@ -1,0 +1,241 @@
+//! The server's sockets: who is connected, what arrives, what is sent.
+
+use std::io::Write;
+use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crate::error::{FciError, Result};
+use crate::message::read_message;
+use crate::wire::{Header, HeaderKind};
+
+/// A client that does not take a response within this time is gone.
+const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+
+/// What a listening thread or a reading one tells the loop.
+#[derive(Debug)]
+enum Event {
+    Connected(TcpStream, SocketAddr),
+    Message(u64, Header, Vec<u8>),
+    Gone(u64),
+}
+
+/// What the loop is told.
+#[derive(Debug)]
+pub enum Incoming {
+    /// A request.
+    Request(Header, Vec<u8>),
+    /// The client has gone or sent what is no message.
+    Gone,
+}
+
+/// The connected client.
+#[derive(Debug)]
+struct Client {
+    session: u64,
+    stream: TcpStream,
+    address: SocketAddr,
+    udp_port: Option<u16>,
+}
+
+/// A TCP port with one client at a time, and the UDP socket beside it.
+#[derive(Debug)]
+pub struct Link {
+    kind: HeaderKind,
+    address: SocketAddr,
+    udp: UdpSocket,
+    events: Receiver<Event>,
+    sender: Sender<Event>,
+    client: Option<Client>,
+    num_sessions: u64,
+    is_stopping: Arc<AtomicBool>,
+    listener: Option<JoinHandle<()>>,
+}
+
+impl Link {
+    /// Listens on an address; UDP goes out from a port of its own.
+    ///
+    /// # Errors
+    /// [`FciError::Socket`], as where the port is taken.
+    pub fn listen(ip: IpAddr, port: u16, kind: HeaderKind) -> Result<Self> {
+        let failed = |source| FciError::Socket { action: "listen on", address: format!("{ip}:{port}"), source };
+        let listener = TcpListener::bind((ip, port)).map_err(failed)?;
+        let address = listener.local_addr().map_err(failed)?;
+        let udp = UdpSocket::bind((ip, 0)).map_err(failed)?;
+        udp.set_nonblocking(true).map_err(failed)?;
+        let (sender, events) = channel();
+        let is_stopping = Arc::new(AtomicBool::new(false));
+        let accepted = (sender.clone(), is_stopping.clone());
+        let thread = thread::Builder::new()
+            .name("fci listener".into())
+            .spawn(move || accept(&listener, &accepted.0, &accepted.1))
+            .map_err(failed)?;
+        Ok(Self {
+            kind,
+            address,
+            udp,
+            events,
+            sender,
+            client: None,
+            num_sessions: 0,
+            is_stopping,
+            listener: Some(thread),
+        })
+    }
+
+    /// Where clients connect to.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The next thing that a client has sent, without waiting.
+    pub fn poll(&mut self) -> Option<Incoming> {
+        loop {
+            match self.events.try_recv() {
+                Ok(Event::Connected(stream, address)) => self.welcome(stream, address),
+                Ok(Event::Message(session, header, payload)) if self.is_of(session) => {
+                    return Some(Incoming::Request(header, payload));
+                }
+                Ok(Event::Gone(session)) if self.is_of(session) => {
+                    self.close();
+                    return Some(Incoming::Gone);
+                }
+                // Of a client that is no longer served.
+                Ok(Event::Message(..) | Event::Gone(..)) => {}
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
+            }
+        }
+    }
+
+    /// Sends states to this port of the client from now on.
+    pub fn open_udp(&mut self, port: u16) {
+        if let Some(client) = &mut self.client {
+            client.udp_port = Some(port);
+        }
+    }
+
+    /// Whether a client has opened a session.
+    pub fn is_open(&self) -> bool {
+        self.client.as_ref().is_some_and(|client| client.udp_port.is_some())
+    }
+
+    /// Sends a response; a client that does not take it is gone, which [`Link::poll`] tells.
+    pub fn respond(&mut self, message: &[u8]) {
+        if let Some(client) = &mut self.client
+            && client.stream.write_all(message).is_err()
+        {
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
+    }
+
+    /// Sends a state.
+    pub fn send_state(&self, datagram: &[u8]) {
+        if let Some(peer) = self.udp_peer() {
+            // A datagram that does not get through is a lost one.
+            let _ = self.udp.send_to(datagram, peer);
+        }
+    }
+
+    /// The next datagram of the client, without waiting, and its length.
+    pub fn receive(&self, buffer: &mut [u8]) -> Option<usize> {
+        let peer = self.udp_peer()?;
+        loop {
+            match self.udp.recv_from(buffer) {
+                Ok((length, from)) if from == peer => return Some(length),
+                Ok(_) => {}
+                // An error of an earlier datagram (port unreachable) is told here; the next call reads on.
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// Lets [`Link::receive`] wait for a datagram for a short while, or not at all.
+    ///
+    /// # Errors
+    /// [`FciError::Socket`].
+    pub fn set_waiting(&self, is_waiting: bool) -> Result<()> {
+        let failed = |source| FciError::Socket { action: "set up", address: self.address.to_string(), source };
+        self.udp.set_nonblocking(!is_waiting).map_err(failed)?;
+        self.udp.set_read_timeout(Some(Duration::from_millis(2))).map_err(failed)
+    }
+
+    /// Ends the connection.
+    pub fn close(&mut self) {
+        if let Some(client) = self.client.take() {
+            let _ = client.stream.shutdown(Shutdown::Both);
+        }
+    }
+
+    fn udp_peer(&self) -> Option<SocketAddr> {
+        let client = self.client.as_ref()?;
+        Some(SocketAddr::new(client.address.ip(), client.udp_port?))
+    }
+
+    fn is_of(&self, session: u64) -> bool {
+        self.client.as_ref().is_some_and(|client| client.session == session)
+    }
+
+    /// Takes a client, or closes its connection where there is one already.
+    fn welcome(&mut self, stream: TcpStream, address: SocketAddr) {
+        if self.client.is_some() {
+            let _ = stream.shutdown(Shutdown::Both);
+            return;
+        }
+        self.num_sessions += 1;
+        let (session, kind, sender) = (self.num_sessions, self.kind, self.sender.clone());
+        let set_up = || -> std::io::Result<TcpStream> {
+            stream.set_nodelay(true)?;
+            stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+            let reading = stream.try_clone()?;
+            thread::Builder::new()
+                .name("fci requests".into())
+                .spawn(move || read_requests(reading, session, kind, &sender))?;
+            Ok(stream)
+        };
+        if let Ok(stream) = set_up() {
+            self.client = Some(Client { session, stream, address, udp_port: None });
+        }
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.close();
+        self.is_stopping.store(true, Ordering::Relaxed);
+        // Wakes the thread that waits for clients.
+        let _ = TcpStream::connect_timeout(&self.address, WRITE_TIMEOUT);
+        if let Some(listener) = self.listener.take() {
+            let _ = listener.join();
+        }
+    }
+}
+
+fn accept(listener: &TcpListener, sender: &Sender<Event>, is_stopping: &AtomicBool) {
+    for stream in listener.incoming() {
+        if is_stopping.load(Ordering::Relaxed) {
+            return;
+        }
+        let Ok(stream) = stream else { continue };
+        let Ok(address) = stream.peer_addr() else { continue };
+        if sender.send(Event::Connected(stream, address)).is_err() {
+            return;
+        }
+    }
+}
+
+fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: &Sender<Event>) {
+    loop {
+        let event = match read_message(&mut stream, kind) {
+            Ok(Ok((header, payload))) => Event::Message(session, header, payload),
+            // A header that cannot be ends the connection as its closing does.
+            Ok(Err(_)) | Err(_) => Event::Gone(session),
+        };
+        let is_end = matches!(event, Event::Gone(..));
+        if sender.send(event).is_err() || is_end {
+            return;
+        }
+    }
+}

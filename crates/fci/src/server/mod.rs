@@ -1,0 +1,30 @@
+//! The server: makes a [`Plant`], a simulated arm with a hand, a Panda on the network (protocol versions 5 and, for the hand, 3).
+//!
+//! [`RobotCore`] and [`HandCore`] are the robot without sockets and clock: every cycle takes the client's command or none, and
+//! gives the next state. [`Server`] is the network around them.
+
+mod cartesian;
+mod communication;
+mod config;
+mod contact;
+mod frames;
+mod hand;
+mod link;
+mod monitor;
+mod motion;
+mod plant;
+mod reference;
+mod report;
+mod robot;
+mod run;
+mod settings;
+mod statistics;
+mod torque;
+
+pub use config::{Pace, ServerConfig};
+pub use hand::{HandCore, HandOutgoing};
+pub use plant::{Jacobian, JointVector, Observation, Plant};
+pub use reference::PERIOD_SECS;
+pub use robot::{Outgoing, RobotCore};
+pub use run::Server;
+pub use statistics::ServerStatistics;

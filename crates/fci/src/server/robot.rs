@@ -1,0 +1,346 @@
+//! The simulated robot: requests and commands in, responses and states out, a cycle at a time. No socket, no clock.
+
+use nalgebra::Isometry3;
+
+use super::cartesian::{CartesianReference, MIN_SINGULAR_VALUE, elbow_of, smallest_singular_value};
+use super::contact::Contacts;
+use super::frames::{end_effector_at, shifted};
+use super::motion::{Motion, References};
+use super::plant::{Jacobian, JointVector, Observation, Plant};
+use super::reference::{JointReference, PERIOD_SECS};
+use super::settings::Settings;
+use super::torque::{EndEffector, cartesian_impedance, joint_impedance, load_gravity};
+use crate::limits::Limits;
+use crate::robot_error::{RobotError, RobotErrors};
+use crate::wire::{
+    Command, ControllerMode, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, Status,
+};
+
+/// So many cycles of a recovery the arm yields to what it touches, so that the next motion does not start in a collision.
+const RECOVERY_CYCLES: u32 = 200;
+/// Nothing has to be simulated once the measured velocities are below this, rad/s, or after so many cycles without a motion: an
+/// arm that presses on something may never stand wholly still.
+const STILL: f64 = 1e-3;
+const MAX_SETTLING_CYCLES: u32 = 1000;
+/// A measured joint velocity below this, rad/s, is standing.
+const STANDING: f64 = 0.01;
+
+/// A response to be sent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outgoing {
+    /// The request's number.
+    pub command_id: u32,
+    /// The request's command.
+    pub command: Command,
+    /// The response.
+    pub response: Response,
+}
+
+/// A robot with its settings, references and errors.
+#[derive(Debug)]
+pub struct RobotCore {
+    pub(super) limits: Limits,
+    pub(super) settings: Settings,
+    pub(super) observation: Observation,
+    pub(super) references: References,
+    pub(super) contacts: Contacts,
+    /// The collisions that led to a reflex, until the recovery.
+    pub(super) collisions: Contacts,
+    pub(super) motion: Option<Motion>,
+    pub(super) mode: RobotMode,
+    pub(super) errors: RobotErrors,
+    pub(super) reflex_reason: RobotErrors,
+    pub(super) time_ms: u64,
+    pub(super) torque: JointVector,
+    pub(super) torque_rate: JointVector,
+    /// Cycles since the last motion.
+    idle_cycles: u32,
+    /// Cycles that the present recovery takes yet.
+    recovery_cycles: u32,
+    /// Answers that wait for the arm to stand.
+    waiting: Vec<Outgoing>,
+    outbox: Vec<Outgoing>,
+}
+
+impl RobotCore {
+    /// A robot that stands where the plant is.
+    pub fn new(plant: &mut dyn Plant, limits: Limits) -> Self {
+        let observation = plant.observe();
+        let settings = Settings::default();
+        let q = observation.q;
+        let torque = observation.gravity;
+        let pose = plant.flange(&q).0 * settings.flange_from_ee();
+        Self {
+            limits,
+            settings,
+            observation,
+            references: References {
+                joints: JointReference::at_rest(q),
+                cartesian: CartesianReference::at_rest(pose, &q),
+                torque: JointVector::zeros(),
+            },
+            contacts: Contacts::default(),
+            collisions: Contacts::default(),
+            motion: None,
+            mode: RobotMode::Idle,
+            errors: RobotErrors::default(),
+            reflex_reason: RobotErrors::default(),
+            time_ms: 1,
+            torque,
+            torque_rate: JointVector::zeros(),
+            idle_cycles: 0,
+            recovery_cycles: 0,
+            waiting: Vec::new(),
+            outbox: Vec::new(),
+        }
+    }
+
+    /// Responses that are due.
+    pub fn take_responses(&mut self) -> Vec<Outgoing> {
+        std::mem::take(&mut self.outbox)
+    }
+
+    /// Whether a motion runs and its client has answered a state.
+    pub fn expects_commands(&self) -> Option<bool> {
+        self.motion.as_ref().map(|motion| motion.communication.has_started())
+    }
+
+    /// Whether nothing moves and nobody waits for an answer.
+    pub fn is_settled(&self) -> bool {
+        let is_still = self.observation.dq.amax() < STILL || self.idle_cycles > MAX_SETTLING_CYCLES;
+        self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest() && is_still
+    }
+
+    /// Lets a millisecond pass for the robot's clock alone.
+    pub fn tick_clock(&mut self) {
+        self.time_ms += 1;
+    }
+
+    /// Milliseconds since the start: the number of the present state.
+    pub fn time_ms(&self) -> u64 {
+        self.time_ms
+    }
+
+    /// What the robot stopped for, until the recovery.
+    pub fn errors(&self) -> RobotErrors {
+        self.errors
+    }
+
+    /// Does what a client asks, all but Connect.
+    pub fn request(&mut self, plant: &dyn Plant, command_id: u32, request: &Request) {
+        let command = request.command();
+        let mut rest = Vec::new();
+        let status = match request {
+            Request::Move(request) => match self.start(plant, command_id, request) {
+                Ok(()) => Status::MotionStarted,
+                Err(status) => status,
+            },
+            Request::StopMove => {
+                if self.motion.is_some() {
+                    self.end_motion(Status::Preempted);
+                }
+                self.answer_when_standing(command_id, command, Status::Success);
+                return;
+            }
+            Request::AutomaticErrorRecovery => {
+                if self.motion.is_some() || self.mode == RobotMode::UserStopped {
+                    Status::NotPossible
+                } else {
+                    self.errors = RobotErrors::default();
+                    self.collisions = Contacts::default();
+                    self.mode = RobotMode::AutomaticErrorRecovery;
+                    self.recovery_cycles = RECOVERY_CYCLES;
+                    self.answer_when_standing(command_id, command, Status::Success);
+                    return;
+                }
+            }
+            // There are no walls: size, frame and activation are zero.
+            Request::GetCartesianLimit(_) => {
+                rest = vec![0; 3 * 8 + 16 * 8 + 1];
+                Status::Success
+            }
+            // A library of machine code is the one thing that a robot without Franka's software cannot send.
+            Request::LoadModelLibrary(_) => Status::Error,
+            Request::Connect { .. } | Request::GetRobotModel => Status::NotPossible,
+            setter if self.motion.is_some() => {
+                debug_assert!(setter.command() != Command::Move);
+                Status::NotPossible
+            }
+            setter => self.settings.set(setter).unwrap_or(Status::NotPossible),
+        };
+        self.outbox.push(Outgoing { command_id, command, response: Response { status, rest } });
+    }
+
+    /// The client is gone: a motion that runs is a broken communication.
+    pub fn disconnect(&mut self) {
+        if self.motion.is_some() {
+            self.abort(RobotError::CommunicationConstraintsViolation.into());
+        }
+        self.waiting.clear();
+        self.outbox.clear();
+    }
+
+    /// Lets a millisecond pass, with the answer to the present state or none.
+    ///
+    /// # Errors
+    /// The plant's.
+    pub fn cycle(&mut self, plant: &mut dyn Plant, command: Option<&RobotCommand>) -> Result<(), String> {
+        self.idle_cycles = if self.motion.is_some() { 0 } else { self.idle_cycles.saturating_add(1) };
+        self.update_references(plant, command);
+        let (flange, flange_jacobian) = plant.flange(&self.observation.q);
+        self.references.torque = self.controller_torque(plant, &flange, &flange_jacobian);
+        let load = self.load_torque(&flange, &flange_jacobian);
+        let total = self.references.torque + self.observation.gravity + load;
+        let total =
+            JointVector::from_fn(|joint, _| total[joint].clamp(-self.limits.torque[joint], self.limits.torque[joint]));
+        plant.step(&total)?;
+        self.time_ms += 1;
+        self.torque_rate = (total - self.torque) / PERIOD_SECS;
+        self.torque = total;
+        self.observation = plant.observe();
+        self.feel(plant);
+        self.settle();
+        Ok(())
+    }
+
+    fn start(&mut self, plant: &dyn Plant, command_id: u32, request: &MoveRequest) -> Result<(), Status> {
+        if self.motion.is_some() || self.mode != RobotMode::Idle || !self.waiting.is_empty() {
+            return Err(Status::NotPossible);
+        }
+        for deviation in [request.max_path_deviation, request.max_goal_deviation] {
+            if !(deviation.translation > 0.0 && deviation.rotation > 0.0 && deviation.elbow > 0.0) {
+                return Err(Status::InvalidArgument);
+            }
+        }
+        let is_cartesian = matches!(
+            request.generator,
+            MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity
+        );
+        let q = self.references.joints.q;
+        let (pose, jacobian) = end_effector_at(plant, &self.settings.flange_from_ee(), &q);
+        if is_cartesian && smallest_singular_value(&jacobian) < MIN_SINGULAR_VALUE {
+            return Err(Status::StartAtSingularPose);
+        }
+        self.references.joints = JointReference::at_rest(q);
+        self.references.cartesian = CartesianReference::at_rest(pose, &q);
+        self.motion = Some(Motion::new(command_id, request.controller, request.generator));
+        self.reflex_reason = RobotErrors::default();
+        self.mode = RobotMode::Move;
+        Ok(())
+    }
+
+    fn update_references(&mut self, plant: &dyn Plant, command: Option<&RobotCommand>) {
+        let flange_from_ee = self.settings.flange_from_ee();
+        let at = |q: &JointVector| end_effector_at(plant, &flange_from_ee, q);
+        if self.mode == RobotMode::AutomaticErrorRecovery {
+            self.recovery_cycles = self.recovery_cycles.saturating_sub(1);
+            self.references.joints = JointReference::at_rest(self.observation.q);
+        }
+        let Some(motion) = &mut self.motion else {
+            let joints = &mut self.references.joints;
+            *joints = if joints.is_at_rest() { JointReference::at_rest(joints.q) } else { joints.braked(&self.limits) };
+            self.references.cartesian = CartesianReference::at_rest(at(&joints.q).0, &joints.q);
+            return;
+        };
+        match motion.follow(&self.references, command, &self.limits, &at) {
+            Ok((references, is_finished)) => {
+                self.references = references;
+                if is_finished {
+                    self.end_motion(Status::Success);
+                }
+            }
+            Err(errors) => self.abort(errors),
+        }
+    }
+
+    /// Leaves the motion; the Move is answered when the arm stands.
+    fn end_motion(&mut self, status: Status) {
+        let Some(motion) = self.motion.take() else { return };
+        self.mode = RobotMode::Idle;
+        if motion.controller == ControllerMode::External {
+            self.follow_measurement();
+        }
+        match status {
+            Status::Success => self.answer_when_standing(motion.command_id, Command::Move, status),
+            _ => self.outbox.push(outgoing(motion.command_id, Command::Move, status)),
+        }
+    }
+
+    /// Stops for errors: the motion ends, the arm brakes, and nothing moves until the recovery.
+    pub(super) fn abort(&mut self, errors: RobotErrors) {
+        self.errors = errors;
+        self.reflex_reason = errors;
+        self.collisions = self.contacts;
+        let is_external = self.motion.as_ref().is_some_and(|motion| motion.controller == ControllerMode::External);
+        let is_collision = errors.contains(RobotError::JointReflex) || errors.contains(RobotError::CartesianReflex);
+        if is_collision {
+            // Braking would press on.
+            self.references.joints = JointReference::at_rest(self.observation.q);
+        } else if is_external {
+            // The arm is not where the reference is, and must not go there.
+            self.follow_measurement();
+        }
+        if let Some(motion) = self.motion.take() {
+            self.outbox.push(outgoing(motion.command_id, Command::Move, Status::ReflexAborted));
+        }
+        self.mode = RobotMode::Reflex;
+    }
+
+    fn follow_measurement(&mut self) {
+        let Observation { q, dq, .. } = self.observation;
+        self.references.joints = JointReference { q, dq, ddq: JointVector::zeros() };
+    }
+
+    fn controller_torque(&self, plant: &dyn Plant, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
+        let controller = self.motion.as_ref().map_or(ControllerMode::JointImpedance, |motion| motion.controller);
+        let joints = &self.references.joints;
+        // Until the first command of a torque motion, the internal controller holds the arm.
+        let has_started = self.motion.as_ref().is_some_and(|motion| motion.communication.has_started());
+        match controller {
+            ControllerMode::External if has_started => self.references.torque,
+            ControllerMode::CartesianImpedance => {
+                let flange_from_ee = self.settings.flange_from_ee();
+                let (pose_desired, jacobian_desired) = end_effector_at(plant, &flange_from_ee, &joints.q);
+                let end_effector = EndEffector {
+                    base_from_ee: flange * flange_from_ee,
+                    jacobian: shifted(flange_jacobian, flange, &flange_from_ee),
+                    base_from_ee_desired: pose_desired,
+                    twist_desired: jacobian_desired * joints.dq,
+                };
+                cartesian_impedance(&self.observation, &end_effector, joints, &self.settings.cartesian_stiffness)
+            }
+            _ => joint_impedance(&self.observation, joints, &self.settings.joint_stiffness),
+        }
+    }
+
+    pub(super) fn load_torque(&self, flange: &Isometry3<f64>, flange_jacobian: &Jacobian) -> JointVector {
+        let load = &self.settings.load;
+        let lever = flange.rotation * nalgebra::Vector3::from(load.center);
+        load_gravity(load.mass, flange_jacobian, &lever)
+    }
+
+    fn answer_when_standing(&mut self, command_id: u32, command: Command, status: Status) {
+        self.waiting.push(outgoing(command_id, command, status));
+    }
+
+    /// Sends what waited for the arm to stand.
+    fn settle(&mut self) {
+        let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
+        if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {
+            return;
+        }
+        if self.mode == RobotMode::AutomaticErrorRecovery {
+            self.mode = RobotMode::Idle;
+        }
+        self.outbox.append(&mut self.waiting);
+    }
+
+    /// Joint 3 and the sign of joint 4, measured.
+    pub(super) fn elbow(&self) -> [f64; 2] {
+        elbow_of(&self.observation.q)
+    }
+}
+
+fn outgoing(command_id: u32, command: Command, status: Status) -> Outgoing {
+    Outgoing { command_id, command, response: Response { status, rest: Vec::new() } }
+}

@@ -1,0 +1,189 @@
+//! Packed little-endian fields, read and written by one list of fields.
+//!
+//! A message names its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes them, a [`Decoder`] fills them.
+
+use crate::error::WireError;
+
+/// How a message keeps its real numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Real {
+    /// 4 bytes.
+    F32,
+    /// 8 bytes.
+    F64,
+}
+
+/// One direction of a message: each call writes or reads the next field.
+pub trait Codec {
+    /// The next bytes, in order.
+    ///
+    /// # Errors
+    /// [`WireError::Short`] where a message ends too early.
+    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), WireError>;
+
+    /// How [`Codec::reals`] are kept.
+    fn real(&self) -> Real;
+
+    /// One byte.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn u8(&mut self, value: &mut u8) -> Result<(), WireError> {
+        let mut bytes = [*value];
+        self.bytes(&mut bytes)?;
+        *value = bytes[0];
+        Ok(())
+    }
+
+    /// Two bytes.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn u16(&mut self, value: &mut u16) -> Result<(), WireError> {
+        let mut bytes = value.to_le_bytes();
+        self.bytes(&mut bytes)?;
+        *value = u16::from_le_bytes(bytes);
+        Ok(())
+    }
+
+    /// Four bytes.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn u32(&mut self, value: &mut u32) -> Result<(), WireError> {
+        let mut bytes = value.to_le_bytes();
+        self.bytes(&mut bytes)?;
+        *value = u32::from_le_bytes(bytes);
+        Ok(())
+    }
+
+    /// Eight bytes.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn u64(&mut self, value: &mut u64) -> Result<(), WireError> {
+        let mut bytes = value.to_le_bytes();
+        self.bytes(&mut bytes)?;
+        *value = u64::from_le_bytes(bytes);
+        Ok(())
+    }
+
+    /// A byte that is zero for false; any other is read as true, as C++ does.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn bool(&mut self, value: &mut bool) -> Result<(), WireError> {
+        let mut byte = u8::from(*value);
+        self.u8(&mut byte)?;
+        *value = byte != 0;
+        Ok(())
+    }
+
+    /// One double.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn f64(&mut self, value: &mut f64) -> Result<(), WireError> {
+        let mut bytes = value.to_le_bytes();
+        self.bytes(&mut bytes)?;
+        *value = f64::from_le_bytes(bytes);
+        Ok(())
+    }
+
+    /// Doubles, in order.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn f64s(&mut self, values: &mut [f64]) -> Result<(), WireError> {
+        values.iter_mut().try_for_each(|value| self.f64(value))
+    }
+
+    /// Numbers as wide as [`Codec::real`] says, in order.
+    ///
+    /// # Errors
+    /// As [`Codec::bytes`].
+    fn reals(&mut self, values: &mut [f64]) -> Result<(), WireError> {
+        match self.real() {
+            Real::F64 => self.f64s(values),
+            Real::F32 => values.iter_mut().try_for_each(|value| {
+                let mut bytes = (*value as f32).to_le_bytes();
+                self.bytes(&mut bytes)?;
+                *value = f64::from(f32::from_le_bytes(bytes));
+                Ok(())
+            }),
+        }
+    }
+}
+
+/// Writes fields behind each other.
+#[derive(Debug)]
+pub struct Encoder {
+    bytes: Vec<u8>,
+    real: Real,
+}
+
+impl Encoder {
+    /// Nothing yet.
+    pub fn new(real: Real) -> Self {
+        Self { bytes: Vec::new(), real }
+    }
+
+    /// What was written.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
+impl Codec for Encoder {
+    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), WireError> {
+        self.bytes.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn real(&self) -> Real {
+        self.real
+    }
+}
+
+/// Reads fields from a message.
+#[derive(Debug)]
+pub struct Decoder<'a> {
+    message: &'static str,
+    bytes: &'a [u8],
+    position: usize,
+    real: Real,
+}
+
+impl<'a> Decoder<'a> {
+    /// From the first byte on; `message` names it in errors.
+    pub fn new(message: &'static str, bytes: &'a [u8], real: Real) -> Self {
+        Self { message, bytes, position: 0, real }
+    }
+
+    /// Ends the reading.
+    ///
+    /// # Errors
+    /// [`WireError::Long`] where bytes are left.
+    pub fn finish(self) -> Result<(), WireError> {
+        if self.position == self.bytes.len() {
+            return Ok(());
+        }
+        Err(WireError::Long { message: self.message, expected: self.position, found: self.bytes.len() })
+    }
+}
+
+impl Codec for Decoder<'_> {
+    fn bytes(&mut self, bytes: &mut [u8]) -> Result<(), WireError> {
+        let end = self.position + bytes.len();
+        let Some(read) = self.bytes.get(self.position..end) else {
+            return Err(WireError::Short { message: self.message, expected: end, found: self.bytes.len() });
+        };
+        bytes.copy_from_slice(read);
+        self.position = end;
+        Ok(())
+    }
+
+    fn real(&self) -> Real {
+        self.real
+    }
+}

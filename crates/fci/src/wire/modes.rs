@@ -1,0 +1,80 @@
+//! What the robot is doing, as a state tells it and a Move asks for it.
+
+use crate::error::WireError;
+
+/// An enum of bytes, and its names for messages.
+macro_rules! byte_enum {
+    ($(#[$doc:meta])* $name:ident, $what:literal { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum $name {
+            $($(#[$variant_doc])* $variant = $value,)+
+        }
+
+        impl $name {
+            /// The value of a byte.
+            ///
+            /// # Errors
+            /// [`WireError::Value`] for a byte without a meaning.
+            pub fn from_byte(byte: u8) -> Result<Self, WireError> {
+                match byte {
+                    $($value => Ok($name::$variant),)+
+                    _ => Err(WireError::Value { field: $what, found: byte.into() }),
+                }
+            }
+        }
+    };
+}
+
+byte_enum! {
+    /// Which generator makes the references; `Idle` where none does.
+    MotionGeneratorMode, "motion_generator_mode" {
+        /// No motion.
+        Idle = 0,
+        /// Joint positions.
+        JointPosition = 1,
+        /// Joint velocities.
+        JointVelocity = 2,
+        /// Poses of the end effector.
+        CartesianPosition = 3,
+        /// Twists of the end effector.
+        CartesianVelocity = 4,
+        /// Torques alone (version 10).
+        None = 5,
+    }
+}
+
+byte_enum! {
+    /// Which controller makes the torques.
+    ControllerMode, "controller_mode" {
+        /// The robot's own joint impedance.
+        JointImpedance = 0,
+        /// The robot's own Cartesian impedance.
+        CartesianImpedance = 1,
+        /// The client's torques.
+        External = 2,
+        /// None of these.
+        Other = 3,
+    }
+}
+
+byte_enum! {
+    /// What the robot is doing.
+    RobotMode, "robot_mode" {
+        /// None of the others.
+        Other = 0,
+        /// Standing, ready for a motion.
+        Idle = 1,
+        /// In a motion.
+        Move = 2,
+        /// Led by hand.
+        Guiding = 3,
+        /// Stopped by an error that waits for recovery.
+        Reflex = 4,
+        /// Stopped by a person.
+        UserStopped = 5,
+        /// Recovering.
+        AutomaticErrorRecovery = 6,
+    }
+}

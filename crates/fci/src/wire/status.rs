@@ -1,0 +1,179 @@
+//! The robot's answers; their numbers depend on command and version.
+
+use std::fmt;
+
+use super::commands::Command;
+use super::version::Version;
+use crate::error::WireError;
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Done.
+    Success,
+    /// The motion runs; a second answer follows at its end.
+    MotionStarted,
+    /// Another command ended the motion.
+    Preempted,
+    /// A safety function ended the motion (version 10).
+    PreemptedBySafety,
+    /// A safety function is active (version 10).
+    RejectedBySafety,
+    /// Not in the robot's present mode.
+    NotPossible,
+    /// No Cartesian motion starts at a singular pose.
+    StartAtSingularPose,
+    /// An argument is out of range.
+    InvalidArgument,
+    /// An error stopped the motion.
+    ReflexAborted,
+    /// A person stopped the robot.
+    EmergencyAborted,
+    /// The commands were invalid.
+    InputErrorAborted,
+    /// Stopped for another reason.
+    Aborted,
+    /// Only a person at the robot can recover.
+    ManualRecoveryRequired,
+    /// The versions differ.
+    IncompatibleVersion,
+    /// Failed.
+    Error,
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Status::Success => "success",
+            Status::MotionStarted => "motion started",
+            Status::Preempted => "preempted by a stop",
+            Status::PreemptedBySafety => "preempted by a safety function",
+            Status::RejectedBySafety => "rejected, a safety function is active",
+            Status::NotPossible => "not possible in the robot's present mode",
+            Status::StartAtSingularPose => "rejected, the start is a singular pose",
+            Status::InvalidArgument => "rejected, an argument is out of range",
+            Status::ReflexAborted => "stopped by a reflex",
+            Status::EmergencyAborted => "stopped by the user stop",
+            Status::InputErrorAborted => "stopped by invalid commands",
+            Status::Aborted => "aborted",
+            Status::ManualRecoveryRequired => "rejected, the recovery needs a person at the robot",
+            Status::IncompatibleVersion => "another version of the protocol",
+            Status::Error => "failed",
+        })
+    }
+}
+
+const CONNECT: &[Status] = &[Status::Success, Status::IncompatibleVersion];
+const MOVE_V5: &[Status] = &[
+    Status::Success,
+    Status::MotionStarted,
+    Status::Preempted,
+    Status::NotPossible,
+    Status::StartAtSingularPose,
+    Status::InvalidArgument,
+    Status::ReflexAborted,
+    Status::EmergencyAborted,
+    Status::InputErrorAborted,
+    Status::Aborted,
+];
+const MOVE_V10: &[Status] = &[
+    Status::Success,
+    Status::MotionStarted,
+    Status::Preempted,
+    Status::PreemptedBySafety,
+    Status::RejectedBySafety,
+    Status::NotPossible,
+    Status::StartAtSingularPose,
+    Status::InvalidArgument,
+    Status::ReflexAborted,
+    Status::EmergencyAborted,
+    Status::InputErrorAborted,
+    Status::Aborted,
+];
+const STOP_V5: &[Status] =
+    &[Status::Success, Status::NotPossible, Status::EmergencyAborted, Status::ReflexAborted, Status::Aborted];
+const STOP_V10: &[Status] = &[
+    Status::Success,
+    Status::NotPossible,
+    Status::RejectedBySafety,
+    Status::EmergencyAborted,
+    Status::ReflexAborted,
+    Status::Aborted,
+];
+const SETTER: &[Status] = &[Status::Success, Status::NotPossible, Status::InvalidArgument, Status::RejectedBySafety];
+const RECOVERY_V5: &[Status] = &[
+    Status::Success,
+    Status::NotPossible,
+    Status::ManualRecoveryRequired,
+    Status::ReflexAborted,
+    Status::EmergencyAborted,
+    Status::Aborted,
+];
+const RECOVERY_V10: &[Status] = &[
+    Status::Success,
+    Status::NotPossible,
+    Status::RejectedBySafety,
+    Status::ManualRecoveryRequired,
+    Status::ReflexAborted,
+    Status::EmergencyAborted,
+    Status::Aborted,
+];
+const GETTER: &[Status] = &[Status::Success, Status::NotPossible, Status::RejectedBySafety];
+const LIBRARY: &[Status] = &[Status::Success, Status::Error];
+
+impl Status {
+    /// What a command's numbers mean: the status of number `n` is the `n`th.
+    fn table(command: Command, version: Version) -> &'static [Status] {
+        match (command, version) {
+            (Command::Connect, _) => CONNECT,
+            (Command::Move, Version::V5) => MOVE_V5,
+            (Command::Move, Version::V10) => MOVE_V10,
+            (Command::StopMove, Version::V5) => STOP_V5,
+            (Command::StopMove, Version::V10) => STOP_V10,
+            (Command::AutomaticErrorRecovery, Version::V5) => RECOVERY_V5,
+            (Command::AutomaticErrorRecovery, Version::V10) => RECOVERY_V10,
+            (Command::LoadModelLibrary, _) => LIBRARY,
+            (Command::GetRobotModel, _) => GETTER,
+            // Version 5 has the first three alone.
+            _ => SETTER,
+        }
+    }
+
+    /// The status of a number.
+    ///
+    /// # Errors
+    /// [`WireError::Value`] for a number without a meaning.
+    pub fn from_number(number: u8, command: Command, version: Version) -> Result<Self, WireError> {
+        Self::table(command, version)
+            .get(usize::from(number))
+            .copied()
+            .ok_or(WireError::Value { field: "status", found: number.into() })
+    }
+
+    /// The number of the status, `None` where the command has no such status.
+    pub fn number(self, command: Command, version: Version) -> Option<u8> {
+        Self::table(command, version).iter().position(|&status| status == self).map(|index| index as u8)
+    }
+}
+
+/// A response: its status, and what follows for some commands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Response {
+    /// How the command ended.
+    pub status: Status,
+    /// Bytes after the status: the server's version, the robot's description.
+    pub rest: Vec<u8>,
+}
+
+impl Response {
+    /// Reads the payload of a response.
+    ///
+    /// # Errors
+    /// [`WireError`] for an empty one or an unknown status.
+    pub fn decode(payload: &[u8], command: Command, version: Version) -> Result<Self, WireError> {
+        let Some((&status, rest)) = payload.split_first() else {
+            return Err(WireError::Short { message: "response", expected: 1, found: 0 });
+        };
+        Ok(Self { status: Status::from_number(status, command, version)?, rest: rest.to_vec() })
+    }
+}

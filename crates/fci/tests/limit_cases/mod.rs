@@ -1,0 +1,217 @@
+//! One motion just inside and one just outside of every limit that a robot checks, by our client.
+//!
+//! Each motion leads one signal to its limit with all others well within theirs, at `1 - MARGIN` or `1 + MARGIN` of it.
+
+mod profile;
+mod signal;
+
+use std::fmt;
+
+use sdg_fci::client::Robot;
+use sdg_fci::wire::{RobotMode, Status};
+use sdg_fci::{FciError, Limits, RobotError, RobotErrors};
+
+use profile::Profile;
+use signal::Signal;
+pub use signal::go_to;
+
+/// How far inside and outside, as a share of the limit.
+const MARGIN: f64 = 0.005;
+/// The robot stops for measured velocities this much beyond the limit, rad/s, or somewhat later.
+const MEASURED_BEYOND: f64 = 0.4;
+
+/// A kind of check, with a motion on either side of it.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// What is checked.
+    pub name: &'static str,
+    error: RobotError,
+    inside: Signal,
+    outside: Signal,
+}
+
+/// How a motion ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Found {
+    /// At its end.
+    Done,
+    /// By the robot, for these errors.
+    Stopped(RobotErrors),
+    /// In another way.
+    Other(String),
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Found::Done => f.write_str("done"),
+            Found::Stopped(errors) => write!(f, "stopped for {errors}"),
+            Found::Other(what) => f.write_str(what),
+        }
+    }
+}
+
+/// Every kind of check.
+pub fn all(limits: &Limits) -> Vec<Case> {
+    let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
+    let case = |name, error, signal: &dyn Fn(f64) -> Signal| Case {
+        name,
+        error,
+        inside: signal(inside),
+        outside: signal(outside),
+    };
+    let (joint, turn, elbow) = (0, limits.rotation, limits.elbow);
+    let (velocity, acceleration, jerk) = (limits.velocity[joint], limits.acceleration[joint], limits.jerk[joint]);
+    let position = |profile| Signal::JointPosition { joint, profile };
+    let speed = |profile| Signal::JointVelocity { joint, profile };
+    // Joint 7 starts at 0.785 rad; near its end an FR3 allows little velocity, so that the inner motion ends earlier.
+    let to_the_end = limits.q_max[6] - std::f64::consts::FRAC_PI_4;
+    let torque = |peak: f64| {
+        let up = (0..=20).map(|step| peak * f64::from(step) / 20.0);
+        let pulse: Vec<f64> = up.clone().chain(up.rev()).collect();
+        let back = pulse.clone().into_iter().map(|value| -value);
+        Profile::of(pulse.into_iter().chain(back))
+    };
+    let torque_step = |rate: f64| Profile::of([rate * 1e-3, 0.0, -rate * 1e-3, 0.0].into_iter());
+    let spun = |peak: f64| Signal::SpunJoint { profile: Profile::velocity(-peak, 150) };
+    vec![
+        Case {
+            name: "joint position",
+            error: RobotError::JointMotionGeneratorPositionLimitsViolation,
+            inside: Signal::JointPosition { joint: 6, profile: Profile::distance(to_the_end - 0.02, 8000) },
+            outside: Signal::JointPosition { joint: 6, profile: Profile::distance(to_the_end + 0.001, 8000) },
+        },
+        case("joint velocity, by positions", RobotError::JointMotionGeneratorVelocityLimitsViolation, &|share| {
+            position(Profile::velocity_burst(velocity * share, 800, 0.4 * acceleration))
+        }),
+        case("joint acceleration, by positions", RobotError::JointMotionGeneratorVelocityDiscontinuity, &|share| {
+            position(Profile::acceleration(acceleration * share))
+        }),
+        case("joint jerk, by positions", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
+            position(Profile::jerk(jerk * share))
+        }),
+        case("joint velocity, by velocities", RobotError::JointMotionGeneratorVelocityLimitsViolation, &|share| {
+            speed(Profile::velocity_burst(velocity * share, 800, 0.4 * acceleration))
+        }),
+        case(
+            "joint acceleration, by velocities",
+            RobotError::JointMotionGeneratorAccelerationDiscontinuity,
+            &|share| speed(Profile::acceleration(acceleration * share)),
+        ),
+        case("joint jerk, by velocities", RobotError::JointMotionGeneratorAccelerationDiscontinuity, &|share| {
+            speed(Profile::jerk(jerk * share))
+        }),
+        case("turning velocity, by poses", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
+            Signal::Pose { profile: Profile::velocity(-turn.velocity * share, 500) }
+        }),
+        case("turning acceleration, by poses", RobotError::CartesianMotionGeneratorVelocityDiscontinuity, &|share| {
+            Signal::Pose { profile: Profile::acceleration(turn.acceleration * share) }
+        }),
+        case("turning jerk, by poses", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+            Signal::Pose { profile: Profile::jerk(turn.jerk * share) }
+        }),
+        case("turning velocity, by twists", RobotError::CartesianMotionGeneratorVelocityLimitsViolation, &|share| {
+            Signal::Twist { profile: Profile::velocity(-turn.velocity * share, 500) }
+        }),
+        case(
+            "turning acceleration, by twists",
+            RobotError::CartesianMotionGeneratorAccelerationDiscontinuity,
+            &|share| Signal::Twist { profile: Profile::acceleration(turn.acceleration * share) },
+        ),
+        case("turning jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+            Signal::Twist { profile: Profile::jerk(turn.jerk * share) }
+        }),
+        case("elbow jerk", RobotError::CartesianMotionGeneratorElbowLimitViolation, &|share| Signal::Elbow {
+            profile: Profile::jerk(elbow.jerk * share),
+        }),
+        case("torque", RobotError::TauJRangeViolation, &|share| Signal::Torque {
+            profile: torque(limits.torque[6] * share),
+        }),
+        case("torque rate", RobotError::ControllerTorqueDiscontinuity, &|share| Signal::Torque {
+            profile: torque_step(limits.torque_rate * share),
+        }),
+        Case {
+            name: "measured joint velocity",
+            error: RobotError::JointVelocityViolation,
+            inside: spun(limits.velocity[6] * 0.95),
+            outside: spun(limits.velocity[6] + MEASURED_BEYOND),
+        },
+        Case {
+            name: "first position",
+            error: RobotError::JointPositionMotionGeneratorStartPoseInvalid,
+            // A step to a standing position jerks twice as much when it ends.
+            inside: Signal::StartPosition { offset: 0.5 * jerk * 1e-9 * inside },
+            outside: Signal::StartPosition { offset: 0.101 },
+        },
+        Case {
+            name: "first pose",
+            error: RobotError::CartesianPositionMotionGeneratorStartPoseInvalid,
+            inside: Signal::StartPose { offset: 1e-9 },
+            outside: Signal::StartPose { offset: 0.051 },
+        },
+        Case {
+            name: "first elbow",
+            error: RobotError::CartesianMotionGeneratorStartElbowInvalid,
+            inside: Signal::StartElbow { offset: 0.5 * elbow.jerk * 1e-9 * inside },
+            outside: Signal::StartElbow { offset: 0.101 },
+        },
+        Case {
+            name: "elbow's side",
+            error: RobotError::CartesianMotionGeneratorElbowSignInconsistent,
+            inside: Signal::ElbowSign { changes: false },
+            outside: Signal::ElbowSign { changes: true },
+        },
+        Case {
+            name: "frame",
+            error: RobotError::CartesianPositionMotionGeneratorInvalidFrameFlag,
+            inside: Signal::Frame { scale: 1.0 + 0.9e-5 },
+            outside: Signal::Frame { scale: 1.0 + 1.1e-5 },
+        },
+        Case {
+            name: "unanswered states",
+            error: RobotError::CommunicationConstraintsViolation,
+            inside: Signal::Unanswered { num: 19 },
+            outside: Signal::Unanswered { num: 20 },
+        },
+    ]
+}
+
+impl Case {
+    /// Whether poses, twists or the elbow are commanded. A robot may stop such a motion inside of its Cartesian limits for what
+    /// it needs of the joints, so that the two are told apart only where the joints are allowed more.
+    #[allow(dead_code, reason = "franka-sim is told to allow the joints more")]
+    pub fn is_cartesian(&self) -> bool {
+        matches!(
+            self.inside,
+            Signal::Pose { .. } | Signal::Twist { .. } | Signal::Elbow { .. } | Signal::StartElbow { .. }
+        )
+    }
+
+    /// Whether a motion ended as it should.
+    pub fn is_expected(&self, is_inside: bool, found: &Found) -> bool {
+        match found {
+            Found::Done => is_inside,
+            Found::Stopped(errors) => !is_inside && errors.contains(self.error),
+            Found::Other(_) => false,
+        }
+    }
+
+    /// Runs one of the two motions from `home`, rad, and recovers from its error.
+    ///
+    /// # Errors
+    /// Those of the connection.
+    pub fn run(&self, robot: &mut Robot, home: &[f64; 7], is_inside: bool) -> Result<Found, FciError> {
+        go_to(robot, home)?;
+        let signal = if is_inside { &self.inside } else { &self.outside };
+        let found = match signal.run(robot) {
+            Ok(_) => Found::Done,
+            Err(FciError::Motion { status: Status::ReflexAborted, errors, .. }) => Found::Stopped(errors),
+            Err(error @ (FciError::Motion { .. } | FciError::Refused { .. })) => Found::Other(error.to_string()),
+            Err(error) => return Err(error),
+        };
+        if robot.read_state()?.robot_mode == RobotMode::Reflex {
+            robot.automatic_error_recovery()?;
+        }
+        Ok(found)
+    }
+}

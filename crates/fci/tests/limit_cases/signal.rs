@@ -1,0 +1,220 @@
+//! Motions that lead one signal somewhere.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use sdg_fci::client::{Answer, InternalController, Robot};
+use sdg_fci::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand, RobotState, Version};
+use sdg_fci::{FciError, isometry, transform};
+
+use super::profile::Profile;
+
+/// What a motion commands.
+#[derive(Debug, Clone)]
+pub enum Signal {
+    /// A joint's position.
+    JointPosition { joint: usize, profile: Profile },
+    /// A joint's velocity.
+    JointVelocity { joint: usize, profile: Profile },
+    /// The turn of the end effector about the base's z.
+    Pose { profile: Profile },
+    /// The same as a velocity.
+    Twist { profile: Profile },
+    /// The elbow, the end effector standing.
+    Elbow { profile: Profile },
+    /// Joint 7's torque, the others standing.
+    Torque { profile: Profile },
+    /// Joint 7 brought to a velocity by torques.
+    SpunJoint { profile: Profile },
+    /// The first commanded position of joint 1 is this far off.
+    StartPosition { offset: f64 },
+    /// The first commanded pose is this far off along x.
+    StartPose { offset: f64 },
+    /// The first commanded elbow is this far off.
+    StartElbow { offset: f64 },
+    /// The elbow's sign changes after 20 cycles, or not.
+    ElbowSign { changes: bool },
+    /// The commanded pose is a rotation times this after 20 cycles.
+    Frame { scale: f64 },
+    /// So many answers in a row are left out.
+    Unanswered { num: u64 },
+}
+
+/// Moves the joints at leisure.
+pub fn go_to(robot: &mut Robot, goal: &[f64; 7]) -> Result<(), FciError> {
+    let start = robot.read_state()?.q_desired;
+    let distance = (0..7).map(|joint| (goal[joint] - start[joint]).abs()).fold(0.0, f64::max);
+    if distance < 1e-4 {
+        return Ok(());
+    }
+    let profile = Profile::distance(1.0, 1000 + (distance * 2000.0) as u32);
+    let mut clock = Clock::default();
+    robot.control_joint_positions(InternalController::JointImpedance, |_, step| {
+        let ms = clock.tick(step);
+        let share = profile.offset(ms);
+        let q = std::array::from_fn(|joint| start[joint] + share * (goal[joint] - start[joint]));
+        answer(q, profile.is_over(ms))
+    })?;
+    Ok(())
+}
+
+/// Milliseconds of the robot since the first state of a motion.
+#[derive(Debug, Default)]
+struct Clock(u64);
+
+impl Clock {
+    fn tick(&mut self, step: Duration) -> u64 {
+        self.0 += step.as_millis() as u64;
+        self.0
+    }
+}
+
+fn answer<T>(value: T, is_last: bool) -> Answer<T> {
+    if is_last { ControlFlow::Break(value) } else { ControlFlow::Continue(value) }
+}
+
+/// How long motions last that command no profile.
+const STANDING_MS: u64 = 100;
+/// Profiles begin after so many cycles of standing.
+const PROFILE_START_MS: u64 = 30;
+/// When those do what they are made for.
+const EVENT_MS: u64 = 20;
+
+impl Signal {
+    fn generator(&self, version: Version) -> (ControllerMode, MotionGeneratorMode) {
+        let generator = match self {
+            Signal::JointPosition { .. } | Signal::StartPosition { .. } | Signal::Unanswered { .. } => {
+                MotionGeneratorMode::JointPosition
+            }
+            Signal::JointVelocity { .. } => MotionGeneratorMode::JointVelocity,
+            Signal::Twist { .. } => MotionGeneratorMode::CartesianVelocity,
+            Signal::Torque { .. } | Signal::SpunJoint { .. } => {
+                let generator = match version {
+                    Version::V5 => MotionGeneratorMode::JointVelocity,
+                    Version::V10 => MotionGeneratorMode::None,
+                };
+                return (ControllerMode::External, generator);
+            }
+            _ => MotionGeneratorMode::CartesianPosition,
+        };
+        (ControllerMode::JointImpedance, generator)
+    }
+
+    pub fn run(&self, robot: &mut Robot) -> Result<RobotState, FciError> {
+        let (controller, generator) = self.generator(robot.version());
+        let start = robot.read_state()?.clone();
+        let mut clock = Clock::default();
+        robot.control_unchecked(controller, generator, |state, step| {
+            let ms = clock.tick(step);
+            if let Signal::Unanswered { num } = self
+                && (EVENT_MS..EVENT_MS + num).contains(&ms)
+            {
+                return Ok(None);
+            }
+            let motion = MotionCommand {
+                q: start.q_desired,
+                base_from_ee: start.base_from_ee_commanded,
+                elbow: start.elbow_commanded,
+                ..MotionCommand::default()
+            };
+            let mut command = RobotCommand { motion, ..RobotCommand::default() };
+            let is_last = self.fill(&mut command, ms, state, &start);
+            Ok(Some(answer(command, is_last)))
+        })
+    }
+
+    /// Sets what is commanded in the `ms`th cycle; true in the last.
+    fn fill(&self, command: &mut RobotCommand, ms: u64, state: &RobotState, start: &RobotState) -> bool {
+        let motion = &mut command.motion;
+        // The first command of a motion is judged by other rules, and torques take over from the internal controller.
+        let since_start = ms.checked_sub(PROFILE_START_MS);
+        match self {
+            Signal::Elbow { .. } if since_start.is_none() => motion.valid_elbow = true,
+            Signal::Torque { .. } | Signal::SpunJoint { .. } if since_start.is_none() => {
+                command.torque = holding_torque(state, start);
+            }
+            _ => {}
+        }
+        let is_profile = !matches!(
+            self,
+            Signal::StartPosition { .. }
+                | Signal::StartPose { .. }
+                | Signal::StartElbow { .. }
+                | Signal::ElbowSign { .. }
+                | Signal::Frame { .. }
+                | Signal::Unanswered { .. }
+        );
+        let ms = match since_start {
+            Some(since_start) if is_profile => since_start,
+            None if is_profile => return false,
+            _ => ms,
+        };
+        match self {
+            Signal::JointPosition { joint, profile } => {
+                motion.q[*joint] += profile.offset(ms);
+                return profile.is_over(ms);
+            }
+            Signal::JointVelocity { joint, profile } => {
+                motion.dq[*joint] = profile.value(ms);
+                return profile.is_over(ms);
+            }
+            Signal::Pose { profile } => {
+                let pose = isometry(&start.base_from_ee_commanded);
+                let turn = nalgebra::UnitQuaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), profile.offset(ms));
+                let turned = nalgebra::Isometry3::from_parts(pose.translation, turn * pose.rotation);
+                motion.base_from_ee = transform(&turned);
+                return profile.is_over(ms);
+            }
+            Signal::Twist { profile } => {
+                motion.twist[5] = profile.value(ms);
+                return profile.is_over(ms);
+            }
+            Signal::Elbow { profile } => {
+                motion.valid_elbow = true;
+                motion.elbow[0] += profile.offset(ms);
+                return profile.is_over(ms);
+            }
+            Signal::Torque { profile } => {
+                command.torque = holding_torque(state, start);
+                command.torque[6] = profile.value(ms);
+                return profile.is_over(ms);
+            }
+            Signal::SpunJoint { profile } => {
+                command.torque = holding_torque(state, start);
+                command.torque[6] = within_rate(20.0 * (profile.value(ms) - state.dq[6]), state, 6).clamp(-11.0, 11.0);
+                return profile.is_over(ms);
+            }
+            Signal::StartPosition { offset } => motion.q[0] += offset,
+            Signal::StartPose { offset } => motion.base_from_ee[12] += offset,
+            Signal::StartElbow { offset } => {
+                motion.valid_elbow = true;
+                motion.elbow[0] += offset;
+            }
+            Signal::ElbowSign { changes } => {
+                motion.valid_elbow = true;
+                if *changes && ms >= EVENT_MS {
+                    motion.elbow[1] = -motion.elbow[1];
+                }
+            }
+            Signal::Frame { scale } if ms >= EVENT_MS => {
+                motion.base_from_ee[..12].iter_mut().for_each(|value| *value *= scale);
+            }
+            Signal::Frame { .. } | Signal::Unanswered { .. } => {}
+        }
+        ms >= STANDING_MS
+    }
+}
+
+/// Springs and dampers that keep the joints where they started; joint 7 is let go.
+fn holding_torque(state: &RobotState, start: &RobotState) -> [f64; 7] {
+    std::array::from_fn(|joint| {
+        let spring = 60.0 * (start.q[joint] - state.q[joint]) - 6.0 * state.dq[joint];
+        within_rate(if joint == 6 { 0.0 } else { spring }, state, joint)
+    })
+}
+
+/// A torque that is reached from the last one within the torque's rate.
+fn within_rate(torque: f64, state: &RobotState, joint: usize) -> f64 {
+    let last = state.torque_desired[joint];
+    torque.clamp(last - 0.9, last + 0.9)
+}

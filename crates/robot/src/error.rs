@@ -1,0 +1,72 @@
+//! What can go wrong with a robot, with what was expected and what was found.
+
+use std::error::Error;
+
+use sdg_kinematics::KinematicsError;
+
+use crate::safety::Violation;
+use crate::watch::StopReason;
+
+/// Errors of this crate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RobotError {
+    /// A motion breaks a limit; it was not begun.
+    #[error("the motion was not begun: {0}")]
+    Unsafe(#[from] Violation),
+    /// No motion can be planned.
+    #[error(transparent)]
+    Planning(#[from] KinematicsError),
+    /// The arm was brought to rest on its path.
+    #[error("the arm was stopped: {0}")]
+    Stopped(StopReason),
+    /// Something held the arm up.
+    #[error("the arm was held up: {0}")]
+    Blocked(String),
+    /// The arm stopped by itself.
+    #[error("the arm stopped itself: {0}")]
+    Reflex(String),
+    /// The arm does not move, since it stopped before.
+    #[error("nothing moves until a person has looked and runs `sdg robot recover`: {0}")]
+    Latched(String),
+    /// Arm or hand no longer answer.
+    #[error("the connection to {peer} is lost: {why}")]
+    Lost {
+        /// Arm or hand, with its address.
+        peer: String,
+        /// What was seen.
+        why: String,
+    },
+    /// The hand failed.
+    #[error("the hand failed: {0}")]
+    Hand(String),
+    /// Perception itself failed, which is not the same as finding nothing.
+    #[error("perception failed: {0}")]
+    Perception(String),
+    /// A setting outside its range, or one that the arm cannot do.
+    #[error("{what}: expected {expected}, found {found}")]
+    Configuration {
+        /// Which setting.
+        what: String,
+        /// What it may be.
+        expected: String,
+        /// What it is.
+        found: String,
+    },
+    /// What lies below reports something else.
+    #[error(transparent)]
+    Device(Box<dyn Error + Send + Sync>),
+}
+
+impl RobotError {
+    /// Whether the arm was, or may have been, in motion: afterwards nothing moves until a person says so.
+    pub fn latches(&self) -> bool {
+        !matches!(
+            self,
+            Self::Unsafe(_) | Self::Planning(_) | Self::Latched(_) | Self::Perception(_) | Self::Configuration { .. }
+        )
+    }
+}
+
+/// Shorthand of this crate.
+pub type Result<T> = std::result::Result<T, RobotError>;

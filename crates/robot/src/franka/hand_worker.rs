@@ -1,0 +1,87 @@
+//! The hand, whose calls block, beside the arm's loop.
+
+use std::thread::JoinHandle;
+
+use sdg_fci::client::{Hand, HandStopHandle};
+
+use super::{RobotAddress, lost};
+use crate::arm::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH_M};
+use crate::error::{Result, RobotError};
+
+/// A hand that stands still, or moves in a thread.
+#[derive(Debug)]
+pub(super) struct HandWorker {
+    hand: Option<Hand>,
+    running: Option<JoinHandle<(Hand, Result<()>)>>,
+    stop: HandStopHandle,
+}
+
+impl HandWorker {
+    pub(super) fn new(hand: Hand) -> Self {
+        Self { stop: hand.stop_handle(), hand: Some(hand), running: None }
+    }
+
+    /// Begins a motion; one that runs is waited for.
+    pub(super) fn start(&mut self, command: HandCommand) -> Result<()> {
+        self.finish()?;
+        let mut hand = self.hand.take().ok_or_else(gone)?;
+        self.running = Some(std::thread::spawn(move || {
+            let done = execute(&mut hand, command);
+            (hand, done)
+        }));
+        Ok(())
+    }
+
+    pub(super) fn is_moving(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| !running.is_finished())
+    }
+
+    /// Waits for the motion that runs.
+    pub(super) fn finish(&mut self) -> Result<()> {
+        let Some(running) = self.running.take() else { return Ok(()) };
+        let (hand, done) = running.join().map_err(|_| gone())?;
+        self.hand = Some(hand);
+        done
+    }
+
+    /// Stops the fingers; whoever waits for them goes on.
+    pub(super) fn stop(&self) {
+        // A hand that is gone does not move either.
+        let _ = self.stop.stop();
+    }
+
+    pub(super) fn state(&mut self, address: &RobotAddress) -> Result<HandState> {
+        self.finish()?;
+        let state = self.hand.as_mut().ok_or_else(gone)?.read_state().map_err(|error| lost("hand", address, &error))?;
+        Ok(HandState { opening_m: state.width, is_grasping: state.is_grasped, force_n: None })
+    }
+
+    pub(super) fn home(&mut self) -> Result<()> {
+        self.finish()?;
+        match self.hand.as_mut().ok_or_else(gone)?.homing() {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(RobotError::Hand("it did not find its range".to_owned())),
+            Err(error) => Err(RobotError::Hand(error.to_string())),
+        }
+    }
+}
+
+fn gone() -> RobotError {
+    RobotError::Hand("an earlier motion of the hand failed".to_owned())
+}
+
+fn execute(hand: &mut Hand, command: HandCommand) -> Result<()> {
+    let failed = |error: sdg_fci::FciError| RobotError::Hand(error.to_string());
+    match command {
+        HandCommand::Move { opening_m, speed_m_s } => match hand.move_to(opening_m, speed_m_s).map_err(failed)? {
+            true => Ok(()),
+            false => Err(RobotError::Hand(format!("it did not come to {:.0} mm", opening_m * 1e3))),
+        },
+        HandCommand::Grasp { width_m, speed_m_s, force_n } => {
+            let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
+            let thinner_m = thinner_m.min(width_m - MIN_HELD_WIDTH_M).max(0.0);
+            // Fingers that closed on nothing are no failure of the hand: its width says so.
+            hand.grasp(width_m, speed_m_s, force_n, thinner_m, wider_m).map(drop).map_err(failed)
+        }
+    }
+}

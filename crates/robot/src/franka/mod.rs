@@ -1,0 +1,233 @@
+//! A Franka arm with its hand, over the Franka Control Interface.
+//!
+//! ```text
+//! CheckedMotion ─ Playback ─ one joint position a millisecond ─► robot's joint impedance
+//!                    ▲ Watch sees every state, and may bring the motion to rest on its path
+//! ```
+//! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
+
+mod address;
+mod hand_worker;
+mod real_time;
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use sdg_fci::FciError;
+use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
+use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status};
+use sdg_kinematics::JointVector;
+
+use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
+use crate::error::{Result, RobotError};
+use crate::playback::Playback;
+use crate::safety::CheckedMotion;
+use crate::watch::{StopReason, Watch};
+
+pub use address::RobotAddress;
+use hand_worker::HandWorker;
+pub use real_time::{Scheduling, check_real_time};
+
+/// Bounds every wait for the robot. A real one stops by itself after 20 ms; a server in lockstep waits a second for a packet that was
+/// lost, and then goes on.
+const TIMEOUT: Duration = Duration::from_secs(3);
+/// External torques (N·m) and forces (N, N·m) at which the arm stops in free motion.
+const FREE_TORQUE_NM: [f64; 7] = [20.0, 20.0, 18.0, 18.0, 16.0, 14.0, 12.0];
+const FREE_FORCE: [f64; 6] = [20.0, 20.0, 20.0, 25.0, 25.0, 25.0];
+/// With the part, and where the table may push back, twice as much.
+const CONTACT_FACTOR: f64 = 2.0;
+/// Radius of the ball whose inertia a load is given, m.
+const LOAD_RADIUS_M: f64 = 0.03;
+
+/// A Franka arm, connected.
+#[derive(Debug)]
+pub struct FrankaArm {
+    robot: Robot,
+    hand: HandWorker,
+    address: RobotAddress,
+    scheduling: Scheduling,
+    sensitivity: Option<ContactSensitivity>,
+}
+
+impl FrankaArm {
+    /// Connects to arm and hand.
+    ///
+    /// # Errors
+    /// [`RobotError::Lost`] where one of them does not answer, [`RobotError::Configuration`] where the kernel refuses the real-time
+    /// scheduling that was asked for.
+    pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
+        if scheduling == Scheduling::RealTime {
+            check_real_time()?;
+        }
+        let config = RobotConfig { port: address.port, timeout: TIMEOUT, ..RobotConfig::default() };
+        let robot = Robot::connect(&address.host, &config).map_err(|error| lost("robot", address, &error))?;
+        let config = HandConfig { port: address.hand_port, timeout: TIMEOUT };
+        let hand = Hand::connect(&address.host, &config).map_err(|error| lost("hand", address, &error))?;
+        let hand = HandWorker::new(hand);
+        Ok(Self { robot, hand, address: address.clone(), scheduling, sensitivity: None })
+    }
+
+    /// Finds the fingers' range: once after the hand was switched on.
+    ///
+    /// # Errors
+    /// [`RobotError::Hand`].
+    pub fn home_hand(&mut self) -> Result<()> {
+        self.hand.home()
+    }
+
+    fn error(&self, error: FciError) -> RobotError {
+        match error {
+            FciError::Motion { status: Status::Preempted, .. } => RobotError::Stopped(StopReason::Interrupted),
+            FciError::Motion { status, errors, success_rate } => RobotError::Reflex(format!(
+                "{errors} ({status}; {:.0} % of the last commands arrived in time)",
+                100.0 * success_rate
+            )),
+            FciError::Closed { .. } | FciError::Timeout { .. } | FciError::Socket { .. } | FciError::Wire { .. } => {
+                lost("robot", &self.address, &error)
+            }
+            other => RobotError::Device(Box::new(other)),
+        }
+    }
+
+    /// The loop of a motion; runs in a thread of its own where it is scheduled in real time.
+    fn play(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        let mut playback = Playback::new(motion);
+        let mut last = *motion.start();
+        let mut stopped: Option<StopReason> = None;
+        let played = self.robot.control_joint_positions(InternalController::JointImpedance, |state, elapsed| {
+            if let Some(reason) = watch.observe(&arm_state(state)) {
+                stopped.get_or_insert_with(|| reason.clone());
+                playback.stop();
+            }
+            // The first call asks for where the arm is; later ones for as many cycles on as have passed.
+            for _ in 0..elapsed.as_millis() {
+                match playback.next_reference() {
+                    Some(reference) => last = reference.q,
+                    None => return ControlFlow::Break(last.into()),
+                }
+            }
+            ControlFlow::Continue(last.into())
+        });
+        match (played, stopped) {
+            (Err(error), _) => Err(self.error(error)),
+            (Ok(_), Some(reason)) => Err(RobotError::Stopped(reason)),
+            (Ok(_), None) => Ok(MotionEnd::Arrived),
+        }
+    }
+
+    /// The next state, seen by `watch`.
+    fn observe(&mut self, watch: &mut Watch) -> Result<ArmState> {
+        let state = self.state()?;
+        if let Some(reason) = watch.observe(&state) {
+            return Err(RobotError::Stopped(reason.clone()));
+        }
+        match state.mode {
+            ArmMode::Reflex => Err(RobotError::Reflex(self.robot.state().reflex_reason.to_string())),
+            ArmMode::UserStopped => Err(RobotError::Stopped(StopReason::Mode(state.mode))),
+            _ => Ok(state),
+        }
+    }
+}
+
+impl Arm for FrankaArm {
+    fn state(&mut self) -> Result<ArmState> {
+        match self.robot.read_state() {
+            Ok(state) => Ok(arm_state(state)),
+            Err(error) => Err(self.error(error)),
+        }
+    }
+
+    fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        match self.scheduling {
+            Scheduling::Ordinary => self.play(motion, watch),
+            Scheduling::RealTime => std::thread::scope(|scope| {
+                let played = scope.spawn(|| {
+                    real_time::enter()?;
+                    self.play(motion, watch)
+                });
+                played.join().unwrap_or_else(|_| Err(RobotError::Device("the control loop panicked".into())))
+            }),
+        }
+    }
+
+    fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        let begun_secs = self.observe(watch)?.time_secs;
+        while self.observe(watch)?.time_secs < begun_secs + duration_secs {}
+        Ok(())
+    }
+
+    fn hand(&mut self) -> Result<HandState> {
+        self.hand.state(&self.address)
+    }
+
+    fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        self.hand.start(command)
+    }
+
+    fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
+        while self.hand.is_moving() {
+            if let Err(error) = self.observe(watch) {
+                self.hand.stop();
+                return Err(error);
+            }
+        }
+        self.hand.finish()?;
+        self.hand.state(&self.address)
+    }
+
+    fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<()> {
+        if self.sensitivity == Some(sensitivity) {
+            return Ok(());
+        }
+        let factor = match sensitivity {
+            ContactSensitivity::Free => 1.0,
+            ContactSensitivity::Contact => CONTACT_FACTOR,
+        };
+        let (torque, force) = (FREE_TORQUE_NM.map(|value| value * factor), FREE_FORCE.map(|value| value * factor));
+        let behavior = CollisionBehavior::new(torque, torque, force, force);
+        self.robot.set_collision_behavior(&behavior).map_err(|error| self.error(error))?;
+        self.sensitivity = Some(sensitivity);
+        Ok(())
+    }
+
+    fn set_load(&mut self, load: Load) -> Result<()> {
+        let moment = 0.4 * load.mass_kg * LOAD_RADIUS_M * LOAD_RADIUS_M;
+        let load = sdg_fci::wire::Load {
+            mass: load.mass_kg,
+            center: load.center_in_flange_m,
+            inertia: [moment, 0.0, 0.0, 0.0, moment, 0.0, 0.0, 0.0, moment],
+        };
+        self.robot.set_load(&load).map_err(|error| self.error(error))
+    }
+
+    fn stop(&mut self) -> Result<()> {
+        self.hand.stop();
+        self.robot.stop().map_err(|error| self.error(error))
+    }
+
+    fn recover(&mut self) -> Result<()> {
+        self.robot.automatic_error_recovery().map_err(|error| self.error(error))
+    }
+}
+
+fn arm_state(state: &RobotState) -> ArmState {
+    ArmState {
+        time_secs: state.message_id as f64 * 1e-3,
+        q: JointVector::from(state.q),
+        dq: JointVector::from(state.dq),
+        q_commanded: JointVector::from(state.q_desired),
+        tau_external_nm: JointVector::from(state.external_torque),
+        mode: match state.robot_mode {
+            RobotMode::Idle => ArmMode::Idle,
+            RobotMode::Move => ArmMode::Moving,
+            RobotMode::Guiding => ArmMode::Guiding,
+            RobotMode::Reflex => ArmMode::Reflex,
+            RobotMode::AutomaticErrorRecovery => ArmMode::Recovering,
+            RobotMode::UserStopped | RobotMode::Other => ArmMode::UserStopped,
+        },
+    }
+}
+
+fn lost(what: &str, address: &RobotAddress, error: &FciError) -> RobotError {
+    RobotError::Lost { peer: format!("the {what} at {address}"), why: error.to_string() }
+}

@@ -1,0 +1,56 @@
+//! One grasp sequence for every arm, and the limits between each motion and the arm.
+//!
+//! ```text
+//! workcell file ─► SafetyLimits, GraspConfig
+//! PartFinder ─► GraspTarget ─► grasp: plan ─► Robot::follow ─► SafetyLimits::check ─► CheckedMotion ─► Arm::follow
+//!                                                                                     Watch ◄─ ArmState ─┘
+//! ```
+//! [`Arm`] is implemented by [`FrankaArm`] here and by the simulated workcell in `simulation`. A motion reaches an arm only as a
+//! [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
+//!
+//! Left out: planning around obstacles, cameras and detection (a [`PartFinder`] is handed in), files and terminals.
+//!
+//! ```
+//! use sdg_kinematics::{JointLimits, Trajectory, ready_pose};
+//! use sdg_robot::{SafetyLimits, Violation};
+//!
+//! let mut folded = ready_pose();
+//! (folded[1], folded[3]) = (-1.7, -3.0);
+//! let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
+//! let motion = Trajectory::point_to_point(&ready_pose(), &folded, &slow)?;
+//! assert!(matches!(SafetyLimits::default().check(motion), Err(Violation::SelfCollision { .. })));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod arm;
+mod error;
+mod franka;
+mod pace;
+mod perception;
+mod planned_arm;
+mod playback;
+mod robot;
+mod safety;
+mod sequence;
+mod watch;
+pub mod workcell;
+
+pub use arm::{
+    Arm, ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
+    MotionEnd, PERIOD_SECS,
+};
+pub use error::{Result, RobotError};
+pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
+pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
+pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+pub use planned_arm::{PlannedAction, PlannedArm};
+pub use playback::{JointReference, Playback, STOP_SECS};
+pub use robot::Robot;
+pub use safety::{Capsule, CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
+pub use sequence::{
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, SURE,
+    camera_looking_down, grasp,
+};
+pub use watch::{HISTORY_SECS, MAX_SILENCE_SECS, StopReason, StopRequest, Watch};

@@ -1,0 +1,85 @@
+//! How fast the sequence goes, as shares of Franka's limits.
+
+use sdg_kinematics::{CartesianLimits, JointLimits};
+
+use crate::error::{Result, RobotError};
+
+/// Shares of Franka's velocity, acceleration and jerk limits.
+type Shares = [f64; 3];
+
+/// The largest share of the joints' velocity limits, and that of rehearsals: beyond it nothing was ever tried.
+pub const MAX_SPEED: f64 = 0.6;
+/// The speed of a real arm where nobody asks for another.
+pub const DEFAULT_SPEED: f64 = 0.1;
+
+/// How fast each kind of motion goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Free motions, of the joints' limits.
+    free: Shares,
+    /// The last way down, of the tcp's limits.
+    approach: Shares,
+    /// The way up with the part, of the tcp's limits.
+    lift: Shares,
+}
+
+impl Pace {
+    /// That of rehearsals.
+    pub const REHEARSED: Self =
+        Self { free: [MAX_SPEED, 0.4, 0.2], approach: [0.18, 0.10, 0.05], lift: [0.25, 0.10, 0.05] };
+
+    /// Free motions at a share of the joints' velocity limits; everything else slower in the same proportion.
+    ///
+    /// # Errors
+    /// A share that is not above 0 and at most [`MAX_SPEED`].
+    pub fn at_speed(speed: f64) -> Result<Self> {
+        if !(speed > 0.0 && speed <= MAX_SPEED) {
+            return Err(RobotError::Configuration {
+                what: "speed".into(),
+                expected: format!("a share of the arm's velocity limits above 0 and at most {MAX_SPEED}"),
+                found: speed.to_string(),
+            });
+        }
+        let scaled = |shares: Shares| shares.map(|share| share * (speed / MAX_SPEED));
+        let Self { free, approach, lift } = Self::REHEARSED;
+        Ok(Self { free: scaled(free), approach: scaled(approach), lift: scaled(lift) })
+    }
+
+    /// Of free motions.
+    pub fn free_limits(&self) -> JointLimits {
+        let [velocity, acceleration, jerk] = self.free;
+        JointLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
+    }
+
+    /// Of the last way down.
+    pub fn approach_limits(&self) -> CartesianLimits {
+        scaled(self.approach)
+    }
+
+    /// Of the way up.
+    pub fn lift_limits(&self) -> CartesianLimits {
+        scaled(self.lift)
+    }
+}
+
+fn scaled([velocity, acceleration, jerk]: Shares) -> CartesianLimits {
+    CartesianLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tenth_is_a_tenth_of_frankas_velocity() {
+        let pace = Pace::at_speed(DEFAULT_SPEED).unwrap();
+        assert!((pace.free_limits().velocity_max[0] - 0.2175).abs() < 1e-12);
+        // 0.18 of 1.7 m/s at 60 %: a sixth of that.
+        assert!((pace.approach_limits().velocity_m_s - 0.051).abs() < 1e-12);
+        assert_eq!(Pace::at_speed(MAX_SPEED).unwrap(), Pace::REHEARSED);
+        for bad in [0.0, -0.1, 0.61, f64::NAN] {
+            let message = Pace::at_speed(bad).unwrap_err().to_string();
+            assert!(message.contains("above 0 and at most 0.6"), "{message}");
+        }
+    }
+}

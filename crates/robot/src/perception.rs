@@ -1,0 +1,94 @@
+//! What the sequence asks of whoever looks, and of whoever looks on.
+
+use std::fmt;
+use std::time::Instant;
+
+use nalgebra::Isometry3;
+
+use crate::arm::Arm;
+use crate::error::Result;
+
+/// Where the hand should close, as perception sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GraspTarget {
+    /// Pose of the tool centre point when closing, in the base frame, metres: z into the table, y
+    /// along the fingers' motion.
+    pub base_from_tcp: Isometry3<f64>,
+    /// Width of the part between the fingers, in metres.
+    pub jaw_width_m: f64,
+    /// How sure perception is, 0 to 1; 0.5 is where to decide.
+    pub score: f64,
+}
+
+/// Finds the grasp of the taught part with the arm where it stands.
+pub trait PartFinder<A: Arm> {
+    /// Takes a picture; the best grasp in it, sure or not, `None` where nothing is seen.
+    ///
+    /// # Errors
+    /// Where no picture can be taken or perception could not do its work at all; the sequence is given up with this error.
+    fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
+
+    /// When the picture of the last call was taken; `None` where time does not pass by a clock.
+    fn picture_time(&self) -> Option<Instant> {
+        None
+    }
+}
+
+/// A step of the sequence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum GraspStep {
+    /// Perception finds the part.
+    Detect,
+    /// The arm goes over the part and turns to it.
+    Hover,
+    /// The hand comes down to the part.
+    Approach,
+    /// The fingers close on it.
+    Close,
+    /// The arm lifts it.
+    Lift,
+    /// The part stays between the fingers.
+    Hold,
+}
+
+impl GraspStep {
+    /// The name in messages and in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Detect => "detect",
+            Self::Hover => "hover",
+            Self::Approach => "approach",
+            Self::Close => "close",
+            Self::Lift => "lift",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+impl fmt::Display for GraspStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Looks on, and may know more than the arm does: a simulation knows where the part is.
+pub trait StepObserver<A: Arm> {
+    /// Before a step.
+    ///
+    /// # Errors
+    /// Ends the sequence.
+    fn before(&mut self, _arm: &mut A, _step: GraspStep) -> Result<()> {
+        Ok(())
+    }
+
+    /// After a step, before the hand is asked; why it failed, where it did.
+    ///
+    /// # Errors
+    /// Ends the sequence.
+    fn after(&mut self, _arm: &mut A, _step: GraspStep) -> Result<Option<String>> {
+        Ok(None)
+    }
+}
+
+/// Nobody looks on.
+impl<A: Arm> StepObserver<A> for () {}

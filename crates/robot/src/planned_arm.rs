@@ -1,0 +1,209 @@
+//! An arm that moves on paper only: what a sequence would do, before it is done.
+
+use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
+use crate::error::Result;
+use crate::safety::CheckedMotion;
+use crate::watch::Watch;
+use sdg_kinematics::JointVector;
+
+/// What a planned arm did.
+#[derive(Debug, Clone)]
+pub enum PlannedAction {
+    /// A motion, checked as for a real arm.
+    Motion(Box<CheckedMotion>),
+    /// Standing still, s.
+    Wait(f64),
+    /// The hand, as it was told.
+    Hand(HandCommand),
+}
+
+/// Follows every motion exactly and grasps whatever it is told to; keeps what it was asked.
+#[derive(Debug, Clone)]
+pub struct PlannedArm {
+    state: ArmState,
+    hand: HandState,
+    actions: Vec<PlannedAction>,
+}
+
+impl PlannedArm {
+    /// Stands where a real arm stands, its hand as open as the real one.
+    pub fn new(q: JointVector, opening_m: f64) -> Self {
+        let zero = JointVector::zeros();
+        Self {
+            state: ArmState { time_secs: 0.0, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Idle },
+            hand: HandState { opening_m, is_grasping: false, force_n: None },
+            actions: Vec::new(),
+        }
+    }
+
+    /// What it was asked, in order.
+    pub fn actions(&self) -> &[PlannedAction] {
+        &self.actions
+    }
+
+    /// How long it takes, s; the hand's motions beside the arm's cost nothing.
+    pub fn duration_secs(&self) -> f64 {
+        self.state.time_secs
+    }
+
+    /// Joint positions (rad) and opening of the hand (m) at regular times, the first at the start.
+    pub fn frames(
+        start: &JointVector,
+        opening_m: f64,
+        actions: &[PlannedAction],
+        period_secs: f64,
+    ) -> Vec<(JointVector, f64)> {
+        let mut frames = vec![(*start, opening_m)];
+        let (mut q, mut opening_m) = (*start, opening_m);
+        let mut rest_secs = period_secs;
+        for action in actions {
+            let (duration_secs, motion) = match action {
+                PlannedAction::Motion(motion) => (motion.duration_secs(), Some(motion)),
+                PlannedAction::Wait(duration_secs) => (*duration_secs, None),
+                PlannedAction::Hand(HandCommand::Move { opening_m: told_m, .. }) => {
+                    opening_m = *told_m;
+                    continue;
+                }
+                PlannedAction::Hand(HandCommand::Grasp { width_m, .. }) => {
+                    opening_m = *width_m;
+                    continue;
+                }
+            };
+            let mut at_secs = rest_secs;
+            while at_secs <= duration_secs {
+                let here = motion.map_or(q, |motion| motion.sample(at_secs).0);
+                frames.push((here, opening_m));
+                at_secs += period_secs;
+            }
+            rest_secs = at_secs - duration_secs;
+            q = motion.map_or(q, |motion| *motion.end());
+        }
+        frames.push((q, opening_m));
+        frames
+    }
+}
+
+impl Arm for PlannedArm {
+    fn state(&mut self) -> Result<ArmState> {
+        Ok(self.state)
+    }
+
+    fn follow(&mut self, motion: &CheckedMotion, _watch: &mut Watch) -> Result<MotionEnd> {
+        self.state.time_secs += (motion.duration_secs() / PERIOD_SECS).ceil() * PERIOD_SECS;
+        (self.state.q, self.state.q_commanded) = (*motion.end(), *motion.end());
+        self.actions.push(PlannedAction::Motion(Box::new(motion.clone())));
+        Ok(MotionEnd::Arrived)
+    }
+
+    fn wait(&mut self, duration_secs: f64, _watch: &mut Watch) -> Result<()> {
+        self.state.time_secs += duration_secs;
+        self.actions.push(PlannedAction::Wait(duration_secs));
+        Ok(())
+    }
+
+    fn hand(&mut self) -> Result<HandState> {
+        Ok(self.hand)
+    }
+
+    fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        self.hand = match command {
+            HandCommand::Move { opening_m, .. } => HandState { opening_m, is_grasping: false, force_n: None },
+            HandCommand::Grasp { width_m, force_n, .. } => {
+                HandState { opening_m: width_m, is_grasping: true, force_n: Some(force_n) }
+            }
+        };
+        self.actions.push(PlannedAction::Hand(command));
+        Ok(())
+    }
+
+    fn finish_hand(&mut self, _watch: &mut Watch) -> Result<HandState> {
+        Ok(self.hand)
+    }
+
+    fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
+        Ok(())
+    }
+
+    fn set_load(&mut self, _load: Load) -> Result<()> {
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    fn recover(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::perception::{GraspTarget, PartFinder};
+    use crate::robot::Robot;
+    use crate::safety::SafetyLimits;
+    use crate::sequence::{CameraMount, GraspConfig, GraspOutcome, grasp};
+    use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+    use sdg_kinematics::{Panda, ready_pose};
+
+    struct Given(Option<GraspTarget>);
+
+    impl PartFinder<PlannedArm> for Given {
+        fn find(&mut self, _arm: &mut PlannedArm) -> Result<Option<GraspTarget>> {
+            Ok(self.0)
+        }
+    }
+
+    fn target() -> GraspTarget {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let base_from_tcp = Isometry3::from_parts(Vector3::new(0.5, 0.1, 0.01).into(), down);
+        GraspTarget { base_from_tcp, jaw_width_m: 0.02, score: 0.9 }
+    }
+
+    const MOUNT: CameraMount = CameraMount::Base;
+
+    fn config() -> GraspConfig {
+        let look_outs = vec![crate::sequence::LookOut::Joints(ready_pose())];
+        GraspConfig { look_outs, pace: crate::pace::Pace::at_speed(0.1).unwrap(), ..GraspConfig::default() }
+    }
+
+    #[test]
+    fn a_whole_grasp_is_planned_without_an_arm() {
+        let mut start = ready_pose();
+        start[0] = 0.6;
+        let mut arm = PlannedArm::new(start, 0.08);
+        let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+        let report = grasp(&mut robot, &mut Given(Some(target())), &mut (), MOUNT, &config()).unwrap();
+        assert_eq!(report.outcome, GraspOutcome::Held);
+        let motions: Vec<_> = arm
+            .actions()
+            .iter()
+            .filter_map(|action| match action {
+                PlannedAction::Motion(motion) => Some(motion),
+                _ => None,
+            })
+            .collect();
+        // To the look-out pose, above the part, down, and up.
+        assert_eq!(motions.len(), 4);
+        assert!(motions.windows(2).all(|pair| (pair[0].end() - pair[1].start()).amax() < 1e-9));
+        let tcp = Panda::new().forward(motions[2].end()).translation.vector;
+        assert!((tcp - target().base_from_tcp.translation.vector).norm() < 1e-6, "{tcp}");
+
+        let frames = PlannedArm::frames(&start, 0.08, arm.actions(), 0.25);
+        let expected = arm.duration_secs() / 0.25;
+        assert!((frames.len() as f64 - expected).abs() <= 3.0, "{} of {expected}", frames.len());
+        assert_eq!((frames[0].0, frames[frames.len() - 1].0), (start, *motions[3].end()));
+        // Slow: no joint moves by more than a tenth of Franka's 2.61 rad/s.
+        assert!(frames.windows(2).all(|pair| (pair[1].0 - pair[0].0).amax() <= 0.261 * 0.25 + 1e-9));
+        assert_eq!(frames[frames.len() - 1].1, 0.02);
+    }
+
+    #[test]
+    fn a_part_that_is_not_seen_ends_the_plan_at_the_look_out() {
+        let mut arm = PlannedArm::new(ready_pose(), 0.08);
+        let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+        let report = grasp(&mut robot, &mut Given(None), &mut (), MOUNT, &config()).unwrap();
+        assert!(matches!(report.outcome, GraspOutcome::Failed { step: crate::GraspStep::Detect, .. }));
+    }
+}

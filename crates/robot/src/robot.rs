@@ -1,0 +1,231 @@
+//! An arm behind its limits: the only way by which the sequence moves it.
+
+use sdg_kinematics::{CartesianLimits, JointLimits, JointPath, JointVector, NUM_JOINTS, Panda, Trajectory};
+
+use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
+use crate::error::{Result, RobotError};
+use crate::safety::{SafetyLimits, Violation};
+use crate::watch::{StopReason, Watch};
+
+/// A motion must begin this near to where the controller wants the arm, rad: what a person cannot see.
+const MAX_START_DISTANCE_RAD: f64 = 1e-3;
+/// How often a motion is slowed down so that the tcp keeps to its limits, and to which share of its speed each time.
+const MAX_SLOWDOWNS: usize = 8;
+const SLOWDOWN: f64 = 0.8;
+
+/// An arm, the limits of its motions, and whether it may move at all.
+///
+/// After an error in motion nothing moves any more, neither arm nor hand, until [`Robot::recover`] is called, which a program does
+/// only where a person asked for it.
+#[derive(Debug)]
+pub struct Robot<'a, A: Arm> {
+    arm: &'a mut A,
+    panda: Panda,
+    limits: SafetyLimits,
+    watch: Watch,
+    latched: Option<String>,
+}
+
+impl<'a, A: Arm> Robot<'a, A> {
+    /// Puts an arm behind limits; `watch` sees every state and may stop it.
+    pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
+        Self { arm, panda: Panda::new(), limits, watch, latched: None }
+    }
+
+    /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
+    pub fn arm(&mut self) -> &mut A {
+        self.arm
+    }
+
+    /// The arm's geometry.
+    pub fn panda(&self) -> &Panda {
+        &self.panda
+    }
+
+    /// What every motion keeps to.
+    pub fn limits(&self) -> &SafetyLimits {
+        &self.limits
+    }
+
+    /// The states of the last second.
+    pub fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// Why nothing moves, if so.
+    pub fn latched(&self) -> Option<&str> {
+        self.latched.as_deref()
+    }
+
+    /// What the arm says of itself.
+    ///
+    /// # Errors
+    /// As [`Arm::state`].
+    pub fn state(&mut self) -> Result<ArmState> {
+        let state = self.arm.state();
+        self.note(state)
+    }
+
+    /// Where the controller wants the arm, rad: where the next motion begins.
+    ///
+    /// # Errors
+    /// As [`Arm::state`].
+    pub fn commanded(&mut self) -> Result<JointVector> {
+        Ok(self.state()?.q_commanded)
+    }
+
+    /// The straight motion in joint space to a configuration, as fast as `joints` and the tcp's limits allow.
+    ///
+    /// # Errors
+    /// [`RobotError::Planning`].
+    pub fn plan_free(&mut self, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
+        let start = self.commanded()?;
+        self.slowed(|share| {
+            let slowed = joints.scaled(share, share, share)?;
+            Ok(Trajectory::point_to_point(&start, q, &slowed)?)
+        })
+    }
+
+    /// A motion along a straight path, as fast as the limits allow.
+    ///
+    /// # Errors
+    /// [`RobotError::Planning`].
+    pub fn plan_along(&mut self, path: &JointPath, cartesian: &CartesianLimits) -> Result<Trajectory> {
+        let joints = self.limits.joints.clone();
+        self.slowed(|share| {
+            let slowed = cartesian.scaled(share, share, share)?;
+            Ok(Trajectory::along_path(path.clone(), &joints, &slowed)?)
+        })
+    }
+
+    /// The first motion that keeps to the tcp's limits; the slowest one tried where none does.
+    fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
+        let mut share = 1.0;
+        for _ in 0..MAX_SLOWDOWNS {
+            let trajectory = plan(share)?;
+            match self.limits.check(trajectory.clone()) {
+                Err(Violation::Cartesian { .. }) => share *= SLOWDOWN,
+                _ => return Ok(trajectory),
+            }
+        }
+        plan(share)
+    }
+
+    /// Checks a motion and follows it to its end.
+    ///
+    /// # Errors
+    /// [`RobotError::Unsafe`] before anything moves; afterwards what ended the motion, and from then on nothing moves.
+    pub fn follow(&mut self, trajectory: Trajectory) -> Result<()> {
+        let state = self.ready()?;
+        let apart = (trajectory.start() - state.q_commanded).abs();
+        let joint_idx = (0..NUM_JOINTS).find(|&idx| apart[idx].is_nan() || apart[idx] > MAX_START_DISTANCE_RAD);
+        if let Some(joint_idx) = joint_idx {
+            let (joint, apart_rad, max_rad) = (joint_idx + 1, apart[joint_idx], MAX_START_DISTANCE_RAD);
+            return Err(Violation::StartsElsewhere { joint, apart_rad, max_rad }.into());
+        }
+        let motion = self.limits.check(trajectory)?;
+        self.watch.begin();
+        let ended = match self.arm.follow(&motion, &mut self.watch) {
+            Ok(MotionEnd::Arrived) => Ok(()),
+            Ok(MotionEnd::Blocked(by)) => Err(RobotError::Blocked(by)),
+            Err(error) => Err(error),
+        };
+        self.note(ended)
+    }
+
+    /// Stands still for some seconds.
+    ///
+    /// # Errors
+    /// As [`Arm::wait`].
+    pub fn wait(&mut self, duration_secs: f64) -> Result<()> {
+        self.watch.begin();
+        let waited = self.arm.wait(duration_secs, &mut self.watch);
+        self.note(waited)
+    }
+
+    /// Begins a motion of the hand.
+    ///
+    /// # Errors
+    /// As [`Robot::follow`].
+    pub fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        self.ready()?;
+        let started = self.arm.start_hand(command);
+        self.note(started)
+    }
+
+    /// Waits for the hand.
+    ///
+    /// # Errors
+    /// As [`Arm::finish_hand`].
+    pub fn finish_hand(&mut self) -> Result<HandState> {
+        self.watch.begin();
+        let finished = self.arm.finish_hand(&mut self.watch);
+        self.note(finished)
+    }
+
+    /// What the hand says of itself.
+    ///
+    /// # Errors
+    /// As [`Arm::hand`].
+    pub fn hand(&mut self) -> Result<HandState> {
+        let hand = self.arm.hand();
+        self.note(hand)
+    }
+
+    /// As [`Arm::set_contact_sensitivity`].
+    ///
+    /// # Errors
+    /// What the arm reports.
+    pub fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<()> {
+        let set = self.arm.set_contact_sensitivity(sensitivity);
+        self.note(set)
+    }
+
+    /// As [`Arm::set_load`].
+    ///
+    /// # Errors
+    /// What the arm reports.
+    pub fn set_load(&mut self, load: Load) -> Result<()> {
+        let set = self.arm.set_load(load);
+        self.note(set)
+    }
+
+    /// Recovers the arm and lets it move again: a person has looked.
+    ///
+    /// # Errors
+    /// Where the error stays; nothing moves then.
+    pub fn recover(&mut self) -> Result<()> {
+        self.arm.recover()?;
+        self.latched = None;
+        Ok(())
+    }
+
+    /// The state, where the arm may move now.
+    fn ready(&mut self) -> Result<ArmState> {
+        if let Some(why) = &self.latched {
+            return Err(RobotError::Latched(why.clone()));
+        }
+        if let Some(reason) = self.watch.is_stop_requested() {
+            return self.note(Err(RobotError::Stopped(reason)));
+        }
+        let state = self.state()?;
+        match state.mode {
+            ArmMode::Idle | ArmMode::Moving => Ok(state),
+            ArmMode::Reflex => Err(RobotError::Latched(
+                "the arm is in reflex, after a contact or a command that it could not follow".to_owned(),
+            )),
+            mode => Err(RobotError::Stopped(StopReason::Mode(mode))),
+        }
+    }
+
+    /// Remembers an error after which nothing moves.
+    fn note<T>(&mut self, result: Result<T>) -> Result<T> {
+        if let Err(error) = &result
+            && error.latches()
+            && self.latched.is_none()
+        {
+            self.latched = Some(error.to_string());
+        }
+        result
+    }
+}

@@ -1,0 +1,217 @@
+//! What a motion may do, and the motion that was found to keep to it.
+
+use nalgebra::{Isometry3, Vector3, Vector6};
+use sdg_kinematics::{ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Panda, Trajectory};
+
+use crate::arm::PERIOD_SECS;
+use crate::safety::capsules::LinkCapsules;
+use crate::safety::violation::Violation;
+
+/// Where the hand may be, in the robot's base frame, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorkspaceBox {
+    /// Smallest x, y and z.
+    pub min_m: Vector3<f64>,
+    /// Largest x, y and z.
+    pub max_m: Vector3<f64>,
+}
+
+/// What every motion keeps to.
+#[derive(Debug, Clone)]
+pub struct SafetyLimits {
+    /// Of each joint.
+    pub joints: JointLimits,
+    /// Of the tcp.
+    pub cartesian: CartesianLimits,
+    /// Where tcp and flange may be; anywhere where `None`.
+    pub workspace: Option<WorkspaceBox>,
+    /// Height of the table in the base frame, m.
+    pub table_height_m: f64,
+    /// How far the finger tips reach beyond the tcp, m.
+    pub fingertip_beyond_tcp_m: f64,
+    /// The least height of hand, wrist and elbow above the table, m. [`sdg_kinematics::Panda::clearance`] says what counts as theirs.
+    pub min_table_clearance_m: f64,
+    /// The arm's shape, against itself.
+    pub capsules: LinkCapsules,
+}
+
+impl Default for SafetyLimits {
+    /// Franka's limits over a table at the base's height.
+    fn default() -> Self {
+        Self {
+            joints: JointLimits::franka(),
+            cartesian: CartesianLimits::franka(),
+            workspace: None,
+            table_height_m: 0.0,
+            fingertip_beyond_tcp_m: 0.004,
+            min_table_clearance_m: 0.001,
+            capsules: LinkCapsules::panda(),
+        }
+    }
+}
+
+/// A motion that keeps to [`SafetyLimits`]; made by [`SafetyLimits::check`] alone.
+#[derive(Debug, Clone)]
+pub struct CheckedMotion {
+    trajectory: Trajectory,
+}
+
+impl CheckedMotion {
+    /// How long it takes, s.
+    pub fn duration_secs(&self) -> f64 {
+        self.trajectory.duration_secs()
+    }
+
+    /// Where it starts, rad.
+    pub fn start(&self) -> &JointVector {
+        self.trajectory.start()
+    }
+
+    /// Where it ends, rad.
+    pub fn end(&self) -> &JointVector {
+        self.trajectory.end()
+    }
+
+    /// Positions (rad), velocities (rad/s) and accelerations (rad/s²) at a time; at rest before the start and after the end.
+    pub fn sample(&self, time_secs: f64) -> (JointVector, JointVector, JointVector) {
+        self.trajectory.sample(time_secs)
+    }
+}
+
+/// Limits are met exactly by motions that were planned for them: rounding, and differences over a cycle, are no violation.
+const ROUNDING: f64 = 1e-3;
+
+impl SafetyLimits {
+    /// Looks at a whole motion.
+    ///
+    /// # Errors
+    /// The first limit that it breaks.
+    pub fn check(&self, trajectory: Trajectory) -> Result<CheckedMotion, Violation> {
+        let panda = Panda::new();
+        let num_cycles = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
+        let mut before = Derivatives::default();
+        for cycle in 0..=num_cycles {
+            let time_secs = cycle as f64 * PERIOD_SECS;
+            let (q, dq, ddq) = trajectory.sample(time_secs);
+            before = self.check_joints(time_secs, (&q, &dq, &ddq), &before)?.cartesian_of(&before);
+            let frames = panda.frames(&q);
+            let twist = panda.jacobian(&q) * dq;
+            before = self.check_twist(time_secs, twist, &before)?;
+            self.check_workspace(time_secs, "tcp", &frames.base_from_tcp)?;
+            self.check_workspace(time_secs, "flange", &frames.base_from_flange)?;
+            self.check_table(time_secs, &panda, &q)?;
+            if let Some(collision) = self.capsules.collision(&frames) {
+                return Err(Violation::SelfCollision { time_secs, collision });
+            }
+        }
+        Ok(CheckedMotion { trajectory })
+    }
+
+    fn check_joints(
+        &self,
+        time_secs: f64,
+        (q, dq, ddq): (&JointVector, &JointVector, &JointVector),
+        before: &Derivatives,
+    ) -> Result<Derivatives, Violation> {
+        let jerk = before.ddq.map_or_else(JointVector::zeros, |before| (ddq - before) / PERIOD_SECS);
+        let zero = JointVector::zeros();
+        let limits = &self.joints;
+        for idx in 0..NUM_JOINTS {
+            let joint = idx + 1;
+            if ![q[idx], dq[idx], ddq[idx]].iter().all(|value| value.is_finite()) {
+                return Err(Violation::NotFinite { time_secs, joint });
+            }
+            for (quantity, unit, value, min, max) in [
+                ("position", "rad", q, &limits.position_min, &limits.position_max),
+                ("velocity", "rad/s", dq, &zero, &limits.velocity_max),
+                ("acceleration", "rad/s²", ddq, &zero, &limits.acceleration_max),
+                ("jerk", "rad/s³", &jerk, &zero, &limits.jerk_max),
+            ] {
+                let (found, max) = (value[idx], max[idx]);
+                let min = if quantity == "position" { min[idx] } else { -max };
+                let rounding = if quantity == "position" { 1e-6 } else { ROUNDING * max };
+                if found < min - rounding || found > max + rounding {
+                    return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
+                }
+            }
+        }
+        Ok(Derivatives { ddq: Some(*ddq), ..Derivatives::default() })
+    }
+
+    fn check_twist(&self, time_secs: f64, twist: Vector6<f64>, before: &Derivatives) -> Result<Derivatives, Violation> {
+        let differ =
+            |now: &Vector6<f64>, before: Option<Vector6<f64>>| before.map(|before| (now - before) / PERIOD_SECS);
+        let acceleration = differ(&twist, before.twist);
+        let jerk = acceleration.as_ref().and_then(|acceleration| differ(acceleration, before.acceleration));
+        let limits = &self.cartesian;
+        let linear = |value: &Vector6<f64>| value.fixed_rows::<3>(0).norm();
+        let angular = |value: &Vector6<f64>| value.fixed_rows::<3>(3).norm();
+        let zero = Vector6::zeros();
+        let [acceleration_now, jerk] = [acceleration, jerk].map(|value| value.unwrap_or(zero));
+        for (quantity, unit, found, max) in [
+            ("velocity", "m/s", linear(&twist), limits.velocity_m_s),
+            ("acceleration", "m/s²", linear(&acceleration_now), limits.acceleration_m_s2),
+            ("jerk", "m/s³", linear(&jerk), limits.jerk_m_s3),
+            ("angular velocity", "rad/s", angular(&twist), limits.angular_velocity_rad_s),
+            ("angular acceleration", "rad/s²", angular(&acceleration_now), limits.angular_acceleration_rad_s2),
+            ("angular jerk", "rad/s³", angular(&jerk), limits.angular_jerk_rad_s3),
+        ] {
+            if found > max * (1.0 + ROUNDING) {
+                return Err(Violation::Cartesian { time_secs, quantity, found, max, unit });
+            }
+        }
+        Ok(Derivatives { ddq: before.ddq, twist: Some(twist), acceleration })
+    }
+
+    fn check_workspace(
+        &self,
+        time_secs: f64,
+        part: &'static str,
+        base_from_part: &Isometry3<f64>,
+    ) -> Result<(), Violation> {
+        let Some(workspace) = &self.workspace else { return Ok(()) };
+        let p = base_from_part.translation.vector;
+        for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
+            let (found_m, min_m, max_m) = (p[k], workspace.min_m[k], workspace.max_m[k]);
+            if !(min_m..=max_m).contains(&found_m) {
+                return Err(Violation::Workspace { time_secs, part, axis, found_m, min_m, max_m });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_table(&self, time_secs: f64, panda: &Panda, q: &JointVector) -> Result<(), Violation> {
+        let clearance = panda.clearance(q, self.table_height_m);
+        let (part, beyond_m) = match clearance.part {
+            ArmPart::FingerTips => ("finger tips", self.fingertip_beyond_tcp_m),
+            ArmPart::Hand => ("hand", 0.0),
+            ArmPart::Wrist => ("wrist", 0.0),
+            ArmPart::Elbow => ("elbow", 0.0),
+        };
+        let found_m = clearance.lowest_m - beyond_m;
+        if found_m < self.min_table_clearance_m {
+            let (found_mm, min_mm) = (found_m * 1e3, self.min_table_clearance_m * 1e3);
+            return Err(Violation::Table { time_secs, part, found_mm, min_mm });
+        }
+        Ok(())
+    }
+}
+
+/// What the next cycle is compared with.
+#[derive(Debug, Default)]
+struct Derivatives {
+    ddq: Option<JointVector>,
+    /// Of the tcp: linear in m/s, angular in rad/s.
+    twist: Option<Vector6<f64>>,
+    acceleration: Option<Vector6<f64>>,
+}
+
+impl Derivatives {
+    /// The joints' part of this one with the tcp's part of another.
+    fn cartesian_of(self, other: &Self) -> Self {
+        Self { twist: other.twist, acceleration: other.acceleration, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,113 @@
+use super::*;
+use sdg_kinematics::{IkOptions, LineOptions, ready_pose};
+
+fn point_to_point(change: [f64; 7], scale: [f64; 3]) -> Trajectory {
+    let limits = JointLimits::franka().scaled(scale[0], scale[1], scale[2]).unwrap();
+    Trajectory::point_to_point(&ready_pose(), &(ready_pose() + JointVector::from(change)), &limits).unwrap()
+}
+
+fn straight_down(to_height_m: f64) -> Trajectory {
+    let panda = Panda::new();
+    let mut base_from_tcp = panda.forward(&ready_pose());
+    base_from_tcp.translation.z = to_height_m;
+    let path = panda.straight_path(&ready_pose(), &base_from_tcp, &LineOptions::default()).unwrap();
+    let cartesian = CartesianLimits::franka().scaled(0.2, 0.1, 0.05).unwrap();
+    Trajectory::along_path(path, &JointLimits::franka(), &cartesian).unwrap()
+}
+
+#[test]
+fn a_motion_within_every_limit_is_handed_on_as_it_is() {
+    let trajectory = point_to_point([0.5, 0.1, 0.0, 0.2, 0.0, 0.3, -0.4], [0.5, 0.4, 0.2]);
+    let end = *trajectory.end();
+    let checked = SafetyLimits::default().check(trajectory.clone()).unwrap();
+    assert_eq!((*checked.end(), checked.duration_secs()), (end, trajectory.duration_secs()));
+    assert_eq!(checked.sample(0.3), trajectory.sample(0.3));
+}
+
+/// Planned for exactly the limits it passes; with any of them one percent lower it does not.
+#[test]
+fn just_inside_passes_and_just_outside_is_refused() {
+    let trajectory = point_to_point([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.3, 0.2, 0.05]);
+    let planned = JointLimits::franka().scaled(0.3, 0.2, 0.05).unwrap();
+    let limits = |joints| SafetyLimits { joints, ..SafetyLimits::default() };
+    assert!(limits(planned.clone()).check(trajectory.clone()).is_ok());
+    type Lower = fn(&mut JointLimits);
+    let lowered: [(&str, Lower); 4] = [
+        ("position", |limits| limits.position_max[0] = 0.396),
+        ("velocity", |limits| limits.velocity_max *= 0.99),
+        ("acceleration", |limits| limits.acceleration_max *= 0.99),
+        ("jerk", |limits| limits.jerk_max *= 0.99),
+    ];
+    for (expected, lower) in lowered {
+        let mut joints = planned.clone();
+        lower(&mut joints);
+        match limits(joints).check(trajectory.clone()).unwrap_err() {
+            Violation::Joint { quantity, joint: 1, .. } => assert_eq!(quantity, expected),
+            other => panic!("{expected}: {other}"),
+        }
+    }
+}
+
+#[test]
+fn the_tcp_has_limits_of_its_own() {
+    let trajectory = straight_down(0.20);
+    let planned = CartesianLimits::franka().scaled(0.2, 0.1, 0.05).unwrap();
+    let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
+    // The path is a straight line between waypoints only: differences of 1 ms see its third derivative jump.
+    let roomy = CartesianLimits { jerk_m_s3: 6500.0, ..planned };
+    limits(roomy).check(trajectory.clone()).unwrap();
+    for (expected, cartesian) in [
+        ("velocity", CartesianLimits { velocity_m_s: 0.1, ..roomy }),
+        ("acceleration", CartesianLimits { acceleration_m_s2: 0.5, ..roomy }),
+        ("jerk", CartesianLimits { jerk_m_s3: 10.0, ..roomy }),
+    ] {
+        match limits(cartesian).check(trajectory.clone()).unwrap_err() {
+            Violation::Cartesian { quantity, .. } => assert_eq!(quantity, expected),
+            other => panic!("{expected}: {other}"),
+        }
+    }
+    let turning = point_to_point([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5], [0.9, 0.5, 0.2]);
+    let slow = CartesianLimits { angular_velocity_rad_s: 0.5, ..CartesianLimits::franka() };
+    let found = limits(slow).check(turning).unwrap_err().to_string();
+    assert!(found.contains("the angular velocity of the tcp is 0.5") && found.contains("rad/s"), "{found}");
+}
+
+#[test]
+fn table_and_workspace_stop_a_motion_before_it_begins() {
+    let limits = SafetyLimits::default();
+    // The finger tips reach 4 mm beyond the tcp and keep 1 mm: a tcp at 6 mm is allowed, one at 4 mm is not.
+    limits.check(straight_down(0.006)).unwrap();
+    let found = limits.check(straight_down(0.004)).unwrap_err();
+    assert!(matches!(found, Violation::Table { part: "finger tips", .. }), "{found}");
+    let raised = SafetyLimits { table_height_m: 0.1, ..limits.clone() };
+    assert!(raised.check(straight_down(0.1)).is_err());
+
+    let workspace = WorkspaceBox { min_m: Vector3::new(0.2, -0.4, 0.0), max_m: Vector3::new(0.8, 0.4, 0.9) };
+    let fenced = SafetyLimits { workspace: Some(workspace), ..limits };
+    fenced.check(straight_down(0.1)).unwrap();
+    let found = fenced.check(point_to_point([1.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.2, 0.2, 0.2])).unwrap_err();
+    assert!(matches!(found, Violation::Workspace { axis: 'x' | 'y', .. }), "{found}");
+}
+
+#[test]
+fn an_arm_that_would_fold_onto_itself_is_stopped_before() {
+    let folded = JointVector::from([0.0, -1.7, 0.0, -3.0, 0.0, 0.5, 0.0]);
+    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let trajectory = Trajectory::point_to_point(&ready_pose(), &folded, &slow).unwrap();
+    let open = SafetyLimits { table_height_m: -2.0, ..SafetyLimits::default() };
+    let found = open.check(trajectory).unwrap_err();
+    assert!(matches!(found, Violation::SelfCollision { .. }), "{found}");
+}
+
+#[test]
+fn motions_to_any_place_over_the_table_pass_at_the_default_speed() {
+    let (panda, limits) = (Panda::new(), SafetyLimits::default());
+    let slow = JointLimits::franka().scaled(0.1, 0.07, 0.04).unwrap();
+    for (x, y, z) in [(0.3, -0.3, 0.4), (0.3, 0.3, 0.2), (0.65, 0.2, 0.1), (0.5, 0.0, 0.05), (0.65, -0.3, 0.3)] {
+        let mut base_from_tcp = panda.forward(&ready_pose());
+        base_from_tcp.translation = nalgebra::Translation3::new(x, y, z);
+        let solution = panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).unwrap();
+        let trajectory = Trajectory::point_to_point(&ready_pose(), &solution.q, &slow).unwrap();
+        limits.check(trajectory).unwrap_or_else(|violation| panic!("({x}, {y}, {z}): {violation}"));
+    }
+}

@@ -1,0 +1,17 @@
+//! The limits between every motion and the arm.
+//!
+//! ```text
+//! Trajectory ── SafetyLimits::check ──► CheckedMotion ── Arm::follow
+//!                     └─ Violation: which limit, when, by how much; nothing moves
+//! ```
+//! The whole motion is looked at before it begins, at every millisecond: joint limits, the tcp's limits, the workspace, the table,
+//! the arm against itself. These limits are no safety function in the sense of a standard: they know nothing of people, of what
+//! stands in the cell, or of a fault below them. An emergency stop remains required.
+
+mod capsules;
+mod limits;
+mod violation;
+
+pub use capsules::{Capsule, LinkCapsules, SelfCollision};
+pub use limits::{CheckedMotion, SafetyLimits, WorkspaceBox};
+pub use violation::Violation;

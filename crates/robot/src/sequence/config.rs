@@ -1,0 +1,167 @@
+//! Where the sequence looks from and how it grasps.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
+
+use crate::arm::Load;
+use crate::error::{Result, RobotError};
+use crate::pace::Pace;
+
+/// Middle of the first look on the table where nobody says otherwise, base frame, m.
+pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
+/// Height of a wrist camera above the table at the first look where nobody says otherwise, m.
+pub const LOOK_HEIGHT_M: f64 = 0.58;
+
+/// Where the arm goes to look out for the part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LookOut {
+    /// The camera on the hand looks straight down.
+    CameraAt {
+        /// Where, base frame, m.
+        at_m: [f64; 2],
+        /// Height above the table, m.
+        height_m: f64,
+        /// Turn about the vertical, rad; see [`camera_looking_down`].
+        yaw_rad: f64,
+    },
+    /// The arm is in a configuration, rad: with a camera beside the robot, out of its view.
+    Joints(JointVector),
+}
+
+/// Where the camera is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraMount {
+    /// On the hand: it is moved over the part and looks again.
+    Hand {
+        /// From the optical frame to the tcp, m.
+        tcp_from_camera: Isometry3<f64>,
+    },
+    /// Beside the robot: it looks once, with the arm out of its view.
+    Base,
+}
+
+/// Where the sequence goes, how it grasps, and how fast.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GraspConfig {
+    /// Where the arm looks out from, one after the other, until the part is found. The first must be within reach.
+    pub look_outs: Vec<LookOut>,
+    /// Height of the wrist camera above the table at the second look, m: best that of the demonstration.
+    pub hover_height_m: f64,
+    /// Force of each finger when closed, N.
+    pub grasp_force_n: f64,
+    /// How far the hand opens beyond the part's width, both sides together, m.
+    pub opening_margin_m: f64,
+    /// How far the part is lifted, m.
+    pub lift_m: f64,
+    /// The least lift that will do where the arm cannot reach further, m.
+    pub min_lift_m: f64,
+    /// How long the lifted part is held, s.
+    pub hold_secs: f64,
+    /// How old a picture may be when a motion begins that rests on it, s.
+    pub max_detection_age_secs: f64,
+    /// What the hand carries once it holds the part.
+    pub load: Option<Load>,
+    /// How fast.
+    pub pace: Pace,
+}
+
+impl Default for GraspConfig {
+    /// The paper's sequence, as rehearsals run it.
+    fn default() -> Self {
+        let look_outs = [0.0, 0.10, -0.10].map(|shift_m| LookOut::CameraAt {
+            at_m: [LOOK_AT_M[0], LOOK_AT_M[1] + shift_m],
+            height_m: LOOK_HEIGHT_M,
+            yaw_rad: 0.0,
+        });
+        Self {
+            look_outs: look_outs.to_vec(),
+            hover_height_m: 0.50,
+            grasp_force_n: 40.0,
+            opening_margin_m: 0.045,
+            lift_m: 0.45,
+            min_lift_m: 0.25,
+            hold_secs: 1.0,
+            max_detection_age_secs: 1.0,
+            load: None,
+            pace: Pace::REHEARSED,
+        }
+    }
+}
+
+impl LookOut {
+    /// The arm's configuration there, rad.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`] for a place out of reach, or a camera that is to be moved and does not stand on the hand.
+    pub fn configuration(&self, panda: &Panda, mount: &CameraMount, table_height_m: f64) -> Result<JointVector> {
+        let (at_m, height_m, yaw_rad) = match (*self, mount) {
+            (Self::Joints(q), _) => return Ok(q),
+            (Self::CameraAt { at_m, height_m, yaw_rad }, CameraMount::Hand { .. }) => (at_m, height_m, yaw_rad),
+            (Self::CameraAt { .. }, CameraMount::Base) => {
+                return Err(RobotError::Configuration {
+                    what: "look-out pose".into(),
+                    expected: "joint angles, with a camera that stands beside the robot".into(),
+                    found: "a place for the camera".into(),
+                });
+            }
+        };
+        let base_from_camera = camera_looking_down(at_m[0], at_m[1], table_height_m + height_m, yaw_rad);
+        let base_from_tcp = mount.base_from_tcp(&base_from_camera);
+        panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map(|solution| solution.q).map_err(
+            |error| RobotError::Configuration {
+                what: format!("look-out pose at ({}, {}) m, {height_m} m above the table", at_m[0], at_m[1]),
+                expected: "a camera pose within the arm's reach".into(),
+                found: error.to_string(),
+            },
+        )
+    }
+}
+
+impl CameraMount {
+    /// The tcp's pose for the camera on the hand to be at a pose.
+    pub(super) fn base_from_tcp(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
+        match self {
+            Self::Hand { tcp_from_camera } => base_from_camera * tcp_from_camera.inverse(),
+            Self::Base => *base_from_camera,
+        }
+    }
+}
+
+/// A camera pose straight down from `height_m`, over (x, y), base frame: with yaw 0 the picture's up is the base's x and its
+/// right is -y; a positive yaw turns it counter-clockwise as seen from above.
+pub fn camera_looking_down(x: f64, y: f64, height_m: f64, yaw_rad: f64) -> Isometry3<f64> {
+    // Columns: the optical frame's x (right), y (down), z (forward) in the base frame.
+    let at_yaw_zero = Matrix3::from_columns(&[-Vector3::y(), -Vector3::x(), -Vector3::z()]);
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
+        * UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(at_yaw_zero));
+    Isometry3::from_parts(Translation3::new(x, y, height_m), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_look_out_puts_the_camera_where_it_is_told() {
+        let panda = Panda::new();
+        let mount = CameraMount::Hand { tcp_from_camera: Isometry3::translation(0.072, 0.0, -0.0534) };
+        let look_out = LookOut::CameraAt { at_m: [0.5, 0.1], height_m: 0.5, yaw_rad: 0.3 };
+        let q = look_out.configuration(&panda, &mount, 0.05).unwrap();
+        let CameraMount::Hand { tcp_from_camera } = mount else { unreachable!() };
+        let apart = (panda.forward(&q) * tcp_from_camera).inverse() * camera_looking_down(0.5, 0.1, 0.55, 0.3);
+        assert!(apart.translation.vector.norm() < 1e-5 && apart.rotation.angle() < 1e-5, "{apart}");
+    }
+
+    #[test]
+    fn places_that_cannot_be_are_said() {
+        let (panda, mount) = (Panda::new(), CameraMount::Hand { tcp_from_camera: Isometry3::identity() });
+        let far = LookOut::CameraAt { at_m: [1.5, 0.0], height_m: 0.5, yaw_rad: 0.0 };
+        let found = far.configuration(&panda, &mount, 0.0).unwrap_err().to_string();
+        assert!(
+            found.starts_with("look-out pose at (1.5, 0) m, 0.5 m above the table: expected a camera pose"),
+            "{found}"
+        );
+        let found = far.configuration(&panda, &CameraMount::Base, 0.0).unwrap_err().to_string();
+        assert!(found.contains("joint angles, with a camera that stands beside the robot"), "{found}");
+    }
+}

@@ -1,0 +1,110 @@
+//! Closing, lifting and holding; whether the part is held is read from the hand's width and force.
+
+use sdg_kinematics::LineOptions;
+
+use super::reach::above;
+use super::{Sequence, Steps, Stop, fails_at};
+use crate::arm::{Arm, HandCommand, HandState, MIN_HELD_WIDTH_M};
+use crate::error::RobotError;
+use crate::perception::{GraspStep, GraspTarget};
+
+/// Speed at which the opening changes when the hand closes, m/s.
+const CLOSING_SPEED_M_S: f64 = 0.1;
+/// Steps in which a lift is made shorter where the arm cannot reach so far, m.
+const LIFT_STEP_M: f64 = 0.05;
+/// Fingers that moved by more since they closed no longer hold what they held, m.
+const MAX_WIDTH_CHANGE_M: f64 = 0.005;
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    /// Closes the hand on the part.
+    pub(super) fn close(&mut self, target: &GraspTarget) -> Steps<()> {
+        self.robot.start_hand(HandCommand::Grasp {
+            width_m: target.jaw_width_m,
+            speed_m_s: CLOSING_SPEED_M_S,
+            force_n: self.config.grasp_force_n,
+        })?;
+        let hand = self.robot.finish_hand()?;
+        self.closed = Some(hand);
+        self.judge(GraspStep::Close, &hand)?;
+        if let Some(load) = self.config.load {
+            self.robot.set_load(load)?;
+        }
+        Ok(())
+    }
+
+    /// Lifts the part, as high as the arm reaches.
+    pub(super) fn lift(&mut self) -> Steps<()> {
+        let start = self.robot.commanded()?;
+        let base_from_tcp = self.robot.panda().forward(&start);
+        let mut lift_m = self.config.lift_m;
+        let path = loop {
+            let lifted = above(&base_from_tcp, lift_m);
+            match self.robot.panda().straight_path(&start, &lifted, &LineOptions::default()) {
+                Ok(path) => break path,
+                Err(_) if lift_m - LIFT_STEP_M >= self.config.min_lift_m - 1e-9 => lift_m -= LIFT_STEP_M,
+                Err(error) => return fails_at(GraspStep::Lift, Err(RobotError::Planning(error))),
+            }
+        };
+        let planned = self.robot.plan_along(&path, &self.config.pace.lift_limits());
+        let motion = fails_at(GraspStep::Lift, planned)?;
+        self.follow(motion, GraspStep::Lift)?;
+        let hand = self.robot.hand()?;
+        self.judge(GraspStep::Lift, &hand)
+    }
+
+    /// Holds the part still for a while.
+    pub(super) fn hold(&mut self) -> Steps<()> {
+        self.observer.before(self.robot.arm(), GraspStep::Hold)?;
+        self.robot.wait(self.config.hold_secs)?;
+        let hand = self.robot.hand()?;
+        self.judge(GraspStep::Hold, &hand)
+    }
+
+    /// Whether the part is held: the observer's word, which may rest on more, then the hand's.
+    fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
+        let by_hand = held(&self.closed.unwrap_or(*hand), hand);
+        self.hand_verdicts.push((step, by_hand.clone().err()));
+        self.passed(step)?;
+        by_hand.map_err(|why| Stop::Failed(step, why))
+    }
+}
+
+/// Whether the hand holds what it closed on; why not, where it does not.
+fn held(closed: &HandState, now: &HandState) -> Result<(), String> {
+    let [closed_mm, now_mm] = [closed.opening_m * 1e3, now.opening_m * 1e3];
+    if closed.opening_m < MIN_HELD_WIDTH_M {
+        return Err(format!("the fingers closed to {closed_mm:.1} mm without touching the part"));
+    }
+    if now.opening_m < MIN_HELD_WIDTH_M || (now.opening_m - closed.opening_m).abs() > MAX_WIDTH_CHANGE_M {
+        return Err(format!("the part slipped: the fingers held it at {closed_mm:.1} mm and are at {now_mm:.1} mm"));
+    }
+    if !now.is_grasping {
+        let force = now.force_n.map_or_else(String::new, |force_n| format!(" with {force_n:.0} N"));
+        return Err(format!("the fingers are at {now_mm:.1} mm and do not press on the part as told{force}"));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn hand(opening_m: f64, is_grasping: bool) -> HandState {
+        HandState { opening_m, is_grasping, force_n: None }
+    }
+
+    #[test]
+    fn width_and_force_tell_whether_a_part_is_held() {
+        let closed = hand(0.020, true);
+        assert_eq!(held(&closed, &hand(0.0205, true)), Ok(()));
+        for (closed, now, expected) in [
+            (hand(0.0002, true), hand(0.0002, true), "closed to 0.2 mm without touching"),
+            (closed, hand(0.0, true), "slipped: the fingers held it at 20.0 mm and are at 0.0 mm"),
+            (closed, hand(0.030, true), "slipped"),
+            (closed, hand(0.020, false), "do not press"),
+        ] {
+            let why = held(&closed, &now).unwrap_err();
+            assert!(why.contains(expected), "{why}");
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Looking: from afar, and from above what was found.
+
+use nalgebra::Vector3;
+use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, JointVector, with_fingers_exchanged};
+
+use super::{FREE_CLEARANCE_M, SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down, fails_at};
+use crate::arm::{Arm, ContactSensitivity};
+use crate::perception::{GraspStep, GraspTarget};
+
+/// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.
+const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
+/// Score on which perception decides.
+pub const SURE: f64 = 0.5;
+/// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
+/// radians of that.
+const CONFIRMED: f64 = 0.2;
+const CONFIRMED_WITHIN: (f64, f64) = (0.015, 0.26);
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    /// Looks from one place after the other until the part is found.
+    pub(super) fn look_around(&mut self) -> Steps<GraspTarget> {
+        let config = self.config;
+        let table_height_m = self.robot.limits().table_height_m;
+        let mut looks = 0;
+        for look_out in &config.look_outs {
+            let arrived = match look_out.configuration(self.robot.panda(), &self.mount, table_height_m) {
+                Ok(q) => self.move_freely(&q, GraspStep::Detect),
+                Err(error) => Err(Stop::Error(error)),
+            };
+            match arrived {
+                Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
+                // A place that cannot be reached is not looked from.
+                Err(_) => continue,
+                Ok(()) => self.robot.wait(SETTLE_SECS)?,
+            }
+            looks += 1;
+            self.looks[0] = looks;
+            if let Some(target) = self.find(|target| target.score >= SURE)? {
+                return Ok(target);
+            }
+        }
+        Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks")))
+    }
+
+    /// Looks again from above what the first look found: nearer to the middle of the picture, errors are smaller.
+    pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
+        let mut looks = 0;
+        for shift_m in HOVER_SHIFTS_M {
+            match self.hover(first, shift_m) {
+                Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
+                Err(_) => continue,
+                Ok(()) => looks += 1,
+            }
+            self.looks[1] = looks;
+            if let Some(target) = self.find(|target| target.score >= SURE || confirms(first, target))? {
+                return Ok(target);
+            }
+        }
+        Err(Stop::Failed(GraspStep::Detect, format!("the part was not found in {looks} looks from above it")))
+    }
+
+    /// Takes a picture and asks perception; a target that no hand can take is a failure.
+    fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
+        let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
+        self.picture_time = self.finder.picture_time();
+        self.targets.push(target);
+        let Some(found) = target else { return Ok(None) };
+        let failed = |why: String| Stop::Failed(GraspStep::Detect, why);
+        let p = found.base_from_tcp.translation.vector;
+        if !(p.iter().all(|value| value.is_finite()) && found.jaw_width_m.is_finite()) {
+            return Err(failed("the grasp that was found is not finite".into()));
+        }
+        if found.jaw_width_m > HAND_OPENING_MAX_M {
+            return Err(failed(format!(
+                "the part is {:.0} mm wide, the hand opens {:.0} mm",
+                found.jaw_width_m * 1e3,
+                HAND_OPENING_MAX_M * 1e3
+            )));
+        }
+        Ok(Some(found))
+    }
+
+    /// Refuses to begin a motion that rests on an old picture.
+    pub(super) fn check_age(&mut self) -> Steps<()> {
+        let Some(taken) = self.picture_time.take() else { return Ok(()) };
+        let (age_secs, max_secs) = (taken.elapsed().as_secs_f64(), self.config.max_detection_age_secs);
+        if age_secs <= max_secs {
+            return Ok(());
+        }
+        Err(Stop::Failed(
+            GraspStep::Detect,
+            format!(
+                "the detection is {age_secs:.1} s old when the arm is to move, at most {max_secs:.1} s are allowed"
+            ),
+        ))
+    }
+
+    /// Puts the camera over the grasp or shifted from there, the hand turned as for the grasp or by half a turn more.
+    fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2]) -> Steps<()> {
+        let seed = self.robot.commanded()?;
+        let grasp = target.base_from_tcp.translation;
+        let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
+        let height_m = self.robot.limits().table_height_m + self.config.hover_height_m;
+        let mut best: Option<IkSolution> = None;
+        let mut first_error = None;
+        for base_from_grasp in [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)] {
+            // The picture's up is the hand's x.
+            let up = base_from_grasp.rotation * Vector3::x();
+            let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
+            let base_from_tcp = self.mount.base_from_tcp(&base_from_camera);
+            match self.robot.panda().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
+                Ok(solution) if best.as_ref().is_none_or(|best| solution.cost < best.cost) => best = Some(solution),
+                Ok(_) => {}
+                Err(error) => {
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+        let solution = best.ok_or_else(|| {
+            let why = first_error.map_or_else(String::new, |error| error.to_string());
+            Stop::Failed(GraspStep::Hover, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"))
+        })?;
+        self.check_age()?;
+        self.move_freely(&solution.q, GraspStep::Hover)?;
+        Ok(self.robot.wait(SETTLE_SECS)?)
+    }
+
+    /// Goes to a configuration in joint space, keeping off the table.
+    pub(super) fn move_freely(&mut self, q: &JointVector, step: GraspStep) -> Steps<()> {
+        let limits = self.config.pace.free_limits();
+        let planned = self.robot.plan_free(q, &limits);
+        let motion = fails_at(step, planned)?;
+        let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
+        let clearance = motion.clearance(panda, table_height_m);
+        // The end is wanted, whatever its height; on the way the arm must not come lower.
+        let allowed = FREE_CLEARANCE_M.min(panda.clearance(q, table_height_m).lowest_m - 1e-3);
+        if clearance.lowest_m < allowed {
+            return Err(Stop::Failed(
+                step,
+                format!("the way there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
+            ));
+        }
+        self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
+        self.follow(motion, step)
+    }
+}
+
+/// Whether a second look sees what the first one saw.
+fn confirms(first: &GraspTarget, second: &GraspTarget) -> bool {
+    let apart = first.base_from_tcp.inverse() * second.base_from_tcp;
+    second.score >= CONFIRMED
+        && apart.translation.vector.norm() <= CONFIRMED_WITHIN.0
+        && apart.rotation.angle() <= CONFIRMED_WITHIN.1
+}

@@ -1,0 +1,203 @@
+//! What is looked at in every state of a moving arm, and the states of the last second.
+
+use std::collections::VecDeque;
+use std::fmt;
+
+use sdg_kinematics::{JointVector, NUM_JOINTS, VELOCITY_MAX_RAD_S};
+
+use crate::arm::{ArmMode, ArmState};
+
+/// Why a motion was ended before its end.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// A person asked for it.
+    Interrupted,
+    /// A state that no arm can be in.
+    Implausible(String),
+    /// No state for longer than [`MAX_SILENCE_SECS`] of the arm's clock, or a motion that does not end.
+    Watchdog(String),
+    /// The arm's controller is in a mode in which it does not move.
+    Mode(ArmMode),
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Interrupted => f.write_str("a person asked for it"),
+            Self::Implausible(what) => write!(f, "its state cannot be: {what}"),
+            Self::Watchdog(what) => write!(f, "watchdog: {what}"),
+            Self::Mode(mode) => write!(f, "the arm is in mode \"{}\"", mode.name()),
+        }
+    }
+}
+
+/// The longest gap between two states of a moving arm, in seconds of its clock: what Franka's controller bridges itself.
+pub const MAX_SILENCE_SECS: f64 = 0.020;
+/// How much of the past is kept, in seconds of the arm's clock.
+pub const HISTORY_SECS: f64 = 1.0;
+/// A measured joint moves at most so many times as fast as Franka's limit between two states, and by so much for noise, rad.
+const MAX_SPEED_SHARE: f64 = 2.0;
+const NOISE_RAD: f64 = 0.005;
+
+/// Asks, once in every cycle, whether to stop.
+pub type StopRequest = Box<dyn FnMut() -> Option<StopReason> + Send>;
+
+/// Sees every state of a moving arm.
+pub struct Watch {
+    request: StopRequest,
+    states: VecDeque<ArmState>,
+    stop: Option<StopReason>,
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Watch").field("num_states", &self.states.len()).field("stop", &self.stop).finish()
+    }
+}
+
+impl Default for Watch {
+    /// Nobody asks to stop.
+    fn default() -> Self {
+        Self::new(Box::new(|| None))
+    }
+}
+
+impl Watch {
+    /// Asks `request` in every cycle.
+    pub fn new(request: StopRequest) -> Self {
+        Self { request, states: VecDeque::new(), stop: None }
+    }
+
+    /// Begins another motion: a gap since the last state is none.
+    pub(crate) fn begin(&mut self) {
+        self.stop = None;
+        if let Some(state) = self.states.back_mut() {
+            // The states before stay for the file, but nothing is concluded from the distance to them.
+            state.mode = ArmMode::Idle;
+        }
+    }
+
+    /// Looks at a state; the reason to stop, if there is one. The first reason stays.
+    pub fn observe(&mut self, state: &ArmState) -> Option<&StopReason> {
+        if self.stop.is_none() {
+            self.stop = self.implausible(state).or_else(|| (self.request)());
+        }
+        while self.states.front().is_some_and(|first| state.time_secs - first.time_secs > HISTORY_SECS) {
+            self.states.pop_front();
+        }
+        self.states.push_back(*state);
+        self.stop.as_ref()
+    }
+
+    /// Whether a person or a program asks to stop now.
+    pub fn is_stop_requested(&mut self) -> Option<StopReason> {
+        (self.request)()
+    }
+
+    fn implausible(&self, state: &ArmState) -> Option<StopReason> {
+        if let Some(joint_idx) = (0..NUM_JOINTS).find(|&idx| !(state.q[idx].is_finite() && state.dq[idx].is_finite())) {
+            return Some(StopReason::Implausible(format!("joint {} is at {}", joint_idx + 1, state.q[joint_idx])));
+        }
+        let before = self.states.back().filter(|before| before.mode == ArmMode::Moving)?;
+        let elapsed_secs = state.time_secs - before.time_secs;
+        if elapsed_secs > MAX_SILENCE_SECS {
+            return Some(StopReason::Watchdog(format!(
+                "no state of the arm for {:.0} ms, at most {:.0} ms are allowed",
+                elapsed_secs * 1e3,
+                MAX_SILENCE_SECS * 1e3
+            )));
+        }
+        let moved = (state.q - before.q).abs();
+        let allowed = JointVector::from(VELOCITY_MAX_RAD_S) * (MAX_SPEED_SHARE * elapsed_secs.max(0.0));
+        let joint_idx = (0..NUM_JOINTS).find(|&idx| moved[idx] > allowed[idx] + NOISE_RAD)?;
+        Some(StopReason::Implausible(format!(
+            "joint {} jumped by {:.3} rad within {:.0} ms",
+            joint_idx + 1,
+            moved[joint_idx],
+            elapsed_secs * 1e3
+        )))
+    }
+
+    /// The states of the last second, oldest first.
+    pub fn states(&self) -> impl ExactSizeIterator<Item = &ArmState> {
+        self.states.iter()
+    }
+
+    /// The states of the last second as CSV, with a line of names.
+    pub fn states_csv(&self) -> String {
+        use std::fmt::Write as _;
+        let mut text = String::from("time_secs,mode");
+        for name in ["q_rad", "dq_rad_s", "q_commanded_rad", "tau_external_nm"] {
+            for joint in 1..=NUM_JOINTS {
+                let _ = write!(text, ",{name}_{joint}");
+            }
+        }
+        text.push('\n');
+        for state in &self.states {
+            let _ = write!(text, "{:.3},{}", state.time_secs, state.mode.name());
+            for values in [&state.q, &state.dq, &state.q_commanded, &state.tau_external_nm] {
+                for value in values.iter() {
+                    let _ = write!(text, ",{value:.6}");
+                }
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_kinematics::ready_pose;
+
+    fn state(time_secs: f64, q: JointVector) -> ArmState {
+        let zero = JointVector::zeros();
+        ArmState { time_secs, q, dq: zero, q_commanded: q, tau_external_nm: zero, mode: ArmMode::Moving }
+    }
+
+    #[test]
+    fn a_jump_a_gap_and_what_is_no_number_are_reasons_to_stop() {
+        let mut jumped = ready_pose();
+        jumped[2] += 1.0;
+        let mut nan = ready_pose();
+        nan[4] = f64::NAN;
+        for (second, expected) in [
+            (state(0.001, jumped), "joint 3 jumped by 1.000 rad within 1 ms"),
+            (state(0.001, nan), "joint 5 is at NaN"),
+            (state(0.050, ready_pose()), "no state of the arm for 50 ms"),
+        ] {
+            let mut watch = Watch::default();
+            assert_eq!(watch.observe(&state(0.0, ready_pose())), None);
+            let found = watch.observe(&second).unwrap().to_string();
+            assert!(found.contains(expected), "{found}");
+            // What comes later does not make it good.
+            assert!(watch.observe(&state(0.051, ready_pose())).is_some());
+        }
+    }
+
+    #[test]
+    fn a_second_of_states_is_kept_and_written() {
+        let mut watch = Watch::default();
+        for cycle in 0..3000 {
+            assert_eq!(watch.observe(&state(f64::from(cycle) * 1e-3, ready_pose())), None);
+        }
+        assert!((1000..=1002).contains(&watch.states().len()), "{}", watch.states().len());
+        let csv = watch.states_csv();
+        assert_eq!(csv.lines().count(), watch.states().len() + 1);
+        assert!(csv.lines().all(|line| line.split(',').count() == 30), "{}", csv.lines().next().unwrap());
+        assert!(csv.lines().last().unwrap().starts_with("2.999,moving,0.000000,-0.785398"));
+    }
+
+    #[test]
+    fn whoever_asks_stops_the_arm() {
+        let mut cycles = 0;
+        let mut watch = Watch::new(Box::new(move || {
+            cycles += 1;
+            (cycles > 3).then_some(StopReason::Interrupted)
+        }));
+        let stopped = (0..10).position(|cycle| watch.observe(&state(f64::from(cycle) * 1e-3, ready_pose())).is_some());
+        assert_eq!(stopped, Some(3));
+    }
+}

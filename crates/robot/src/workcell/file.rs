@@ -1,0 +1,271 @@
+//! The file's own layout, and the checks of what it says.
+
+use nalgebra::Vector3;
+use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Mounting, RobotModel, Workcell, WorkcellError};
+use crate::franka::RobotAddress;
+use crate::safety::WorkspaceBox;
+use crate::sequence::LookOut;
+
+/// What files of this layout begin with.
+const FORMAT: i64 = 1;
+/// A table is not farther from the base's height, mm.
+const MAX_TABLE_MM: f64 = 1000.0;
+/// Where an arm can be at all, mm.
+const MAX_REACH_MM: f64 = 1500.0;
+/// No finger is longer than this beyond the tcp, mm.
+const MAX_FINGERTIP_MM: f64 = 100.0;
+/// What the hand holds for long, N.
+const MAX_FORCE_N: f64 = 70.0;
+/// What a Panda may carry, kg.
+const MAX_LOAD_KG: f64 = 3.0;
+/// Heights of a camera above the table, mm.
+const CAMERA_HEIGHTS_MM: [f64; 2] = [150.0, 1200.0];
+/// Franka's own finger tips reach this far beyond its tcp, mm.
+const FINGERTIP_MM: f64 = 9.0;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    format: Spanned<i64>,
+    robot: Robot,
+    #[serde(default)]
+    tool: Tool,
+    camera: Camera,
+    table: Table,
+    workspace: Workspace,
+    look_out: Spanned<Vec<Spanned<LookOutSection>>>,
+    #[serde(default)]
+    obstacle: Vec<Spanned<toml::Value>>,
+    #[serde(default)]
+    tray: Vec<Spanned<toml::Value>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Robot {
+    model: Spanned<String>,
+    address: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct Tool {
+    fingertip_beyond_tcp_mm: Option<Spanned<f64>>,
+    grasp_force_n: Option<Spanned<f64>>,
+    part_mass_kg: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Camera {
+    file: Option<Spanned<String>>,
+    mounting: Spanned<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    height_mm: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Workspace {
+    x_mm: Spanned<Numbers<2>>,
+    y_mm: Spanned<Numbers<2>>,
+    z_mm: Spanned<Numbers<2>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LookOutSection {
+    camera_at_mm: Option<Spanned<Numbers<3>>>,
+    yaw_deg: Option<Spanned<f64>>,
+    joints_deg: Option<Spanned<Numbers<NUM_JOINTS>>>,
+}
+
+/// So many numbers and no more; serde's own arrays pass over what follows.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+struct Numbers<const N: usize>([f64; N]);
+
+impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
+    type Error = String;
+
+    fn try_from(found: Vec<f64>) -> Result<Self, String> {
+        let count = found.len();
+        found.try_into().map(Self).map_err(|_| format!("expected {N} numbers, found {count}"))
+    }
+}
+
+/// The text, to turn places in it into lines.
+struct Source<'t>(&'t str);
+
+impl Source<'_> {
+    fn error(&self, at: usize, what: impl Into<String>) -> WorkcellError {
+        let end = at.min(self.0.len());
+        let line = 1 + self.0.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count();
+        WorkcellError { line, what: what.into() }
+    }
+
+    fn expected<T>(
+        &self,
+        place: &Spanned<T>,
+        name: &str,
+        expected: &str,
+        found: impl std::fmt::Display,
+    ) -> WorkcellError {
+        self.error(place.span().start, format!("{name}: expected {expected}, found {found}"))
+    }
+
+    fn number(&self, value: &Spanned<f64>, name: &str, [min, max]: [f64; 2]) -> Result<f64, WorkcellError> {
+        let found = *value.get_ref();
+        if (min..=max).contains(&found) {
+            return Ok(found);
+        }
+        Err(self.expected(value, name, &format!("a number from {min} to {max}"), found))
+    }
+
+    fn range_m(&self, value: &Spanned<Numbers<2>>, name: &str) -> Result<[f64; 2], WorkcellError> {
+        let Numbers([min, max]) = *value.get_ref();
+        if min < max && min >= -MAX_REACH_MM && max <= MAX_REACH_MM {
+            return Ok([min * 1e-3, max * 1e-3]);
+        }
+        let expected = format!("[smallest, largest] in mm, within {MAX_REACH_MM} of the base");
+        Err(self.expected(value, name, &expected, format!("[{min}, {max}]")))
+    }
+}
+
+pub(super) fn read(text: &str) -> Result<Workcell, WorkcellError> {
+    let source = Source(text);
+    let file: File = toml::from_str(text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start);
+        // The parser's message goes on with the place in the text, which the line says.
+        source.error(at, error.message().split_whitespace().collect::<Vec<_>>().join(" "))
+    })?;
+    if *file.format.get_ref() != FORMAT {
+        return Err(source.expected(&file.format, "format", &FORMAT.to_string(), file.format.get_ref()));
+    }
+    let robot = match file.robot.model.get_ref().as_str() {
+        "panda" => RobotModel::Panda,
+        "fr3" => RobotModel::Fr3,
+        other => {
+            return Err(source.expected(&file.robot.model, "model", "\"panda\" or \"fr3\"", format!("\"{other}\"")));
+        }
+    };
+    if let Some(address) = &file.robot.address
+        && let Err(why) = address.get_ref().parse::<RobotAddress>()
+    {
+        return Err(source.error(address.span().start, format!("address: {why}")));
+    }
+    let mounting = match file.camera.mounting.get_ref().as_str() {
+        "hand" => Mounting::Hand,
+        "base" => Mounting::Base,
+        other => {
+            return Err(source.expected(
+                &file.camera.mounting,
+                "mounting",
+                "\"hand\" or \"base\"",
+                format!("\"{other}\""),
+            ));
+        }
+    };
+    for (name, sections) in [("obstacle", &file.obstacle), ("tray", &file.tray)] {
+        if let Some(section) = sections.first() {
+            let why = format!(
+                "{name}: no motion is planned around it yet, so the arm might run into it; take it out of the cell and of this file"
+            );
+            return Err(source.error(section.span().start, why));
+        }
+    }
+    let option = |value: &Option<Spanned<f64>>, name: &str, range: [f64; 2]| {
+        value.as_ref().map(|value| source.number(value, name, range)).transpose()
+    };
+    let tool = &file.tool;
+    let fingertip_mm = option(&tool.fingertip_beyond_tcp_mm, "fingertip_beyond_tcp_mm", [0.0, MAX_FINGERTIP_MM])?;
+    let [x, y, z] = [
+        source.range_m(&file.workspace.x_mm, "x_mm")?,
+        source.range_m(&file.workspace.y_mm, "y_mm")?,
+        source.range_m(&file.workspace.z_mm, "z_mm")?,
+    ];
+    let look_outs = file.look_out.get_ref();
+    if look_outs.is_empty() {
+        return Err(source.expected(&file.look_out, "look_out", "at least one", "none"));
+    }
+    Ok(Workcell {
+        robot,
+        address: file.robot.address.map(Spanned::into_inner),
+        fingertip_beyond_tcp_m: fingertip_mm.unwrap_or(FINGERTIP_MM) * 1e-3,
+        grasp_force_n: option(&tool.grasp_force_n, "grasp_force_n", [1.0, MAX_FORCE_N])?.unwrap_or(40.0),
+        part_mass_kg: option(&tool.part_mass_kg, "part_mass_kg", [0.0, MAX_LOAD_KG])?,
+        camera_file: file.camera.file.map(Spanned::into_inner),
+        mounting,
+        table_height_m: source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3,
+        workspace: WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) },
+        look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
+    })
+}
+
+fn look_out(
+    source: &Source<'_>,
+    section: &Spanned<LookOutSection>,
+    mounting: Mounting,
+) -> Result<LookOut, WorkcellError> {
+    let LookOutSection { camera_at_mm, yaw_deg, joints_deg } = section.get_ref();
+    match (camera_at_mm, joints_deg) {
+        (Some(at), None) if mounting == Mounting::Hand => {
+            let Numbers([x, y, height]) = *at.get_ref();
+            if ![x, y].iter().all(|value| value.abs() <= MAX_REACH_MM) {
+                let expected = format!("x and y within {MAX_REACH_MM} mm of the base");
+                return Err(source.expected(at, "camera_at_mm", &expected, format!("[{x}, {y}, {height}]")));
+            }
+            let [min, max] = CAMERA_HEIGHTS_MM;
+            if !(min..=max).contains(&height) {
+                let expected = format!("a height from {min} to {max} mm above the table");
+                return Err(source.expected(at, "camera_at_mm", &expected, height));
+            }
+            let yaw_deg = yaw_deg.as_ref().map(|yaw| source.number(yaw, "yaw_deg", [-360.0, 360.0])).transpose()?;
+            Ok(LookOut::CameraAt {
+                at_m: [x * 1e-3, y * 1e-3],
+                height_m: height * 1e-3,
+                yaw_rad: yaw_deg.unwrap_or(0.0).to_radians(),
+            })
+        }
+        (None, Some(joints)) => {
+            if let Some(yaw) = yaw_deg {
+                return Err(source.error(yaw.span().start, "yaw_deg: expected with camera_at_mm only"));
+            }
+            let q = JointVector::from(joints.get_ref().0.map(f64::to_radians));
+            match JointLimits::franka().worst_violation(&q, 0.0) {
+                None if q.iter().all(|value| value.is_finite()) => Ok(LookOut::Joints(q)),
+                None => Err(source.expected(
+                    joints,
+                    "joints_deg",
+                    "seven finite numbers",
+                    format!("{:?}", joints.get_ref().0),
+                )),
+                Some(violation) => {
+                    let [min, max] = [violation.min_rad, violation.max_rad].map(f64::to_degrees);
+                    let expected = format!("joint {} from {min:.1} to {max:.1} degrees", violation.joint);
+                    let found = format!("{:.1}", violation.found_rad.to_degrees());
+                    Err(source.expected(joints, "joints_deg", &expected, found))
+                }
+            }
+        }
+        (Some(at), None) => {
+            let why =
+                "camera_at_mm: expected joints_deg, since a camera that is mounted on the base is not moved by the arm";
+            Err(source.error(at.span().start, why))
+        }
+        (None, None) => {
+            Err(source.error(section.span().start, "look_out: expected camera_at_mm or joints_deg, found neither"))
+        }
+        (Some(_), Some(joints)) => {
+            Err(source.error(joints.span().start, "look_out: expected camera_at_mm or joints_deg, found both"))
+        }
+    }
+}

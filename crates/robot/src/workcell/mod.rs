@@ -1,0 +1,142 @@
+//! A workcell's file: the robot, what it carries, the camera, the table, and where the arm may go.
+//!
+//! ```toml
+//! format = 1
+//!
+//! [robot]
+//! model = "panda"                   # or "fr3"
+//! address = "172.16.0.2"            # may be left out; --robot says it too
+//!
+//! [tool]                            # may be left out
+//! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
+//! grasp_force_n = 40.0
+//! part_mass_kg = 0.2                # told to the controller once the part is held
+//!
+//! [camera]
+//! file = "camera.yaml"              # beside this file; --camera says it too
+//! mounting = "hand"                 # or "base"
+//!
+//! [table]
+//! height_mm = 0.0                   # its z in the robot's base frame
+//!
+//! [workspace]                       # where tcp and flange may be, mm in the base frame
+//! x_mm = [200, 800]
+//! y_mm = [-450, 450]
+//! z_mm = [0, 900]
+//!
+//! [[look_out]]                      # one or more; the first that shows the part is enough
+//! camera_at_mm = [480, 0, 580]      # x, y in the base frame, height above the table; or
+//! joints_deg = [0, -45, 0, -135, 0, 90, 45]
+//! yaw_deg = 0                       # with camera_at_mm; may be left out
+//!
+//! [[obstacle]]                      # refused as long as no motion is planned around it
+//! [[tray]]                          # likewise
+//! ```
+//! Every error names the line. This crate holds no file: text in, a [`Workcell`] out.
+
+mod error;
+mod file;
+
+use sdg_kinematics::JointVector;
+
+use crate::safety::{SafetyLimits, WorkspaceBox};
+use crate::sequence::{GraspConfig, LookOut};
+
+pub use error::WorkcellError;
+
+/// The robot's model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RobotModel {
+    /// Franka Emika Robot, "Panda".
+    Panda,
+    /// Franka Research 3.
+    Fr3,
+}
+
+/// Where the camera is mounted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mounting {
+    /// On the robot's hand: the camera's file has `hand_eye:`.
+    Hand,
+    /// Beside the robot: the camera's file has `table:` in the base frame.
+    Base,
+}
+
+impl Mounting {
+    /// The name in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hand => "hand",
+            Self::Base => "base",
+        }
+    }
+}
+
+/// A workcell, as its file says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Workcell {
+    /// Which robot.
+    pub robot: RobotModel,
+    /// Where it is on the network.
+    pub address: Option<String>,
+    /// How far the finger tips reach beyond the tcp, m.
+    pub fingertip_beyond_tcp_m: f64,
+    /// Force of each finger, N.
+    pub grasp_force_n: f64,
+    /// Mass of the part, kg.
+    pub part_mass_kg: Option<f64>,
+    /// The camera's file, as it is written.
+    pub camera_file: Option<String>,
+    /// Where the camera is.
+    pub mounting: Mounting,
+    /// The table's z in the base frame, m.
+    pub table_height_m: f64,
+    /// Where the hand may be.
+    pub workspace: WorkspaceBox,
+    /// Where the arm looks out from.
+    pub look_outs: Vec<LookOut>,
+}
+
+impl Workcell {
+    /// Reads a workcell's file.
+    ///
+    /// # Errors
+    /// [`WorkcellError`] with the line, what was expected and what was found.
+    pub fn from_toml(text: &str) -> Result<Self, WorkcellError> {
+        file::read(text)
+    }
+
+    /// What every motion in this workcell keeps to.
+    pub fn safety_limits(&self) -> SafetyLimits {
+        SafetyLimits {
+            workspace: Some(self.workspace),
+            table_height_m: self.table_height_m,
+            fingertip_beyond_tcp_m: self.fingertip_beyond_tcp_m,
+            ..SafetyLimits::default()
+        }
+    }
+
+    /// The sequence in this workcell, at the pace of rehearsals; the part hangs at the tcp.
+    pub fn grasp_config(&self) -> GraspConfig {
+        let load = self
+            .part_mass_kg
+            .map(|mass_kg| crate::arm::Load { mass_kg, center_in_flange_m: [0.0, 0.0, sdg_kinematics::TCP_OFFSET_M] });
+        GraspConfig {
+            look_outs: self.look_outs.clone(),
+            grasp_force_n: self.grasp_force_n,
+            load,
+            ..GraspConfig::default()
+        }
+    }
+
+    /// Joint angles of the first look-out pose that is given as such.
+    pub fn home(&self) -> Option<JointVector> {
+        self.look_outs.iter().find_map(|look_out| match look_out {
+            LookOut::Joints(q) => Some(*q),
+            LookOut::CameraAt { .. } => None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,78 @@
+//! Whole grasps over TCP and UDP beside the same attempts in one process, part by part.
+//!
+//! `cargo run --release -p sdg-simulation --example network_grasps [lockstep|realtime] [ATTEMPTS] [PART]…`
+
+use sdg_fci::server::Pace;
+use sdg_robot::{GraspConfig, GraspOutcome, Robot, Watch, grasp};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::{AttemptConfig, RenderConfig, Workcell, WorkcellConfig};
+
+#[path = "../tests/network/mod.rs"]
+mod network;
+
+fn cell(spec: &ObjectSpec, seed: u64) -> sdg_simulation::Result<Workcell> {
+    let config = VariationConfig { appearance: false, ..VariationConfig::default() };
+    let scene = SceneVariation::sample(Some(spec), &config, seed);
+    let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
+    let mut cell = Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) })?;
+    cell.reset_for_attempt(&GraspConfig::default(), seed)?;
+    Ok(cell)
+}
+
+/// Over the network: whether the part is held by the hand's word, and by the truth, and why not.
+fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<dyn std::error::Error>> {
+    let (server, positions) = network::serve(&cell, pace);
+    let mount = cell.wrist_mount();
+    let mut twin = network::Twin { cell, positions };
+    let mut arm = network::connect(&server)?;
+    let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
+    let report = grasp(&mut robot, &mut twin, &mut (), mount, &GraspConfig::default());
+    let (said, why) = match report {
+        Ok(report) => match report.outcome {
+            GraspOutcome::Held => (true, String::new()),
+            GraspOutcome::Failed { step, why } => (false, format!("{step}: {why}")),
+        },
+        Err(error) => (false, error.to_string()),
+    };
+    drop(arm);
+    let is_lifted = twin.is_lifted();
+    server.stop()?;
+    Ok((said, is_lifted, why))
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let pace = match arguments.next().as_deref() {
+        Some("realtime") => Pace::RealTime,
+        None | Some("lockstep") => Pace::LOCKSTEP,
+        Some(other) => return Err(format!("expected lockstep or realtime, found {other}").into()),
+    };
+    let num_attempts: u64 = arguments.next().map_or(Ok(20), |n| n.parse())?;
+    let mut parts: Vec<String> = arguments.collect();
+    if parts.is_empty() {
+        parts = ObjectSpec::names().map(str::to_owned).collect();
+    }
+    for name in parts {
+        let spec = ObjectSpec::by_name(&name)?;
+        let (mut in_process, mut network, mut differing) = (0, 0, Vec::new());
+        for seed in 0..num_attempts {
+            let report = cell(&spec, seed)?.run_oracle_attempt(&AttemptConfig::default(), seed)?;
+            let (said, is_lifted, why) = over_network(cell(&spec, seed)?, pace)?;
+            if said != is_lifted {
+                println!("{name} seed {seed}: the hand says {said}, the truth {is_lifted}: {why}");
+            }
+            let is_held = report.outcome.is_held();
+            in_process += u64::from(is_held);
+            network += u64::from(said && is_lifted);
+            if is_held != (said && is_lifted) {
+                differing.push(seed);
+                println!("{name} seed {seed}: in one process {:?}, over the network {said} {why}", report.outcome);
+            }
+        }
+        println!(
+            "{name}: {in_process} in one process, {network} over the network, of {num_attempts}; other: {differing:?}"
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,193 @@
+//! The simulated Panda as an arm that the grasp sequence moves.
+
+use sdg_robot::{
+    Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load,
+    MIN_HELD_WIDTH_M, MotionEnd, PERIOD_SECS, Playback, RobotError, StopReason, Watch,
+};
+
+use crate::attempt_errors::{ArmFault, ArmFaultKind};
+use crate::controller::ArmReference;
+use crate::error::SimulationError;
+use crate::panda::ArmVector;
+use crate::workcell::Workcell;
+
+type Result<T> = sdg_robot::Result<T>;
+
+/// A joint that is this far from its reference is held up by something, in radians.
+const BLOCKED_RAD: f64 = 0.03;
+/// How often a closing hand is looked at, in seconds.
+const HAND_PERIOD_SECS: f64 = 0.05;
+/// Fingers that stand still for so long have closed, in seconds.
+const HAND_STILL_SECS: f64 = 0.2;
+/// Fingers that move by less between two looks stand still, in metres.
+const HAND_STILL_M: f64 = 1e-4;
+/// Up to 0.04 m of each finger at 0.05 m/s, and time for the force to build up.
+const MAX_HAND_SECS: f64 = 1.6;
+/// A hand this near to its opening is there, in metres.
+const HAND_THERE_M: f64 = 1e-3;
+/// Share of the force that a hand that presses reaches.
+const PRESSING_SHARE: f64 = 0.8;
+/// How far a state is wrong that jumps, in radians.
+const JUMP_RAD: f64 = 1.0;
+
+impl From<SimulationError> for RobotError {
+    fn from(error: SimulationError) -> Self {
+        Self::Device(Box::new(error))
+    }
+}
+
+impl Workcell {
+    /// The fault that is due, if there is one.
+    fn fault(&self) -> Option<ArmFaultKind> {
+        let ArmFault { at_secs, kind } = self.config().errors.arm_fault?;
+        (self.data.time_secs() >= at_secs).then_some(kind)
+    }
+
+    fn arm_state(&self, mode: ArmMode) -> ArmState {
+        let mut q = self.panda_ids.position(&self.data);
+        match self.fault() {
+            Some(ArmFaultKind::NotANumber) => q[3] = f64::NAN,
+            Some(ArmFaultKind::Jump) => q[3] += JUMP_RAD,
+            Some(ArmFaultKind::Reflex | ArmFaultKind::HandStuck) | None => {}
+        }
+        ArmState {
+            time_secs: self.data.time_secs(),
+            q,
+            dq: self.panda_ids.velocity(&self.data),
+            q_commanded: self.commanded(),
+            tau_external_nm: ArmVector::zeros(),
+            mode: if self.is_in_reflex { ArmMode::Reflex } else { mode },
+        }
+    }
+
+    /// One cycle of a motion or of standing still; the arm may stop itself in it.
+    fn cycle(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
+        self.tick()?;
+        if self.fault() == Some(ArmFaultKind::Reflex) && !self.is_in_reflex {
+            self.is_in_reflex = true;
+            self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
+            watch.observe(&self.arm_state(ArmMode::Reflex));
+            return Err(RobotError::Reflex("an injected reflex".to_owned()));
+        }
+        Ok(watch.observe(&self.arm_state(ArmMode::Moving)).cloned())
+    }
+
+    fn hand_force_n(&self) -> f64 {
+        let motors = self.panda_ids.finger_motors;
+        // Closing forces are negative.
+        motors.iter().map(|motor| -self.data.ctrl()[motor.index()]).fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Arm for Workcell {
+    fn state(&mut self) -> Result<ArmState> {
+        Ok(self.arm_state(ArmMode::Idle))
+    }
+
+    fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        let mut playback = Playback::new(motion);
+        let mut stopped = None;
+        while let Some(reference) = playback.next_reference() {
+            self.set_reference(ArmReference {
+                position: reference.q,
+                velocity: reference.dq,
+                acceleration: reference.ddq,
+            });
+            if let Some(reason) = self.cycle(watch)? {
+                playback.stop();
+                stopped.get_or_insert(reason);
+            }
+            if (self.panda_ids.position(&self.data) - reference.q).amax() > BLOCKED_RAD {
+                let obstacle = self.describe_arm_contacts();
+                self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
+                return Ok(MotionEnd::Blocked(obstacle));
+            }
+        }
+        match stopped {
+            Some(reason) => Err(RobotError::Stopped(reason)),
+            None => Ok(MotionEnd::Arrived),
+        }
+    }
+
+    fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        self.set_reference(ArmReference::at_rest(self.commanded()));
+        for _ in 0..(duration_secs / PERIOD_SECS).round() as usize {
+            if let Some(reason) = self.cycle(watch)? {
+                return Err(RobotError::Stopped(reason));
+            }
+        }
+        Ok(())
+    }
+
+    fn hand(&mut self) -> Result<HandState> {
+        let (opening_m, force_n) = (self.opening_m(), self.hand_force_n());
+        let is_grasping = match self.hand_command {
+            Some(HandCommand::Grasp { width_m, force_n: told_n, .. }) => {
+                let [thinner_m, wider_m] = GRASP_TOLERANCE_M;
+                let widths_m = (width_m - thinner_m).max(MIN_HELD_WIDTH_M)..=width_m + wider_m;
+                widths_m.contains(&opening_m) && force_n >= PRESSING_SHARE * told_n.min(crate::MAX_FINGER_FORCE_N)
+            }
+            Some(HandCommand::Move { .. }) | None => false,
+        };
+        Ok(HandState { opening_m, is_grasping, force_n: Some(force_n) })
+    }
+
+    fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        match command {
+            _ if self.fault() == Some(ArmFaultKind::HandStuck) => {}
+            HandCommand::Move { opening_m, .. } => self.gripper.move_to(opening_m),
+            HandCommand::Grasp { force_n, .. } => self.gripper.grasp(force_n),
+        }
+        self.hand_command = Some(command);
+        Ok(())
+    }
+
+    fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
+        let (mut still_secs, mut elapsed_secs) = (0.0, 0.0);
+        let is_there = |opening_m: f64, still_secs: f64, command: Option<HandCommand>| match command {
+            Some(HandCommand::Move { opening_m: told_m, .. }) => (opening_m - told_m).abs() < HAND_THERE_M,
+            Some(HandCommand::Grasp { .. }) => still_secs >= HAND_STILL_SECS,
+            None => true,
+        };
+        while elapsed_secs < MAX_HAND_SECS && !is_there(self.opening_m(), still_secs, self.hand_command) {
+            let before = self.opening_m();
+            self.wait(HAND_PERIOD_SECS, watch)?;
+            elapsed_secs += HAND_PERIOD_SECS;
+            still_secs =
+                if (self.opening_m() - before).abs() < HAND_STILL_M { still_secs + HAND_PERIOD_SECS } else { 0.0 };
+        }
+        if let Some(HandCommand::Move { opening_m: told_m, .. }) = self.hand_command {
+            let found_m = self.opening_m();
+            if (found_m - told_m).abs() >= HAND_THERE_M {
+                let (told_mm, found_mm) = (told_m * 1e3, found_m * 1e3);
+                return Err(RobotError::Hand(format!(
+                    "it was to open to {told_mm:.0} mm and stands at {found_mm:.0} mm"
+                )));
+            }
+        }
+        self.hand()
+    }
+
+    /// The simulated arm stops at what blocks it, whatever the sensitivity.
+    fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
+        Ok(())
+    }
+
+    /// The controller does without: at its stiffness a part costs a fraction of a millimetre.
+    fn set_load(&mut self, _load: Load) -> Result<()> {
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<()> {
+        self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
+        Ok(())
+    }
+
+    fn recover(&mut self) -> Result<()> {
+        if self.fault() == Some(ArmFaultKind::Reflex) {
+            return Err(RobotError::Reflex("what caused it is still there".to_owned()));
+        }
+        self.is_in_reflex = false;
+        Ok(())
+    }
+}

@@ -1,0 +1,177 @@
+//! One grasp attempt: the sequence of every arm (`sdg_robot::grasp`), from a random start, judged by the truth at every step.
+
+mod judge;
+mod report;
+
+use std::time::Instant;
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_kinematics::{CartesianLimits, JointVector, Trajectory, ready_pose};
+use sdg_robot::{
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspReport, GraspTarget, LookOut, PartFinder, Robot, RobotError,
+    SafetyLimits, Watch,
+};
+
+use crate::camera::CameraView;
+use crate::error::{Result, SimulationError};
+use crate::panda::FINGERTIP_BEYOND_TCP_M;
+use crate::perception::Perception;
+use crate::record::RecordConfig;
+use crate::workcell::Workcell;
+use judge::Judge;
+
+pub use report::AttemptReport;
+
+/// Where the sequence goes and how it is judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AttemptConfig {
+    /// The sequence.
+    pub grasp: GraspConfig,
+    /// Height of the part's lowest point above the table that counts as grasped, in metres.
+    pub success_height_m: f64,
+    /// Pictures from outside while it happens.
+    pub record: Option<RecordConfig>,
+}
+
+impl Default for AttemptConfig {
+    fn default() -> Self {
+        Self { grasp: GraspConfig::default(), success_height_m: 0.10, record: None }
+    }
+}
+
+/// The hand's angular velocity in rehearsals, rad/s. Franka's 2.5 hold for motions that are commanded in Cartesian space; at the pace of
+/// rehearsals joint motions, which Franka limits joint by joint, turn the hand at up to twice that.
+const REHEARSED_ANGULAR_VELOCITY_RAD_S: f64 = 6.0;
+const REHEARSED_ANGULAR_ACCELERATION_RAD_S2: f64 = 60.0;
+
+impl Workcell {
+    /// What every motion in the workcell keeps to: Franka's limits over the table, but for the hand's turning, since joint motions
+    /// go at the pace of rehearsals.
+    pub fn safety_limits() -> SafetyLimits {
+        SafetyLimits {
+            cartesian: CartesianLimits {
+                angular_velocity_rad_s: REHEARSED_ANGULAR_VELOCITY_RAD_S,
+                angular_acceleration_rad_s2: REHEARSED_ANGULAR_ACCELERATION_RAD_S2,
+                ..CartesianLimits::franka()
+            },
+            fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M,
+            ..SafetyLimits::default()
+        }
+    }
+
+    /// Where the wrist camera is.
+    pub fn wrist_mount(&self) -> CameraMount {
+        CameraMount::Hand { tcp_from_camera: self.tcp_from_camera() }
+    }
+
+    /// Tries to grasp the part once, from a start configuration drawn from `seed`.
+    ///
+    /// Everything is put back to the start first, so that the same seed and perception give the same
+    /// attempt.
+    ///
+    /// # Errors
+    /// Errors of the simulation or of perception itself, and whatever stops the arm; a grasp that fails is a report.
+    pub fn run_attempt(
+        &mut self,
+        perception: &mut dyn Perception,
+        config: &AttemptConfig,
+        seed: u64,
+    ) -> Result<AttemptReport> {
+        self.run_attempt_with(&mut |_, view| perception.perceive(view), config, seed)
+    }
+
+    /// As [`Workcell::run_attempt`], for a perception that may look behind the curtain.
+    pub(crate) fn run_attempt_with(
+        &mut self,
+        perceive: &mut PerceiveFn<'_>,
+        config: &AttemptConfig,
+        seed: u64,
+    ) -> Result<AttemptReport> {
+        let started = Instant::now();
+        self.reset_for_attempt(&config.grasp, seed)?;
+        if let Some(record) = &config.record {
+            self.start_recording(record)?;
+        }
+        let base_from_object = self.base_from_object();
+        let mut finder = ViewFinder { perceive, views: Vec::new(), perception_secs: 0.0 };
+        let mut judge = Judge::new(config.success_height_m);
+        let mount = self.wrist_mount();
+        let mut robot = Robot::new(self, Self::safety_limits(), Watch::default());
+        let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut judge, mount, &config.grasp);
+        let ViewFinder { views, perception_secs, .. } = finder;
+        let frames = self.stop_recording();
+        let GraspReport { outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
+        Ok(AttemptReport {
+            outcome,
+            seed,
+            base_from_object,
+            views,
+            targets,
+            looks,
+            shake_amplitude_m: judge.shake_amplitude_m,
+            hand_verdicts,
+            object_height_m: self.object_height_m(),
+            simulated_secs: self.data.time_secs(),
+            wall_secs: started.elapsed().as_secs_f64(),
+            perception_secs,
+            frames,
+        })
+    }
+
+    /// Puts everything back to the start of an attempt: the arm at rest in a configuration drawn from `seed`.
+    ///
+    /// # Errors
+    /// A first look-out pose that the arm cannot reach.
+    pub fn reset_for_attempt(&mut self, config: &GraspConfig, seed: u64) -> Result<()> {
+        let start = self.random_start(config, seed)?;
+        self.reset(&start)
+    }
+
+    /// A configuration around the ready pose, well above the table, from which the first look can be
+    /// reached without coming near the table.
+    fn random_start(&self, config: &GraspConfig, seed: u64) -> Result<JointVector> {
+        const SPREAD_RAD: [f64; 7] = [0.9, 0.4, 0.5, 0.4, 0.6, 0.4, 0.9];
+        const NUM_TRIES: usize = 200;
+        let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5354_4152_545f_5144);
+        let first = config.look_outs.first().copied().unwrap_or(LookOut::Joints(ready_pose()));
+        let look = first.configuration(&self.panda, &self.wrist_mount(), 0.0)?;
+        let limits = config.pace.free_limits();
+        for _ in 0..NUM_TRIES {
+            let offset = JointVector::from_fn(|joint, _| rng.random_range(-SPREAD_RAD[joint]..SPREAD_RAD[joint]));
+            let q = self.panda.limits().clamp(&(ready_pose() + offset));
+            let safe = self.panda.clearance(&q, 0.0).lowest_m > 0.2
+                && Trajectory::point_to_point(&q, &look, &limits)
+                    .is_ok_and(|motion| motion.clearance(&self.panda, 0.0).lowest_m > FREE_CLEARANCE_M);
+            if safe {
+                return Ok(q);
+            }
+        }
+        Ok(ready_pose())
+    }
+}
+
+/// Perception that may also look at the physics.
+pub(crate) type PerceiveFn<'a> = dyn FnMut(&Workcell, &CameraView) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>>
+    + 'a;
+
+/// Perception behind the wrist camera.
+struct ViewFinder<'a, 'p> {
+    perceive: &'a mut PerceiveFn<'p>,
+    views: Vec<CameraView>,
+    perception_secs: f64,
+}
+
+impl PartFinder<Workcell> for ViewFinder<'_, '_> {
+    fn find(&mut self, cell: &mut Workcell) -> sdg_robot::Result<Option<GraspTarget>> {
+        let mut view = cell.wrist_view()?;
+        if let Some(camera_from_told) = cell.config().errors.camera_from_told {
+            view.camera.world_from_camera *= camera_from_told;
+        }
+        let started = Instant::now();
+        let found = (self.perceive)(cell, &view).map_err(|error| RobotError::Perception(error.to_string()))?;
+        self.perception_secs += started.elapsed().as_secs_f64();
+        self.views.push(view);
+        Ok(found)
+    }
+}

@@ -1,0 +1,35 @@
+//! A simulated Panda on a free port of this computer, in lockstep, and a client of it.
+
+use std::net::SocketAddr;
+
+use sdg_fci::Limits;
+use sdg_fci::client::{Hand, HandConfig, Robot, RobotConfig};
+use sdg_fci::server::{Pace, Server, ServerConfig};
+use sdg_simulation::scene::SceneVariation;
+use sdg_simulation::{PandaPlant, WorkcellConfig};
+
+/// An empty table.
+pub fn serve(pace: Pace, limits: Limits) -> Server {
+    let plant = PandaPlant::new(&WorkcellConfig::new(SceneVariation::nominal(None))).unwrap();
+    let config = ServerConfig { robot_port: 0, hand_port: 0, pace, limits, ..ServerConfig::default() };
+    Server::start(plant, &config).unwrap()
+}
+
+/// The same with the Panda's limits, and a client.
+pub fn serve_panda() -> (Server, Robot) {
+    let server = serve(Pace::LOCKSTEP, Limits::PANDA);
+    let robot = connect(&server);
+    (server, robot)
+}
+
+/// A client of a server.
+pub fn connect(server: &Server) -> Robot {
+    let address: SocketAddr = server.robot_address();
+    Robot::connect(&address.to_string(), &RobotConfig::default()).unwrap()
+}
+
+/// A client of a server's hand.
+#[allow(dead_code, reason = "not every test file has a hand")]
+pub fn connect_hand(server: &Server) -> Hand {
+    Hand::connect(&server.hand_address().to_string(), &HandConfig::default()).unwrap()
+}

@@ -1,0 +1,51 @@
+//! A simulated Panda on the network, and a twin of its workcell that tells the truth about it.
+
+#![allow(clippy::unwrap_used)]
+
+use sdg_fci::server::{Pace, Server, ServerConfig};
+use sdg_robot::{FrankaArm, GraspTarget, PartFinder, RobotAddress, Scheduling};
+use sdg_simulation::{AttemptConfig, PandaPlant, SharedPositions, Workcell, marked_grasp};
+
+/// A server with free ports, on this computer.
+pub fn serve(twin: &Workcell, pace: Pace) -> (Server, SharedPositions) {
+    let plant = PandaPlant::with_positions(twin.config(), twin.data().qpos()).unwrap();
+    let positions = plant.positions();
+    let config = ServerConfig { robot_port: 0, hand_port: 0, pace, ..ServerConfig::default() };
+    (Server::start(plant, &config).unwrap(), positions)
+}
+
+/// The client of a server.
+pub fn connect(server: &Server) -> sdg_robot::Result<FrankaArm> {
+    let address = RobotAddress {
+        host: server.robot_address().ip().to_string(),
+        port: server.robot_address().port(),
+        hand_port: server.hand_address().port(),
+    };
+    FrankaArm::connect(&address, Scheduling::Ordinary)
+}
+
+/// The same workcell in this process, put where the served one is before it is asked.
+pub struct Twin {
+    pub cell: Workcell,
+    pub positions: SharedPositions,
+}
+
+impl Twin {
+    fn sync(&mut self) {
+        self.cell.set_positions(&self.positions.get()).unwrap();
+    }
+
+    /// Whether the part hangs in the air: what is up there at rest is held, whatever touches it.
+    pub fn is_lifted(&mut self) -> bool {
+        self.sync();
+        self.cell.object_height_m().is_some_and(|height_m| height_m >= AttemptConfig::default().success_height_m)
+    }
+}
+
+impl PartFinder<FrankaArm> for Twin {
+    fn find(&mut self, _arm: &mut FrankaArm) -> sdg_robot::Result<Option<GraspTarget>> {
+        self.sync();
+        let spec = self.cell.config().scene.object.as_ref().map(|object| object.spec.clone());
+        Ok(spec.zip(self.cell.base_from_object()).map(|(spec, pose)| marked_grasp(&spec, &pose)))
+    }
+}
