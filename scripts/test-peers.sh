@@ -15,7 +15,7 @@ install() {
     "$environment/bin/pip" install --quiet --disable-pip-version-check "$@"
 }
 install panda panda-python==1.1.1
-install fr3 franka-sim==1.1.7 pylibfranka==0.21.3
+install fr3 franka-sim==1.1.7
 
 cargo=${CARGO:-cargo}
 $cargo build --release --locked --workspace --bins --example try_views
