@@ -1,28 +1,25 @@
 //! The robot at its table: one scene, its state, its cameras, and motion through time.
 
-use std::sync::Arc;
-
 use image::RgbImage;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use sdg_geometry::{PinholeCamera, PosedCamera};
-use sdg_kinematics::{HAND_TURN_RAD, IkOptions, Panda, ready_pose};
+use sdg_kinematics::{IkOptions, Panda, ready_pose};
 use sdg_robot::{HandCommand, PERIOD_SECS};
 
 use crate::attempt_errors::AttemptErrors;
-use crate::camera::{
-    CameraView, WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, posed_camera, vertical_field_of_view_rad,
-};
+use crate::camera::{CameraView, posed_camera};
 use crate::controller::{ArmController, ArmReference};
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
 use crate::extent::lowest_point_m;
 use crate::gripper::Gripper;
 use crate::lens::Frustum;
-use crate::model::{Body, Camera, Id, Joint, Model};
-use crate::panda::{PANDA_FILE, PandaIds, changed_panda_asset};
+use crate::model::{Body, Camera, Id, Joint};
+use crate::panda::PandaIds;
 use crate::record::{RecordConfig, Recorder};
 use crate::render::{RenderConfig, Renderer, Segmentation};
-use crate::scene::{SceneVariation, pose_attributes};
+use crate::scene::SceneVariation;
+use crate::workcell_model::{CAMERA_IN_BASE, CameraPlace, build_model};
 
 /// What a workcell is made of.
 #[derive(Debug, Clone)]
@@ -37,15 +34,6 @@ pub struct WorkcellConfig {
     pub wrist_camera: Option<PinholeCamera>,
     /// Where the camera is, if not in its usual place on the hand.
     pub camera_place: Option<CameraPlace>,
-}
-
-/// Where a workcell's camera is (optical frame), m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraPlace {
-    /// On the robot's flange.
-    OnFlange(Isometry3<f64>),
-    /// Beside the robot, in its base frame.
-    InBase(Isometry3<f64>),
 }
 
 impl WorkcellConfig {
@@ -374,39 +362,6 @@ impl Workcell {
         if touching.is_empty() { "the motors were too weak".into() } else { touching.join(", ") }
     }
 }
-
-/// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
-pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
-    let fragment = config.scene.fragment();
-    let fovy_deg = match &config.wrist_camera {
-        Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
-        None => None,
-    };
-    let (mut hand_from_camera, mut camera_in_base) = (None, String::new());
-    match config.camera_place {
-        None => {}
-        Some(CameraPlace::OnFlange(flange_from_camera)) => {
-            let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
-            hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
-        }
-        Some(CameraPlace::InBase(base_from_camera)) => {
-            let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
-            let fovy_deg = fovy_deg
-                .unwrap_or(vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees());
-            camera_in_base =
-                format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
-        }
-    }
-    let xml = include_str!("../assets/workcell.xml")
-        .replace("PANDA_FILE", PANDA_FILE)
-        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
-    let mut assets = fragment.files;
-    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));
-    Ok(Arc::new(Model::from_xml(&xml, &assets)?))
-}
-
-/// Name of a camera beside the robot.
-const CAMERA_IN_BASE: &str = "beside";
 
 fn is_arm(body: &str) -> bool {
     body.starts_with("link") || body == "hand" || body.ends_with("_finger")

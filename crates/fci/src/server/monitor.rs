@@ -43,7 +43,8 @@ impl RobotCore {
         if twist.fixed_rows::<3>(0).norm() > self.limits.translation.velocity + MEASURED_VELOCITY_MARGIN {
             errors.insert(RobotError::CartesianVelocityViolation);
         }
-        if *self_collision {
+        self.began_in_self_collision &= *self_collision;
+        if *self_collision && !self.began_in_self_collision {
             errors.insert(RobotError::SelfCollisionAvoidanceViolation);
         }
         if !errors.is_empty() {

@@ -50,6 +50,8 @@ pub struct RobotCore {
     pub(super) mode: RobotMode,
     pub(super) errors: RobotErrors,
     pub(super) reflex_reason: RobotErrors,
+    /// Whether the arm touched itself when the motion began, which then may lead it out.
+    pub(super) began_in_self_collision: bool,
     pub(super) time_ms: u64,
     pub(super) torque: JointVector,
     pub(super) torque_rate: JointVector,
@@ -85,6 +87,7 @@ impl RobotCore {
             mode: RobotMode::Idle,
             errors: RobotErrors::default(),
             reflex_reason: RobotErrors::default(),
+            began_in_self_collision: false,
             time_ms: 1,
             torque,
             torque_rate: JointVector::zeros(),
@@ -225,6 +228,7 @@ impl RobotCore {
         self.references.cartesian = CartesianReference::at_rest(pose, &q);
         self.motion = Some(Motion::new(command_id, request.controller, request.generator));
         self.reflex_reason = RobotErrors::default();
+        self.began_in_self_collision = self.observation.self_collision;
         self.mode = RobotMode::Move;
         Ok(())
     }

@@ -73,7 +73,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         Profile::of(pulse.into_iter().chain(back))
     };
     let torque_step = |rate: f64| Profile::of([rate * 1e-3, 0.0, -rate * 1e-3, 0.0].into_iter());
-    let spun = |peak: f64| Signal::SpunJoint { profile: Profile::velocity(-peak, 150) };
+    let spun = |peak: f64| Signal::SpunJoint { profile: Profile::velocity(-peak, 400) };
     vec![
         Case {
             name: "joint position",

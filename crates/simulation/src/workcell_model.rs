@@ -1,0 +1,56 @@
+//! The workcell's MJCF: the robot, the table, what stands on it, and the camera in its place.
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use sdg_kinematics::HAND_TURN_RAD;
+
+use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_field_of_view_rad};
+use crate::error::Result;
+use crate::lens::Frustum;
+use crate::model::Model;
+use crate::panda::{PANDA_FILE, changed_panda_asset};
+use crate::scene::pose_attributes;
+use crate::workcell::WorkcellConfig;
+
+/// Name of a camera beside the robot.
+pub(crate) const CAMERA_IN_BASE: &str = "beside";
+
+/// Where a workcell's camera is (optical frame), m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraPlace {
+    /// On the robot's flange.
+    OnFlange(Isometry3<f64>),
+    /// Beside the robot, in its base frame.
+    InBase(Isometry3<f64>),
+}
+
+/// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
+pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
+    let fragment = config.scene.fragment();
+    let fovy_deg = match &config.wrist_camera {
+        Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
+        None => None,
+    };
+    let (mut hand_from_camera, mut camera_in_base) = (None, String::new());
+    match config.camera_place {
+        None => {}
+        Some(CameraPlace::OnFlange(flange_from_camera)) => {
+            let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
+            hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
+        }
+        Some(CameraPlace::InBase(base_from_camera)) => {
+            let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
+            let fovy_deg = fovy_deg
+                .unwrap_or(vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees());
+            camera_in_base =
+                format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
+        }
+    }
+    let xml = include_str!("../assets/workcell.xml")
+        .replace("PANDA_FILE", PANDA_FILE)
+        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
+    let mut assets = fragment.files;
+    assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));
+    Ok(Arc::new(Model::from_xml(&xml, &assets)?))
+}
