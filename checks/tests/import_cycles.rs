@@ -15,9 +15,9 @@ const EXCEPTIONS: [(&str, &str, &str); 10] = [
     ("crates/orientation", "training/augmented.rs", "the crops to learn from take their size from the configuration"),
     ("crates/shape", "consensus.rs", "refinement and consensus of several starts call each other"),
     ("crates/robot", "arm.rs", "an arm's errors, limits and watch name each other's types; to be undone"),
-    ("crates/robot", "franka/mod.rs", "the hand's thread reads the arm's settings; to be undone"),
-    ("crates/robot", "workcell/mod.rs", "the workcell's file makes the workcell; to be undone"),
-    ("crates/cli", "commands/robot/mod.rs", "the verbs of a robot share their arguments; to be undone"),
+    ("crates/robot", "franka/hand_worker.rs", "the hand's thread reads the arm's settings; to be undone"),
+    ("crates/robot", "workcell/file.rs", "the workcell's file makes the workcell; to be undone"),
+    ("crates/cli", "commands/robot/hand.rs", "the verbs of a robot share their arguments; to be undone"),
     ("crates/fci", "error.rs", "the error names the robot's errors, which are read from bytes; to be undone"),
 ];
 
