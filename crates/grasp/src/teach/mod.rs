@@ -27,9 +27,10 @@ use std::time::{Duration, Instant};
 
 use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
+use sdg_detection::config::Freeze;
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
 use sdg_geometry::{GraspLine, RotationalSymmetry};
-use sdg_training::{History, SampleSource, Trained, TrainingError, train};
+use sdg_training::{History, SampleSource, Trained, TrainingConfig, TrainingError, train};
 
 use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
@@ -65,6 +66,10 @@ pub struct TeachOptions {
     pub time_budget: Option<Duration>,
     /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
     pub steps: Option<usize>,
+    /// Another training than the preset's; for tests and trials.
+    pub training: Option<TrainingConfig>,
+    /// Other stages of the backbone that are not trained than the preset's; for tests and trials.
+    pub freeze: Option<Freeze>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
     /// Sizes over the usual one at which the part is looked for.
@@ -86,6 +91,8 @@ impl TeachOptions {
             seed,
             time_budget: None,
             steps: None,
+            training: None,
+            freeze: None,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
@@ -99,13 +106,20 @@ impl TeachOptions {
         models::rcnn_kind(self.kind).map(|rcnn| self.preset.network(rcnn, true))
     }
 
+    /// The detector while it is taught, which may have more heads than the model: what base weights of ours are read for.
+    pub fn taught_network(&self) -> Option<RcnnConfig> {
+        models::rcnn_kind(self.kind).map(|rcnn| self.preset.plan(rcnn, self).network)
+    }
+
     /// The detector as teaching starts. Heads that the model itself has not start from nothing.
     fn initial_detector(&self, config: &RcnnConfig) -> Result<GeneralizedRcnn> {
         let device = self.device.clone().autodiff();
         let detector = config.init(&device, self.seed)?;
         match &self.base_weights {
             Some(base_weights) => {
-                let own = base_weights.apply(own_config(self.kind, config).init(&device, self.seed)?)?;
+                // Weights of ours have every head that is taught, imported ones those of the model alone.
+                let start = if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
+                let own = base_weights.apply(start.init(&device, self.seed)?)?;
                 Ok(state_dict::import(detector, &state_dict::export(&own)).0)
             }
             None if self.preset.needs_base_weights() => {

@@ -118,10 +118,11 @@ impl Preset {
     /// How a model with a network is taught.
     pub(super) fn plan(self, rcnn: RcnnKind, options: &TeachOptions) -> Plan {
         let &TeachOptions { kind, seed, symmetry, .. } = options;
-        let network = self.network(rcnn, options.base_weights.is_some());
+        let mut network = self.network(rcnn, options.base_weights.is_some());
+        network.backbone.freeze = options.freeze.unwrap_or(network.backbone.freeze);
         Plan {
             network: if self == Self::Edge { with_keypoints(network) } else { network },
-            training: self.training(kind, seed),
+            training: options.training.clone().unwrap_or_else(|| self.training(kind, seed)),
             samples: self.samples(),
             distinct_samples: (self == Self::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match self {
