@@ -69,7 +69,8 @@ impl Checkpoint {
         };
         let settings = serde_json::from_str(entry("settings")?).with_context(named)?;
         let step = entry("step")?.parse().with_context(named)?;
-        let mut optimizer = AdamWState { step: entry("optimizer_step")?.parse().with_context(named)?, ..Default::default() };
+        let mut optimizer =
+            AdamWState { step: entry("optimizer_step")?.parse().with_context(named)?, ..Default::default() };
         let mut parameters = StateDict::new();
         for (name, view) in SafeTensors::deserialize(&bytes).with_context(named)?.iter() {
             let values = view.data().as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();

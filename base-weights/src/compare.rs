@@ -54,7 +54,7 @@ pub struct Outcome {
     /// Pictures with the part in which the surest detection, accepted or not, is right.
     pub placed: usize,
     /// Median error of what is right, in pixels of the photo.
-    pub error_px: f64,
+    pub error_px: Option<f64>,
     /// Processor time of teaching, seconds.
     pub cpu_secs: f64,
     /// Steps done: an early stop makes them fewer.
@@ -99,7 +99,8 @@ impl Trial {
     pub fn new(part_seed: u64) -> Result<Self> {
         let seed = part_seed % FIRST_PART_SEED;
         let part = Part::generate(seed);
-        let scenes = |config: SceneConfig, purpose: u64| Scenes::new(std::slice::from_ref(&part), config, seed * 10 + purpose);
+        let scenes =
+            |config: SceneConfig, purpose: u64| Scenes::new(std::slice::from_ref(&part), config, seed * 10 + purpose);
         let with = scenes(SceneConfig { absent_share: 0.0, ..scene_config() }, 1)?;
         let absent = SceneConfig { absent_share: 1.0, others: [1, 5], ..scene_config() };
         let without = scenes(absent.clone(), 2)?;
@@ -107,7 +108,8 @@ impl Trial {
         let draw = |scenes: &Scenes, count| (0..count as u64).map(|i| scenes.sample(i)).collect();
         // The part itself in another size is the part nearer to the camera: nobody can tell.
         let is_another = |sample: &Sample| {
-            let other = |kind: &OtherKind| matches!(kind, OtherKind::LookAlike(LookAlike::Mirrored | LookAlike::FeatureMoved));
+            let other =
+                |kind: &OtherKind| matches!(kind, OtherKind::LookAlike(LookAlike::Mirrored | LookAlike::FeatureMoved));
             !sample.others.is_empty() && sample.others.iter().all(|object| other(&object.kind))
         };
         let alike = (0..20 * PICTURES[2] as u64).map(|i| look_alikes.sample(i)).filter(is_another).take(PICTURES[2]);
@@ -141,7 +143,7 @@ impl Trial {
             look_alikes: self.look_alikes.len(),
             look_alike_alarms: 0,
             placed: 0,
-            error_px: f64::NAN,
+            error_px: None,
             cpu_secs: (cpu_secs * 10.0).round() / 10.0,
             steps_done: 0,
             failed: None,
@@ -171,11 +173,14 @@ impl Trial {
             }
         }
         let alarms = |samples: &[Sample]| -> Result<usize> {
-            samples.iter().map(|sample| Ok(usize::from(self.best(&model, sample)?.is_some_and(|(accepted, _)| accepted)))).sum()
+            samples
+                .iter()
+                .map(|sample| Ok(usize::from(self.best(&model, sample)?.is_some_and(|(accepted, _)| accepted))))
+                .sum()
         };
         outcome.alarms = alarms(&self.without)?;
         outcome.look_alike_alarms = alarms(&self.look_alikes)?;
-        outcome.error_px = sdg_training::median(&mut errors).map_or(f64::NAN, |error| (error * 100.0).round() / 100.0);
+        outcome.error_px = sdg_training::median(&mut errors).map(|error| (error * 100.0).round() / 100.0);
         Ok(outcome)
     }
 
@@ -251,7 +256,8 @@ impl Comparison<'_> {
             }
         }
         let is_done = |part: u64, steps: usize| {
-            let same = |o: &&Outcome| (o.weights.as_str(), o.part, o.steps, o.seed) == (self.name, part, steps, self.seed);
+            let same =
+                |o: &&Outcome| (o.weights.as_str(), o.part, o.steps, o.seed) == (self.name, part, steps, self.seed);
             done.iter().any(|outcome| same(&outcome))
         };
         let mut out = OpenOptions::new().create(true).append(true).open(self.out).with_context(named)?;

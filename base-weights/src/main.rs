@@ -86,6 +86,9 @@ enum Command {
         /// Stages of the backbone that are not trained: Nothing, Stem, ThroughRes2 or ThroughRes3.
         #[arg(long)]
         freeze: Option<String>,
+        /// Generated parts that lie about while a part is taught.
+        #[arg(long, default_value_t = 0)]
+        other_parts: usize,
     },
 }
 
@@ -100,17 +103,26 @@ fn main() -> Result<()> {
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
         }
-        Command::Compare { weights, name, first, parts, steps, seed, out, training, freeze } => {
+        Command::Compare { weights, name, first, parts, steps, seed, out, training, freeze, other_parts } => {
             let weights = weights.map(|path| read_weights(&path)).transpose()?;
             let training: Option<serde_json::Value> =
                 training.map(|text| serde_json::from_str(&text)).transpose().context("--training")?;
-            let freeze = freeze.map(|name| serde_json::from_value(serde_json::json!(name))).transpose().context("--freeze")?;
+            let freeze =
+                freeze.map(|name| serde_json::from_value(serde_json::json!(name))).transpose().context("--freeze")?;
             let adapt = |options: &mut TeachOptions, _steps: usize| {
                 options.freeze = freeze;
+                options.num_other_parts = other_parts;
                 options.training = training.as_ref().map(|changes| changed(TrainingConfig::edge(seed), changes));
             };
-            let comparison =
-                Comparison { name: &name, weights, parts: first..first + parts, steps: &steps, seed, out: &out, adapt: &adapt };
+            let comparison = Comparison {
+                name: &name,
+                weights,
+                parts: first..first + parts,
+                steps: &steps,
+                seed,
+                out: &out,
+                adapt: &adapt,
+            };
             comparison.run(&mut |outcome: &Outcome| println!("{}", serde_json::json!(outcome)))
         }
     }
@@ -164,7 +176,11 @@ fn read_weights(path: &Path) -> Result<BaseWeights> {
     let named = || path.display().to_string();
     let bytes = std::fs::read(path).with_context(named)?;
     let network = TeachOptions::new(1).taught_network().context("model C has a network")?;
-    Ok(BaseWeightsFile::from_bytes(&bytes).with_context(named)?.for_network(Preset::Edge.name(), &network, sha256(&bytes))?)
+    Ok(BaseWeightsFile::from_bytes(&bytes).with_context(named)?.for_network(
+        Preset::Edge.name(),
+        &network,
+        sha256(&bytes),
+    )?)
 }
 
 fn sha256(bytes: &[u8]) -> String {

@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! images [N, 3, H, W] ─ backbone, FPN ─ RPN: is there any part ─ ROIs ─┬─ box head: which of the K parts, one box
-//!                                                                      ├─ keypoint convolutions ─ maps of that part
+//!                                                                      ├─ keypoint head: maps of any part + of that part
 //!                                                                      └─ mask head: what the part covers
 //! ```
 //!
 //! Shapes: N images, R ROIs, K parts, S side of a heatmap. Only the last layers know one part from another: the K + 1 class
-//! scores and a transposed convolution for each part's keypoints. All else is what teaching starts from.
+//! scores, and for each part's keypoints a transposed convolution that is added to the one for all parts. All else is what
+//! teaching starts from.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -16,7 +17,7 @@ use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::NUM_KEYPOINTS;
 use sdg_detection::config::{BoxDeltas, RcnnConfig};
 use sdg_detection::image_transform::pad_batch;
-use sdg_detection::initialization::Initializer;
+use sdg_detection::initialization::{Distribution, Initializer};
 use sdg_detection::layers::{ConvTranspose2x, upsample_bilinear_2x};
 use sdg_detection::presets::{RcnnKind, edge_of};
 use sdg_detection::roi_heads::box_head::RoiClass;
@@ -45,9 +46,9 @@ pub fn pretrain_config(num_parts: usize) -> RcnnConfig {
 /// The network that is pretrained.
 #[derive(Module, Debug)]
 pub struct PretrainNetwork {
-    /// Trunk and heads. The keypoint head's own last layer is not used.
+    /// Trunk and heads.
     pub detector: GeneralizedRcnn,
-    /// The last layer of the keypoint head for each part.
+    /// What each part adds to the last layer of the keypoint head.
     pub keypoint_maps: Vec<ConvTranspose2x>,
 }
 
@@ -60,8 +61,14 @@ impl PretrainNetwork {
         let detector = config.init(device, seed)?;
         let mut init = Initializer::new(device, seed ^ 0x6b65_7970_6f69_6e74);
         let channels = config.roi_heads.keypoint_head.as_ref().and_then(|head| head.conv_channels.last().copied());
-        let maps = |channels| ConvTranspose2x::init(channels, NUM_KEYPOINTS, 4, &mut init);
-        let keypoint_maps = std::iter::repeat_n(channels.unwrap_or(1), config.roi_heads.num_classes).map(maps).collect();
+        // Zero: every part starts from what holds for all of them.
+        let mut zeros = |channels| {
+            let (weight, bias) = ([channels, NUM_KEYPOINTS, 4, 4], [NUM_KEYPOINTS]);
+            let zero = Distribution::Constant(0.0);
+            ConvTranspose2x { weight: init.param(weight, zero), bias: init.param(bias, zero) }
+        };
+        let keypoint_maps =
+            std::iter::repeat_n(channels.unwrap_or(1), config.roi_heads.num_classes).map(&mut zeros).collect();
         Ok(Self { detector, keypoint_maps })
     }
 
@@ -120,13 +127,15 @@ impl PretrainNetwork {
         let boxes: Vec<Roi> = with_cells.iter().map(|(chosen, _)| chosen.roi).collect();
         let pooled = pool(features, &boxes, &config.pooler);
         let hidden = head.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
+        let of_any_part = head.score_lowres.forward(hidden.clone());
         let mut sum = zero();
         let mut start = 0;
         // The ROIs of a part stand side by side.
         for of_part in with_cells.chunk_by(|(a, _), (b, _)| a.part_idx == b.part_idx) {
-            let rows = hidden.clone().narrow(0, start, of_part.len());
+            let rows = |maps: &Tensor<4>| maps.clone().narrow(0, start, of_part.len());
+            let own = self.keypoint_maps[of_part[0].0.part_idx].forward(rows(&hidden));
+            let logits = upsample_bilinear_2x(rows(&of_any_part) + own);
             start += of_part.len();
-            let logits = upsample_bilinear_2x(self.keypoint_maps[of_part[0].0.part_idx].forward(rows));
             let [r, k, _, _] = logits.dims();
             let cells: Vec<Option<usize>> = of_part.iter().flat_map(|(_, cells)| cells.iter().copied()).collect();
             sum = sum + losses::cross_entropy(logits.reshape([r * k, size * size]), &cells);

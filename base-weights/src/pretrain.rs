@@ -139,7 +139,7 @@ pub fn export(checkpoint: &Checkpoint, commit: &str) -> Result<BaseWeightsFile> 
     let mut one_part = pretrain_config(1);
     one_part.roi_heads.box_head.box_deltas = sdg_detection::config::BoxDeltas::ClassSpecific;
     let wanted = state_dict::export(&one_part.init_blank(&Device::flex())?);
-    let anew = |name: &str| name.contains("box_predictor.cls_score.") || name.contains("keypoint_head.score_lowres.");
+    let anew = |name: &str| name.contains("box_predictor.cls_score.");
     let mut parameters = BTreeMap::new();
     let mut reinitialized = BTreeSet::new();
     for (name, blank) in wanted {
@@ -148,7 +148,8 @@ pub fn export(checkpoint: &Checkpoint, commit: &str) -> Result<BaseWeightsFile> 
             continue;
         }
         let key = format!("detector.{name}");
-        let mut found = checkpoint.parameters.get(&key).with_context(|| format!("expected {key} in the checkpoint"))?.clone();
+        let mut found =
+            checkpoint.parameters.get(&key).with_context(|| format!("expected {key} in the checkpoint"))?.clone();
         if name.starts_with("roi_heads.mask_head.predictor.") {
             // The map that served for every part is the first.
             found.values.truncate(blank.values.len());

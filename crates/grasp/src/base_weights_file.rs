@@ -100,7 +100,12 @@ impl BaseWeightsFile {
         let own = |name: &&String| names.contains_key(*name);
         Ok(BaseWeights {
             sha256,
-            parameters: self.parameters.iter().filter(|(name, _)| own(name)).map(|(n, v)| (n.clone(), v.clone())).collect(),
+            parameters: self
+                .parameters
+                .iter()
+                .filter(|(name, _)| own(name))
+                .map(|(n, v)| (n.clone(), v.clone()))
+                .collect(),
             reinitialized: self.reinitialized.iter().filter(own).cloned().collect(),
         })
     }

@@ -50,6 +50,6 @@ pub use grasp::PartGrasp;
 pub use look_alike::LookAlike;
 pub use part::{Part, PartKind};
 pub use scene::{
-    Condition, Conditions, DemonstrationPhoto, Instance, MixedInstance, MixedSample, OtherKind, OtherObject, PhotoConfig, Sample, SceneConfig,
-    Scenes, demonstration,
+    Condition, Conditions, DemonstrationPhoto, Instance, MixedInstance, MixedSample, OtherKind, OtherObject,
+    PhotoConfig, Sample, SceneConfig, Scenes, demonstration,
 };

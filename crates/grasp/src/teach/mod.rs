@@ -14,6 +14,7 @@ mod device_parity;
 mod event;
 mod held_back;
 mod orientation;
+mod other_parts;
 mod paper;
 mod plan;
 mod r50;
@@ -70,6 +71,8 @@ pub struct TeachOptions {
     pub training: Option<TrainingConfig>,
     /// Other stages of the backbone that are not trained than the preset's; for tests and trials.
     pub freeze: Option<Freeze>,
+    /// Generated parts that lie about while the part is taught, beside it and in its place.
+    pub num_other_parts: usize,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
     /// Sizes over the usual one at which the part is looked for.
@@ -93,6 +96,7 @@ impl TeachOptions {
             steps: None,
             training: None,
             freeze: None,
+            num_other_parts: 0,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
@@ -118,7 +122,8 @@ impl TeachOptions {
         match &self.base_weights {
             Some(base_weights) => {
                 // Weights of ours have every head that is taught, imported ones those of the model alone.
-                let start = if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
+                let start =
+                    if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
                 let own = base_weights.apply(start.init(&device, self.seed)?)?;
                 Ok(state_dict::import(detector, &state_dict::export(&own)).0)
             }
@@ -281,6 +286,9 @@ pub(crate) fn teach_network(
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
     let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
+    let [to_learn, to_hold_back] = other_parts::draw(options.num_other_parts, options.seed);
+    let augmenter = augmenter.with_other_parts(&to_learn)?;
+    let held_back = held_back.with_other_parts(&to_hold_back)?;
     let turns = HiddenTurns::new(demonstrations, options.symmetry);
     let num_held_back = plan.training.validation.samples as u64;
     let held_back: Vec<Sample> = (0..num_held_back).map(|i| turns.canonical(held_back.held_out(i))).collect();
