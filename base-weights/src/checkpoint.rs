@@ -9,23 +9,23 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::state_dict::{StateDict, WeightTensor};
 use sdg_training::AdamWState;
-
-use crate::pretrain::Settings;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 /// A run after some steps.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checkpoint {
+pub struct Checkpoint<S> {
     /// What the run was started with.
-    pub settings: Settings,
+    pub settings: S,
     /// Steps done.
     pub step: usize,
     /// The network's parameters.
     pub parameters: StateDict,
-    /// What the optimiser remembers.
+    /// What the optimiser remembers between steps; nothing where every episode has its own.
     pub optimizer: AdamWState,
 }
 
-impl Checkpoint {
+impl<S: Serialize + DeserializeOwned> Checkpoint<S> {
     /// Writes the file whole: under a temporary name, synced, renamed.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Checkpoint {
     /// Reads a file.
     ///
     /// # Errors
-    /// A file that cannot be read or is no checkpoint of a pretraining.
+    /// A file that cannot be read or is no checkpoint with such settings.
     pub fn read(path: &Path) -> Result<Self> {
         let named = || path.display().to_string();
         let bytes = std::fs::read(path).with_context(named)?;

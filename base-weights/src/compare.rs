@@ -10,6 +10,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use image::RgbImage;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity};
 use sdg_grasp::{BaseWeights, GraspError, GraspModel, ModelKind, TeachOptions, Verification, teach};
@@ -120,6 +121,15 @@ impl Trial {
             look_alikes: alike.collect(),
             part,
         })
+    }
+
+    /// The photo and the pictures, each with a name; to look at.
+    pub fn pictures(&self) -> Vec<(String, &RgbImage)> {
+        let kinds = [("with", &self.with), ("without", &self.without), ("look-alikes", &self.look_alikes)];
+        let of_kind = kinds.into_iter().flat_map(|(kind, samples)| {
+            samples.iter().enumerate().map(move |(i, sample)| (format!("{kind}-{i}"), &sample.image))
+        });
+        std::iter::once(("photo".to_owned(), &self.demonstration.image)).chain(of_kind).collect()
     }
 
     /// Teaches the part and shows the model its pictures.

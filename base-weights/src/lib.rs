@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! seed ─ Pictures ─ PretrainNetwork: losses ─ AdamW on one cycle ─ checkpoint ─ export ─ BaseWeightsFile (f16)
-//!                                                                                            │
+//!                                                          Episodes: part after part ─────────┤
 //! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps ────────────────────────────┘
 //!                                 └ recall and false alarms of the network alone (`compare`)
 //! ```
@@ -14,6 +14,7 @@
 
 pub mod checkpoint;
 pub mod compare;
+pub mod episodes;
 pub mod network;
 pub mod pictures;
 pub mod pretrain;

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
 use sdg_base_weights::compare::{Comparison, Outcome};
+use sdg_base_weights::episodes::{EpisodeSettings, Episodes};
 use sdg_base_weights::pretrain::{Settings, export, start_or_resume};
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, Preset, TeachOptions};
 use sdg_training::TrainingConfig;
@@ -37,6 +38,30 @@ enum Command {
         steps: usize,
         /// Steps between checkpoints.
         #[arg(long, default_value_t = 200)]
+        every: usize,
+        /// Ends after so many minutes; the next call goes on.
+        #[arg(long)]
+        minutes: Option<f64>,
+        /// flex, or a device that this build has.
+        #[arg(long, default_value = "flex")]
+        device: String,
+    },
+    /// Teaches part after part for a few steps and moves towards what comes of it, or goes on where a run was stopped.
+    Episodes {
+        /// Where the run keeps what it goes on from.
+        #[arg(long)]
+        checkpoint: PathBuf,
+        /// Base weights to start from; none for nothing.
+        #[arg(long)]
+        start: Option<PathBuf>,
+        /// Decides parts, pictures and every random choice.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Episodes of the whole run.
+        #[arg(long, default_value_t = 500)]
+        episodes: usize,
+        /// Episodes between checkpoints.
+        #[arg(long, default_value_t = 20)]
         every: usize,
         /// Ends after so many minutes; the next call goes on.
         #[arg(long)]
@@ -97,8 +122,12 @@ fn main() -> Result<()> {
         Command::Pretrain { checkpoint, seed, parts, steps, every, minutes, device } => {
             pretrain(&checkpoint, Settings::new(seed, parts, steps), every, minutes, &device)
         }
+        Command::Episodes { checkpoint, start, seed, episodes, every, minutes, device } => {
+            let settings = EpisodeSettings::new(seed, episodes);
+            episodes_of(&checkpoint, start.as_deref(), settings, every, minutes, &device)
+        }
         Command::Export { checkpoint, out, commit } => {
-            let bytes = export(&Checkpoint::read(&checkpoint)?, &commit)?.to_bytes();
+            let bytes = exported(&checkpoint, &commit)?.to_bytes();
             write_whole(&out, &bytes)?;
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
@@ -159,6 +188,61 @@ fn pretrain(checkpoint: &Path, settings: Settings, every: usize, minutes: Option
         }
     }
     Ok(())
+}
+
+fn episodes_of(
+    checkpoint: &Path,
+    start_file: Option<&Path>,
+    mut settings: EpisodeSettings,
+    every: usize,
+    minutes: Option<f64>,
+    device: &str,
+) -> Result<()> {
+    let device = device.parse::<ComputeBackend>()?.open()?;
+    let start = Instant::now();
+    let start_weights =
+        start_file.map(|path| std::fs::read(path).with_context(|| path.display().to_string())).transpose()?;
+    settings.start_sha256 = start_weights.as_ref().map(|bytes| sha256(bytes));
+    let mut run = if checkpoint.exists() {
+        let read = Checkpoint::<EpisodeSettings>::read(checkpoint)?;
+        if read.settings != settings {
+            bail!("{}: expected a run of {settings:?}, found one of {:?}", checkpoint.display(), read.settings);
+        }
+        Episodes::start(settings, &read.parameters, read.step, &device)?
+    } else {
+        let weights = start_weights.map(|bytes| BaseWeightsFile::from_bytes(&bytes)).transpose()?;
+        Episodes::start(settings, &weights.map(|file| file.parameters).unwrap_or_default(), 0, &device)?
+    };
+    println!("at episode {}, {:.1} s to prepare", run.episode(), start.elapsed().as_secs_f64());
+    let mut losses = Vec::new();
+    while !run.is_over() {
+        losses.push(run.advance()?);
+        let is_out_of_time = minutes.is_some_and(|minutes| start.elapsed().as_secs_f64() > 60.0 * minutes);
+        if run.episode().is_multiple_of(every) || is_out_of_time || run.is_over() {
+            let mean = losses.drain(..).collect::<Vec<_>>();
+            let mean = mean.iter().sum::<f64>() / mean.len() as f64;
+            println!(
+                "episode {:5} {:7.1} s  loss after teaching {mean:.3}",
+                run.episode(),
+                start.elapsed().as_secs_f64()
+            );
+            run.checkpoint().write(checkpoint)?;
+        }
+        if is_out_of_time {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// What teaching starts from, of a checkpoint of either method.
+fn exported(path: &Path, commit: &str) -> Result<BaseWeightsFile> {
+    if let Ok(checkpoint) = Checkpoint::<Settings>::read(path) {
+        return export(&checkpoint, commit);
+    }
+    let checkpoint = Checkpoint::<EpisodeSettings>::read(path)?;
+    let device = ComputeBackend::default().open()?;
+    Ok(Episodes::start(checkpoint.settings, &checkpoint.parameters, checkpoint.step, &device)?.export(commit))
 }
 
 /// A training with some values other than the preset's.

@@ -33,13 +33,19 @@ const MAX_ROIS_PER_IMAGE: usize = 5;
 
 /// The detector that is pretrained: preset `edge` with every head, for so many parts.
 pub fn pretrain_config(num_parts: usize) -> RcnnConfig {
-    let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
-    config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
+    let mut config = one_part_config();
     config.roi_heads.num_classes = num_parts;
     // One box for all parts has the shape of the box of one part, which teaching goes on with.
     config.roi_heads.box_head.box_deltas = BoxDeltas::ClassAgnostic;
     // Pictures show several parts: half of the ROIs may lie on one.
     config.roi_heads.sampler.positive_fraction = 0.5;
+    config
+}
+
+/// The network that teaching has, with every head.
+pub fn one_part_config() -> RcnnConfig {
+    let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
+    config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
     config
 }
 

@@ -78,7 +78,7 @@ impl Pictures {
 }
 
 /// The parts of a seed, each as often as any other.
-fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
+pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
     let first = FIRST_PART_SEED.wrapping_add(seed.wrapping_mul(1_000_000));
     let mut parts: Vec<Part> = Vec::with_capacity(num_parts);
     for i in 0..num_parts {

@@ -15,7 +15,7 @@ use sdg_training::{AdamW, LossValues, OneCycle};
 use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
-use crate::network::{PretrainNetwork, pretrain_config};
+use crate::network::{PretrainNetwork, one_part_config, pretrain_config};
 use crate::pictures::Pictures;
 
 /// Decoupled weight decay and the norm that each parameter's gradient is cut to, as teaching has them.
@@ -68,7 +68,7 @@ impl Run {
     ///
     /// # Errors
     /// A checkpoint of another network.
-    pub fn resume(checkpoint: &Checkpoint, config: &RcnnConfig, device: &Device) -> Result<Self> {
+    pub fn resume(checkpoint: &Checkpoint<Settings>, config: &RcnnConfig, device: &Device) -> Result<Self> {
         let fresh = Self::start(checkpoint.settings.clone(), config, device)?;
         let (network, report) = state_dict::import(fresh.network, &checkpoint.parameters);
         if !report.is_complete() {
@@ -94,7 +94,7 @@ impl Run {
     }
 
     /// What a later run goes on from.
-    pub fn checkpoint(&self) -> Checkpoint {
+    pub fn checkpoint(&self) -> Checkpoint<Settings> {
         Checkpoint {
             settings: self.settings.clone(),
             step: self.step,
@@ -134,11 +134,8 @@ impl Run {
 ///
 /// # Errors
 /// A checkpoint without the heads of the preset.
-pub fn export(checkpoint: &Checkpoint, commit: &str) -> Result<BaseWeightsFile> {
-    // The preset's own network for one part, with all heads.
-    let mut one_part = pretrain_config(1);
-    one_part.roi_heads.box_head.box_deltas = sdg_detection::config::BoxDeltas::ClassSpecific;
-    let wanted = state_dict::export(&one_part.init_blank(&Device::flex())?);
+pub fn export(checkpoint: &Checkpoint<Settings>, commit: &str) -> Result<BaseWeightsFile> {
+    let wanted = state_dict::export(&one_part_config().init_blank(&Device::flex())?);
     let anew = |name: &str| name.contains("box_predictor.cls_score.");
     let mut parameters = BTreeMap::new();
     let mut reinitialized = BTreeSet::new();
@@ -181,7 +178,7 @@ pub fn start_or_resume(path: &Path, settings: Settings, device: &Device) -> Resu
     if !path.exists() {
         return Run::start(settings, &config, device);
     }
-    let checkpoint = Checkpoint::read(path)?;
+    let checkpoint = Checkpoint::<Settings>::read(path)?;
     if checkpoint.settings != settings {
         bail!("{}: expected a run of {settings:?}, found one of {:?}", path.display(), checkpoint.settings);
     }

@@ -46,7 +46,7 @@ fn fifty_steps_are_the_same_bits_whether_stopped_or_not() {
     let mut stopped = advance(&mut first, 17);
     first.checkpoint().write(&file).unwrap();
     drop(first);
-    let mut second = Run::resume(&Checkpoint::read(&file).unwrap(), &config, &device).unwrap();
+    let mut second = Run::resume(&Checkpoint::<Settings>::read(&file).unwrap(), &config, &device).unwrap();
     assert_eq!(second.step(), 17);
     stopped.extend(advance(&mut second, STEPS - 17));
 
