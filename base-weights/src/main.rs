@@ -108,7 +108,7 @@ enum Command {
         /// A training other than the preset's, as JSON.
         #[arg(long)]
         training: Option<String>,
-        /// Stages of the backbone that are not trained: Nothing, Stem, ThroughRes2 or ThroughRes3.
+        /// Stages of the backbone that are not trained: Nothing, Stem, ThroughRes2, ThroughRes3 or FirstStage.
         #[arg(long)]
         freeze: Option<String>,
         /// Generated parts that lie about while a part is taught.

@@ -181,7 +181,8 @@ pub struct TeachArgs {
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
-    /// Weights to start from: any file that `sdg weights convert` reads or writes, or a grasp model
+    /// Weights to start from: base weights of `make base-weights`, any file that `sdg weights convert` reads or writes, a
+    /// grasp model, or none
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
     /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several

@@ -156,6 +156,8 @@ pub enum Freeze {
     ThroughRes2,
     /// The stem, res2 and res3 are frozen.
     ThroughRes3,
+    /// The residual network, the pyramid and the region proposal network are frozen: the second stage alone is trained.
+    FirstStage,
 }
 
 /// A residual network with four stages, res2 to res5, at strides 4, 8, 16, 32.

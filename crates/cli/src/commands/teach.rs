@@ -22,6 +22,9 @@ use crate::interrupt::Interrupt;
 use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
 
+/// What `--base-weights` says for a start from nothing.
+const NO_BASE_WEIGHTS: &str = "none";
+
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = TeachOptions {
@@ -140,7 +143,9 @@ fn command(args: &TeachArgs) -> String {
 /// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
 fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Report>> {
-    let Some(path) = &args.base_weights else { return Ok(None) };
+    let Some(path) = args.base_weights.as_ref().filter(|path| path.as_os_str() != NO_BASE_WEIGHTS) else {
+        return Ok(None);
+    };
     let Some(network) = options.network() else {
         return Err(Usage(format!(
             "--base-weights: model {} has no network that could start from weights",
@@ -148,6 +153,10 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         ))
         .into());
     };
+    if let Some(own) = base_weights::read_own(path, options, &args.reinitialized)? {
+        options.base_weights = Some(own);
+        return Ok(None);
+    }
     let mut told = None;
     let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
         if !args.json {
