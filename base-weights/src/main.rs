@@ -31,10 +31,10 @@ enum Command {
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Parts that are told apart.
-        #[arg(long, default_value_t = 256)]
+        #[arg(long, default_value_t = 128)]
         parts: usize,
         /// Steps of the whole run.
-        #[arg(long, default_value_t = 5000)]
+        #[arg(long, default_value_t = 4000)]
         steps: usize,
         /// Steps between checkpoints.
         #[arg(long, default_value_t = 200)]

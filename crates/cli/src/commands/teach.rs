@@ -9,7 +9,7 @@ use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::args::TeachArgs;
 use crate::base_weights;
@@ -142,7 +142,7 @@ fn command(args: &TeachArgs) -> String {
 
 /// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
-fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Report>> {
+fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = args.base_weights.as_ref().filter(|path| path.as_os_str() != NO_BASE_WEIGHTS) else {
         return Ok(None);
     };
@@ -153,9 +153,13 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         ))
         .into());
     };
-    if let Some(own) = base_weights::read_own(path, options, &args.reinitialized)? {
+    if let Some((own, origin)) = base_weights::read_own(path, options, &args.reinitialized)? {
         options.base_weights = Some(own);
-        return Ok(None);
+        if !args.json {
+            let made: Vec<String> = origin.iter().map(|(name, value)| format!("{name} {value}")).collect();
+            println!("base weights {}: {}", path.display(), made.join(", "));
+        }
+        return Ok(Some(json!(origin)));
     }
     let mut told = None;
     let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
@@ -168,7 +172,7 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         Ok(())
     })?;
     options.base_weights = Some(base_weights);
-    Ok(told)
+    Ok(told.map(|report: Report| json!(report)))
 }
 
 /// What the network has learnt, for people; nothing for a model without.

@@ -318,7 +318,8 @@ pub(crate) fn teach_network(
     // The samples show the part at other sizes than those that may be looked for later.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
-    let calibrated = held_back.calibrate(&network, &of_any_size)?;
+    let other_parts = other_parts::highest_scores(demonstrations, &to_hold_back, &network, options.seed)?;
+    let calibrated = held_back.calibrate(&network, &of_any_size, &other_parts)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.least_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
