@@ -4,7 +4,7 @@
 //! its mirror image or itself with one feature moved. The network alone answers.
 
 use std::fs::OpenOptions;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -13,10 +13,10 @@ use anyhow::{Context, Result};
 use image::RgbImage;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity};
-use sdg_grasp::{BaseWeights, GraspError, GraspModel, ModelKind, TeachOptions, Verification, teach};
+use sdg_grasp::{BaseWeights, FineTuning, GraspError, GraspModel, ModelKind, TeachOptions, Verification, teach};
 use sdg_part_generator::{LookAlike, OtherKind, Part, PhotoConfig, Sample, SceneConfig, Scenes};
-use serde::{Deserialize, Serialize};
 
+use crate::outcome::{Outcome, outcomes};
 use crate::pictures::FIRST_PART_SEED;
 
 /// A detection farther from the truth is another thing: 10 mm at the paper's camera, which has 0.92 px a millimetre in
@@ -26,44 +26,6 @@ const MAX_ERROR_DEGREES: f64 = 10.0;
 
 /// Pictures of each kind a part.
 const PICTURES: [usize; 3] = [10, 10, 5];
-
-/// What becomes of one teaching.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
-    /// The name of the weights.
-    pub weights: String,
-    /// Seed of the part.
-    pub part: u64,
-    /// Steps of teaching.
-    pub steps: usize,
-    /// Seed of teaching.
-    pub seed: u64,
-    /// Pictures with the part, and those in which the surest accepted detection is right, and in which it is wrong.
-    pub with: usize,
-    /// Right.
-    pub found: usize,
-    /// Accepted at a wrong place.
-    pub wrong: usize,
-    /// Pictures with other parts alone, and those with an accepted detection.
-    pub without: usize,
-    /// False alarms.
-    pub alarms: usize,
-    /// Pictures with look-alikes alone, and those with an accepted detection.
-    pub look_alikes: usize,
-    /// Look-alikes taken for the part.
-    pub look_alike_alarms: usize,
-    /// Pictures with the part in which the surest detection, accepted or not, is right.
-    pub placed: usize,
-    /// Median error of what is right, in pixels of the photo.
-    pub error_px: Option<f64>,
-    /// Processor time of teaching, seconds.
-    pub cpu_secs: f64,
-    /// Steps done: an early stop makes them fewer.
-    pub steps_done: usize,
-    /// Why there is no model; pictures then count as neither found nor alarms.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failed: Option<String>,
-}
 
 /// One part to measure on: its photo and its pictures.
 pub struct Trial {
@@ -247,30 +209,36 @@ pub struct Comparison<'a> {
     pub seed: u64,
     /// JSON lines; what stands there already is not measured again.
     pub out: &'a Path,
-    /// What to change in each teaching.
-    pub adapt: &'a dyn Fn(&mut TeachOptions, usize),
+    /// How parts are taught; `None` for as from nothing.
+    pub fine_tuning: Option<FineTuning>,
 }
 
 impl Comparison<'_> {
+    /// The file's text; none where there is no file yet.
+    fn text(&self) -> Result<String> {
+        if !self.out.exists() {
+            return Ok(String::new());
+        }
+        std::fs::read_to_string(self.out).with_context(|| self.out.display().to_string())
+    }
+
     /// Measures what is not in the file yet.
     ///
     /// # Errors
     /// Files that cannot be read or written, and what teaching refuses.
     pub fn run(&self, observe: &mut dyn FnMut(&Outcome)) -> Result<()> {
         let named = || self.out.display().to_string();
-        let mut done = Vec::new();
-        if self.out.exists() {
-            for line in BufReader::new(std::fs::File::open(self.out).with_context(named)?).lines() {
-                // A line that was cut off when the program was stopped is measured again.
-                done.extend(serde_json::from_str::<Outcome>(&line.with_context(named)?).ok());
-            }
-        }
+        let text = self.text()?;
+        let done = outcomes(&text);
         let is_done = |part: u64, steps: usize| {
             let same =
                 |o: &&Outcome| (o.weights.as_str(), o.part, o.steps, o.seed) == (self.name, part, steps, self.seed);
             done.iter().any(|outcome| same(&outcome))
         };
         let mut out = OpenOptions::new().create(true).append(true).open(self.out).with_context(named)?;
+        if !text.is_empty() && !text.ends_with('\n') {
+            writeln!(out).with_context(named)?;
+        }
         for part in self.parts.clone() {
             let missing: Vec<usize> = self.steps.iter().copied().filter(|steps| !is_done(part, *steps)).collect();
             if missing.is_empty() {
@@ -278,19 +246,84 @@ impl Comparison<'_> {
             }
             let trial = Trial::new(part)?;
             for steps in missing {
-                let mut options = TeachOptions {
+                let options = TeachOptions {
                     kind: ModelKind::C,
                     symmetry: trial.part.symmetry(),
                     base_weights: self.weights.clone(),
+                    steps: Some(steps),
+                    fine_tuning: self.fine_tuning.clone(),
                     ..TeachOptions::new(self.seed)
                 };
-                (self.adapt)(&mut options, steps);
-                options.steps = Some(steps);
                 let outcome = trial.run(self.name, part, &options)?;
                 observe(&outcome);
                 writeln!(out, "{}", serde_json::to_string(&outcome)?).with_context(named)?;
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::RotationalSymmetry;
+
+    #[test]
+    fn the_truth_is_right_and_what_is_turned_or_moved_is_not() {
+        let trial = Trial::new(9001).unwrap();
+        assert_eq!(trial.part.symmetry(), RotationalSymmetry::None);
+        assert_eq!([trial.with.len(), trial.without.len(), trial.look_alikes.len()], PICTURES);
+        assert!(trial.without.iter().chain(&trial.look_alikes).all(|sample| sample.instances.is_empty()));
+        for sample in &trial.with {
+            let instance = &sample.instances[0];
+            let (start, end, pose) = (instance.grasp.start, instance.grasp.end, instance.image_from_demonstration);
+            let truth = PlanarGrasp::from_line(&instance.grasp, 10.0);
+            let error = |grasp: &PlanarGrasp| trial.error(grasp, &start, &end, &pose);
+            assert!(error(&truth).is_some_and(|error| error < 1e-6));
+            let turned = PlanarGrasp { angle: truth.angle + Angle::from_degrees(12.0), ..truth };
+            let moved = PlanarGrasp { x: truth.x + 5.0 * pose.scale, ..truth };
+            let near = PlanarGrasp { x: truth.x + 4.0 * pose.scale, ..truth };
+            assert!(error(&turned).is_none() && error(&moved).is_none());
+            assert!(error(&near).is_some_and(|error| (error - 4.0).abs() < 1e-6));
+        }
+    }
+
+    #[test]
+    fn what_was_measured_is_not_measured_again_and_a_torn_line_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("outcomes.jsonl");
+        let outcome = Outcome {
+            weights: "some".into(),
+            part: 1,
+            steps: 15,
+            seed: 2,
+            with: 10,
+            found: 7,
+            wrong: 1,
+            without: 10,
+            alarms: 1,
+            look_alikes: 5,
+            look_alike_alarms: 2,
+            placed: 8,
+            error_px: None,
+            cpu_secs: 4.0,
+            steps_done: 15,
+            failed: None,
+        };
+        let line = serde_json::to_string(&outcome).unwrap();
+        std::fs::write(&out, format!("{line}\n{}", &line[..20])).unwrap();
+        let comparison = |part: u64| Comparison {
+            name: "some",
+            weights: None,
+            parts: part..part + 1,
+            steps: &[15],
+            seed: 2,
+            out: &out,
+            fine_tuning: None,
+        };
+        comparison(1).run(&mut |outcome| panic!("measured again: {outcome:?}")).unwrap();
+        // What follows a torn line begins a line of its own.
+        let text = std::fs::read_to_string(&out).unwrap();
+        assert_eq!(outcomes(&format!("{text}{line}\n")), [outcome.clone(), outcome]);
     }
 }

@@ -16,5 +16,7 @@ pub mod checkpoint;
 pub mod compare;
 pub mod episodes;
 pub mod network;
+pub mod outcome;
 pub mod pictures;
 pub mod pretrain;
+pub mod table;

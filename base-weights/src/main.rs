@@ -6,11 +6,13 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
-use sdg_base_weights::compare::{Comparison, Outcome};
+use sdg_base_weights::compare::Comparison;
 use sdg_base_weights::episodes::{EpisodeSettings, Episodes};
+use sdg_base_weights::outcome::{Outcome, outcomes};
 use sdg_base_weights::pretrain::{Settings, export, start_or_resume};
-use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, Preset, TeachOptions};
-use sdg_training::TrainingConfig;
+use sdg_base_weights::table::table;
+use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 /// Pretraining of preset `edge` on generated parts.
@@ -105,15 +107,17 @@ enum Command {
         /// JSON lines; what stands there is not measured again.
         #[arg(long)]
         out: PathBuf,
-        /// A training other than the preset's, as JSON.
-        #[arg(long)]
-        training: Option<String>,
-        /// Stages of the backbone that are not trained: Nothing, Stem, ThroughRes2, ThroughRes3 or FirstStage.
-        #[arg(long)]
-        freeze: Option<String>,
-        /// Generated parts that lie about while a part is taught.
-        #[arg(long, default_value_t = 0)]
-        other_parts: usize,
+        /// What differs from the default fine-tuning, as JSON, such as {"freeze": "FirstStage"}; null to teach as from
+        /// nothing.
+        #[arg(long, default_value = "{}")]
+        fine_tuning: String,
+    },
+    /// Outcomes as a table, over the parts that every row has.
+    Table {
+        /// JSON lines of `compare`.
+        outcomes: PathBuf,
+        /// Names of weights; all where none is given.
+        weights: Vec<String>,
     },
 }
 
@@ -132,26 +136,16 @@ fn main() -> Result<()> {
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
         }
-        Command::Compare { weights, name, first, parts, steps, seed, out, training, freeze, other_parts } => {
+        Command::Table { outcomes: path, weights } => {
+            let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+            print!("{}", table(&outcomes(&text), &weights));
+            Ok(())
+        }
+        Command::Compare { weights, name, first, parts, steps, seed, out, fine_tuning } => {
             let weights = weights.map(|path| read_weights(&path)).transpose()?;
-            let training: Option<serde_json::Value> =
-                training.map(|text| serde_json::from_str(&text)).transpose().context("--training")?;
-            let freeze =
-                freeze.map(|name| serde_json::from_value(serde_json::json!(name))).transpose().context("--freeze")?;
-            let adapt = |options: &mut TeachOptions, _steps: usize| {
-                options.freeze = freeze;
-                options.num_other_parts = other_parts;
-                options.training = training.as_ref().map(|changes| changed(TrainingConfig::edge(seed), changes));
-            };
-            let comparison = Comparison {
-                name: &name,
-                weights,
-                parts: first..first + parts,
-                steps: &steps,
-                seed,
-                out: &out,
-                adapt: &adapt,
-            };
+            let fine_tuning = changed(FineTuning::new(seed), &fine_tuning).context("--fine-tuning")?;
+            let (steps, out, name) = (&steps[..], &out, &name);
+            let comparison = Comparison { name, weights, parts: first..first + parts, steps, seed, out, fine_tuning };
             comparison.run(&mut |outcome: &Outcome| println!("{}", serde_json::json!(outcome)))
         }
     }
@@ -245,15 +239,27 @@ fn exported(path: &Path, commit: &str) -> Result<BaseWeightsFile> {
     Ok(Episodes::start(checkpoint.settings, &checkpoint.parameters, checkpoint.step, &device)?.export(commit))
 }
 
-/// A training with some values other than the preset's.
-fn changed(training: TrainingConfig, changes: &serde_json::Value) -> TrainingConfig {
-    let merged = serde_json::to_value(&training).map(|mut all| {
-        if let (Some(all), Some(changes)) = (all.as_object_mut(), changes.as_object()) {
-            all.extend(changes.clone());
+/// A fine-tuning with some values changed, those of its training too; `None` for null.
+fn changed(fine_tuning: FineTuning, changes: &str) -> Result<Option<FineTuning>> {
+    let changes: Value = serde_json::from_str(changes)?;
+    if changes.is_null() {
+        return Ok(None);
+    }
+    let mut all = serde_json::to_value(&fine_tuning)?;
+    merge(&mut all, changes);
+    Ok(Some(serde_json::from_value(all)?))
+}
+
+/// Objects entry by entry, anything else as a whole.
+fn merge(value: &mut Value, changes: Value) {
+    match (value, changes) {
+        (Value::Object(all), Value::Object(changes)) => {
+            for (name, change) in changes {
+                merge(all.entry(name).or_insert(Value::Null), change);
+            }
         }
-        all
-    });
-    merged.and_then(serde_json::from_value).unwrap_or_else(|error| panic!("--training: {error}"))
+        (value, change) => *value = change,
+    }
 }
 
 fn read_weights(path: &Path) -> Result<BaseWeights> {

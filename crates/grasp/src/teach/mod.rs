@@ -12,6 +12,7 @@
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
 mod event;
+mod fine_tuning;
 mod held_back;
 mod orientation;
 mod other_parts;
@@ -28,10 +29,9 @@ use std::time::{Duration, Instant};
 
 use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
-use sdg_detection::config::Freeze;
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
 use sdg_geometry::{GraspLine, RotationalSymmetry};
-use sdg_training::{History, SampleSource, Trained, TrainingConfig, TrainingError, train};
+use sdg_training::{History, SampleSource, Trained, TrainingError, train};
 
 use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
@@ -48,6 +48,7 @@ use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
 pub use event::Event;
+pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
 pub(crate) use plan::Plan;
 pub use plan::Preset;
@@ -67,12 +68,8 @@ pub struct TeachOptions {
     pub time_budget: Option<Duration>,
     /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
     pub steps: Option<usize>,
-    /// Another training than the preset's; for tests and trials.
-    pub training: Option<TrainingConfig>,
-    /// Other stages of the backbone that are not trained than the preset's; for tests and trials.
-    pub freeze: Option<Freeze>,
-    /// Generated parts that lie about while the part is taught, beside it and in its place.
-    pub num_other_parts: usize,
+    /// How to teach from base weights of our own; `None` to teach from them as from nothing.
+    pub fine_tuning: Option<FineTuning>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
     /// Sizes over the usual one at which the part is looked for.
@@ -94,9 +91,7 @@ impl TeachOptions {
             seed,
             time_budget: None,
             steps: None,
-            training: None,
-            freeze: None,
-            num_other_parts: 0,
+            fine_tuning: None,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
@@ -286,7 +281,7 @@ pub(crate) fn teach_network(
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
     let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
-    let [to_learn, to_hold_back] = other_parts::draw(options.num_other_parts, options.seed);
+    let [to_learn, to_hold_back] = other_parts::draw(plan.num_other_parts, options.seed);
     let augmenter = augmenter.with_other_parts(&to_learn)?;
     let held_back = held_back.with_other_parts(&to_hold_back)?;
     let turns = HiddenTurns::new(demonstrations, options.symmetry);

@@ -118,11 +118,10 @@ impl Preset {
     /// How a model with a network is taught.
     pub(super) fn plan(self, rcnn: RcnnKind, options: &TeachOptions) -> Plan {
         let &TeachOptions { kind, seed, symmetry, .. } = options;
-        let mut network = self.network(rcnn, options.base_weights.is_some());
-        network.backbone.freeze = options.freeze.unwrap_or(network.backbone.freeze);
-        Plan {
+        let network = self.network(rcnn, options.base_weights.is_some());
+        let plan = Plan {
             network: if self == Self::Edge { with_keypoints(network) } else { network },
-            training: options.training.clone().unwrap_or_else(|| self.training(kind, seed)),
+            training: self.training(kind, seed),
             samples: self.samples(),
             distinct_samples: (self == Self::Paper).then_some(paper::DISTINCT_SAMPLES),
             held_back: match self {
@@ -132,7 +131,9 @@ impl Preset {
             },
             least_hit_rate: LEAST_HIT_RATE,
             orientation: (kind == ModelKind::A).then(|| self.orientation(symmetry, seed)),
-        }
+            num_other_parts: 0,
+        };
+        options.fine_tuning.iter().fold(plan, |plan, fine_tuning| fine_tuning.adapt(plan))
     }
 }
 
@@ -164,6 +165,8 @@ pub(crate) struct Plan {
     pub(crate) least_hit_rate: f64,
     /// Model A's other network.
     pub(crate) orientation: Option<OrientationPlan>,
+    /// Generated parts that lie about while the part is taught, beside it and in its place.
+    pub(crate) num_other_parts: usize,
 }
 
 /// The orientation CNN and its training.
