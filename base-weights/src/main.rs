@@ -213,8 +213,8 @@ fn episodes_of(
         losses.push(run.advance()?);
         let is_out_of_time = minutes.is_some_and(|minutes| start.elapsed().as_secs_f64() > 60.0 * minutes);
         if run.episode().is_multiple_of(every) || is_out_of_time || run.is_over() {
-            let mean = losses.drain(..).collect::<Vec<_>>();
-            let mean = mean.iter().sum::<f64>() / mean.len() as f64;
+            let mean = losses.iter().sum::<f64>() / losses.len() as f64;
+            losses.clear();
             println!(
                 "episode {:5} {:7.1} s  loss after teaching {mean:.3}",
                 run.episode(),
