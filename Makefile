@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint bench bench-browser clean
+.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -75,6 +75,16 @@ package: ## Packages the libraries that other programs can use, into target/pack
 lint: setup ## Formatting and lints, as CI denies them
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
+
+# What is in target/base-weights is gone on with. DEVICE: flex, wgpu or cuda.
+DEVICE ?= flex
+BASE_WEIGHTS := target/base-weights
+base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on where it was stopped)
+	$(CARGO) build $(PROFILE) --locked --workspace --bin sdg-base-weights --features sdg-base-weights/$(DEVICE)
+	mkdir -p $(BASE_WEIGHTS)
+	target/release/sdg-base-weights pretrain --checkpoint $(BASE_WEIGHTS)/run.safetensors --device $(DEVICE)
+	target/release/sdg-base-weights export --checkpoint $(BASE_WEIGHTS)/run.safetensors \
+		--out $(BASE_WEIGHTS)/edge.safetensors --commit $$(git rev-parse --short HEAD)
 
 bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
 	benches/peers/install.sh target/bench/venv

@@ -1,15 +1,53 @@
-//! Base weights for teaching: a checkpoint of any format, fitted to the network that is taught.
+//! Base weights for teaching: our own, or a checkpoint of any format, fitted to the network that is taught.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
 use sdg_detection::config::ImageTransformConfig;
 use sdg_detection::state_dict::{StateDict, WeightTensor};
-use sdg_grasp::BaseWeights;
+use sdg_grasp::{BaseWeights, BaseWeightsFile, TeachOptions};
 use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, naming_of, sha256_of};
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};
+use crate::files;
+
+/// How base weights of our own were made, by names such as `seed`.
+pub type Origin = BTreeMap<String, String>;
+
+/// More than base weights of our own have.
+const MAX_OWN_BYTES: u64 = 64 << 20;
+
+/// Reads base weights of our own for what `options` teach, all but the parts that are named in `reinitialized`, and how
+/// they were made; `None` where the file is another one.
+///
+/// # Errors
+/// A file that cannot be read, weights of another preset, a part that they have not.
+pub fn read_own(
+    path: &Path,
+    options: &TeachOptions,
+    reinitialized: &[String],
+) -> Result<Option<(BaseWeights, Origin)>> {
+    let named = || path.display().to_string();
+    let (_, checkpoint) = open(path)?;
+    let (true, Some(network)) = (BaseWeightsFile::is_described_by(&checkpoint.metadata), options.taught_network())
+    else {
+        return Ok(None);
+    };
+    let file = BaseWeightsFile::from_bytes(&files::read(path, MAX_OWN_BYTES)?).with_context(named)?;
+    let sha256 = sha256_of(path).with_context(named)?;
+    let mut weights = file.for_network(options.preset.name(), &network, sha256).with_context(named)?;
+    for prefix in reinitialized {
+        let names: Vec<String> = weights.parameters.keys().filter(|name| name.starts_with(prefix)).cloned().collect();
+        if names.is_empty() {
+            bail!("{}: --reinit: expected the beginning of a parameter's name, found \"{prefix}\"", path.display());
+        }
+        names.iter().for_each(|name| drop(weights.parameters.remove(name)));
+        weights.reinitialized.extend(names);
+    }
+    Ok(Some((weights, file.origin)))
+}
 
 /// Opens a checkpoint of any format.
 ///

@@ -14,9 +14,9 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_cli::base_weights;
 use sdg_detection::config::{BlockKind, RcnnConfig};
-use sdg_detection::presets::{RcnnKind, r50_detectron2, r50_torchvision};
+use sdg_detection::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchvision};
 use sdg_detection::state_dict;
-use sdg_grasp::{BaseWeights, Device};
+use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS};
 use serde_json::{Map, Value, json};
 use support::sdg;
 
@@ -184,6 +184,39 @@ fn msra_s_resnet_50_of_caffe2_fills_a_backbone() {
     );
     // The generator counts on through the file: the first scale is a quarter.
     assert_eq!(values("stem.conv1.norm.weight"), &[0.25, 0.5]);
+}
+
+#[test]
+fn weights_of_our_own_are_a_start_for_every_network_and_none_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (own, out, demonstration) = (at("own.safetensors"), at("part.sdg"), demonstration());
+    let mut network = edge(NUM_KEYPOINTS);
+    network.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
+    let mut parameters = state_dict::export(&network.init(&Device::flex(), 3).unwrap());
+    parameters.retain(|name, _| !name.contains("cls_score"));
+    let names = ["bias", "weight"].map(|name| format!("roi_heads.box_predictor.cls_score.{name}"));
+    let origin = BTreeMap::from([("seed".to_owned(), "3".to_owned())]);
+    let file = BaseWeightsFile { preset: "edge".into(), reinitialized: names.into(), parameters, origin };
+    fs::write(&own, file.to_bytes()).unwrap();
+
+    let teach = |arguments: &[&str]| {
+        let output = sdg(&[&["teach", "--demo", &demonstration, "--out", &out, "--steps", "2"], arguments].concat());
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    // Two steps teach nothing; what is wrong with the weights would have come before.
+    for model in ["A", "D"] {
+        let (code, stdout, stderr) = teach(&["--model", model, "--base-weights", &own]);
+        assert!(stdout.contains("own.safetensors: seed 3"), "{stdout}");
+        assert!(stderr.contains("held-back samples: too few to keep"), "{model}: {stderr}");
+        assert_eq!(code, Some(1));
+    }
+    let (_, stdout, stderr) = teach(&["--base-weights", "none"]);
+    assert!(!stdout.contains("base weights") && stderr.contains("too few to keep"), "{stdout} {stderr}");
+    let (_, _, stderr) = teach(&["--base-weights", &own, "--preset", "paper"]);
+    assert!(stderr.contains("weights for preset edge instead of paper"), "{stderr}");
+    let (_, _, stderr) = teach(&["--base-weights", &own, "--reinit", "roi_heads.nose"]);
+    assert!(stderr.contains("found \"roi_heads.nose\""), "{stderr}");
 }
 
 #[test]

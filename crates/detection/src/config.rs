@@ -158,6 +158,8 @@ pub enum Freeze {
     ThroughRes2,
     /// The stem, res2 and res3 are frozen.
     ThroughRes3,
+    /// The residual network, the pyramid and the region proposal network are frozen: the second stage alone is trained.
+    FirstStage,
 }
 
 /// A residual network with four stages, res2 to res5, at strides 4, 8, 16, 32.
@@ -342,12 +344,20 @@ pub struct RoiHeadsConfig {
     pub matcher: MatcherConfig,
     /// Proposals in the loss.
     pub sampler: SamplerConfig,
+    /// Share of the negatives among them that are the proposals of the highest objectness; the others are drawn. With 0,
+    /// as Detectron2 and torchvision have it, all are drawn, and most lie on the bare table.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hard_negative_share: f64,
     /// The box head.
     pub box_head: BoxHeadConfig,
     /// The keypoint head, if the detector has one.
     pub keypoint_head: Option<KeypointHeadConfig>,
     /// The mask head, if the detector has one.
     pub mask_head: Option<MaskHeadConfig>,
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 /// Two fully connected layers, class scores and box deltas.

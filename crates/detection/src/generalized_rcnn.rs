@@ -6,13 +6,13 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{BoundingBox, Mask};
 
-use crate::config::{MaskHeadConfig, RcnnConfig};
+use crate::config::{Freeze, MaskHeadConfig, RcnnConfig};
 use crate::error::{DetectionError, Result};
 use crate::fpn::Fpn;
 use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
 use crate::initialization::Initializer;
 use crate::losses::Losses;
-use crate::resnet::ResNet;
+use crate::resnet::{ResNet, frozen};
 use crate::roi_heads::{RoiDetection, RoiHeads};
 use crate::rpn::{ImageSize, Mode, Proposals, RegionProposalNetwork};
 use crate::target::ResizedTarget;
@@ -98,12 +98,18 @@ impl RcnnConfig {
     fn build(&self, mut init: Initializer) -> Result<GeneralizedRcnn> {
         self.validate()?;
         let stage_channels = self.backbone.stage_channels();
+        let mut backbone = Backbone {
+            bottom_up: ResNet::init(&self.backbone, &mut init),
+            fpn: Fpn::init(&self.fpn, stage_channels, &mut init),
+        };
+        let mut proposal_generator =
+            RegionProposalNetwork::init(&self.rpn, &self.anchors, self.fpn.channels, &mut init);
+        if self.backbone.freeze >= Freeze::FirstStage {
+            (backbone, proposal_generator) = (frozen(backbone), frozen(proposal_generator));
+        }
         Ok(GeneralizedRcnn {
-            backbone: Backbone {
-                bottom_up: ResNet::init(&self.backbone, &mut init),
-                fpn: Fpn::init(&self.fpn, stage_channels, &mut init),
-            },
-            proposal_generator: RegionProposalNetwork::init(&self.rpn, &self.anchors, self.fpn.channels, &mut init),
+            backbone,
+            proposal_generator,
             roi_heads: RoiHeads::init(&self.roi_heads, &self.fpn, &mut init),
             config: self.clone(),
         })

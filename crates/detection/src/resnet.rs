@@ -150,7 +150,7 @@ impl ResNet {
 }
 
 /// Takes a module's parameters out of training.
-fn frozen<M: Module>(module: M) -> M {
+pub(crate) fn frozen<M: Module>(module: M) -> M {
     struct Freezer;
     impl ModuleMapper for Freezer {
         fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {

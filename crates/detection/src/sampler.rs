@@ -19,6 +19,11 @@ pub struct Sampled {
 ///
 /// Where everything fits, all is taken in order and the generator decides nothing.
 pub fn sample(matches: &[Match], config: &SamplerConfig, rng: &mut Pcg64Mcg) -> Sampled {
+    sample_with_first(matches, config, 0.0, rng)
+}
+
+/// [`sample`] where a share of the negatives are the first in the list, of proposals those of the highest objectness.
+pub fn sample_with_first(matches: &[Match], config: &SamplerConfig, first_share: f64, rng: &mut Pcg64Mcg) -> Sampled {
     let mut positive = Vec::new();
     let mut negative = Vec::new();
     for (idx, m) in matches.iter().enumerate() {
@@ -30,7 +35,11 @@ pub fn sample(matches: &[Match], config: &SamplerConfig, rng: &mut Pcg64Mcg) -> 
     }
     let max_positive = (config.batch_size_per_image as f64 * config.positive_fraction) as usize;
     draw(&mut positive, max_positive, rng);
-    draw(&mut negative, config.batch_size_per_image - positive.len(), rng);
+    let num_negative = config.batch_size_per_image - positive.len();
+    let num_first = ((num_negative as f64 * first_share) as usize).min(negative.len());
+    let mut others = negative.split_off(num_first);
+    draw(&mut others, num_negative - num_first, rng);
+    negative.extend(others);
     Sampled { positive, negative }
 }
 
@@ -64,6 +73,15 @@ mod tests {
         assert!(sampled.negative.iter().all(|i| (5..55).contains(i)));
         let few = sample(&matches(1, 50), &CONFIG, &mut Pcg64Mcg::seed_from_u64(1));
         assert_eq!((few.positive.len(), few.negative.len()), (1, 7));
+    }
+
+    #[test]
+    fn the_first_negatives_are_taken_for_certain_where_asked() {
+        let sampled = sample_with_first(&matches(5, 50), &CONFIG, 0.5, &mut Pcg64Mcg::seed_from_u64(1));
+        assert_eq!((&sampled.negative[..3], sampled.negative.len()), (&[5, 6, 7][..], 6));
+        assert!(sampled.negative[3..].iter().all(|idx| (8..55).contains(idx)));
+        let few = sample_with_first(&matches(1, 3), &CONFIG, 1.0, &mut Pcg64Mcg::seed_from_u64(1));
+        assert_eq!(few.negative, [1, 2, 3]);
     }
 
     #[test]

@@ -219,6 +219,12 @@ fn gradients_spare_the_frozen() {
     assert!(unreached.iter().all(is_frozen), "{unreached:?}");
     assert!(!reached.iter().any(is_frozen), "{reached:?}");
     assert!(unreached.len() > 8 && reached.len() > 20);
+
+    let mut config = tiny();
+    config.backbone.freeze = Freeze::FirstStage;
+    let (reached, unreached) = gradient_paths(&config);
+    assert!(reached.iter().all(|path| path.starts_with("roi_heads.")) && reached.len() > 10, "{reached:?}");
+    assert!(unreached.iter().all(|path| !path.starts_with("roi_heads.")) && unreached.len() > 20, "{unreached:?}");
 }
 
 #[test]

@@ -23,6 +23,11 @@ pub struct BaseWeights {
 }
 
 impl BaseWeights {
+    /// Whether they have a keypoint head, which preset `edge` also teaches models without keypoints with.
+    pub(crate) fn has_keypoint_head(&self) -> bool {
+        self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
+    }
+
     /// Sets the network's parameters. What the preset freezes stays frozen.
     ///
     /// Frozen norms become a scale and a shift, with mean 0 and variance 1, which is the same function: a grasp model

@@ -35,6 +35,8 @@
 
 #[cfg(feature = "teach")]
 mod base_weights;
+#[cfg(feature = "teach")]
+mod base_weights_file;
 mod calibration;
 mod check_config;
 mod decimal;
@@ -63,6 +65,8 @@ mod verification;
 
 #[cfg(feature = "teach")]
 pub use base_weights::BaseWeights;
+#[cfg(feature = "teach")]
+pub use base_weights_file::BaseWeightsFile;
 pub use burn::tensor::Device;
 pub use calibration::Calibration;
 pub use check_config::{CheckConfig, ScoreConfig, Term};
@@ -83,6 +87,6 @@ pub use sdg_detection::keep_freed_memory;
 pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
-pub use teach::{Event, Preset, Taught, TeachOptions, teach};
+pub use teach::{Event, FineTuning, Preset, Taught, TeachOptions, teach};
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;

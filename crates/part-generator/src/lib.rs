@@ -52,6 +52,6 @@ pub use look_alike::LookAlike;
 pub use part::Part;
 pub use part_kind::PartKind;
 pub use scene::{
-    Condition, Conditions, DemonstrationPhoto, Instance, OtherKind, OtherObject, PhotoConfig, Sample, SceneConfig,
-    Scenes, demonstration,
+    Condition, Conditions, DemonstrationPhoto, Instance, MixedInstance, MixedSample, OtherKind, OtherObject,
+    PhotoConfig, Sample, SceneConfig, Scenes, demonstration,
 };

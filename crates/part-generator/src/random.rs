@@ -20,6 +20,8 @@ pub(crate) enum Stream {
     Others = 6,
     /// Tiles of noise that all pictures share.
     Tiles = 7,
+    /// A sample of several parts.
+    MixedSample = 8,
 }
 
 /// The generator of item `index` of a stream of a seed.

@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 
-use burn::module::{Module, ModuleMapper, Param, ParamId};
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::GradientsParams;
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor, TensorData};
+use sdg_detection::state_dict::{StateDict, WeightTensor};
 use sdg_kernels::{AdamWParams, adamw};
 
 /// The optimiser and what it remembers of every parameter.
@@ -43,6 +44,68 @@ impl AdamW {
     }
 }
 
+/// What [`AdamW`] remembers between steps, by the parameters' names: enough to go on with the same bits.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AdamWState {
+    /// Steps done.
+    pub step: i32,
+    /// `[2, number of values]` for each parameter that had a gradient: the running means of it and of its square.
+    pub moments: StateDict,
+}
+
+impl AdamW {
+    /// What the optimiser of `module` remembers.
+    pub fn state<M: Module>(&self, module: &M) -> AdamWState {
+        let mut moments = StateDict::new();
+        for (name, id, ..) in named_parameters(module) {
+            if let Some(tensor) = self.moments.get(&id) {
+                let shape = tensor.dims().to_vec();
+                let values = tensor.clone().into_data().iter::<f32>().collect();
+                moments.insert(name, WeightTensor { shape, values });
+            }
+        }
+        AdamWState { step: self.step, moments }
+    }
+
+    /// The same optimiser as it was for `module` when [`Self::state`] was asked. Moments of parameters that the module
+    /// has not, or has in another size, are left out.
+    pub fn with_state<M: Module>(mut self, module: &M, state: &AdamWState) -> Self {
+        self.step = state.step;
+        self.moments.clear();
+        for (name, id, count, device) in named_parameters(module) {
+            if let Some(saved) = state.moments.get(&name).filter(|saved| saved.shape == [2, count]) {
+                let data = TensorData::new(saved.values.clone(), [2, count]);
+                self.moments.insert(id, Tensor::from_data(data, &device));
+            }
+        }
+        self
+    }
+}
+
+/// Name, id, number of values and device (without autodiff) of every float parameter.
+fn named_parameters<M: Module>(module: &M) -> Vec<(String, ParamId, usize, Device)> {
+    struct Names {
+        path: Vec<String>,
+        found: Vec<(String, ParamId, usize, Device)>,
+    }
+    impl ModuleVisitor for Names {
+        fn enter_module(&mut self, name: &str, _container_type: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _name: &str, _container_type: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+            let tensor = param.val().inner();
+            let count = tensor.dims().iter().product();
+            self.found.push((self.path.join("."), param.id, count, tensor.device()));
+        }
+    }
+    let mut names = Names { path: Vec::new(), found: Vec::new() };
+    module.visit(&mut names);
+    names.found
+}
+
 struct Update<'a> {
     moments: &'a mut HashMap<ParamId, Tensor<2>>,
     gradients: GradientsParams,
@@ -72,6 +135,7 @@ mod tests {
     use burn::tensor::Device;
     use sdg_detection::initialization::{Distribution, Initializer};
     use sdg_detection::layers::Linear;
+    use sdg_detection::state_dict;
 
     use super::*;
 
@@ -86,6 +150,32 @@ mod tests {
             // Large, so that gradients are clipped.
             (self.second.forward(self.first.forward(x)) * 30.0).square().mean()
         }
+    }
+
+    #[test]
+    fn a_restored_optimiser_goes_on_with_the_same_bits() {
+        let device = Device::flex().autodiff();
+        let mut init = Initializer::new(&device, 3);
+        let mut linear =
+            |inside, outside| Linear::init(inside, outside, Distribution::lecun_uniform(inside), &mut init);
+        let mut net = Net { first: linear(3, 5), second: linear(5, 2) };
+        let x = Tensor::<2>::from_floats([[1.0, 0.5, -0.3]], &device);
+        let step = |adamw: &mut AdamW, net: Net| {
+            let gradients = GradientsParams::from_grads(net.loss(x.clone()).backward(), &net);
+            adamw.step(0.01, net, gradients)
+        };
+        let mut adamw = AdamW::new(0.1, 0.5);
+        for _ in 0..3 {
+            net = step(&mut adamw, net);
+        }
+        let state = adamw.state(&net);
+        assert_eq!((state.step, state.moments.len()), (3, 4));
+        let mut restored = AdamW::new(0.1, 0.5).with_state(&net, &state);
+        let (one, other) = (step(&mut adamw, net.clone()), step(&mut restored, net.clone()));
+        assert_eq!(state_dict::export(&one), state_dict::export(&other));
+        // Without its memory the step is another.
+        let forgetful = step(&mut AdamW::new(0.1, 0.5), net);
+        assert_ne!(state_dict::export(&one), state_dict::export(&forgetful));
     }
 
     #[test]

@@ -34,7 +34,7 @@ mod schedule;
 mod trainer;
 mod validation;
 
-pub use adamw::AdamW;
+pub use adamw::{AdamW, AdamWState};
 pub use batch::SampleSource;
 pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;

@@ -1,5 +1,7 @@
 //! What a run tells while it goes on, and keeps of itself afterwards.
 
+use burn::tensor::Tensor;
+use sdg_detection::Losses;
 use serde::{Deserialize, Serialize};
 
 use crate::validation::Validation;
@@ -26,6 +28,21 @@ impl LossValues {
     /// Their sum: what the step descends.
     pub fn total(&self) -> f64 {
         self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint + self.mask
+    }
+}
+
+impl From<&Losses> for LossValues {
+    /// Waits for the device.
+    fn from(losses: &Losses) -> Self {
+        let value = |loss: &Tensor<1>| f64::from(loss.clone().into_scalar::<f32>());
+        Self {
+            rpn_cls: value(&losses.rpn_cls),
+            rpn_loc: value(&losses.rpn_loc),
+            cls: value(&losses.cls),
+            box_reg: value(&losses.box_reg),
+            keypoint: losses.keypoint.as_ref().map_or(0.0, value),
+            mask: losses.mask.as_ref().map_or(0.0, value),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::optim::GradientsParams;
-use sdg_detection::{GeneralizedRcnn, Losses};
+use sdg_detection::GeneralizedRcnn;
 
 use crate::batch::{Batch, BatchRequest, Batches, SampleSource, View, with_batches};
 use crate::config::TrainingConfig;
@@ -119,7 +119,7 @@ impl Run<'_> {
         let learning_rate = self.config.schedule.learning_rate(self.pace.progress(step, self.elapsed_secs()));
         let losses = self.detector.losses(&batch.images, &batch.targets, step_seed(self.config.seed, step))?;
         let total = losses.total();
-        let record = StepRecord { step, samples: batch.images.len(), learning_rate, losses: values(&losses) };
+        let record = StepRecord { step, samples: batch.images.len(), learning_rate, losses: LossValues::from(&losses) };
         if !record.losses.total().is_finite() {
             return Err(TrainingError::Diverged { step, loss: record.losses.total(), learning_rate });
         }
@@ -163,16 +163,4 @@ impl Run<'_> {
 /// A seed of its own for every step, far from those of its neighbours.
 fn step_seed(seed: u64, step: usize) -> u64 {
     seed.wrapping_add((step as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
-}
-
-fn values(losses: &Losses) -> LossValues {
-    let value = |loss: &burn::tensor::Tensor<1>| f64::from(loss.clone().into_scalar::<f32>());
-    LossValues {
-        rpn_cls: value(&losses.rpn_cls),
-        rpn_loc: value(&losses.rpn_loc),
-        cls: value(&losses.cls),
-        box_reg: value(&losses.box_reg),
-        keypoint: losses.keypoint.as_ref().map_or(0.0, value),
-        mask: losses.mask.as_ref().map_or(0.0, value),
-    }
 }

@@ -12,7 +12,7 @@ use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::base_weights;
 use crate::camera_files::CameraFile;
@@ -63,7 +63,8 @@ pub struct TeachArgs {
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
-    /// Weights to start from: any file that `sdg weights convert` reads or writes, or a grasp model
+    /// Weights to start from: base weights of `make base-weights`, any file that `sdg weights convert` reads or writes, a
+    /// grasp model, or none
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
     /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
@@ -89,6 +90,9 @@ fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
         _ => Err("expected 1 to 360 equal turns, or full".to_owned()),
     }
 }
+
+/// What `--base-weights` says for a start from nothing.
+const NO_BASE_WEIGHTS: &str = "none";
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
@@ -207,8 +211,10 @@ fn command(args: &TeachArgs) -> String {
 
 /// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
-fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Report>> {
-    let Some(path) = &args.base_weights else { return Ok(None) };
+fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
+    let Some(path) = args.base_weights.as_ref().filter(|path| path.as_os_str() != NO_BASE_WEIGHTS) else {
+        return Ok(None);
+    };
     let Some(network) = options.network() else {
         return Err(Usage(format!(
             "--base-weights: model {} has no network that could start from weights",
@@ -216,6 +222,14 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         ))
         .into());
     };
+    if let Some((own, origin)) = base_weights::read_own(path, options, &args.reinitialized)? {
+        options.base_weights = Some(own);
+        if !args.json {
+            let made: Vec<String> = origin.iter().map(|(name, value)| format!("{name} {value}")).collect();
+            println!("base weights {}: {}", path.display(), made.join(", "));
+        }
+        return Ok(Some(json!(origin)));
+    }
     let mut told = None;
     let base_weights = base_weights::read(path, &network, &args.reinitialized, &mut |report| {
         if !args.json {
@@ -227,7 +241,7 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         Ok(())
     })?;
     options.base_weights = Some(base_weights);
-    Ok(told)
+    Ok(told.map(|report: Report| json!(report)))
 }
 
 /// What the network has learnt, for people; nothing for a model without.

@@ -22,6 +22,7 @@ const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
 /// alone, so that any number of threads may ask.
 pub struct Augmenter {
     parts: Vec<Prepared>,
+    others: Vec<Prepared>,
     config: AugmentationConfig,
     /// Width and height of the samples.
     frame: [u32; 2],
@@ -50,7 +51,21 @@ impl Augmenter {
         let mut rng = sample_rng(seed, Stream::Preparation, 0);
         let parts = demonstrations.iter().map(|one| Prepared::new(one, frame, &mut rng)).collect();
         let (noises, normal) = (NoiseBank::new(&mut rng), NormalTable::new(&mut rng));
-        Ok(Self { parts, config, frame, seed, noises, normal })
+        Ok(Self { parts, others: Vec::new(), config, frame, seed, noises, normal })
+    }
+
+    /// The same with other parts among what lies about; they have outlines, and their annotations count for nothing else.
+    ///
+    /// # Errors
+    /// An annotation that does not lie on its image, or has no outline to cut the part out by.
+    pub fn with_other_parts(mut self, others: &[Demonstration]) -> Result<Self> {
+        let mut rng = sample_rng(self.seed, Stream::OtherParts, 0);
+        for other in others {
+            other.check()?;
+            other.annotation.require_outline()?;
+            self.others.push(Prepared::without_mutants(other, self.frame, &mut rng));
+        }
+        Ok(self)
     }
 
     /// Only windows of the frame, just large enough for the part at any turn and size: the same scale, tables, things
@@ -113,6 +128,7 @@ impl Augmenter {
             AugmentationStyle::Scenes(style) => {
                 let studio = Studio {
                     parts: &self.parts,
+                    others: &self.others,
                     style,
                     noises: &self.noises,
                     normal: &self.normal,

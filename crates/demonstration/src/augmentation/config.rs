@@ -72,6 +72,8 @@ pub struct SceneStyle {
     pub max_distractors: usize,
     /// Share of the distractors that are made from pieces of the part itself.
     pub mutant_share: f32,
+    /// Share of the rest that are other parts, where the augmenter was given any.
+    pub other_part_share: f32,
     /// Probability that something lies over the part.
     pub occlusion_probability: f32,
     /// Greatest share of the part that may be covered.
@@ -95,6 +97,7 @@ impl Default for SceneStyle {
             least_inside: 0.75,
             max_distractors: 5,
             mutant_share: 0.3,
+            other_part_share: 0.6,
             occlusion_probability: 0.3,
             max_occluded: 0.25,
             blur_probability: 0.45,
@@ -138,6 +141,7 @@ impl AugmentationConfig {
                     ("photo_background_share", scenes.photo_background_share),
                     ("least_inside", scenes.least_inside),
                     ("mutant_share", scenes.mutant_share),
+                    ("other_part_share", scenes.other_part_share),
                     ("occlusion_probability", scenes.occlusion_probability),
                     ("max_occluded", scenes.max_occluded),
                     ("blur_probability", scenes.blur_probability),

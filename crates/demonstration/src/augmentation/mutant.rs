@@ -32,6 +32,8 @@ enum Kind {
     Bent { bend: f32 },
     /// Left and right exchanged.
     Mirrored,
+    /// Unchanged: of use for another part alone.
+    Whole,
 }
 
 impl Mutant {
@@ -48,7 +50,13 @@ impl Mutant {
             Kind::Doubled { .. } => (p, UNCUT),
             Kind::Bent { bend } => (p - across * (bend * along * along), UNCUT),
             Kind::Mirrored => (p - self.axis * (2.0 * along), UNCUT),
+            Kind::Whole => (p, UNCUT),
         }
+    }
+
+    /// A part as it is, all of which lies within `radius` of its centre.
+    pub fn whole(radius: f32) -> Self {
+        Self { kind: Kind::Whole, axis: Vector2::new(1.0, 0.0), radius }
     }
 
     /// Mutants of a part that do not look like it, however turned; a symmetric part's mirror image does, and is left out.

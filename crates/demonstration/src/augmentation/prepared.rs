@@ -52,6 +52,13 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     pub fn new(demonstration: &Demonstration, output: [u32; 2], rng: &mut SampleRng) -> Self {
+        let mut prepared = Self::without_mutants(demonstration, output, rng);
+        prepared.mutants = Mutant::bank(&prepared.region, prepared.center, &prepared.area_points, rng);
+        prepared
+    }
+
+    /// The same without [`Self::mutants`], which take most of the time.
+    pub fn without_mutants(demonstration: &Demonstration, output: [u32; 2], rng: &mut SampleRng) -> Self {
         let image = &demonstration.image;
         let photo_size = [f64::from(image.width()), f64::from(image.height())];
         let nominal_scale = (f64::from(output[0]) / photo_size[0]).min(f64::from(output[1]) / photo_size[1]);
@@ -92,7 +99,6 @@ impl Prepared {
             })
             .collect();
         let keypoints = annotation.grasp.as_ref().map(|line| line.keypoints(NUM_KEYPOINTS)).unwrap_or_default();
-        let mutants = Mutant::bank(&region, center, &area_points, rng);
         Self {
             prepared_from_photo,
             nominal_scale,
@@ -108,7 +114,7 @@ impl Prepared {
             area_points,
             keypoints,
             colours,
-            mutants,
+            mutants: Vec::new(),
         }
     }
 

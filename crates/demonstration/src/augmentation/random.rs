@@ -18,6 +18,8 @@ pub(crate) enum Stream {
     HeldOut = 2,
     /// What is drawn once, when the augmenter is made.
     Preparation = 3,
+    /// What is drawn once for other parts.
+    OtherParts = 4,
 }
 
 /// The generator of sample `index`, the same whoever asks and in whatever order.

@@ -10,6 +10,7 @@ use super::distractor::{Distractor, Lamp, paint_mutant};
 use super::figure::Figure;
 use super::homography::Homography;
 use super::light::relight;
+use super::mutant::Mutant;
 use super::noise::NormalTable;
 use super::pose::draw_pose;
 use super::prepared::Prepared;
@@ -18,9 +19,14 @@ use super::raster::{PixelRect, Raster, blend, smoothstep};
 use super::sample::{Sample, SampleObject};
 use super::sensor::{blur, expose};
 
+/// Size of other parts over that of the part: what is much larger or smaller is refused by its size.
+const OTHER_PART_SIZE: [f32; 2] = [0.6, 1.5];
+
 /// What every scene is made with.
 pub(crate) struct Studio<'a> {
     pub parts: &'a [Prepared],
+    /// Other parts, which lie beside the part or in its place.
+    pub others: &'a [Prepared],
     pub style: &'a SceneStyle,
     pub noises: &'a NoiseBank,
     pub normal: &'a NormalTable,
@@ -90,6 +96,11 @@ impl Studio<'_> {
                 let [low, high] = self.style.scale;
                 let scale = part.nominal_scale as f32 * log_uniform(rng, low, high);
                 paint_mutant(canvas, part, &mutant, center, scale, lamp, rng);
+            } else if !self.others.is_empty() && chance(rng, self.style.other_part_share) {
+                let other = &self.others[index_below(rng, self.others.len())];
+                let whole = Mutant::whole(other.radius as f32);
+                let scale = part_radius * log_uniform(rng, OTHER_PART_SIZE[0], OTHER_PART_SIZE[1]) / whole.radius;
+                paint_mutant(canvas, other, &whole, center, scale, lamp, rng);
             } else {
                 let smallest = 0.04 * canvas.frame_width as f32;
                 let size = (part_radius * log_uniform(rng, 0.3, 1.4)).clamp(smallest, 0.45 * canvas.frame_width as f32);

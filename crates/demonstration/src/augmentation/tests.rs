@@ -162,6 +162,23 @@ fn scenes_without_the_part_have_no_object_and_show_none_of_it() {
 }
 
 #[test]
+fn other_parts_lie_about_where_there_are_any() {
+    let style = SceneStyle { positive_share: 0.0, photo_background_share: 1.0, other_part_share: 1.0, ..plain() };
+    let mut green = demonstration(true);
+    green.image.pixels_mut().for_each(|pixel| pixel.0.swap(0, 1));
+    let without = augmenter(style.clone());
+    let with = augmenter(style).with_other_parts(&[green.clone()]).unwrap();
+    let shows_green = |augmenter: &Augmenter, index: u64| {
+        let image = augmenter.sample(index).image;
+        image.pixels().filter(|p| f64::from(p[1]) > 2.2 * f64::from(p[0]) + 12.0).count() > 200
+    };
+    let count = |augmenter: &Augmenter| (0..40).filter(|&i| shows_green(augmenter, i)).count();
+    assert!(count(&with) > 25 && count(&without) < 8, "{} {}", count(&with), count(&without));
+    green.annotation.outline = None;
+    assert!(augmenter(plain()).with_other_parts(&[green]).is_err());
+}
+
+#[test]
 fn poses_keep_the_part_in_view_and_never_mirror_it() {
     let part = Prepared::new(&demonstration(true), [320, 240], &mut sample_rng(1, Stream::Preparation, 0));
     let style = SceneStyle::default();

@@ -63,6 +63,7 @@ pub fn r50_detectron2(kind: RcnnKind) -> RcnnConfig {
                 low_quality: LowQualityMatches::Forbidden,
             },
             sampler: SamplerConfig { batch_size_per_image: 512, positive_fraction: 0.25 },
+            hard_negative_share: 0.0,
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 fc_channels: 1024,

@@ -52,6 +52,7 @@ pub fn r50_torchvision(kind: RcnnKind) -> RcnnConfig {
             ..base.rpn
         },
         roi_heads: RoiHeadsConfig {
+            hard_negative_share: 0.0,
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 background: BackgroundClass::First,

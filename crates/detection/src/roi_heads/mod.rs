@@ -26,7 +26,7 @@ use crate::initialization::Initializer;
 use crate::matcher::{Match, match_boxes};
 use crate::roi_pooler::Roi;
 use crate::rpn::{ImageSize, Proposals};
-use crate::sampler::{draw, sample};
+use crate::sampler::{draw, sample_with_first};
 use crate::target::ResizedTarget;
 
 use box_head::{BoxHead, BoxPredictor};
@@ -92,7 +92,8 @@ impl RoiHeads {
         for (image_idx, ((proposals, target), rng)) in proposals.iter().zip(targets).zip(rngs).enumerate() {
             let candidates: Vec<Corners> = proposals.boxes.iter().chain(&target.boxes).copied().collect();
             let matches = match_boxes(&candidates, &target.boxes, &self.config.matcher);
-            let sampled = sample(&matches, &self.config.sampler, rng);
+            let hard_share = self.config.hard_negative_share;
+            let sampled = sample_with_first(&matches, &self.config.sampler, hard_share, rng);
             rois.extend(sampled.positive.iter().chain(&sampled.negative).map(|idx| SampledRoi {
                 roi: Roi { image_idx, corners: candidates[*idx] },
                 class: match matches[*idx] {

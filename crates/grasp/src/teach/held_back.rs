@@ -53,14 +53,20 @@ impl HeldBack<'_> {
             .collect()
     }
 
-    /// Tries the network on held-back samples, laid over by the demonstration as in use.
+    /// Tries the network on held-back samples, laid over by the demonstration as in use. `other_parts` are the network's
+    /// highest scores in pictures of other parts alone.
     ///
     /// # Errors
     /// An image that the network refuses.
-    pub(super) fn calibrate(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Calibrated> {
+    pub(super) fn calibrate(
+        &self,
+        network: &Network,
+        demonstrations: &[TaughtDemonstration],
+        other_parts: &[f64],
+    ) -> Result<Calibrated> {
         /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
-        let (mut right_scores, mut wrong_scores) = (Vec::new(), Vec::new());
+        let (mut right_scores, mut wrong_scores) = (Vec::new(), other_parts.to_vec());
         let (mut on_part, mut elsewhere) = (Vec::new(), Vec::new());
         let mut positives = 0;
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());

@@ -12,8 +12,10 @@
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
 mod event;
+mod fine_tuning;
 mod held_back;
 mod orientation;
+mod other_parts;
 mod paper;
 mod plan;
 mod r50;
@@ -46,6 +48,7 @@ use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
 pub use event::Event;
+pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
 pub(crate) use plan::Plan;
 pub use plan::Preset;
@@ -65,6 +68,8 @@ pub struct TeachOptions {
     pub time_budget: Option<Duration>,
     /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
     pub steps: Option<usize>,
+    /// How to teach from base weights of our own; `None` to teach from them as from nothing.
+    pub fine_tuning: Option<FineTuning>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
     /// Sizes over the usual one at which the part is looked for.
@@ -86,6 +91,7 @@ impl TeachOptions {
             seed,
             time_budget: None,
             steps: None,
+            fine_tuning: None,
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
@@ -99,13 +105,21 @@ impl TeachOptions {
         models::rcnn_kind(self.kind).map(|rcnn| self.preset.network(rcnn, true))
     }
 
+    /// The detector while it is taught, which may have more heads than the model: what base weights of ours are read for.
+    pub fn taught_network(&self) -> Option<RcnnConfig> {
+        models::rcnn_kind(self.kind).map(|rcnn| self.preset.plan(rcnn, self).network)
+    }
+
     /// The detector as teaching starts. Heads that the model itself has not start from nothing.
     fn initial_detector(&self, config: &RcnnConfig) -> Result<GeneralizedRcnn> {
         let device = self.device.clone().autodiff();
         let detector = config.init(&device, self.seed)?;
         match &self.base_weights {
             Some(base_weights) => {
-                let own = base_weights.apply(own_config(self.kind, config).init(&device, self.seed)?)?;
+                // Weights of ours have every head that is taught, imported ones those of the model alone.
+                let start =
+                    if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
+                let own = base_weights.apply(start.init(&device, self.seed)?)?;
                 Ok(state_dict::import(detector, &state_dict::export(&own)).0)
             }
             None if self.preset.needs_base_weights() => {
@@ -267,6 +281,9 @@ pub(crate) fn teach_network(
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
     let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
+    let [to_learn, to_hold_back] = other_parts::draw(plan.num_other_parts, options.seed);
+    let augmenter = augmenter.with_other_parts(&to_learn)?;
+    let held_back = held_back.with_other_parts(&to_hold_back)?;
     let turns = HiddenTurns::new(demonstrations, options.symmetry);
     let num_held_back = plan.training.validation.samples as u64;
     let held_back: Vec<Sample> = (0..num_held_back).map(|i| turns.canonical(held_back.held_out(i))).collect();
@@ -296,7 +313,8 @@ pub(crate) fn teach_network(
     // The samples show the part at other sizes than those that may be looked for later.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
-    let calibrated = held_back.calibrate(&network, &of_any_size)?;
+    let other_parts = other_parts::highest_scores(demonstrations, &to_hold_back, &network, options.seed)?;
+    let calibrated = held_back.calibrate(&network, &of_any_size, &other_parts)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.least_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });

@@ -119,7 +119,7 @@ impl Preset {
     pub(super) fn plan(self, rcnn: RcnnKind, options: &TeachOptions) -> Plan {
         let &TeachOptions { kind, seed, symmetry, .. } = options;
         let network = self.network(rcnn, options.base_weights.is_some());
-        Plan {
+        let plan = Plan {
             network: if self == Self::Edge { with_keypoints(network) } else { network },
             training: self.training(kind, seed),
             samples: self.samples(),
@@ -131,7 +131,9 @@ impl Preset {
             },
             least_hit_rate: LEAST_HIT_RATE,
             orientation: (kind == ModelKind::A).then(|| self.orientation(symmetry, seed)),
-        }
+            num_other_parts: 0,
+        };
+        options.fine_tuning.iter().fold(plan, |plan, fine_tuning| fine_tuning.adapt(plan))
     }
 }
 
@@ -163,6 +165,8 @@ pub(crate) struct Plan {
     pub(crate) least_hit_rate: f64,
     /// Model A's other network.
     pub(crate) orientation: Option<OrientationPlan>,
+    /// Generated parts that lie about while the part is taught, beside it and in its place.
+    pub(crate) num_other_parts: usize,
 }
 
 /// The orientation CNN and its training.

@@ -1,12 +1,14 @@
 //! Pictures of parts on tables, with the truth.
 
 mod blur;
+mod composition;
 mod config;
 mod contents;
 mod edges;
 mod ground;
 mod layout;
 mod light;
+mod mixed;
 mod photo;
 mod placement;
 mod render;
@@ -18,6 +20,7 @@ mod table;
 mod view;
 
 pub use config::{Condition, SceneConfig};
+pub use mixed::{MixedInstance, MixedSample};
 pub use photo::{DemonstrationPhoto, PhotoConfig, demonstration};
 pub use sample::{Conditions, Instance, OtherKind, OtherObject, Sample};
 pub use scenes::Scenes;

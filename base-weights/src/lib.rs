@@ -1,0 +1,22 @@
+//! Pretraining of preset `edge` on generated parts.
+//!
+//! ```text
+//! seed ─ Pictures ─ PretrainNetwork: losses ─ AdamW on one cycle ─ checkpoint ─ export ─ BaseWeightsFile (f16)
+//!                                                          Episodes: part after part ─────────┤
+//! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps ────────────────────────────┘
+//!                                 └ recall and false alarms of the network alone (`compare`)
+//! ```
+//!
+//! A run is a function of its seed: picture *i* is always the same, and a checkpoint holds all that the next step needs. A
+//! run that was stopped and resumed gives the same bits as one that was not.
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod checkpoint;
+pub mod compare;
+pub mod episodes;
+pub mod network;
+pub mod outcome;
+pub mod pictures;
+pub mod pretrain;
+pub mod table;

@@ -1,0 +1,108 @@
+//! Pictures that show several of the parts, each labelled.
+
+use image::RgbImage;
+use rand_pcg::Pcg64Mcg;
+
+use super::composition::{SIZE_RATIO, finish};
+use super::layout::Layout;
+use super::render::Rendered;
+use super::sample::Instance;
+use super::scenes::{CANVAS, Scenes, instance};
+use super::sensor;
+use crate::random::{Draw, Stream, generator};
+
+/// Parts that are drawn before one of the wanted size must have come up.
+const MAX_DRAWS: usize = 12;
+
+/// A picture of several parts, and where each lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MixedSample {
+    /// The picture.
+    pub image: RgbImage,
+    /// Every labelled part in the picture. What else lies there is none of the parts.
+    pub instances: Vec<MixedInstance>,
+}
+
+/// A part in a [`MixedSample`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct MixedInstance {
+    /// Which of the parts of [`Scenes`] it is.
+    pub part_idx: usize,
+    /// Where it lies.
+    pub instance: Instance,
+}
+
+impl Scenes {
+    /// Draws sample `index` of several parts: as many as [`SceneConfig::instances`](crate::SceneConfig::instances) says,
+    /// all of about one size, with other parts and covers as in [`Self::sample`]. Which parts is drawn too.
+    pub fn mixed_sample(&self, index: u64) -> MixedSample {
+        let mut rng = generator(self.seed, Stream::MixedSample, index);
+        let first = rng.whole(0, self.subjects.len() - 1);
+        let (view, conditions) = self.draw_view(&self.subjects[first], &mut rng);
+        let mut layout = Layout::new(&view);
+        let mut part_idxs = Vec::new();
+        let wanted = rng.whole(self.config.instances[0], self.config.instances[1]);
+        for number in 0..wanted {
+            let part_idx = if number == 0 { first } else { self.draw_of_size(first, &mut rng) };
+            if layout.lay(&self.subjects[part_idx].part, self.config.min_inside_share as f32, &mut rng) {
+                part_idxs.push(part_idx);
+            }
+        }
+        let num_instances = part_idxs.len();
+        let _kinds = self.lay_others(&self.subjects[first], &mut layout, num_instances, &mut rng);
+        let bodies = layout.bodies;
+        let scene = finish(view, bodies, conditions.glare, &mut rng);
+        let sensor = self.sensor(&conditions, &mut rng);
+        let (Rendered { ids, footprints }, image) = CANVAS.with_borrow_mut(|canvas| {
+            let rendered = scene.render(num_instances, canvas);
+            (rendered, sensor::take(canvas, scene.view.width, &sensor, &mut rng))
+        });
+        let instances = part_idxs
+            .into_iter()
+            .zip(&footprints)
+            .enumerate()
+            .map(|(body, (part_idx, footprint))| MixedInstance {
+                part_idx,
+                instance: instance(&self.subjects[part_idx], &scene, body, footprint, &ids),
+            })
+            .collect();
+        MixedSample { image, instances }
+    }
+
+    /// A part of about the size of another one, where a few draws find it.
+    fn draw_of_size(&self, part_idx: usize, rng: &mut Pcg64Mcg) -> usize {
+        let diagonal = |idx: usize| self.subjects[idx].part.diagonal_mm();
+        let ratio = |idx: usize| (diagonal(idx) / diagonal(part_idx)).ln().abs();
+        let mut best = rng.whole(0, self.subjects.len() - 1);
+        for _ in 0..MAX_DRAWS {
+            if ratio(best) < SIZE_RATIO.ln() {
+                break;
+            }
+            let other = rng.whole(0, self.subjects.len() - 1);
+            best = if ratio(other) < ratio(best) { other } else { best };
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Part, SceneConfig, Scenes};
+
+    #[test]
+    fn several_parts_are_told_apart_and_lie_where_the_picture_shows_them() {
+        let parts: Vec<Part> = (0..4).map(Part::generate).collect();
+        let config = SceneConfig { instances: [3, 5], num_other_parts: 2, ..SceneConfig::default() };
+        let scenes = Scenes::new(&parts, config, 5).unwrap();
+        let samples: Vec<_> = (0..12).map(|index| scenes.mixed_sample(index)).collect();
+        assert_eq!(samples[7], scenes.mixed_sample(7));
+        let mut shown = [0; 4];
+        for mixed in samples.iter().flat_map(|sample| &sample.instances) {
+            shown[mixed.part_idx] += 1;
+            let pose = mixed.instance.image_from_demonstration;
+            let marks = scenes.photo(mixed.part_idx).demonstration.annotation.grasp.unwrap().transformed(&pose);
+            assert!((marks.start - mixed.instance.grasp.start).norm() < 1.0);
+        }
+        assert!(shown.iter().all(|&count| count > 0), "{shown:?}");
+    }
+}
