@@ -202,11 +202,11 @@ fn normal_equations(sightings: &[Sighting], step: &Vector4<f64>, width: f64) -> 
         let weight = sighting.weight * share;
         if weight > 0.0 {
             let rest = distance - sighting.row.dot(step);
-            for i in 0..4 {
+            for (i, (lower, right)) in lower.iter_mut().zip(&mut right).enumerate() {
                 let weighted = sighting.row[i] * weight;
-                right[i] += weighted * rest;
-                for j in 0..=i {
-                    lower[i][j] += weighted * sighting.row[j];
+                *right += weighted * rest;
+                for (sum, other) in lower.iter_mut().zip(sighting.row.iter()).take(i + 1) {
+                    *sum += weighted * other;
                 }
             }
         }
