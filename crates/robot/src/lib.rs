@@ -15,10 +15,11 @@
 //! use sdg_robot::{SafetyLimits, Violation};
 //!
 //! let mut folded = ready_pose();
-//! (folded[1], folded[3]) = (-1.7, -3.0);
+//! (folded[1], folded[3], folded[5]) = (-1.7, -3.0, 0.5);
 //! let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
 //! let motion = Trajectory::point_to_point(&ready_pose(), &folded, &slow)?;
-//! assert!(matches!(SafetyLimits::default().check(motion), Err(Violation::SelfCollision { .. })));
+//! let refused = SafetyLimits::default().check(motion);
+//! assert!(matches!(refused, Err(Violation::SelfCollision { .. })), "{refused:?}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
