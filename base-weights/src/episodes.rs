@@ -22,7 +22,7 @@ use sdg_training::{AdamWState, OneCycle, SampleSource, TrainingConfig, Validatio
 use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
-use crate::network::one_part_config;
+use crate::network::pretrain_config;
 use crate::pictures::FIRST_PART_SEED;
 
 /// What decides a run of episodes.
@@ -79,7 +79,7 @@ impl Episodes {
     /// # Errors
     /// Weights of another network.
     pub fn start(settings: EpisodeSettings, weights: &StateDict, episode: usize, device: &Device) -> Result<Self> {
-        let config = one_part_config();
+        let config = pretrain_config();
         let (network, report) = state_dict::import(config.init(device, settings.seed)?, weights);
         if !report.mismatched.is_empty() || !report.unused.is_empty() {
             bail!("expected weights of preset edge, found {:?} and {:?}", report.mismatched, report.unused);

@@ -1,25 +1,30 @@
-//! The network while it is pretrained: the trunk and heads of preset `edge`, with classes and keypoints for many parts.
+//! The network while it is pretrained: preset `edge` with every head, which tells parts apart by other views of them.
 //!
 //! ```text
-//! images [N, 3, H, W] ─ backbone, FPN ─ RPN: is there any part ─ ROIs ─┬─ box head: which of the K parts, one box
-//!                                                                      ├─ keypoint head: maps of any part + of that part
+//! images [N, 3, H, W] ─ backbone, FPN ─ RPN: is there any part ─ ROIs ─┬─ box head ─ hidden ─ one box for all parts
+//!                                                                      │     └ of each part, but of the other images: mean
+//!                                                                      │        ─ imprint ─ which of the step's parts is it
+//!                                                                      ├─ keypoint head ─ map
+//!                                                                      │     └ read at the keypoints in the other images
+//!                                                                      │        ─ imprint ─ where are they here
 //!                                                                      └─ mask head: what the part covers
 //! ```
 //!
-//! Shapes: N images, R ROIs, K parts, S side of a heatmap. Only the last layers know one part from another: the K + 1 class
-//! scores, and for each part's keypoints a transposed convolution that is added to the one for all parts. All else is what
-//! teaching starts from.
+//! Shapes: N images, R ROIs, P parts of a step, F hidden width, C channels, S side of a map, K keypoints. No parameter
+//! belongs to one part: what teaching needs, features by which views of a part it has never seen can be told from other
+//! parts, is what is learnt. See [`sdg_detection::imprint`].
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::NUM_KEYPOINTS;
 use sdg_detection::ResizedTarget;
 use sdg_detection::config::{BoxDeltas, RcnnConfig};
 use sdg_detection::image_transform::pad_batch;
-use sdg_detection::initialization::{Distribution, Initializer};
-use sdg_detection::layers::{ConvTranspose2x, upsample_bilinear_2x};
+use sdg_detection::imprint::{Imprint, reading_weights};
+use sdg_detection::initialization::Initializer;
+use sdg_detection::layers::upsample_bilinear_2x;
 use sdg_detection::presets::{RcnnKind, edge_of};
 use sdg_detection::roi_heads::heatmap::encode;
 use sdg_detection::roi_heads::roi::{RoiClass, SampledRoi};
@@ -29,12 +34,12 @@ use sdg_detection::sampler::draw;
 use sdg_detection::{DetectionError, GeneralizedRcnn, Losses, TransformedImage, losses};
 
 /// ROIs of an image that go through the keypoint head, and as many through the mask head.
-const MAX_ROIS_PER_IMAGE: usize = 5;
+const MAX_ROIS_PER_IMAGE: usize = 6;
 
-/// The detector that is pretrained: preset `edge` with every head, for so many parts.
-pub fn pretrain_config(num_parts: usize) -> RcnnConfig {
-    let mut config = one_part_config();
-    config.roi_heads.num_classes = num_parts;
+/// The network that is pretrained, and that teaching has, with every head.
+pub fn pretrain_config() -> RcnnConfig {
+    let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
+    config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
     // One box for all parts has the shape of the box of one part, which teaching goes on with.
     config.roi_heads.box_head.box_deltas = BoxDeltas::ClassAgnostic;
     // Pictures show several parts: half of the ROIs may lie on one.
@@ -42,20 +47,13 @@ pub fn pretrain_config(num_parts: usize) -> RcnnConfig {
     config
 }
 
-/// The network that teaching has, with every head.
-pub fn one_part_config() -> RcnnConfig {
-    let mut config = edge_of(RcnnKind::Keypoint { num_keypoints: NUM_KEYPOINTS });
-    config.roi_heads.mask_head = edge_of(RcnnKind::Mask { num_classes: 1 }).roi_heads.mask_head;
-    config
-}
-
 /// The network that is pretrained.
 #[derive(Module, Debug)]
 pub struct PretrainNetwork {
-    /// Trunk and heads.
+    /// Trunk and heads. The class scores are not used.
     pub detector: GeneralizedRcnn,
-    /// What each part adds to the last layer of the keypoint head.
-    pub keypoint_maps: Vec<ConvTranspose2x>,
+    /// What makes the last layers of other views' features.
+    pub imprint: Imprint,
 }
 
 impl PretrainNetwork {
@@ -65,20 +63,14 @@ impl PretrainNetwork {
     /// A configuration that contradicts itself.
     pub fn init(config: &RcnnConfig, device: &Device, seed: u64) -> Result<Self, DetectionError> {
         let detector = config.init(device, seed)?;
-        let mut init = Initializer::new(device, seed ^ 0x6b65_7970_6f69_6e74);
         let channels = config.roi_heads.keypoint_head.as_ref().and_then(|head| head.conv_channels.last().copied());
-        // Zero: every part starts from what holds for all of them.
-        let mut zeros = |channels| {
-            let (weight, bias) = ([channels, NUM_KEYPOINTS, 4, 4], [NUM_KEYPOINTS]);
-            let zero = Distribution::Constant(0.0);
-            ConvTranspose2x { weight: init.param(weight, zero), bias: init.param(bias, zero) }
-        };
-        let keypoint_maps =
-            std::iter::repeat_n(channels.unwrap_or(1), config.roi_heads.num_classes).map(&mut zeros).collect();
-        Ok(Self { detector, keypoint_maps })
+        let mut init = Initializer::new(device, seed ^ 0x6b65_7970_6f69_6e74);
+        let imprint = Imprint::init(config.roi_heads.box_head.fc_channels, channels.unwrap_or(1), &mut init);
+        Ok(Self { detector, imprint })
     }
 
-    /// Gives the losses of a batch whose targets are in pixels of the images. `seed` draws what takes part in them.
+    /// Gives the losses of a batch whose targets are in pixels of the images; labels tell one part from another. `seed`
+    /// draws what takes part in them.
     pub fn losses(&self, images: &[TransformedImage], targets: &[ResizedTarget], seed: u64) -> Losses {
         let stream = |purpose: u128| -> Vec<Pcg64Mcg> {
             let state = |idx: usize| purpose << 64 | u128::from(seed.wrapping_add((idx as u64) << 40));
@@ -87,7 +79,7 @@ impl PretrainNetwork {
         let detector = &self.detector;
         let padded = pad_batch(images, detector.config().input.size_divisibility);
         let [_, _, height, width] = padded.dims;
-        let data = burn::tensor::TensorData::new(padded.pixels, padded.dims);
+        let data = TensorData::new(padded.pixels, padded.dims);
         let features = detector.backbone.forward(Tensor::from_data(data, &detector.device()));
         let sizes: Vec<ImageSize> = images.iter().map(|image| [image.height, image.width]).collect();
 
@@ -101,14 +93,91 @@ impl PretrainNetwork {
         let rois = heads.sample_rois(&proposals, targets, &mut stream(2));
         let boxes: Vec<Roi> = rois.iter().map(|sampled| sampled.roi).collect();
         let hidden = heads.box_head.forward(&features, &boxes);
-        let [cls, box_reg] = heads.box_predictor.losses(hidden, &rois, targets);
+        let of_any_part: Vec<SampledRoi> = rois.iter().map(any_part).collect();
+        let [_, box_reg] = heads.box_predictor.losses(hidden.clone(), &of_any_part, targets);
+        let cls = self.class_loss(&hidden, &rois);
         let chosen = choose(&rois, images.len(), &mut stream(3));
         let keypoint = self.keypoint_loss(&features, &chosen, targets);
-        let mask = self.mask_loss(&features, &chosen, targets, &sizes);
+        let mask = match &heads.mask_head {
+            Some(head) if !chosen.is_empty() => {
+                let rois: Vec<SampledRoi> = chosen.iter().map(Chosen::of_any_part).collect();
+                head.loss(&features, &rois, targets, &sizes)
+            }
+            _ => Tensor::zeros([1], &features[0].device()),
+        };
         Losses { rpn_cls, rpn_loc, cls, box_reg, keypoint: Some(keypoint), mask: Some(mask) }
     }
 
-    /// The cross-entropy over the cells of each part's own maps, divided by the keypoints that have a cell.
+    /// Which part an ROI shows, by the mean of each part's ROIs in the other images: cross-entropy over the parts and
+    /// background, and, since teaching has one part and all else, whether it is that part for every part on its own.
+    ///
+    /// # Shapes
+    /// - `hidden`: `[R, F]`
+    fn class_loss(&self, hidden: &Tensor<2>, rois: &[SampledRoi]) -> Tensor<1> {
+        let part_of = |sampled: &SampledRoi| match sampled.class {
+            RoiClass::Object { class_idx, .. } => Some(class_idx),
+            RoiClass::Background => None,
+        };
+        let device = hidden.device();
+        let num_parts = rois.iter().filter_map(part_of).max().map_or(0, |last| last + 1);
+        let mut sum = Tensor::zeros([1], &device);
+        let (mut num_rows, mut num_pairs) = (0, 0.0);
+        let mut start = 0;
+        for of_image in rois.chunk_by(|a, b| a.roi.image_idx == b.roi.image_idx) {
+            let rows = start..start + of_image.len();
+            start = rows.end;
+            // Rows of other images by part; parts that no other image shows are left out.
+            let mut views: Vec<Vec<usize>> = vec![Vec::new(); num_parts];
+            for (row, sampled) in rois.iter().enumerate().filter(|(row, _)| !rows.contains(row)) {
+                if let Some(part) = part_of(sampled) {
+                    views[part].push(row);
+                }
+            }
+            let known: Vec<usize> = (0..num_parts).filter(|part| !views[*part].is_empty()).collect();
+            if known.is_empty() {
+                continue;
+            }
+            let mut means = vec![0f32; known.len() * rois.len()];
+            for (part, of_part) in known.iter().zip(means.chunks_exact_mut(rois.len())) {
+                let share = 1.0 / views[*part].len() as f32;
+                views[*part].iter().for_each(|row| of_part[*row] = share);
+            }
+            let means = Tensor::<2>::from_data(TensorData::new(means, [known.len(), rois.len()]), &device);
+            let (weights, biases) = self.imprint.class.classifier(means.matmul(hidden.clone()));
+            let of_rows = hidden.clone().slice(rows.clone());
+            let scores = of_rows.matmul(weights.transpose()) + biases.unsqueeze();
+
+            let columns: Vec<Option<usize>> = of_image
+                .iter()
+                .map(|sampled| match part_of(sampled) {
+                    Some(part) => known.iter().position(|one| *one == part),
+                    None => Some(known.len()),
+                })
+                .collect();
+            num_rows += columns.iter().flatten().count();
+            let background = Tensor::zeros([rows.len(), 1], &device);
+            sum = sum + losses::cross_entropy(Tensor::cat(vec![scores.clone(), background], 1), &columns);
+
+            let (mut is_part, mut pair_weights) = (Vec::new(), Vec::new());
+            for column in &columns {
+                for idx in 0..known.len() {
+                    is_part.push(if *column == Some(idx) { 1.0 } else { 0.0 });
+                    pair_weights.push(match column {
+                        None => 0.0,
+                        Some(own) if *own == idx => 1.0,
+                        Some(_) => 1.0 / known.len() as f32,
+                    });
+                }
+            }
+            num_pairs += pair_weights.iter().map(|weight| f64::from(*weight)).sum::<f64>();
+            let flat = scores.reshape([rows.len() * known.len()]);
+            sum = sum + losses::weighted_binary_cross_entropy(flat, &is_part, &pair_weights);
+        }
+        sum * (2.0 / (num_rows as f64 + num_pairs).max(1.0))
+    }
+
+    /// Where the keypoints are, by what their part's ROIs in the other images show there: the cross-entropy over the cells,
+    /// divided by the keypoints that have a cell.
     fn keypoint_loss(&self, features: &[Tensor<4>; 5], chosen: &[Chosen], targets: &[ResizedTarget]) -> Tensor<1> {
         let zero = || Tensor::zeros([1], &features[0].device());
         let (Some(head), Some(config)) =
@@ -116,59 +185,75 @@ impl PretrainNetwork {
         else {
             return zero();
         };
-        let size = config.heatmap_size();
-        let cells_of = |chosen: &Chosen| -> Vec<Option<usize>> {
-            let keypoints = &targets[chosen.roi.image_idx].keypoints[chosen.gt_idx];
-            keypoints.iter().map(|keypoint| encode(keypoint, &chosen.roi.corners, size)).collect()
-        };
-        let with_cells: Vec<(&Chosen, Vec<Option<usize>>)> = chosen
-            .iter()
-            .map(|chosen| (chosen, cells_of(chosen)))
-            .filter(|(_, cells)| cells.iter().any(Option::is_some))
-            .collect();
-        let count = with_cells.iter().flat_map(|(_, cells)| cells.iter().flatten()).count();
+        let (size, side) = (config.heatmap_size(), config.pooler.output_size);
+        let keypoints = |chosen: &Chosen| &targets[chosen.roi.image_idx].keypoints[chosen.gt_idx];
+        let chosen: Vec<&Chosen> =
+            chosen.iter().filter(|chosen| keypoints(chosen).iter().any(|keypoint| keypoint.is_labelled())).collect();
+        let count = chosen.len();
         if count == 0 {
             return zero();
         }
-        let boxes: Vec<Roi> = with_cells.iter().map(|(chosen, _)| chosen.roi).collect();
+        let boxes: Vec<Roi> = chosen.iter().map(|chosen| chosen.roi).collect();
         let pooled = pool(features, &boxes, &config.pooler);
         let hidden = head.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
-        let of_any_part = head.score_lowres.forward(hidden.clone());
-        let mut sum = zero();
-        let mut start = 0;
-        // The ROIs of a part stand side by side.
-        for of_part in with_cells.chunk_by(|(a, _), (b, _)| a.part_idx == b.part_idx) {
-            let rows = |maps: &Tensor<4>| maps.clone().narrow(0, start, of_part.len());
-            let own = self.keypoint_maps[of_part[0].0.part_idx].forward(rows(&hidden));
-            let logits = upsample_bilinear_2x(rows(&of_any_part) + own);
-            start += of_part.len();
-            let [r, k, _, _] = logits.dims();
-            let cells: Vec<Option<usize>> = of_part.iter().flat_map(|(_, cells)| cells.iter().copied()).collect();
-            sum = sum + losses::cross_entropy(logits.reshape([r * k, size * size]), &cells);
-        }
-        sum * (config.loss_weight / count as f64)
-    }
+        let [_, channels, _, _] = hidden.dims();
+        let flat: Tensor<3> = hidden.clone().reshape([count, channels, side * side]);
 
-    /// The mask head's loss with the map of the first class for every part.
-    fn mask_loss(
-        &self,
-        features: &[Tensor<4>; 5],
-        chosen: &[Chosen],
-        targets: &[ResizedTarget],
-        sizes: &[ImageSize],
-    ) -> Tensor<1> {
-        match &self.detector.roi_heads.mask_head {
-            Some(head) if !chosen.is_empty() => {
-                let of_any_part = |chosen: &Chosen| SampledRoi {
-                    roi: chosen.roi,
-                    class: RoiClass::Object { class_idx: 0, gt_idx: chosen.gt_idx },
-                };
-                let rois: Vec<SampledRoi> = chosen.iter().map(of_any_part).collect();
-                head.loss(features, &rois, targets, sizes)
+        // [R, K, S·S] reads each ROI at its keypoints, [K, R, R] takes the mean over the other images' ROIs of the part.
+        let mut readings = vec![0f32; count * NUM_KEYPOINTS * side * side];
+        let mut is_read = vec![[false; NUM_KEYPOINTS]; count];
+        for (row, of_roi) in readings.chunks_exact_mut(NUM_KEYPOINTS * side * side).enumerate() {
+            for (k, (keypoint, of_keypoint)) in
+                keypoints(chosen[row]).iter().zip(of_roi.chunks_exact_mut(side * side)).enumerate()
+            {
+                if let Some(weights) = reading_weights(keypoint, &chosen[row].roi.corners, side) {
+                    is_read[row][k] = true;
+                    weights.iter().for_each(|(cell, weight)| of_keypoint[*cell] += weight);
+                }
             }
-            _ => Tensor::zeros([1], &features[0].device()),
         }
+        let mut means = vec![0f32; NUM_KEYPOINTS * count * count];
+        let mut cells = vec![None; count * NUM_KEYPOINTS];
+        for (row, asked) in chosen.iter().enumerate() {
+            for k in 0..NUM_KEYPOINTS {
+                let is_view = |other: usize| {
+                    let view = chosen[other];
+                    view.part_idx == asked.part_idx && view.roi.image_idx != asked.roi.image_idx && is_read[other][k]
+                };
+                let views: Vec<usize> = (0..count).filter(|other| is_view(*other)).collect();
+                if views.is_empty() {
+                    continue;
+                }
+                let share = 1.0 / views.len() as f32;
+                views.iter().for_each(|other| means[(k * count + row) * count + other] = share);
+                cells[row * NUM_KEYPOINTS + k] = encode(&keypoints(asked)[k], &asked.roi.corners, size);
+            }
+        }
+        let num_cells = cells.iter().flatten().count();
+        if num_cells == 0 {
+            return zero();
+        }
+        let device = flat.device();
+        let readings = TensorData::new(readings, [count, NUM_KEYPOINTS, side * side]);
+        let read: Tensor<3> = Tensor::<3>::from_data(readings, &device).matmul(flat.clone().swap_dims(1, 2));
+        let means = Tensor::<3>::from_data(TensorData::new(means, [NUM_KEYPOINTS, count, count]), &device);
+        let descriptors = means.matmul(read.swap_dims(0, 1)).swap_dims(0, 1);
+        let weights = self.imprint.keypoint.weights(descriptors.reshape([count * NUM_KEYPOINTS, channels]));
+        let own: Tensor<3> = weights.reshape([count, NUM_KEYPOINTS, channels]).matmul(flat);
+        let own = upsample_bilinear_2x(own.reshape([count, NUM_KEYPOINTS, side, side]));
+        let logits = upsample_bilinear_2x(head.score_lowres.forward(hidden) + own);
+        let sum = losses::cross_entropy(logits.reshape([count * NUM_KEYPOINTS, size * size]), &cells);
+        sum * (config.loss_weight / num_cells as f64)
     }
+}
+
+/// The ROI on whatever part, as the first class.
+fn any_part(sampled: &SampledRoi) -> SampledRoi {
+    let class = match sampled.class {
+        RoiClass::Object { gt_idx, .. } => RoiClass::Object { class_idx: 0, gt_idx },
+        RoiClass::Background => RoiClass::Background,
+    };
+    SampledRoi { roi: sampled.roi, class }
 }
 
 /// An ROI on a part.
@@ -179,7 +264,13 @@ struct Chosen {
     gt_idx: usize,
 }
 
-/// ROIs on parts, at most [`MAX_ROIS_PER_IMAGE`] an image, in the order of the parts.
+impl Chosen {
+    fn of_any_part(&self) -> SampledRoi {
+        SampledRoi { roi: self.roi, class: RoiClass::Object { class_idx: 0, gt_idx: self.gt_idx } }
+    }
+}
+
+/// ROIs on parts, at most [`MAX_ROIS_PER_IMAGE`] an image.
 fn choose(rois: &[SampledRoi], num_images: usize, rngs: &mut [Pcg64Mcg]) -> Vec<Chosen> {
     let on_part = |sampled: &SampledRoi| match sampled.class {
         RoiClass::Object { class_idx, gt_idx } => Some(Chosen { roi: sampled.roi, part_idx: class_idx, gt_idx }),
@@ -193,6 +284,5 @@ fn choose(rois: &[SampledRoi], num_images: usize, rngs: &mut [Pcg64Mcg]) -> Vec<
         draw(&mut idxs, MAX_ROIS_PER_IMAGE, rng);
         chosen.extend(idxs.into_iter().map(|idx| of_image[idx]));
     }
-    chosen.sort_by_key(|chosen| chosen.part_idx);
     chosen
 }

@@ -1,6 +1,9 @@
 //! What is learnt from: pictures of several generated parts each, with the truth, by random access.
 
 use anyhow::Result;
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use sdg_demonstration::NUM_KEYPOINTS;
 use sdg_detection::ResizedTarget;
 use sdg_detection::{ImageTransform, ObjectMask, RcnnConfig, TransformedImage};
@@ -8,7 +11,12 @@ use sdg_geometry::{BoundingBox, GraspLine, Keypoint, Polygon, RotationalSymmetry
 use sdg_part_generator::{LookAlike, MixedInstance, MixedSample, Part, PhotoConfig, SceneConfig, Scenes};
 
 /// Every so many parts, one is a look-alike of the part before it: what tells the two apart must be learnt.
-const LOOK_ALIKE_EVERY: usize = 4;
+const LOOK_ALIKE_EVERY: usize = 2;
+
+/// Parts that a step tells apart, and the parts next to each other by size that they are drawn from: the size alone, which
+/// a photo gives away only roughly, shall not tell which it is.
+const GROUP: usize = 8;
+const GROUP_FROM: usize = 20;
 
 /// Parts of which less is visible are not asked for.
 const MIN_VISIBLE_SHARE: f64 = 0.35;
@@ -38,6 +46,9 @@ pub struct Pictures {
     transform: ImageTransform,
     /// Parts whose turn cannot be told: their keypoints are not asked for.
     is_symmetric: Vec<bool>,
+    /// All parts, the smallest first; look-alikes stand beside each other.
+    by_size: Vec<usize>,
+    seed: u64,
 }
 
 impl Pictures {
@@ -48,16 +59,30 @@ impl Pictures {
     pub fn new(num_parts: usize, network: &RcnnConfig, seed: u64) -> Result<Self> {
         let parts = draw_parts(num_parts, seed);
         let is_symmetric = parts.iter().map(|part| part.symmetry() != RotationalSymmetry::None).collect();
+        let mut by_size: Vec<usize> = (0..parts.len()).collect();
+        by_size.sort_by(|one, other| parts[*one].diagonal_mm().total_cmp(&parts[*other].diagonal_mm()));
         let scenes = Scenes::new(&parts, scene_config(), seed)?;
-        Ok(Self { scenes, transform: ImageTransform::new(&network.input), is_symmetric })
+        Ok(Self { scenes, transform: ImageTransform::new(&network.input), is_symmetric, by_size, seed })
     }
 
-    /// Picture `index` as the network gets it, and what is in it, in pixels of the network's input.
+    /// The parts that a step tells apart.
+    pub fn group(&self, step: usize) -> Vec<usize> {
+        let mut rng = Pcg64Mcg::seed_from_u64(self.seed ^ (step as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let count = GROUP_FROM.min(self.by_size.len());
+        let first = rng.random_range(0..=self.by_size.len() - count);
+        let mut group = self.by_size[first..first + count].to_vec();
+        group.shuffle(&mut rng);
+        group.truncate(GROUP);
+        group
+    }
+
+    /// Picture `index` of a group of parts as the network gets it, and what is in it, in pixels of the network's input. A
+    /// part's label is its place in the group.
     ///
     /// # Errors
     /// A picture that the network refuses.
-    pub fn picture(&self, index: u64) -> Result<(TransformedImage, ResizedTarget)> {
-        let MixedSample { image, instances } = self.scenes.mixed_sample(index);
+    pub fn picture(&self, group: &[usize], index: u64) -> Result<(TransformedImage, ResizedTarget)> {
+        let MixedSample { image, instances } = self.scenes.mixed_sample_of(group, index);
         let transformed = self.transform.apply(&image)?;
         let [sx, sy] = transformed.resized_from_original();
         let (width, height) = (f64::from(image.width()), f64::from(image.height()));
@@ -69,7 +94,7 @@ impl Pictures {
             }
             let outline = outline.unwrap_or_else(|| Polygon::from_box(&bbox));
             target.boxes.push(transformed.resized_box(&bbox));
-            target.labels.push(part_idx);
+            target.labels.extend(group.iter().position(|one| *one == part_idx));
             target.keypoints.push(keypoints(&instance.grasp, self.is_symmetric[part_idx], &bbox, [sx, sy]));
             target.masks.push(ObjectMask::from(outline.scaled(sx, sy)));
         }
@@ -84,7 +109,7 @@ pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
     for i in 0..num_parts {
         let look_alike = parts.last().filter(|_| i % LOOK_ALIKE_EVERY == LOOK_ALIKE_EVERY - 1).and_then(|part| {
             let kinds = [LookAlike::Mirrored, LookAlike::FeatureMoved];
-            let [one, other] = if i % 8 == 3 { kinds } else { [kinds[1], kinds[0]] };
+            let [one, other] = if i % 4 == 1 { kinds } else { [kinds[1], kinds[0]] };
             part.look_alike(one, i as u64).or_else(|| part.look_alike(other, i as u64))
         });
         parts.push(look_alike.unwrap_or_else(|| Part::generate(first.wrapping_add(i as u64))));

@@ -15,7 +15,7 @@ use sdg_training::{AdamW, LossValues, OneCycle};
 use serde::{Deserialize, Serialize};
 
 use crate::checkpoint::Checkpoint;
-use crate::network::{PretrainNetwork, one_part_config, pretrain_config};
+use crate::network::{PretrainNetwork, pretrain_config};
 use crate::pictures::Pictures;
 
 /// Decoupled weight decay and the norm that each parameter's gradient is cut to, as teaching has them.
@@ -27,7 +27,7 @@ const MAX_GRADIENT_NORM: f64 = 10.0;
 pub struct Settings {
     /// Decides parts, pictures and every random choice.
     pub seed: u64,
-    /// Parts that are told apart.
+    /// Parts that are drawn from.
     pub num_parts: usize,
     /// Pictures a step.
     pub batch_size: usize,
@@ -125,7 +125,8 @@ impl Run {
     fn batch(&self) -> Result<(Vec<TransformedImage>, Vec<ResizedTarget>)> {
         let first = (self.step * self.settings.batch_size) as u64;
         let indices = first..first + self.settings.batch_size as u64;
-        let pictures: Vec<_> = indices.into_par_iter().map(|i| self.pictures.picture(i)).collect::<Result<_>>()?;
+        let group = self.pictures.group(self.step);
+        let pictures: Vec<_> = indices.into_par_iter().map(|i| self.pictures.picture(&group, i)).collect::<Result<_>>()?;
         Ok(pictures.into_iter().unzip())
     }
 }
@@ -135,7 +136,7 @@ impl Run {
 /// # Errors
 /// A checkpoint without the heads of the preset.
 pub fn export(checkpoint: &Checkpoint<Settings>, commit: &str) -> Result<BaseWeightsFile> {
-    let wanted = state_dict::export(&one_part_config().init_blank(&Device::flex())?);
+    let wanted = state_dict::export(&pretrain_config().init_blank(&Device::flex())?);
     let anew = |name: &str| name.contains("box_predictor.cls_score.");
     let mut parameters = BTreeMap::new();
     let mut reinitialized = BTreeSet::new();
@@ -145,18 +146,15 @@ pub fn export(checkpoint: &Checkpoint<Settings>, commit: &str) -> Result<BaseWei
             continue;
         }
         let key = format!("detector.{name}");
-        let mut found =
+        let found =
             checkpoint.parameters.get(&key).with_context(|| format!("expected {key} in the checkpoint"))?.clone();
-        if name.starts_with("roi_heads.mask_head.predictor.") {
-            // The map that served for every part is the first.
-            found.values.truncate(blank.values.len());
-            found.shape.clone_from(&blank.shape);
-        }
         if found.shape != blank.shape {
             bail!("{key}: expected shape {:?}, found {:?}", blank.shape, found.shape);
         }
         parameters.insert(name, found);
     }
+    let imprint = checkpoint.parameters.iter().filter(|(name, _)| name.starts_with("imprint."));
+    parameters.extend(imprint.map(|(name, tensor)| (name.clone(), tensor.clone())));
     let Settings { seed, num_parts, batch_size, .. } = checkpoint.settings;
     let origin = BTreeMap::from([
         ("commit".to_owned(), commit.to_owned()),
@@ -174,7 +172,7 @@ pub fn export(checkpoint: &Checkpoint<Settings>, commit: &str) -> Result<BaseWei
 /// # Errors
 /// A checkpoint of other settings.
 pub fn start_or_resume(path: &Path, settings: Settings, device: &Device) -> Result<Run> {
-    let config = pretrain_config(settings.num_parts);
+    let config = pretrain_config();
     if !path.exists() {
         return Run::start(settings, &config, device);
     }

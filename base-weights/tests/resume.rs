@@ -11,8 +11,8 @@ use sdg_grasp::Device;
 const STEPS: usize = 50;
 
 /// The pretraining's network, narrow and for small pictures, so that fifty steps take seconds.
-fn narrow(num_parts: usize) -> RcnnConfig {
-    let mut config = pretrain_config(num_parts);
+fn narrow() -> RcnnConfig {
+    let mut config = pretrain_config();
     config.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 72 };
     (config.backbone.stem_channels, config.backbone.res2_channels) = (8, 8);
     config.backbone.num_blocks = [1, 1, 1, 1];
@@ -35,7 +35,7 @@ fn advance(run: &mut Run, steps: usize) -> Vec<f64> {
 #[test]
 fn fifty_steps_are_the_same_bits_whether_stopped_or_not() {
     let (settings, device) = (settings(), Device::flex());
-    let config = narrow(settings.num_parts);
+    let config = narrow();
     let mut whole = Run::start(settings.clone(), &config, &device).unwrap();
     let losses = advance(&mut whole, STEPS);
     assert!(whole.is_over());
@@ -60,8 +60,8 @@ fn fifty_steps_are_the_same_bits_whether_stopped_or_not() {
 #[test]
 fn a_checkpoint_of_another_network_is_refused() {
     let device = Device::flex();
-    let run = Run::start(settings(), &narrow(5), &device).unwrap();
-    let mut other = narrow(5);
+    let run = Run::start(settings(), &narrow(), &device).unwrap();
+    let mut other = narrow();
     other.fpn.channels = 16;
     let error = Run::resume(&run.checkpoint(), &other, &device).err().unwrap().to_string();
     assert!(error.contains("expected a checkpoint of this network"), "{error}");

@@ -44,6 +44,7 @@ pub mod fpn;
 mod generalized_rcnn;
 mod host;
 pub mod image_transform;
+pub mod imprint;
 pub mod initialization;
 pub mod layers;
 pub mod losses;

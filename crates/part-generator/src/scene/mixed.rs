@@ -36,14 +36,23 @@ impl Scenes {
     /// Draws sample `index` of several parts: as many as [`SceneConfig::instances`](crate::SceneConfig::instances) says,
     /// all of about one size, with other parts and covers as in [`Self::sample`]. Which parts is drawn too.
     pub fn mixed_sample(&self, index: u64) -> MixedSample {
+        let all: Vec<usize> = (0..self.subjects.len()).collect();
+        self.mixed_sample_of(&all, index)
+    }
+
+    /// The same of some of the parts, given by their indices.
+    ///
+    /// # Panics
+    /// Without a part.
+    pub fn mixed_sample_of(&self, of: &[usize], index: u64) -> MixedSample {
         let mut rng = generator(self.seed, Stream::MixedSample, index);
-        let first = rng.whole(0, self.subjects.len() - 1);
+        let first = of[rng.whole(0, of.len() - 1)];
         let (view, conditions) = self.draw_view(&self.subjects[first], &mut rng);
         let mut layout = Layout::new(&view);
         let mut part_idxs = Vec::new();
         let wanted = rng.whole(self.config.instances[0], self.config.instances[1]);
         for number in 0..wanted {
-            let part_idx = if number == 0 { first } else { self.draw_of_size(first, &mut rng) };
+            let part_idx = if number == 0 { first } else { self.draw_of_size(of, first, &mut rng) };
             if layout.lay(&self.subjects[part_idx].part, self.config.min_inside_share as f32, &mut rng) {
                 part_idxs.push(part_idx);
             }
@@ -70,15 +79,15 @@ impl Scenes {
     }
 
     /// A part of about the size of another one, where a few draws find it.
-    fn draw_of_size(&self, part_idx: usize, rng: &mut Pcg64Mcg) -> usize {
+    fn draw_of_size(&self, of: &[usize], part_idx: usize, rng: &mut Pcg64Mcg) -> usize {
         let diagonal = |idx: usize| self.subjects[idx].part.diagonal_mm();
         let ratio = |idx: usize| (diagonal(idx) / diagonal(part_idx)).ln().abs();
-        let mut best = rng.whole(0, self.subjects.len() - 1);
+        let mut best = of[rng.whole(0, of.len() - 1)];
         for _ in 0..MAX_DRAWS {
             if ratio(best) < SIZE_RATIO.ln() {
                 break;
             }
-            let other = rng.whole(0, self.subjects.len() - 1);
+            let other = of[rng.whole(0, of.len() - 1)];
             best = if ratio(other) < ratio(best) { other } else { best };
         }
         best
