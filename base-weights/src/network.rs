@@ -28,7 +28,7 @@ use sdg_detection::layers::upsample_bilinear_2x;
 use sdg_detection::presets::{RcnnKind, edge_of};
 use sdg_detection::roi_heads::heatmap::encode;
 use sdg_detection::roi_heads::roi::{RoiClass, SampledRoi};
-use sdg_detection::roi_pooler::{Roi, pool};
+use sdg_detection::roi_pooler::Roi;
 use sdg_detection::rpn::{ImageSize, Mode};
 use sdg_detection::sampler::draw;
 use sdg_detection::{DetectionError, GeneralizedRcnn, Losses, TransformedImage, losses};
@@ -194,8 +194,7 @@ impl PretrainNetwork {
             return zero();
         }
         let boxes: Vec<Roi> = chosen.iter().map(|chosen| chosen.roi).collect();
-        let pooled = pool(features, &boxes, &config.pooler);
-        let hidden = head.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
+        let hidden = head.hidden(features, &boxes);
         let [_, channels, _, _] = hidden.dims();
         let flat: Tensor<3> = hidden.clone().reshape([count, channels, side * side]);
 

@@ -2,9 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use sdg_detection::GeneralizedRcnn;
+use burn::module::Module;
+use burn::tensor::Device;
 use sdg_detection::config::NormKind;
+use sdg_detection::imprint::Imprint;
+use sdg_detection::initialization::Initializer;
 use sdg_detection::state_dict::{self, ImportReport, StateDict, WeightTensor};
+use sdg_detection::{GeneralizedRcnn, Target, TransformedImage};
 
 use crate::error::{GraspError, Result};
 
@@ -20,12 +24,39 @@ pub struct BaseWeights {
     pub parameters: StateDict,
     /// Parameters that stay as the seed draws them, such as predictors for other classes.
     pub reinitialized: BTreeSet<String>,
+    /// What makes last layers of a part's own views; empty for weights without.
+    pub imprint: StateDict,
 }
 
 impl BaseWeights {
     /// Whether they have a keypoint head, which preset `edge` also teaches models without keypoints with.
     pub(crate) fn has_keypoint_head(&self) -> bool {
         self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
+    }
+
+    /// The detector with last layers made from views of the part, where the weights can make them.
+    ///
+    /// # Errors
+    /// Targets that do not fit the images; [`GraspError::BaseWeights`] where the imprint is another network's.
+    pub(crate) fn imprint(
+        &self,
+        detector: GeneralizedRcnn,
+        images: &[TransformedImage],
+        targets: &[Target],
+    ) -> Result<GeneralizedRcnn> {
+        if self.imprint.is_empty() {
+            return Ok(detector);
+        }
+        let heads = &detector.config().roi_heads;
+        let channels = heads.keypoint_head.as_ref().and_then(|head| head.conv_channels.last().copied()).unwrap_or(1);
+        let mut init = Initializer::blank(&Device::flex());
+        let blank = Imprint::init(heads.box_head.fc_channels, channels, &mut init);
+        let (imprint, report) = state_dict::import(blank, &self.imprint);
+        if let Some(found) = first_misfit(&report) {
+            return Err(GraspError::BaseWeights { fitting: report.applied.len(), found });
+        }
+        let layers = imprint.last_layers(&detector.valid(), images, targets)?;
+        Ok(state_dict::import(detector, &layers).0)
     }
 
     /// Sets the network's parameters. What the preset freezes stays frozen.
@@ -96,12 +127,9 @@ fn first_misfit(report: &ImportReport) -> Option<String> {
 mod tests {
     use super::*;
     use burn::grad_clipping::GradientClippingConfig;
-    use burn::module::Module;
     use burn::optim::{AdamWConfig, GradientsParams};
-    use burn::tensor::Device;
     use image::{Rgb, RgbImage};
     use sdg_detection::RcnnConfig;
-    use sdg_detection::Target;
 
     /// torchvision's numerics and freezing on a network that takes no time.
     fn narrow() -> RcnnConfig {
@@ -114,7 +142,7 @@ mod tests {
     fn base(config: &RcnnConfig) -> BaseWeights {
         let network = config.init(&Device::flex(), 7).unwrap();
         let parameters = state_dict::export(&network);
-        BaseWeights { sha256: "0".repeat(64), parameters, reinitialized: BTreeSet::new() }
+        BaseWeights { sha256: "0".repeat(64), parameters, reinitialized: BTreeSet::new(), imprint: StateDict::new() }
     }
 
     #[test]

@@ -108,6 +108,11 @@ impl BaseWeightsFile {
                 .map(|(n, v)| (n.clone(), v.clone()))
                 .collect(),
             reinitialized: self.reinitialized.iter().filter(own).cloned().collect(),
+            imprint: self
+                .parameters
+                .iter()
+                .filter_map(|(name, tensor)| Some((name.strip_prefix("imprint.")?.to_owned(), tensor.clone())))
+                .collect(),
         })
     }
 }

@@ -70,6 +70,20 @@ fn prepare(
     Ok(batch)
 }
 
+/// The first windows of a source and what is in them.
+///
+/// # Errors
+/// A window that the network refuses.
+pub fn first_windows(
+    count: usize,
+    transform: &ImageTransformConfig,
+    source: &SampleSource<'_>,
+) -> Result<(Vec<TransformedImage>, Vec<Target>), TrainingError> {
+    let Batch { images, targets } =
+        prepare(BatchRequest { step: 0, view: View::Window, size: count }, transform, source)?;
+    Ok((images, targets))
+}
+
 /// The truth of a sample, in pixels of its image; one class.
 fn target(sample: &Sample) -> Target {
     Target {

@@ -35,7 +35,7 @@ mod trainer;
 mod validation;
 
 pub use adamw::{AdamW, AdamWState};
-pub use batch::SampleSource;
+pub use batch::{SampleSource, first_windows};
 pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
 pub use pace::Pace;

@@ -58,9 +58,13 @@ impl KeypointHead {
 
     /// Gives heatmap logits `[R, K, S, S]`.
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
+        upsample_bilinear_2x(self.score_lowres.forward(self.hidden(features, rois)))
+    }
+
+    /// Gives the maps `[R, C, P, P]` that the heatmaps are made of, `C` those of the last convolution.
+    pub fn hidden(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
-        let hidden = self.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
-        upsample_bilinear_2x(self.score_lowres.forward(hidden))
+        self.conv_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x))
     }
 
     /// Gives the cross-entropy over the cells, divided by the keypoints that have a cell.

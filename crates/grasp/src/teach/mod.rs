@@ -31,7 +31,7 @@ use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
 use sdg_geometry::{GraspLine, RotationalSymmetry};
-use sdg_training::{History, SampleSource, Trained, TrainingError, train};
+use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
 use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
@@ -254,6 +254,9 @@ fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Inst
     Ok(Taught { model, history: None })
 }
 
+/// Windows that last layers are made from.
+const NUM_VIEWS: usize = 64;
+
 /// The models with a network, by a plan.
 pub(crate) fn teach_network(
     demonstrations: &[Demonstration],
@@ -293,13 +296,21 @@ pub(crate) fn teach_network(
 
     let recurring = |i: u64| plan.distinct_samples.map_or(i, |distinct| i % distinct);
     let windows = augmenter.windows(plan.network.input.size_divisibility as u32);
+    let source = SampleSource {
+        frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
+        windows: &|i| turns.canonical(windows.sample(recurring(i))),
+    };
+    let detector = match &options.base_weights {
+        Some(base_weights) if !base_weights.imprint.is_empty() => {
+            let (images, targets) = first_windows(NUM_VIEWS, &plan.network.input, &source)?;
+            base_weights.imprint(detector, &images, &targets)?
+        }
+        _ => detector,
+    };
     let Trained { detector, history } = train(
         detector,
         &training,
-        SampleSource {
-            frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
-            windows: &|i| turns.canonical(windows.sample(recurring(i))),
-        },
+        source,
         &mut |detector: &GeneralizedRcnn| {
             let network = Network { detector: detector.clone(), reading: reading.clone() };
             held_back.examine(&network, &taught).map_err(|error| TrainingError::Examination(error.into()))
