@@ -24,10 +24,10 @@ const PICTURE: &str = "datasets/demonstrations/pendulum/image.png";
 const OUR_MODULE: [&str; 2] = ["sdg_web_bg.wasm", "sdg_web.js"];
 const THEIR_MODULE: [&str; 3] = ["ort-wasm-simd-threaded.wasm", "ort-wasm-simd-threaded.mjs", "ort.wasm.min.mjs"];
 /// Between the same network's answers here and there: sums in another order.
-const MOST_SCORE: f64 = 0.01;
-const MOST_PX: f64 = 0.5;
+const MAX_SCORE: f64 = 0.01;
+const MAX_PX: f64 = 0.5;
 /// Frames a second that we promise, without WebGPU.
-const LEAST_FRAMES: f64 = 5.0;
+const MIN_FRAMES: f64 = 5.0;
 
 /// `sdg-bench browser`
 #[derive(Debug, ClapArgs)]
@@ -73,7 +73,7 @@ pub fn run(args: &BrowserArgs) -> Result<()> {
         rewrite(results, "browser", &table)?;
     }
     let frames = 1e3 / times(&measured, "verified")?;
-    ensure!(frames >= LEAST_FRAMES, "expected {LEAST_FRAMES} frames a second, found {frames:.1}");
+    ensure!(frames >= MIN_FRAMES, "expected {MIN_FRAMES} frames a second, found {frames:.1}");
     Ok(())
 }
 
@@ -129,7 +129,7 @@ fn check_same(measured: &Value) -> Result<()> {
     let ours = &measured["network"]["detections"][0];
     let number = |value: &Value| value.as_f64().context("a number is missing in what the page measured");
     let (our_score, their_score) = (number(&ours["network_score"])?, number(&measured["theirs"]["scores"][0])?);
-    if (our_score - their_score).abs() > MOST_SCORE {
+    if (our_score - their_score).abs() > MAX_SCORE {
         bail!("not the same network: our best score is {our_score}, onnxruntime-web's {their_score}");
     }
     // Theirs are in pixels of the network's input, half as large as the picture.
@@ -138,7 +138,7 @@ fn check_same(measured: &Value) -> Result<()> {
         for axis in 0..2 {
             let theirs = number(&measured["theirs"]["keypoints"][3 * idx + axis])? * image_over_input;
             let distance = (number(&keypoint[axis])? - theirs).abs();
-            ensure!(distance <= MOST_PX, "not the same network: keypoint {idx} lies {distance:.2} px apart");
+            ensure!(distance <= MAX_PX, "not the same network: keypoint {idx} lies {distance:.2} px apart");
         }
     }
     Ok(())
@@ -185,8 +185,8 @@ fn markdown(measured: &Value, folder: &Path) -> Result<String> {
 
 fn chromium() -> String {
     let output = Command::new("chromium").arg("--version").output();
-    let said = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
-    said.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
+    let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    text.split_whitespace().take(2).collect::<Vec<_>>().join(" ")
 }
 
 /// Bytes of files as a host sends them.

@@ -55,7 +55,7 @@ fn first_losses(seed: u64) -> Vec<f64> {
     let demonstration = shipped::demonstration("rod_end").unwrap();
     let mut losses = Vec::new();
     let ended = teach(&[demonstration], &TeachOptions::new(seed), &mut |event| {
-        if let sdg_grasp::Event::Step { record, .. } = event {
+        if let sdg_grasp::TeachingEvent::Step { record, .. } = event {
             losses.push(record.losses.total());
         }
         if losses.len() == STEPS { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -12,7 +12,7 @@ use crate::source::{Source, Span};
 use crate::tensor::{Encoding, Payload, StoredTensor};
 
 /// A detector's header takes some 50 kB. Parsed, `[0,0,…` takes some ten times its bytes in memory.
-const MOST_HEADER_BYTES: u64 = 4 << 20;
+const MAX_HEADER_BYTES: u64 = 4 << 20;
 
 /// Tensors and metadata by name.
 pub(crate) type Content = (BTreeMap<String, StoredTensor>, BTreeMap<String, String>);
@@ -79,9 +79,9 @@ pub(crate) fn read(source: &mut Source) -> Result<Content> {
     let mut header_len = [0; 8];
     source.read_at(0, &mut header_len)?;
     let header_len = u64::from_le_bytes(header_len);
-    if header_len > MOST_HEADER_BYTES {
+    if header_len > MAX_HEADER_BYTES {
         let what = "bytes of the safetensors header".to_owned();
-        return Err(WeightsError::TooLarge { what, most: MOST_HEADER_BYTES, found: header_len });
+        return Err(WeightsError::TooLarge { what, most: MAX_HEADER_BYTES, found: header_len });
     }
     let header = source.read_span(Span { offset: 8, len: header_len })?;
     let header: Header = serde_json::from_slice(&header)

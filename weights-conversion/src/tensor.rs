@@ -5,7 +5,7 @@ use crate::error::{Result, WeightsError};
 use crate::source::{Source, Span};
 
 /// More axes than any layer has.
-const MOST_AXES: usize = 8;
+const MAX_AXES: usize = 8;
 /// Bytes decoded at once; a multiple of every element's size.
 const PIECE: usize = 1 << 20;
 
@@ -259,10 +259,10 @@ impl StoredTensor {
 
 /// Bytes of a dense tensor, unless the shape is one that no file could hold.
 fn checked_bytes(part: &str, shape: &[usize], element: ElementType) -> Result<u64> {
-    if shape.len() > MOST_AXES {
+    if shape.len() > MAX_AXES {
         return Err(WeightsError::TooLarge {
             what: format!("{part}: axes"),
-            most: MOST_AXES as u64,
+            most: MAX_AXES as u64,
             found: shape.len() as u64,
         });
     }

@@ -9,11 +9,11 @@ use crate::error::{Result, WeightsError, printable};
 use crate::source::{Scanner, Source, Span};
 
 /// A state dict has an entry for each tensor.
-const MOST_ENTRIES: u64 = 100_000;
+const MAX_ENTRIES: u64 = 100_000;
 /// Bytes of the list of entries; some 100 bytes each.
-const MOST_DIRECTORY_BYTES: u64 = 16 << 20;
+const MAX_DIRECTORY_BYTES: u64 = 16 << 20;
 /// The end record and the longest comment behind it.
-const MOST_END_BYTES: u64 = 22 + 0xffff;
+const MAX_END_BYTES: u64 = 22 + 0xffff;
 /// Bytes whose checksum is taken at once.
 const PIECE: usize = 1 << 20;
 
@@ -79,7 +79,7 @@ impl Fields<'_> {
 
 /// Number of entries and place of the directory.
 fn find_directory(source: &mut Source) -> Result<(u64, Span)> {
-    let tail_len = source.len().min(MOST_END_BYTES);
+    let tail_len = source.len().min(MAX_END_BYTES);
     let tail_at = source.len() - tail_len;
     let tail = source.read_span(Span { offset: tail_at, len: tail_len })?;
     let magic = END_RECORD.to_le_bytes();
@@ -128,9 +128,9 @@ impl ZipArchive {
     /// An archive that was cut short or altered; names that climb out of a folder; entries that overlap.
     pub fn read(source: &mut Source) -> Result<Self> {
         let (count, directory) = find_directory(source)?;
-        if count > MOST_ENTRIES || directory.len > MOST_DIRECTORY_BYTES {
+        if count > MAX_ENTRIES || directory.len > MAX_DIRECTORY_BYTES {
             let what = "entries of the zip archive".to_owned();
-            return Err(WeightsError::TooLarge { what, most: MOST_ENTRIES, found: count.max(directory.len / 46) });
+            return Err(WeightsError::TooLarge { what, most: MAX_ENTRIES, found: count.max(directory.len / 46) });
         }
         let directory = source.read_span(directory)?;
         let mut fields = Fields(&directory);

@@ -23,9 +23,9 @@ static ALLOCATOR: PeakAlloc = PeakAlloc;
 /// Of the short run; some two seconds.
 const MUTATIONS: u64 = 5_000;
 /// Beyond twice the file.
-const MOST_EXTRA_BYTES: usize = 100_000_000;
+const MAX_EXTRA_BYTES: usize = 100_000_000;
 /// A thousand times what the slowest file takes, for machines that do other things meanwhile.
-const MOST_TIME: Duration = Duration::from_secs(30);
+const MAX_TIME: Duration = Duration::from_secs(30);
 
 /// A file to start from.
 struct Seed {
@@ -130,10 +130,10 @@ fn a_mutated_file_is_an_error_or_a_checkpoint_and_nothing_else() {
     let first = number("SDG_FIRST_MUTATION").unwrap_or(0);
     let target = Architecture { backbone: Backbone::resnet(18).unwrap(), heads: None };
     let seeds = seeds();
-    let (mut accepted, mut most_extra, mut slowest) = (0, 0, Duration::ZERO);
+    let (mut accepted, mut max_extra, mut slowest) = (0, 0, Duration::ZERO);
     for i in first..first + count {
         if i > first && i % 20_000 == 0 {
-            println!("{} done: {accepted} accepted, {most_extra} bytes beyond, slowest {slowest:?}", i - first);
+            println!("{} done: {accepted} accepted, {max_extra} bytes beyond, slowest {slowest:?}", i - first);
         }
         let mut rng = Pcg64Mcg::seed_from_u64(i);
         let seed = &seeds[i as usize % seeds.len()];
@@ -153,12 +153,12 @@ fn a_mutated_file_is_an_error_or_a_checkpoint_and_nothing_else() {
         // The file itself is in memory here; a conversion leaves it on the disk.
         let extra = peak.saturating_sub(before).saturating_sub(3 * len);
         let file = format!("mutation {i} of {}", seed.name);
-        assert!(extra <= MOST_EXTRA_BYTES, "{file}: {peak} bytes at most for a file of {len}");
-        assert!(elapsed <= MOST_TIME, "{file}: {elapsed:?}");
+        assert!(extra <= MAX_EXTRA_BYTES, "{file}: {peak} bytes at most for a file of {len}");
+        assert!(elapsed <= MAX_TIME, "{file}: {elapsed:?}");
         accepted += u64::from(ended.unwrap_or_else(|_| panic!("{file}: panicked")));
-        (most_extra, slowest) = (most_extra.max(extra), slowest.max(elapsed));
+        (max_extra, slowest) = (max_extra.max(extra), slowest.max(elapsed));
     }
-    println!("{count} files: {accepted} accepted, at most {most_extra} bytes beyond twice a file, slowest {slowest:?}");
+    println!("{count} files: {accepted} accepted, at most {max_extra} bytes beyond twice a file, slowest {slowest:?}");
     // Mutations that never got past the first bytes would test nothing.
     assert!(accepted > count / 20 && accepted < count, "{accepted} of {count}");
     the_costliest_operations_stay_within_bounds(&target);
@@ -177,6 +177,6 @@ fn the_costliest_operations_stay_within_bounds(target: &Architecture) {
         digest(file, target);
         let extra = ALLOCATOR.peak_usage().saturating_sub(before).saturating_sub(3 * len);
         println!("{operation:02x?}: {extra} bytes beyond twice the file");
-        assert!(extra <= MOST_EXTRA_BYTES, "{operation:02x?}: {extra} bytes");
+        assert!(extra <= MAX_EXTRA_BYTES, "{operation:02x?}: {extra} bytes");
     }
 }

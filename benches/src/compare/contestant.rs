@@ -105,7 +105,7 @@ impl Contestant {
     /// Why it ended: the last line of its log.
     fn last_words(&self) -> anyhow::Error {
         let log = std::fs::read_to_string(&self.log).unwrap_or_default();
-        let last = log.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it said nothing");
+        let last = log.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or("it printed nothing");
         anyhow!("{} ended: {last} ({})", self.side.title(), self.log.display())
     }
 }

@@ -6,7 +6,7 @@ pub struct Pace {
     /// Rounds, where they fit.
     pub rounds: usize,
     /// Rounds, whether they fit or not.
-    pub least_rounds: usize,
+    pub min_rounds: usize,
     /// A turn lasts at least this long: fast works run several times in it.
     pub turn_secs: f64,
     /// Rounds beyond the least ones end here.
@@ -24,9 +24,9 @@ pub struct Plan {
 
 impl Pace {
     /// For figures to be published: all works in twelve minutes.
-    pub const FULL: Self = Self { rounds: 7, least_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
+    pub const FULL: Self = Self { rounds: 7, min_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
     /// To see where we are.
-    pub const QUICK: Self = Self { rounds: 3, least_rounds: 1, turn_secs: 0.3, budget_secs: 10.0 };
+    pub const QUICK: Self = Self { rounds: 3, min_rounds: 1, turn_secs: 0.3, budget_secs: 10.0 };
 
     /// Plans from the seconds of one run of each side.
     pub fn plan(&self, warm_ups: &[Option<f64>]) -> Plan {
@@ -37,7 +37,7 @@ impl Pace {
         let round: f64 = warm_ups.iter().zip(&repeats).map(|(secs, &count)| secs.unwrap_or(0.0) * count as f64).sum();
         let fit = (self.budget_secs / round.max(1e-6)) as usize;
         // An order from outside for fewer rounds counts.
-        let least = self.least_rounds.min(self.rounds);
+        let least = self.min_rounds.min(self.rounds);
         Plan { rounds: fit.clamp(least, self.rounds), repeats }
     }
 
@@ -51,7 +51,7 @@ impl Pace {
 mod tests {
     use super::*;
 
-    const PACE: Pace = Pace { rounds: 7, least_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
+    const PACE: Pace = Pace { rounds: 7, min_rounds: 3, turn_secs: 0.5, budget_secs: 30.0 };
 
     #[test]
     fn fast_works_fill_their_turn_and_slow_ones_have_few_rounds() {

@@ -62,9 +62,9 @@ export function reach({ center, angle, length }, part) {
 const TURNS = Array.from({ length: 36 }, (_, i) => (i * Math.PI) / 36 - Math.PI / 2);
 /** Room between a jaw and the part when the gripper is placed, as a share of the part's width, and at least so many pixels. */
 const ROOM = 0.08;
-const LEAST_ROOM_PX = 2;
+const MIN_ROOM_PX = 2;
 
-export const withRoom = (width) => width + Math.max(2 * LEAST_ROOM_PX, width * ROOM);
+export const withRoom = (width) => width + Math.max(2 * MIN_ROOM_PX, width * ROOM);
 
 /** The gripper at `point` turned so that it closes over the narrowest of the part, with the middle moved between its sides. */
 export function placedAt(point, part) {

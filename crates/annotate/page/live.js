@@ -216,9 +216,9 @@ function renderTrying() {
   const time = isFound ? `Looked for ${Math.max(1, Math.round(live.seconds * 1000))} ms.` : state.hasModel ? "Looking…" : "Teach a model first: it then looks for the part here.";
   setText(by("live-time"), live.failed || !state.tryingLive || (live.fault && !live.isUsable) ? "" : time);
   const told = isFound ? cards(live.detections) : [];
-  const said = JSON.stringify(told);
-  if (by("live-found").dataset.said === said) return;
-  by("live-found").dataset.said = said;
+  const text = JSON.stringify(told);
+  if (by("live-found").dataset.shown === text) return;
+  by("live-found").dataset.shown = text;
   by("live-found").replaceChildren(...told.map(([title, score, pose]) => {
     const item = document.createElement("div");
     item.className = "found";
@@ -231,7 +231,7 @@ function renderTrying() {
   }));
   // Told to those who do not see the page when the number changes only; the figures change with every frame.
   const count = live.detections?.filter((d) => d.is_accepted).length ?? 0;
-  setText(by("live-said"), isFound ? `${count} found` : "");
+  setText(by("live-status"), isFound ? `${count} found` : "");
 }
 
 export function renderLive() {

@@ -116,9 +116,9 @@ function fix(remedy) {
 
 function renderAdvice({ advice }) {
   const list = by("remarks");
-  const said = JSON.stringify(advice.remarks);
-  if (list.dataset.said !== said) {
-    list.dataset.said = said;
+  const text = JSON.stringify(advice.remarks);
+  if (list.dataset.shown !== text) {
+    list.dataset.shown = text;
     list.replaceChildren(...advice.remarks.map((remark) => {
       const item = document.createElement("li");
       item.dataset.code = remark.code;
@@ -135,8 +135,8 @@ function renderAdvice({ advice }) {
   const enough = by("enough");
   const models = ORDER.map((letter) => advice.models.find((m) => m.model === letter));
   const text = JSON.stringify(models);
-  if (enough.dataset.said === text) return;
-  enough.dataset.said = text;
+  if (enough.dataset.shown === text) return;
+  enough.dataset.shown = text;
   const title = document.createElement("h3");
   const ready = models.filter((m) => !m.lacks.length).length;
   title.textContent = ready === models.length ? "Enough for every model" : ready ? "Enough for these models" : "Not enough to teach yet";
@@ -192,6 +192,6 @@ function renderTools() {
   by("delete").disabled = !(state.draft || (state.selected && image()?.marks[state.selected]));
   by("mark-tools").hidden = by("edit-tools").hidden = !marking;
   by("stage").dataset.tool = marking ? state.tool : "select";
-  const said = marking ? hint() : "";
-  if (by("hint").textContent !== said) by("hint").textContent = said;
+  const text = marking ? hint() : "";
+  if (by("hint").textContent !== text) by("hint").textContent = text;
 }

@@ -130,9 +130,9 @@ function card(detection, i, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : scene();
-  const said = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
-  if (found.dataset.said === said) return;
-  found.dataset.said = said;
+  const text = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
+  if (found.dataset.shown === text) return;
+  found.dataset.shown = text;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));

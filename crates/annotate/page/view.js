@@ -3,8 +3,8 @@
 import { clamp } from "./geometry.js";
 import { changed, state } from "./store.js";
 
-const LEAST_SCALE = 0.05;
-const MOST_SCALE = 40;
+const MIN_SCALE = 0.05;
+const MAX_SCALE = 40;
 /** Room around a photo that is shown whole, so that marks at its border can be taken hold of. */
 const MARGIN_PX = 24;
 /** From this scale on, pixels are shown as squares. */
@@ -52,7 +52,7 @@ export function fit() {
 /** Shows a box of the photo, with as much again around it. */
 export function showBox([x1, y1, x2, y2]) {
   const { clientWidth, clientHeight } = stage;
-  const scale = clamp(Math.min(clientWidth / (2 * (x2 - x1)), clientHeight / (2 * (y2 - y1))), LEAST_SCALE, MOST_SCALE);
+  const scale = clamp(Math.min(clientWidth / (2 * (x2 - x1)), clientHeight / (2 * (y2 - y1))), MIN_SCALE, MAX_SCALE);
   move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
 }
 
@@ -62,7 +62,7 @@ export const isSmall = () => stage.clientWidth < 600;
 /** Zooms by `factor` so that the place under `at` (on the screen) stays. */
 export function zoom(factor, at = [stage.clientWidth / 2, stage.clientHeight / 2]) {
   const [px, py] = toPhoto(at);
-  const scale = clamp(state.view.scale * factor, LEAST_SCALE, MOST_SCALE);
+  const scale = clamp(state.view.scale * factor, MIN_SCALE, MAX_SCALE);
   move(scale, at[0] - px * scale, at[1] - py * scale);
 }
 

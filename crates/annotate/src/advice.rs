@@ -10,15 +10,15 @@ use crate::marks::Marks;
 /// A mark this near to the picture's border is cut by it.
 const BORDER_PX: f64 = 1.0;
 /// Least overlap (IoU) of the box with the outline's own.
-const LEAST_BOX_AGREEMENT: f64 = 0.8;
+const MIN_BOX_AGREEMENT: f64 = 0.8;
 /// A line shorter than this gives its angle by luck: a pixel's slip is more than five degrees.
-const LEAST_LINE_PX: f64 = 12.0;
+const MIN_LINE_PX: f64 = 12.0;
 /// Fewer pixels show too little of a part.
-const LEAST_PART_PX: f64 = 24.0;
+const MIN_PART_PX: f64 = 24.0;
 /// The part may reach this far beyond a jaw: outlines are drawn by hand.
 const JAW_SLACK_PX: f64 = 1.5;
 /// Jaws farther from the part than this share of its width were left wide open by mistake.
-const MOST_CLEARANCE: f64 = 1.0;
+const MAX_CLEARANCE: f64 = 1.0;
 
 /// What the marks of one picture suffice for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -93,7 +93,7 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
     }
     if let Some(bbox) = marks.bounding_box() {
         let around = outline.bounds();
-        if around.iou(&bbox) < LEAST_BOX_AGREEMENT {
+        if around.iou(&bbox) < MIN_BOX_AGREEMENT {
             let text = if around.intersection(&bbox) == 0.0 {
                 "The outline lies outside the box. One of them is on the wrong thing."
             } else {
@@ -108,7 +108,7 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
 fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
     let (Some(grasp), Some(part)) = (&marks.grasp, marks.region()) else { return };
     let gripper = Gripper { line: grasp.line(), jaw_width: grasp.jaw_width };
-    if gripper.line.length() < LEAST_LINE_PX {
+    if gripper.line.length() < MIN_LINE_PX {
         let text = "The jaws are very short, so their angle is uncertain. Pull the ends of the line apart.";
         remarks.push(remark("line_short", text, None));
     }
@@ -129,7 +129,7 @@ fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
     } else if marks.outline.is_some() && reach.left.max(reach.right) > half + JAW_SLACK_PX {
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
-    } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MOST_CLEARANCE) {
+    } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
         let text = "The jaws stand far from the part. Close them until they almost touch it.";
         remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
     }
@@ -144,7 +144,7 @@ fn about_place(marks: &Marks, size: [u32; 2], remarks: &mut Vec<Remark>) {
         let text = "The part touches the border of the photo and may be cut. A photo of the whole part teaches better.";
         remarks.push(remark("part_cut", text, None));
     }
-    if around.width().max(around.height()) < LEAST_PART_PX {
+    if around.width().max(around.height()) < MIN_PART_PX {
         let text = "The part is very small in the photo. Go closer, so that there is more of it to learn.";
         remarks.push(remark("part_small", text, None));
     }

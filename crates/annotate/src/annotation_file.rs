@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::marks::Marks;
 
 /// Larger annotations than any tool writes.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 
 /// What stood beside a picture when it was opened.
 #[derive(Debug, Clone, PartialEq)]
@@ -79,8 +79,8 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {
     match fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(source) => return Err(Error::file(path, "cannot read")(source)),
-        Ok(metadata) if metadata.len() > MOST_BYTES => {
-            return Err(Error::TooLarge { path: path.to_owned(), most: MOST_BYTES, found: metadata.len() });
+        Ok(metadata) if metadata.len() > MAX_BYTES => {
+            return Err(Error::TooLarge { path: path.to_owned(), most: MAX_BYTES, found: metadata.len() });
         }
         Ok(_) => {}
     }

@@ -51,7 +51,7 @@ impl Gripper {
 
     /// The narrowest opening whose jaws do not come down on the part; zero where they would close on nothing. The hand
     /// closes about the line, so the side that reaches farther counts twice.
-    pub fn least_jaw_width(&self, part: &Polygon) -> f64 {
+    pub fn min_jaw_width(&self, part: &Polygon) -> f64 {
         self.reach(part).map_or(0.0, |reach| 2.0 * reach.left.max(reach.right).max(0.0))
     }
 }
@@ -72,15 +72,15 @@ mod tests {
 
     #[test]
     fn a_bar_is_as_wide_as_it_is() {
-        assert!((along(40.0, 30.0, 60.0, 30.0).least_jaw_width(&bar()) - 20.0).abs() < 1e-9);
-        assert!((along(60.0, 25.0, 60.0, 35.0).least_jaw_width(&bar()) - 100.0).abs() < 1e-9);
+        assert!((along(40.0, 30.0, 60.0, 30.0).min_jaw_width(&bar()) - 20.0).abs() < 1e-9);
+        assert!((along(60.0, 25.0, 60.0, 35.0).min_jaw_width(&bar()) - 100.0).abs() < 1e-9);
     }
 
     #[test]
     fn off_the_middle_the_farther_side_counts_twice() {
         let reach = along(40.0, 25.0, 60.0, 25.0).reach(&bar()).unwrap();
         assert!((reach.left - 5.0).abs() < 1e-9 && (reach.right - 15.0).abs() < 1e-9, "{reach:?}");
-        assert!((along(40.0, 25.0, 60.0, 25.0).least_jaw_width(&bar()) - 30.0).abs() < 1e-9);
+        assert!((along(40.0, 25.0, 60.0, 25.0).min_jaw_width(&bar()) - 30.0).abs() < 1e-9);
     }
 
     #[test]
@@ -100,8 +100,8 @@ mod tests {
             .map(Point2::from)
             .to_vec(),
         };
-        assert!((along(40.0, 30.0, 60.0, 30.0).least_jaw_width(&lugged) - 20.0).abs() < 1e-9);
-        assert!((along(70.0, 30.0, 85.0, 30.0).least_jaw_width(&lugged) - 60.0).abs() < 1e-9);
+        assert!((along(40.0, 30.0, 60.0, 30.0).min_jaw_width(&lugged) - 20.0).abs() < 1e-9);
+        assert!((along(70.0, 30.0, 85.0, 30.0).min_jaw_width(&lugged) - 60.0).abs() < 1e-9);
     }
 
     #[test]

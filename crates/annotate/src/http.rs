@@ -11,8 +11,8 @@ use std::borrow::Cow;
 use std::io::{self, Read, Write};
 
 /// Longer heads than any browser sends to a page of ours.
-const MOST_HEAD_BYTES: usize = 16 << 10;
-const MOST_HEADERS: usize = 64;
+const MAX_HEAD_BYTES: usize = 16 << 10;
+const MAX_HEADERS: usize = 64;
 
 /// Where a request goes and what it says of itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -67,7 +67,7 @@ impl Head {
                 buffer.drain(..length);
                 return Ok(head);
             }
-            if buffer.len() > MOST_HEAD_BYTES {
+            if buffer.len() > MAX_HEAD_BYTES {
                 return Err(Unreadable::Refused(431, "expected a head of at most 16 KiB\n"));
             }
             match stream.read(&mut piece)? {
@@ -80,7 +80,7 @@ impl Head {
     /// The head at the start of `bytes` and its length, or `None` while it is incomplete.
     fn parse(bytes: &[u8]) -> Result<Option<(Self, usize)>, Unreadable> {
         const MALFORMED: Unreadable = Unreadable::Refused(400, "expected an HTTP/1.1 request\n");
-        let mut headers = [httparse::EMPTY_HEADER; MOST_HEADERS];
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         let httparse::Status::Complete(length) = request.parse(bytes).map_err(|_| MALFORMED)? else {
             return Ok(None);

@@ -56,4 +56,4 @@ pub use server::Server;
 pub use session::{Session, SessionOptions};
 pub use teacher::{FoundGrasp, GraspPose, GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
 pub use teaching::{News, Status};
-pub use views::{ImageView, Saved, SceneView, SessionView};
+pub use views::{ImageView, Saved, SessionView, TrialPictureView};

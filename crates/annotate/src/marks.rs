@@ -47,7 +47,7 @@ impl Marks {
     pub fn of(annotation: &Annotation) -> Self {
         let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
         let grasp = annotation.grasp.map(|line| {
-            let fitting = || Gripper { line, jaw_width: 0.0 }.least_jaw_width(&annotation.region());
+            let fitting = || Gripper { line, jaw_width: 0.0 }.min_jaw_width(&annotation.region());
             GraspMarks {
                 start: line.start.into(),
                 end: line.end.into(),

@@ -11,7 +11,7 @@ use sdg_demonstration::{ImageLimits, decode_image};
 use crate::error::{Error, Result};
 
 /// Larger photos than any camera makes.
-pub const MOST_PICTURE_BYTES: u64 = 64 << 20;
+pub const MAX_PICTURE_BYTES: u64 = 64 << 20;
 /// Quality of pictures that are encoded for the page alone.
 const JPEG_QUALITY: u8 = 90;
 
@@ -116,8 +116,8 @@ pub fn png(image: &RgbImage) -> Result<Vec<u8>> {
 fn read(path: &Path) -> Result<Vec<u8>> {
     let failed = || Error::file(path, "cannot read");
     let found = fs::metadata(path).map_err(failed())?.len();
-    if found > MOST_PICTURE_BYTES {
-        return Err(Error::TooLarge { path: path.to_owned(), most: MOST_PICTURE_BYTES, found });
+    if found > MAX_PICTURE_BYTES {
+        return Err(Error::TooLarge { path: path.to_owned(), most: MAX_PICTURE_BYTES, found });
     }
     fs::read(path).map_err(failed())
 }

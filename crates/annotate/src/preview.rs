@@ -87,6 +87,6 @@ impl Previews {
 
 fn jaw_width(demonstration: &Demonstration) -> f64 {
     let annotation = &demonstration.annotation;
-    let fitting = |line| Gripper { line, jaw_width: 0.0 }.least_jaw_width(&annotation.region());
+    let fitting = |line| Gripper { line, jaw_width: 0.0 }.min_jaw_width(&annotation.region());
     annotation.jaw_width.or_else(|| annotation.grasp.map(fitting)).unwrap_or_default()
 }

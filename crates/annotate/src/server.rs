@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// How long what is refused is still read, so that the refusal arrives before the connection closes.
 const LINGER: Duration = Duration::from_secs(2);
 /// More connections than the page's browsers keep.
-const MOST_CONNECTIONS: usize = 64;
+const MAX_CONNECTIONS: usize = 64;
 
 /// A bound port and the sitting behind it.
 pub struct Server {
@@ -79,7 +79,7 @@ impl Server {
                 Err(error) if error.kind() == std::io::ErrorKind::ConnectionAborted => continue,
                 Err(source) => return Err(Error::Port { port, source }),
             };
-            if connections.fetch_add(1, Ordering::SeqCst) >= MOST_CONNECTIONS {
+            if connections.fetch_add(1, Ordering::SeqCst) >= MAX_CONNECTIONS {
                 connections.fetch_sub(1, Ordering::SeqCst);
                 continue;
             }
@@ -126,7 +126,7 @@ fn next_answer(
     if let Err(refusal) = guard.check(&head) {
         return Ok((with_policy(refusal.answer()), false));
     }
-    let body = read_body(stream, buffer, &head, routes::most_body_bytes(&head.path))?;
+    let body = read_body(stream, buffer, &head, routes::max_body_bytes(&head.path))?;
     let (keeps_open, is_page) = (head.keeps_open, head.path == "/");
     let request = Request { head, body };
     // What breaks in one request is told to the page, and the terminal has said more.

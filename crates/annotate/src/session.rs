@@ -16,15 +16,15 @@ use crate::marks::Marks;
 use crate::names::{file_name, free_name, free_numbered, safe_stem};
 use crate::picture::{Picture, pictures_in, png};
 use crate::preview::{Previews, SampleKey};
-use crate::session_state::{MarkedPicture, Scene, State};
+use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest};
 use crate::teaching::{News, Teaching};
-use crate::views::{ImageView, Saved, SceneView, SessionView};
+use crate::views::{ImageView, Saved, SessionView, TrialPictureView};
 
 /// Pictures to try that one sitting keeps.
-const MOST_SCENES: usize = 500;
+const MAX_SCENES: usize = 500;
 /// The longest name of an object.
-const MOST_LABEL_CHARS: usize = 80;
+const MAX_LABEL_CHARS: usize = 80;
 
 /// What the page is opened with.
 #[derive(Debug, Clone, Default)]
@@ -79,12 +79,12 @@ impl Session {
             for path in paths {
                 let taken = images.iter().any(|image| image.picture.path == path);
                 if !taken {
-                    scenes.push(Scene { picture: Picture::open(&path)?, uploaded: false, became: None });
+                    scenes.push(TrialPicture { picture: Picture::open(&path)?, uploaded: false, became: None });
                 }
             }
         }
-        if scenes.len() > MOST_SCENES {
-            return Err(Error::TooManyPictures { most: MOST_SCENES });
+        if scenes.len() > MAX_SCENES {
+            return Err(Error::TooManyPictures { most: MAX_SCENES });
         }
         let uploads = tempfile::Builder::new()
             .prefix("sdg-annotate-")
@@ -145,11 +145,11 @@ impl Session {
     pub fn set_label(&self, label: &str) -> Result<SessionView> {
         let label = label.trim();
         let count = label.chars().count();
-        if count == 0 || count > MOST_LABEL_CHARS || label.chars().any(char::is_control) {
+        if count == 0 || count > MAX_LABEL_CHARS || label.chars().any(char::is_control) {
             return Err(Error::Request {
                 what: "name",
-                expected: format!("1 to {MOST_LABEL_CHARS} letters"),
-                found: if count > MOST_LABEL_CHARS { format!("{count}") } else { format!("{label:?}") },
+                expected: format!("1 to {MAX_LABEL_CHARS} letters"),
+                found: if count > MAX_LABEL_CHARS { format!("{count}") } else { format!("{label:?}") },
             });
         }
         let mut state = self.state();
@@ -183,7 +183,7 @@ impl Session {
     ///
     /// # Errors
     /// No such picture.
-    pub(crate) fn scene(&self, id: usize) -> Result<Scene> {
+    pub(crate) fn scene(&self, id: usize) -> Result<TrialPicture> {
         Ok(self.state().scene(id)?.clone())
     }
 
@@ -191,14 +191,14 @@ impl Session {
     ///
     /// # Errors
     /// Bytes that are no picture, more pictures than a sitting keeps.
-    pub fn add_scene(&self, name: &str, bytes: &[u8]) -> Result<SceneView> {
+    pub fn add_scene(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
         let count = self.state().scenes.len();
-        if count >= MOST_SCENES {
-            return Err(Error::TooManyPictures { most: MOST_SCENES });
+        if count >= MAX_SCENES {
+            return Err(Error::TooManyPictures { most: MAX_SCENES });
         }
         // The name is for people; the file's own is ours.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
-        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MOST_LABEL_CHARS).collect();
+        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
         let file = tempfile::Builder::new()
             .suffix(&format!(".{extension}"))
             .tempfile_in(self.uploads.path())
@@ -214,7 +214,7 @@ impl Session {
             source: error.error,
         })?;
         let mut state = self.state();
-        state.scenes.push(Scene {
+        state.scenes.push(TrialPicture {
             picture: Picture { path: kept, name: shown, ..picture },
             uploaded: true,
             became: None,
@@ -286,7 +286,7 @@ impl Session {
     ///
     /// # Errors
     /// No camera, a frame that is not kept any more, more pictures than a sitting keeps.
-    pub fn keep_frame(&self, number: u64) -> Result<SceneView> {
+    pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
         let bytes = png(&*self.live_desk()?.frame(number)?)?;
         self.add_scene(&format!("live-{number}.png"), &bytes)
     }

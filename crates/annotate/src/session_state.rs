@@ -10,13 +10,13 @@ use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::names::file_name;
 use crate::picture::Picture;
-use crate::views::{ImageView, Saved, SceneView};
+use crate::views::{ImageView, Saved, TrialPictureView};
 
 /// The present label, the pictures of the object and the pictures to try, each numbered by its place.
 pub struct State {
     pub label: String,
     pub images: Vec<MarkedPicture>,
-    pub scenes: Vec<Scene>,
+    pub scenes: Vec<TrialPicture>,
 }
 
 /// A picture of the object and what is marked on it.
@@ -31,7 +31,7 @@ pub struct MarkedPicture {
 
 /// A picture that a taught model is tried on.
 #[derive(Clone)]
-pub struct Scene {
+pub struct TrialPicture {
     pub picture: Picture,
     pub uploaded: bool,
     /// The number of the marked picture that it became.
@@ -43,7 +43,7 @@ impl State {
         self.images.get(id).ok_or(Error::NoSuchPicture { id, count: self.images.len() })
     }
 
-    pub fn scene(&self, id: usize) -> Result<&Scene> {
+    pub fn scene(&self, id: usize) -> Result<&TrialPicture> {
         self.scenes.get(id).ok_or(Error::NoSuchPicture { id, count: self.scenes.len() })
     }
 
@@ -72,10 +72,10 @@ impl State {
         ImageView { id, name, width, height, marks: marks.clone(), saved: saved.clone(), advice, note: note.clone() }
     }
 
-    pub fn scene_view(&self, id: usize) -> SceneView {
-        let Scene { picture, became, .. } = &self.scenes[id];
+    pub fn scene_view(&self, id: usize) -> TrialPictureView {
+        let TrialPicture { picture, became, .. } = &self.scenes[id];
         let Picture { name, size: [width, height], .. } = picture.clone();
-        SceneView { id, name, width, height, became: *became }
+        TrialPictureView { id, name, width, height, became: *became }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
 
 /// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
-const MOST_POINTS: usize = 240;
+const MAX_POINTS: usize = 240;
 
 /// How a teaching stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
@@ -114,7 +114,7 @@ impl Teaching {
                 if done % *stride == 0 && loss.is_finite() {
                     news.losses.push((done, loss));
                 }
-                if news.losses.len() > MOST_POINTS {
+                if news.losses.len() > MAX_POINTS {
                     *stride *= 2;
                     let stride = *stride;
                     news.losses.retain(|(step, _)| step % stride == 0);

@@ -46,7 +46,7 @@ pub struct ImageView {
 
 /// A picture to try, as the page sees it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct SceneView {
+pub struct TrialPictureView {
     /// Its number.
     pub id: usize,
     /// Its file's name.
@@ -67,7 +67,7 @@ pub struct SessionView {
     /// The pictures of it.
     pub images: Vec<ImageView>,
     /// Pictures to try.
-    pub scenes: Vec<SceneView>,
+    pub scenes: Vec<TrialPictureView>,
     /// Where a taught model is written.
     pub model_path: String,
     /// The camera's address, if there is one.

@@ -151,8 +151,8 @@ impl CalibratedCamera {
     pub fn from_yaml(text: &str) -> Result<Self, CameraFileError> {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
             // The lines below it show the place in the file once more.
-            let said = error.to_string();
-            let first = said.lines().next().unwrap_or_default();
+            let message = error.to_string();
+            let first = message.lines().next().unwrap_or_default();
             CameraFileError::Unreadable { found: first.trim_start_matches("error: ").to_owned() }
         })?;
         Ok(Self {

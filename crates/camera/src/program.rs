@@ -81,9 +81,9 @@ impl Program {
 
     fn with_last_line(&self, status: ExitStatus) -> String {
         let line = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
-        let said =
+        let message =
             if line.is_empty() { "it printed no error".to_owned() } else { format!("its last line of errors: {line}") };
-        format!("expected pictures, found that the program ended with {status}; {said}")
+        format!("expected pictures, found that the program ended with {status}; {message}")
     }
 }
 

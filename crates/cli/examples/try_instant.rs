@@ -1,4 +1,4 @@
-//! The search without a network on unseen pictures: `try_instant OBJECT WITH WITHOUT SEED [LEAST_SCALE LARGEST_SCALE]`.
+//! The search without a network on unseen pictures: `try_instant OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]`.
 //!
 //! Reports how many of WITH pictures of the part are right, at the default least agreement and where the threshold is
 //! the best agreement in any of WITHOUT pictures without it.
@@ -33,7 +33,7 @@ impl Seen {
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, name, with, without, seed, scales @ ..] = &arguments[..] else {
-        return Err("usage: try_instant OBJECT WITH WITHOUT SEED [LEAST_SCALE LARGEST_SCALE]".into());
+        return Err("usage: try_instant OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]".into());
     };
     let object = ObjectSpec::by_name(name)?;
     let demonstration = TaughtDemonstration::new(&shipped::demonstration(name)?)?;
@@ -43,11 +43,11 @@ fn main() -> Result<()> {
         [least, largest] => least.parse()?..=largest.parse()?,
         _ => default.scales.clone(),
     };
-    let threshold = default.least_agreement;
+    let threshold = default.min_agreement;
     let start = Instant::now();
     // All are wanted, to see how far right and wrong are apart.
     let search =
-        InstantSearch::new(&demonstration.cutout, &outline, &SearchConfig { scales, least_agreement: 0.0, ..default })?;
+        InstantSearch::new(&demonstration.cutout, &outline, &SearchConfig { scales, min_agreement: 0.0, ..default })?;
     println!("taught in {:.1} ms", 1e3 * start.elapsed().as_secs_f64());
 
     let seed: u64 = seed.parse()?;

@@ -27,11 +27,11 @@ impl AnnotationFile {
     /// # Errors
     /// Files that cannot be read, and content of no known format.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = files::read(path, files::MOST_ANNOTATION_BYTES)?;
+        let bytes = files::read(path, files::MAX_ANNOTATION_BYTES)?;
         let format = AnnotationFormat::of(&bytes).with_context(|| path.display().to_string())?;
         let beside = match beside(path, format) {
             Some(beside) => {
-                let bytes = files::read(&beside, files::MOST_ANNOTATION_BYTES)?;
+                let bytes = files::read(&beside, files::MAX_ANNOTATION_BYTES)?;
                 Some((beside, bytes))
             }
             None => None,

@@ -16,7 +16,7 @@ use crate::exit::Usage;
 use crate::files;
 
 /// More than any configuration takes.
-const MOST_CONFIG_BYTES: u64 = 1 << 20;
+const MAX_CONFIG_BYTES: u64 = 1 << 20;
 /// The presets that checkpoints are imported into.
 const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
 
@@ -26,7 +26,7 @@ const PRESETS: [&str; 2] = ["r50-detectron2", "r50-torchvision"];
 /// A file that cannot be read, is no JSON of either form, or contradicts itself.
 pub fn read_config(path: &Path) -> Result<RcnnConfig> {
     let named = || path.display().to_string();
-    let bytes = files::read(path, MOST_CONFIG_BYTES)?;
+    let bytes = files::read(path, MAX_CONFIG_BYTES)?;
     let text = std::str::from_utf8(&bytes).with_context(named)?;
     RcnnConfig::from_json(text).with_context(named)
 }

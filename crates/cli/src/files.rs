@@ -10,41 +10,41 @@ use sdg_demonstration::{ImageLimits, decode_image};
 use sdg_grasp::{Device, GraspModel};
 
 /// Larger photos than any camera makes.
-const MOST_IMAGE_BYTES: u64 = 256 << 20;
+const MAX_IMAGE_BYTES: u64 = 256 << 20;
 /// Larger annotations than any tool writes, embedded image included.
-pub const MOST_ANNOTATION_BYTES: u64 = 512 << 20;
+pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
 /// Larger grasp models than any preset gives.
-const MOST_MODEL_BYTES: u64 = 2 << 30;
+const MAX_MODEL_BYTES: u64 = 2 << 30;
 
-/// Reads a whole file, unless it is larger than `most_bytes`.
-pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>> {
+/// Reads a whole file, unless it is larger than `max_bytes`.
+pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     let named = || format!("{}: cannot read", path.display());
     let file = File::open(path).with_context(named)?;
     let metadata = file.metadata().with_context(named)?;
     if metadata.is_dir() {
         bail!("{}: expected a file, found a folder", path.display());
     }
-    if metadata.len() > most_bytes {
-        bail!("{}: expected at most {most_bytes} bytes, found {}", path.display(), metadata.len());
+    if metadata.len() > max_bytes {
+        bail!("{}: expected at most {max_bytes} bytes, found {}", path.display(), metadata.len());
     }
     let mut bytes = Vec::new();
     // A pipe has no length to check beforehand.
-    file.take(most_bytes + 1).read_to_end(&mut bytes).with_context(named)?;
-    if bytes.len() as u64 > most_bytes {
-        bail!("{}: expected at most {most_bytes} bytes, found more", path.display());
+    file.take(max_bytes + 1).read_to_end(&mut bytes).with_context(named)?;
+    if bytes.len() as u64 > max_bytes {
+        bail!("{}: expected at most {max_bytes} bytes, found more", path.display());
     }
     Ok(bytes)
 }
 
 /// Reads a PNG or JPEG.
 pub fn read_image(path: &Path) -> Result<RgbImage> {
-    let bytes = read(path, MOST_IMAGE_BYTES)?;
+    let bytes = read(path, MAX_IMAGE_BYTES)?;
     decode_image(&bytes, &ImageLimits::default()).with_context(|| path.display().to_string())
 }
 
 /// Reads a grasp model onto a device.
 pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
-    let bytes = read(path, MOST_MODEL_BYTES)?;
+    let bytes = read(path, MAX_MODEL_BYTES)?;
     GraspModel::from_bytes(&bytes, device).with_context(|| path.display().to_string())
 }
 

@@ -10,7 +10,7 @@ use sdg_annotate::{
 use sdg_calibration::Frame;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{Event, PlanarPose, Preset, TeachOptions, Verification, teach};
+use sdg_grasp::{PlanarPose, Preset, TeachOptions, TeachingEvent, Verification, teach};
 
 use crate::camera_files::CameraFile;
 use crate::picture_detector::{Found, PictureDetector};
@@ -57,18 +57,18 @@ impl GraspTeacher for PageTeacher {
     }
 }
 
-fn step(event: &Event) -> TeachingStep {
+fn step(event: &TeachingEvent) -> TeachingStep {
     match event {
-        Event::OrientationStep { step, planned_steps, loss, .. } => {
+        TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => {
             TeachingStep::Step { of: "its turns", done: step + 1, planned: *planned_steps, loss: *loss }
         }
-        Event::Step { record, planned_steps, .. } => TeachingStep::Step {
+        TeachingEvent::Step { record, planned_steps, .. } => TeachingStep::Step {
             of: "the network",
             done: record.step + 1,
             planned: *planned_steps,
             loss: record.losses.total(),
         },
-        Event::Validated(record) => {
+        TeachingEvent::Validated(record) => {
             TeachingStep::Validated { done: record.steps_done, hit_rate: record.validation.hit_rate() }
         }
     }

@@ -8,7 +8,7 @@ use image::RgbImage;
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
-use sdg_report::{Attempt, Step};
+use sdg_report::{AttemptSummary, Step};
 use sdg_robot::{GraspConfig, GraspOutcome, GraspTarget};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -55,7 +55,7 @@ pub struct RehearsalErrors {
 /// What became of a rehearsal.
 pub struct Rehearsed {
     /// One each, in their order.
-    pub attempts: Vec<Attempt>,
+    pub attempts: Vec<AttemptSummary>,
     /// Pictures from outside of the first attempt that succeeded, or of the last one recorded.
     pub film: Vec<RgbImage>,
     /// What the wrist camera saw last before each attempt's approach, with the detection drawn.
@@ -102,9 +102,9 @@ pub struct Looks {
 }
 
 /// One attempt, and what there is to see of it.
-pub struct Attempted {
+pub struct RehearsedAttempt {
     /// How it went.
-    pub attempt: Attempt,
+    pub attempt: AttemptSummary,
     /// How often the camera looked.
     pub looks: Looks,
     /// Pictures from outside, if they were asked for.
@@ -115,11 +115,11 @@ pub struct Attempted {
 
 impl Rehearsal<'_> {
     /// Runs the attempts one after the other; `observe` hears of each and may end the rehearsal.
-    pub fn run(&self, observe: &mut dyn FnMut(&Attempt) -> ControlFlow<()>) -> Result<Rehearsed> {
+    pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
-            let Attempted { attempt, frames, view, .. } =
+            let RehearsedAttempt { attempt, frames, view, .. } =
                 self.attempt(number, (!filmed_success).then(RecordConfig::default))?;
             if !frames.is_empty() {
                 rehearsed.film = frames;
@@ -141,7 +141,7 @@ impl Rehearsal<'_> {
     ///
     /// # Errors
     /// Errors of the simulation itself.
-    pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<Attempted> {
+    pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
         let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
@@ -156,12 +156,13 @@ impl Rehearsal<'_> {
             Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
             Err(SimulationError::Perception(why)) => {
                 let duration_secs = started.elapsed().as_secs_f64();
-                let failed = Attempt { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
+                let failed =
+                    AttemptSummary { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
                 (failed, Looks::default(), Vec::new())
             }
             Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
         };
-        Ok(Attempted { attempt, looks, frames, view: perception.last })
+        Ok(RehearsedAttempt { attempt, looks, frames, view: perception.last })
     }
 
     /// The part as the robot is told of it in an attempt.
@@ -172,7 +173,7 @@ impl Rehearsal<'_> {
         told
     }
 
-    fn record(&self, number: usize, report: &AttemptReport) -> Attempt {
+    fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
         let (step, why) = match &report.outcome {
             GraspOutcome::Held => (Step::Hold, String::new()),
             GraspOutcome::Failed { step, why } => (Step::from_name(step.name()).unwrap_or(Step::Detect), why.clone()),
@@ -183,7 +184,7 @@ impl Rehearsal<'_> {
             .base_from_object
             .zip(last_target)
             .map(|(base_from_object, target)| grasp_error(self.object, &base_from_object, &target.base_from_tcp));
-        Attempt {
+        AttemptSummary {
             detection_error,
             step,
             success: report.outcome.is_held(),
@@ -194,13 +195,13 @@ impl Rehearsal<'_> {
     }
 
     /// What is known of an attempt before it begins: where the part lies.
-    fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> Attempt {
+    fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> AttemptSummary {
         let grasp = base_from_object.map(|base_from_object| self.object.grasp_in_base(&base_from_object));
         let (object_mm, object_angle_deg) = match grasp {
             Some((tcp, direction_rad)) => ([tcp.x * 1e3, tcp.y * 1e3], direction_rad.to_degrees()),
             None => ([f64::NAN; 2], f64::NAN),
         };
-        Attempt {
+        AttemptSummary {
             number,
             object_mm,
             object_angle_deg,

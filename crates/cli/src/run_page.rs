@@ -119,14 +119,14 @@ fn with_film(report: Report, page: &RunPage) -> Result<Report> {
 fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
     let right = with_part.iter().filter(|trial| trial.is_right()).count();
     let figure = |trial: &&Trial| {
-        let said = match (trial.present, trial.error) {
+        let verdict = match (trial.present, trial.error) {
             (true, Some(e)) => format!("{:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg),
             (true, None) => "the part is here and was not found".to_owned(),
             (false, _) if trial.is_false_alarm() => "no part here: a false alarm".to_owned(),
             (false, _) if trial.best_score > 0.0 => "no part here: the network's proposal was refused".to_owned(),
             (false, _) => "no part here, nothing found".to_owned(),
         };
-        Figure::photo(trial.drawn.clone()).caption(format!("{said}; score {:.2}", trial.best_score))
+        Figure::photo(trial.drawn.clone()).caption(format!("{verdict}; score {:.2}", trial.best_score))
     };
     let shown = with_part.iter().take(6).chain(without.iter().take(3));
     Section::new("Detections")

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::ops::ControlFlow;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use sdg_grasp::{Event, ValidationRecord};
+use sdg_grasp::{TeachingEvent, ValidationRecord};
 
 use crate::interrupt::Interrupt;
 
@@ -37,9 +37,9 @@ impl TeachingProgress {
     }
 
     /// Shows one event; breaks when Ctrl-C was pressed.
-    pub fn show(&mut self, event: &Event) -> ControlFlow<()> {
+    pub fn show(&mut self, event: &TeachingEvent) -> ControlFlow<()> {
         match event {
-            Event::Step { record, planned_steps, elapsed_secs } => {
+            TeachingEvent::Step { record, planned_steps, elapsed_secs } => {
                 let newest = record.losses.total();
                 let loss = self.loss.map_or(newest, |loss| loss + SMOOTHING * (newest - loss));
                 self.loss = Some(loss);
@@ -60,8 +60,8 @@ impl TeachingProgress {
                     None => {}
                 }
             }
-            Event::Validated(record) => self.show_validation(record),
-            Event::OrientationStep { step, planned_steps, loss, elapsed_secs } => {
+            TeachingEvent::Validated(record) => self.show_validation(record),
+            TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs } => {
                 let done = step + 1;
                 match &self.bar {
                     Some(bar) => {

@@ -21,7 +21,7 @@ use sdg_grasp::{Device, NUM_KEYPOINTS};
 use sdg_training::{Outcome, SampleSource, TrainingConfig, ValidationConfig, train};
 
 /// What boxes and keypoints may differ, in pixels of the image as given.
-const MOST_PX: f64 = 0.1;
+const MAX_PX: f64 = 0.1;
 /// Detections below are the network's own doubts.
 const SURE: f64 = 0.5;
 /// Candidates whose scores are nearer to each other than this tie.
@@ -144,7 +144,7 @@ fn compare(exact: &Detector, rounded: &Detector, pictures: &[RgbImage]) -> Compa
         for i in (0..expected.boxes.len()).filter(|&i| expected.scores[i] >= SURE) {
             made.sure += 1;
             let j = nearest(&expected, i, &found).expect("what full precision is sure of, half precision finds");
-            let kept_the_same = box_difference(&expected, i, &found, j) < MOST_PX;
+            let kept_the_same = box_difference(&expected, i, &found, j) < MAX_PX;
             let (of, j) = if kept_the_same {
                 (&found, j)
             } else {
@@ -186,7 +186,7 @@ fn half_precision_moves_no_detection_of_a_trained_network_by_a_tenth_of_a_pixel(
         let made = compare(&Detector::new(&network, &exact), &Detector::new(&network, &rounded), &pictures);
         println!("{bytes} and {half_bytes} bytes, {readout:?}: {made:?}");
         assert!(made.sure >= PICTURES as usize / 2, "{made:?}");
-        assert!(made.box_px < MOST_PX && made.keypoint_px < MOST_PX, "{made:?}");
+        assert!(made.box_px < MAX_PX && made.keypoint_px < MAX_PX, "{made:?}");
         assert!(made.ties * 10 <= made.sure, "{made:?}");
     }
 }

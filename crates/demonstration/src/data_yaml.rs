@@ -6,7 +6,7 @@
 use crate::{Error, Result};
 
 /// More classes than any dataset has; bounds what a hostile file costs.
-const MOST_NAMES: usize = 100_000;
+const MAX_NAMES: usize = 100_000;
 
 /// What labels need to be read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,7 +41,7 @@ impl DataYaml {
                 None => place,
                 Some(key) => key.parse().map_err(|_| malformed("names", "classes counted from 0", &key))?,
             };
-            if class >= MOST_NAMES {
+            if class >= MAX_NAMES {
                 return Err(malformed("names", "fewer classes", &class.to_string()));
             }
             if data.names.len() <= class {

@@ -6,9 +6,9 @@ use crate::draft::Draft;
 use crate::{Error, Result};
 
 /// How far a keypoint between the ends may stray from its place on the line, as a share of the line's length …
-const MOST_STRAY_SHARE: f64 = 0.02;
+const MAX_STRAY_SHARE: f64 = 0.02;
 /// … and in pixels, whichever is more.
-const MOST_STRAY_PX: f64 = 1.5;
+const MAX_STRAY_PX: f64 = 1.5;
 
 /// Puts the first and the last keypoint into the draft as the grasp's ends; those between them must lie evenly on the
 /// line, as OpenDR's ten do: other keypoints mark something else. `None` is a keypoint that is not labelled.
@@ -20,7 +20,7 @@ pub(crate) fn read_grasp(keypoints: &[Option<Point2<f64>>], place: &str, draft: 
     };
     if let (Some(start), Some(end)) = (first, last) {
         let line = end - start;
-        let most_stray = (MOST_STRAY_SHARE * line.norm()).max(MOST_STRAY_PX);
+        let max_stray = (MAX_STRAY_SHARE * line.norm()).max(MAX_STRAY_PX);
         for (k, keypoint) in keypoints.iter().enumerate() {
             let Some(keypoint) = keypoint else { continue };
             if let Some(found) = keypoint.iter().find(|value| !value.is_finite()) {
@@ -31,7 +31,7 @@ pub(crate) fn read_grasp(keypoints: &[Option<Point2<f64>>], place: &str, draft: 
             }
             let on_line = start + line * (k as f64 / (keypoints.len() - 1) as f64);
             let stray = (keypoint - on_line).norm();
-            if stray > most_stray {
+            if stray > max_stray {
                 return Err(Error::Malformed {
                     place: place.into(),
                     expected: "two keypoints, or more that lie evenly on the grasp line".into(),

@@ -93,7 +93,7 @@ impl Shape {
         }
         // LabelMe's own default, left out by old versions.
         let shape_type = node.optional("shape_type")?.map_or(Ok("polygon"), |kind| kind.text())?;
-        let (kind, least_points) = match (shape_type, label.as_str()) {
+        let (kind, min_points) = match (shape_type, label.as_str()) {
             ("rectangle", _) => (Kind::Box, 2),
             ("polygon", _) => (Kind::Outline, 3),
             ("point", "grasp_start") => (Kind::GraspStart, 1),
@@ -113,8 +113,8 @@ impl Shape {
                 });
             }
         };
-        if points.len() < least_points {
-            return Err(points_node.malformed(format!("at least {least_points} points for a {shape_type}")));
+        if points.len() < min_points {
+            return Err(points_node.malformed(format!("at least {min_points} points for a {shape_type}")));
         }
         let jaw_width = match node.optional("jaw_width")? {
             Some(width) if matches!(kind, Kind::GraspStart) => Some((width.number()?, width.place)),

@@ -7,7 +7,7 @@ use crate::{Error, Result};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// More dimensions than annotations have.
-const MOST_DIMENSIONS: usize = 8;
+const MAX_DIMENSIONS: usize = 8;
 
 pub(crate) fn is_npy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
@@ -113,7 +113,7 @@ impl<'a> NpyArray<'a> {
             .strip_prefix('(')
             .and_then(|rest| rest.strip_suffix(')'))
             .map(|inside| inside.split(',').map(str::trim).filter(|side| !side.is_empty()).collect::<Vec<_>>())
-            .filter(|sides| sides.len() <= MOST_DIMENSIONS)
+            .filter(|sides| sides.len() <= MAX_DIMENSIONS)
             .and_then(|sides| sides.iter().map(|side| side.parse().ok()).collect());
         let shape = shape.ok_or_else(|| malformed("a shape such as (1500, 4)", crate::json::shorten(shape_text)))?;
 
@@ -224,7 +224,7 @@ pub(crate) mod tests {
             }
             bytes.truncate(cut);
             if let Ok(array) = NpyArray::parse(&bytes, "a") {
-                prop_assert!(array.shape.len() <= MOST_DIMENSIONS);
+                prop_assert!(array.shape.len() <= MAX_DIMENSIONS);
             }
         }
     }

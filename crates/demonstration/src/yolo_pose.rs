@@ -23,7 +23,7 @@ use crate::{Annotation, Error, ImageFacts, Result};
 /// Numbers of a line before its keypoints.
 const BOX_NUMBERS: usize = 5;
 /// More objects than a person marks on a photo; bounds what a hostile file costs.
-const MOST_OBJECTS: usize = 10_000;
+const MAX_OBJECTS: usize = 10_000;
 
 /// Whether the first line with anything on it is a row of numbers.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
@@ -47,10 +47,10 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
     })?;
     let mut objects = Vec::new();
     for (line, number) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
-        if objects.len() == MOST_OBJECTS {
+        if objects.len() == MAX_OBJECTS {
             return Err(Error::Malformed {
                 place: format!("line {number}"),
-                expected: format!("at most {MOST_OBJECTS} objects"),
+                expected: format!("at most {MAX_OBJECTS} objects"),
                 found: "more".into(),
             });
         }

@@ -42,6 +42,8 @@ mod config_file;
 mod error;
 pub mod fpn;
 mod generalized_rcnn;
+#[cfg(feature = "training")]
+pub mod golden;
 mod host;
 pub mod image_transform;
 pub mod imprint;
@@ -58,8 +60,6 @@ pub mod rpn;
 pub mod sampler;
 pub mod state_dict;
 mod target;
-#[cfg(feature = "training")]
-pub mod verification;
 
 pub use config::RcnnConfig;
 pub use error::{DetectionError, Result};

@@ -9,8 +9,8 @@ use std::process::Command;
 
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
+use sdg_detection::golden::{GoldenReport, StageComparison, record, verify};
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_detection::verification::{StageComparison, VerificationReport, record, verify};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
 
 fn golden(path: &str) -> PathBuf {
@@ -91,7 +91,7 @@ fn detector(folder: &Path) -> GeneralizedRcnn {
     detector
 }
 
-fn compared(detector: &GeneralizedRcnn, folder: &Path) -> VerificationReport {
+fn compared(detector: &GeneralizedRcnn, folder: &Path) -> GoldenReport {
     let image = image::open(golden("detectron2/input.png")).unwrap().to_rgb8();
     verify(detector, &image, &read(&folder.join("expected.safetensors"))).unwrap()
 }

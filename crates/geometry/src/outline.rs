@@ -5,10 +5,10 @@ use nalgebra::Point2;
 use crate::{Mask, Polygon};
 
 /// The most points that a person would click.
-const MOST_VERTICES: usize = 56;
+const MAX_VERTICES: usize = 56;
 
 /// How far the thinned outline may run from the traced one at first, in pixels.
-const LEAST_TOLERANCE_PX: f64 = 0.35;
+const MIN_TOLERANCE_PX: f64 = 0.35;
 
 /// The outer outline of the largest piece of a mask, holes left out; `None` for a mask without a piece of any size.
 ///
@@ -18,10 +18,10 @@ const LEAST_TOLERANCE_PX: f64 = 0.35;
 /// Pixels; the centre of the first pixel is (0.5, 0.5). The points run clockwise as seen (y points down).
 pub fn outer_outline(mask: &Mask) -> Option<Polygon> {
     let traced = largest_boundary(mask)?;
-    let mut tolerance = LEAST_TOLERANCE_PX;
+    let mut tolerance = MIN_TOLERANCE_PX;
     loop {
         let vertices = simplify_ring(&traced, tolerance);
-        if vertices.len() <= MOST_VERTICES {
+        if vertices.len() <= MAX_VERTICES {
             return Polygon::new(vertices).ok();
         }
         tolerance *= 1.1;
@@ -131,7 +131,7 @@ mod tests {
             |x: u32, y: u32| ((f64::from(x) + 0.5 - 60.0).powi(2) + (f64::from(y) + 0.5 - 50.0).powi(2)).sqrt();
         let mask = Mask::from_fn(120, 100, |x, y| (20.0..40.0).contains(&distance(x, y)));
         let outline = outer_outline(&mask).unwrap();
-        assert!((20..=MOST_VERTICES).contains(&outline.vertices.len()), "{}", outline.vertices.len());
+        assert!((20..=MAX_VERTICES).contains(&outline.vertices.len()), "{}", outline.vertices.len());
         for vertex in &outline.vertices {
             let radius = (vertex - Point2::new(60.0, 50.0)).norm();
             assert!((radius - 40.0).abs() < 0.8, "{vertex} at {radius}");

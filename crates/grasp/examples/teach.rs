@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use sdg_demonstration::{Annotation, Demonstration, ImageFacts, ImageLimits, decode_image};
-use sdg_grasp::{Event, TeachOptions, teach};
+use sdg_grasp::{TeachOptions, TeachingEvent, teach};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -17,11 +17,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let taught = teach(&[demonstration], &TeachOptions::new(1), &mut |event| {
         match event {
-            Event::Step { record, elapsed_secs, .. } if record.step % 10 == 0 => {
+            TeachingEvent::Step { record, elapsed_secs, .. } if record.step % 10 == 0 => {
                 println!("{:4} {elapsed_secs:6.1} s  {:?}", record.step, record.losses);
             }
-            Event::Validated(record) => println!("{record:?}"),
-            Event::Step { .. } | Event::OrientationStep { .. } => {}
+            TeachingEvent::Validated(record) => println!("{record:?}"),
+            TeachingEvent::Step { .. } | TeachingEvent::OrientationStep { .. } => {}
         }
         ControlFlow::Continue(())
     })?;

@@ -50,7 +50,7 @@ impl Calibration {
             let gap = lowest_right - highest_wrong;
             (highest_wrong + SHARE_OF_GAP * gap, SHARE_OF_GAP * gap)
         } else {
-            (least_errors(&right, &wrong), 0.0)
+            (threshold_of_fewest_errors(&right, &wrong), 0.0)
         };
         let slope = (SCORE_AT_GAP_END / (1.0 - SCORE_AT_GAP_END)).ln() / half_gap.max(f64::MIN_POSITIVE);
         let slope = slope.clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
@@ -65,7 +65,7 @@ impl Calibration {
 
 /// The middle between two neighbouring scores that leaves the fewest right ones below and wrong ones above.
 /// Both lists sorted upwards, `right` not empty.
-fn least_errors(right: &[f64], wrong: &[f64]) -> f64 {
+fn threshold_of_fewest_errors(right: &[f64], wrong: &[f64]) -> f64 {
     let mut all: Vec<f64> = right.iter().chain(wrong).copied().collect();
     all.sort_by(f64::total_cmp);
     let errors = |threshold: f64| {

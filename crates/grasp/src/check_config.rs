@@ -39,7 +39,7 @@ impl CheckConfig {
     pub const DEFAULT: Self = Self {
         search: SearchConfig {
             scales: Self::DEFAULT_SIZE_TOLERANCE,
-            least_agreement: 0.2,
+            min_agreement: 0.2,
             max_matches: Self::DEFAULT_MAX_DETECTIONS,
             num_points: SearchConfig::DEFAULT_NUM_POINTS,
             max_starts: SearchConfig::DEFAULT_MAX_STARTS,

@@ -18,14 +18,14 @@ use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::model_file::Calibrations;
-use crate::models::{Candidate, Network, Proposals};
+use crate::models::{Network, PoseCandidate, Proposals};
 use crate::sighting::{SAME_PART_IOU, Sighting, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
-use crate::verification::{Overlay, Scene};
+use crate::verification::{PlacedDemonstration, SearchedImage};
 
 /// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
-const LEAST_SIDE_PX: u32 = 32;
+const MIN_SIDE_PX: u32 = 32;
 
 /// A grasp model: taught from demonstrations, finds planar grasps.
 #[derive(Debug, Clone)]
@@ -231,8 +231,8 @@ impl GraspModel {
     /// [`Self::detect_async`], each detection with what tracking goes on from.
     pub(crate) async fn find_async(&self, image: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         let (width, height) = image.dimensions();
-        if width.min(height) < LEAST_SIDE_PX {
-            return Err(GraspError::ImageTooSmall { least: LEAST_SIDE_PX, width, height });
+        if width.min(height) < MIN_SIDE_PX {
+            return Err(GraspError::ImageTooSmall { least: MIN_SIDE_PX, width, height });
         }
         let mut found: Vec<Found> = match (&self.network, verification) {
             (Some(network), Verification::Off) => network
@@ -243,11 +243,13 @@ impl GraspModel {
                 .map(|c| Found { detection: self.unverified(c), placement: None })
                 .collect(),
             (Some(network), Verification::ByShape) => {
-                let scene = Scene::new(image, &self.demonstrations);
+                let searched = SearchedImage::new(image, &self.demonstrations);
                 let proposals = network.proposals_async(image, &self.demonstrations).await?;
-                self.judged(sightings(&proposals, &scene))
+                self.judged(sightings(&proposals, &searched))
             }
-            (None, _) => self.judged(sightings(&Proposals::default(), &Scene::new(image, &self.demonstrations))),
+            (None, _) => {
+                self.judged(sightings(&Proposals::default(), &SearchedImage::new(image, &self.demonstrations)))
+            }
         };
         let (width, height) = (f64::from(width), f64::from(height));
         found.iter_mut().for_each(|found| found.detection.bbox = found.detection.bbox.clip(width, height));
@@ -257,7 +259,7 @@ impl GraspModel {
         Ok(found)
     }
 
-    fn unverified(&self, candidate: &Candidate) -> GraspDetection {
+    fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {
         GraspDetection {
             score: self.calibrations.network.apply(candidate.network_score),
             network_score: candidate.network_score,
@@ -289,7 +291,7 @@ impl GraspModel {
 
     /// What the verdict is to know of a place.
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
-        let Overlay { evidence, log_size, .. } = sighting.overlay;
+        let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
         let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
         Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance() }
     }
@@ -331,8 +333,8 @@ pub(crate) struct Placement {
 
 impl Placement {
     fn of(sighting: &Sighting<'_>) -> Self {
-        let Overlay { demonstration_idx, image_from_cutout, image_from_marks, agreement, evidence, .. } =
-            sighting.overlay;
+        let PlacedDemonstration { demonstration_idx, image_from_cutout, image_from_marks, agreement, evidence, .. } =
+            sighting.placed;
         Self {
             demonstration_idx,
             image_from_cutout,
@@ -349,8 +351,8 @@ impl Placement {
 impl Sighting<'_> {
     /// A detection as the demonstration says, where it lies.
     pub(crate) fn detection(self, score: f64, evidence: Contributions, num_keypoints: usize) -> GraspDetection {
-        let Overlay { demonstration, image_from_marks, agreement, .. } = self.overlay;
-        let outline = self.overlay.outline();
+        let PlacedDemonstration { demonstration, image_from_marks, agreement, .. } = self.placed;
+        let outline = self.placed.outline();
         let marked = demonstration.keypoints().into_iter().map(|keypoint| image_from_marks.apply(&keypoint.point()));
         GraspDetection {
             score,
@@ -362,7 +364,7 @@ impl Sighting<'_> {
             outline: Some(outline),
             grasp: demonstration.grasp(&image_from_marks),
             turn_source: self.turn_source,
-            light: self.overlay.light,
+            light: self.placed.light,
         }
     }
 }

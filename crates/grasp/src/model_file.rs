@@ -42,7 +42,7 @@ pub const FORMAT_VERSION: u32 = 2;
 const OLDEST_VERSION: u32 = 1;
 
 /// More demonstrations than anybody takes; bounds the work on a forged file.
-const MOST_DEMONSTRATIONS: usize = 1000;
+const MAX_DEMONSTRATIONS: usize = 1000;
 
 /// What was measured of the part while teaching, as stored.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -157,9 +157,9 @@ impl GraspModel {
 
         let kind: ModelKind = metadata.text("model")?.parse()?;
         let marks: Vec<TaughtMarks> = metadata.json("demonstrations")?;
-        if marks.is_empty() || marks.len() > MOST_DEMONSTRATIONS {
+        if marks.is_empty() || marks.len() > MAX_DEMONSTRATIONS {
             return Err(GraspError::Damaged {
-                expected: format!("1 to {MOST_DEMONSTRATIONS} demonstrations"),
+                expected: format!("1 to {MAX_DEMONSTRATIONS} demonstrations"),
                 found: marks.len().to_string(),
             });
         }

@@ -105,7 +105,7 @@ impl Prepared {
     }
 
     /// Where the marks' surroundings lie, given where the whole part lies: as it, or shifted a little.
-    pub(crate) fn settle_marks(&self, field: &GradientField, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
+    pub(crate) fn refine_marks(&self, field: &GradientField, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
         let Some(template) = &self.about_marks else { return *image_from_cutout };
         let refined = template.refine_shift(field, image_from_cutout, self.max_shift * image_from_cutout.scale);
         let gain = refined.agreement - refined.initial_agreement;

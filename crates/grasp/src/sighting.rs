@@ -4,15 +4,15 @@ use sdg_shape::parallel;
 
 use crate::facts::TurnSource;
 use crate::model::are_outlines_of_same_part;
-use crate::models::{Candidate, Proposals};
-use crate::verification::{Overlay, Scene, search, verify};
+use crate::models::{PoseCandidate, Proposals};
+use crate::verification::{PlacedDemonstration, SearchedImage, search, verify};
 
 /// Boxes that overlap so much are taken for the same part's. Chosen by hand, not measured.
 pub(crate) const SAME_PART_IOU: f64 = 0.5;
 
 /// A place where the part may be, before it is scored.
 pub(crate) struct Sighting<'a> {
-    pub(crate) overlay: Overlay<'a>,
+    pub(crate) placed: PlacedDemonstration<'a>,
     /// 0 where the network proposes nothing.
     pub(crate) network_score: f64,
     /// The network's scores of the keypoints; empty where the search found the place.
@@ -23,24 +23,24 @@ pub(crate) struct Sighting<'a> {
 /// The one that agrees best, whatever its score.
 #[cfg(feature = "teach")]
 pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'s Sighting<'a>> {
-    sightings.iter().max_by(|a, b| a.overlay.agreement.total_cmp(&b.overlay.agreement))
+    sightings.iter().max_by(|a, b| a.placed.agreement.total_cmp(&b.placed.agreement))
 }
 
 /// All such places in an image: first those that a network proposes, then those that the search finds. A place may come twice.
-pub(crate) fn sightings<'a>(proposals: &Proposals, scene: &Scene<'a>) -> Vec<Sighting<'a>> {
-    let found = search(scene);
+pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) -> Vec<Sighting<'a>> {
+    let found = search(image);
     let proposed = parallel::map(&proposals.candidates, |candidate| {
-        let overlay = found_already(candidate, &found).copied().or_else(|| verify(candidate, scene))?;
+        let placed = found_already(candidate, &found).copied().or_else(|| verify(candidate, image))?;
         Some(Sighting {
-            overlay,
+            placed,
             network_score: candidate.network_score,
             keypoint_scores: candidate.keypoints.iter().map(|(_, score)| *score).collect(),
             turn_source: candidate.turn_source,
         })
     });
-    let searched = found.iter().map(|overlay| Sighting {
-        overlay: *overlay,
-        network_score: proposals.score_at(&overlay.outline().bounds()),
+    let searched = found.iter().map(|placed| Sighting {
+        placed: *placed,
+        network_score: proposals.score_at(&placed.outline().bounds()),
         keypoint_scores: Vec::new(),
         turn_source: TurnSource::Search,
     });
@@ -49,12 +49,15 @@ pub(crate) fn sightings<'a>(proposals: &Proposals, scene: &Scene<'a>) -> Vec<Sig
 
 /// The pose that the search found of the part that the candidate shows, where it agrees so well that refining the candidate's
 /// own pose, most of the time that model C took, would end there.
-fn found_already<'f, 'a>(candidate: &Candidate, found: &'f [Overlay<'a>]) -> Option<&'f Overlay<'a>> {
-    let of_same_part = found.iter().filter(|overlay| {
-        let demonstration = overlay.demonstration;
-        overlay.demonstration_idx == candidate.demonstration_idx
-            && overlay.agreement >= demonstration.check().search.shape.settling.sure_agreement
-            && are_outlines_of_same_part(&demonstration.outline(&candidate.image_from_cutout), &overlay.outline())
+fn found_already<'f, 'a>(
+    candidate: &PoseCandidate,
+    found: &'f [PlacedDemonstration<'a>],
+) -> Option<&'f PlacedDemonstration<'a>> {
+    let of_same_part = found.iter().filter(|placed| {
+        let demonstration = placed.demonstration;
+        placed.demonstration_idx == candidate.demonstration_idx
+            && placed.agreement >= demonstration.check().search.shape.refinement.sure_agreement
+            && are_outlines_of_same_part(&demonstration.outline(&candidate.image_from_cutout), &placed.outline())
     });
     of_same_part.max_by(|a, b| a.agreement.total_cmp(&b.agreement))
 }

@@ -1,10 +1,10 @@
 //! The check by the demonstration: laid over the image where a model proposes or where the search leads, and refined.
 //!
 //! ```text
-//! picture ─ halved for each size that is looked for ─ Scene ─┬─ search: the whole picture ─────┬─ Overlay {pose, Evidence}
-//! network ─ Candidate ───────────────────────────────────────┴─ verify: about the candidate ───┘
+//! picture ─ halved for each size that is looked for ─ SearchedImage ─┬─ search: the whole picture ──┬─ PlacedDemonstration
+//! network ─ PoseCandidate ───────────────────────────────────────────┴─ verify: about the candidate ┘  {pose, Evidence}
 //! ```
-//! What an overlay is worth, [`crate::verdict`] decides.
+//! [`crate::verdict`] makes a score of the evidence.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -13,18 +13,18 @@ use image::RgbImage;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_shape::{Evidence, GradientField};
 
-use crate::models::Candidate;
+use crate::models::PoseCandidate;
 use crate::prepared::{Prepared, WorkingSize, scaling};
 use crate::sizes::SizeRange;
 use crate::taught::TaughtDemonstration;
 
 /// An image and the demonstrations that are looked for in it, at every size that they may have.
-pub(crate) struct Scene<'a> {
+pub(crate) struct SearchedImage<'a> {
     views: Vec<View<'a>>,
     sized: Vec<SizedDemonstration<'a>>,
 }
 
-/// The image, halved some times, with its gradients, which every overlay reads.
+/// The image, halved some times, with its gradients, which every comparison reads.
 struct View<'a> {
     halvings: u32,
     image: Cow<'a, RgbImage>,
@@ -41,24 +41,24 @@ struct SizedDemonstration<'a> {
     view_idx: usize,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> SearchedImage<'a> {
     /// Makes every demonstration ready for the image's size. One that shows nothing to compare at some size is not looked
     /// for at that size.
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
         let (width, height) = image.dimensions();
-        let mut scene = Self { views: Vec::new(), sized: Vec::new() };
+        let mut searched = Self { views: Vec::new(), sized: Vec::new() };
         for (demonstration_idx, demonstration) in demonstrations.iter().enumerate() {
             let tolerance = &demonstration.check().search.scales;
             for range in SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance) {
                 if let Ok((working, prepared)) = demonstration.prepared(&range) {
-                    let view_idx = scene.view(image, working.halvings, demonstration);
+                    let view_idx = searched.view(image, working.halvings, demonstration);
                     let sized =
                         SizedDemonstration { demonstration, demonstration_idx, range, working, prepared, view_idx };
-                    scene.sized.push(sized);
+                    searched.sized.push(sized);
                 }
             }
         }
-        scene
+        searched
     }
 
     /// The index of the image halved so often.
@@ -95,7 +95,7 @@ pub(crate) fn halved(image: &RgbImage) -> RgbImage {
 
 /// A demonstration laid over an image.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Overlay<'a> {
+pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) demonstration: &'a TaughtDemonstration,
     pub(crate) demonstration_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
@@ -110,7 +110,7 @@ pub(crate) struct Overlay<'a> {
     pub(crate) light: f64,
 }
 
-impl Overlay<'_> {
+impl PlacedDemonstration<'_> {
     /// The part's outline, in pixels of the image.
     pub(crate) fn outline(&self) -> Polygon {
         self.demonstration.outline(&self.image_from_cutout)
@@ -146,21 +146,21 @@ impl<'a> SizedDemonstration<'a> {
         !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + BETTER_BEYOND
     }
 
-    fn overlay(
+    fn placed(
         &self,
         view: &View<'_>,
         view_from_working: &PlanarSimilarity,
         agreement: f64,
         evidence: Evidence,
-    ) -> Overlay<'a> {
+    ) -> PlacedDemonstration<'a> {
         let image_from_cutout = self.image_from_cutout(view_from_working);
         // In the plane of the marks nothing is displaced, and a shift along a rod is held by nothing: of 40 pictures by another
         // camera three were off by 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
         let marks = match self.demonstration.check().score.is_size_known {
             true => *view_from_working,
-            false => self.prepared.settle_marks(&view.field, view_from_working),
+            false => self.prepared.refine_marks(&view.field, view_from_working),
         };
-        Overlay {
+        PlacedDemonstration {
             demonstration: self.demonstration,
             demonstration_idx: self.demonstration_idx,
             image_from_cutout,
@@ -174,16 +174,16 @@ impl<'a> SizedDemonstration<'a> {
 }
 
 /// Every place in the image where a demonstration agrees well enough to be mentioned.
-pub(crate) fn search<'a>(scene: &Scene<'a>) -> Vec<Overlay<'a>> {
+pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstration<'a>> {
     let mut found = Vec::new();
-    for sized in &scene.sized {
-        let view = &scene.views[sized.view_idx];
+    for sized in &searched.sized {
+        let view = &searched.views[sized.view_idx];
         for found_there in sized.prepared.search.search_field(&view.image, &view.field) {
             let pose = &found_there.image_from_demonstration;
             if sized.is_of_other_size(view, pose, found_there.agreement) {
                 continue;
             }
-            found.push(sized.overlay(view, pose, found_there.agreement, found_there.evidence));
+            found.push(sized.placed(view, pose, found_there.agreement, found_there.evidence));
         }
     }
     found
@@ -195,25 +195,25 @@ pub(crate) fn search<'a>(scene: &Scene<'a>) -> Vec<Overlay<'a>> {
 /// Keypoints give place and turn well, but a short grasp line gives the scale badly, so the box decides that: the
 /// start takes the scale at which the outline is as large as the detected box. A network that mistakes one end of a
 /// part for the other is half a turn off; the demonstration sees which end it is.
-pub(crate) fn verify<'a>(candidate: &Candidate, scene: &Scene<'a>) -> Option<Overlay<'a>> {
-    let of_it = scene.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
+pub(crate) fn verify<'a>(candidate: &PoseCandidate, searched: &SearchedImage<'a>) -> Option<PlacedDemonstration<'a>> {
+    let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == candidate.demonstration_idx);
     let demonstration = of_it.clone().next()?.demonstration;
     let pose = candidate.image_from_cutout;
     let outline = demonstration.outline(&pose).bounds();
     let scale = pose.scale * (candidate.bbox.area() / outline.area()).sqrt();
     let sized = of_it.min_by(|a, b| a.range.distance(scale).total_cmp(&b.range.distance(scale)))?;
     let start = about_middle(demonstration, &pose, Angle::ZERO, sized.range.clamp(scale) / pose.scale);
-    better_way_round(sized, &start, scene)
+    better_way_round(sized, &start, searched)
 }
 
-/// Refined from `start` and from half a turn further; the one that agrees better, settled. `None` where it has a size that is
+/// Refined from `start` and from half a turn further; the one that agrees better, refined by edges and surface. `None` where it has a size that is
 /// not looked for: that is another part.
 fn better_way_round<'a>(
     sized: &SizedDemonstration<'a>,
     start: &PlanarSimilarity,
-    scene: &Scene<'_>,
-) -> Option<Overlay<'a>> {
-    let view = &scene.views[sized.view_idx];
+    searched: &SearchedImage<'_>,
+) -> Option<PlacedDemonstration<'a>> {
+    let view = &searched.views[sized.view_idx];
     let comparison = sized.prepared.search.comparison(&view.image, &view.field);
     let turned = about_middle(sized.demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
     let [straight, turned] = [*start, turned].map(|start| {
@@ -223,9 +223,9 @@ fn better_way_round<'a>(
     });
     let (start, refined, _) = if turned.2 > straight.2 { turned } else { straight };
     let scales = sized.prepared.search.scales();
-    let settled = comparison.settled(&start, refined, scales);
-    let agreement = comparison.agreement(&settled).both();
-    scales.contains(&settled.scale).then(|| sized.overlay(view, &settled, agreement, comparison.evidence(&settled)))
+    let refined = comparison.refine_pose(&start, refined, scales);
+    let agreement = comparison.agreement(&refined).both();
+    scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.

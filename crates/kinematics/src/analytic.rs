@@ -20,21 +20,21 @@ pub(crate) const NUM_BRANCHES: usize = 8;
 
 /// One way to reach the pose.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Candidate {
+pub(crate) struct AnalyticSolution {
     pub q: JointVector,
     /// 0 where the pose is met exactly; otherwise by how much the two cosines of the construction leave [-1, 1].
     pub infeasibility: f64,
 }
 
-/// The candidates for one q7, by branch; `None` where the construction degenerates.
+/// The solutions for one q7, by branch; `None` where the construction degenerates.
 ///
 /// `q1_if_free` is used where the upper arm points along the axis of joint 1, and only q1 + q3 matters.
 /// Joint 6, whose range is not centred, is returned in [-π + 1.87, π + 1.87), centred on the middle of its range.
-pub(crate) fn candidates(
+pub(crate) fn analytic_solutions(
     base_from_flange: &Isometry3<f64>,
     q7: f64,
     q1_if_free: f64,
-) -> [Option<Candidate>; NUM_BRANCHES] {
+) -> [Option<AnalyticSolution>; NUM_BRANCHES] {
     let mut found = [None; NUM_BRANCHES];
 
     let flange = base_from_flange.rotation.to_rotation_matrix();
@@ -117,7 +117,7 @@ pub(crate) fn candidates(
                 };
                 let branch = (elbow_idx * 2 + turn_idx) * 2 + shoulder_idx;
                 found[branch] =
-                    Some(Candidate { q: JointVector::from([q1, q2, q3, wrap(q4), q5, q6, q7]), infeasibility });
+                    Some(AnalyticSolution { q: JointVector::from([q1, q2, q3, wrap(q4), q5, q6, q7]), infeasibility });
             }
         }
     }
@@ -154,7 +154,7 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     #[test]
-    fn every_candidate_reaches_and_the_original_is_among_them() {
+    fn every_solution_reaches_and_the_original_is_among_them() {
         // Cosines near ±1 lose half of the digits: 1e-7 rad is what acos leaves there.
         const TOLERANCE: f64 = 1e-6;
         let panda = Panda::new();
@@ -165,16 +165,16 @@ mod tests {
             let target = panda.base_from_flange(&q);
             let mut original_distance = f64::INFINITY;
             let mut num_exact = 0;
-            for candidate in candidates(&target, q[6], q[0]).into_iter().flatten() {
-                if candidate.infeasibility > 0.0 {
+            for solution in analytic_solutions(&target, q[6], q[0]).into_iter().flatten() {
+                if solution.infeasibility > 0.0 {
                     continue;
                 }
                 num_exact += 1;
-                let error = pose_error(&panda.base_from_flange(&candidate.q), &target).norm();
-                assert!(error < TOLERANCE, "{error} at {} from {q}", candidate.q);
-                original_distance = original_distance.min((candidate.q - q).norm());
+                let error = pose_error(&panda.base_from_flange(&solution.q), &target).norm();
+                assert!(error < TOLERANCE, "{error} at {} from {q}", solution.q);
+                original_distance = original_distance.min((solution.q - q).norm());
             }
-            assert!(num_exact >= 4, "only {num_exact} candidates for {q}");
+            assert!(num_exact >= 4, "only {num_exact} solutions for {q}");
             assert!(original_distance < 1e-5, "{original_distance} for {q}");
         }
     }

@@ -8,7 +8,7 @@
 
 use nalgebra::Isometry3;
 
-use crate::analytic::{Candidate, NUM_BRANCHES, candidates};
+use crate::analytic::{AnalyticSolution, NUM_BRANCHES, analytic_solutions};
 use crate::check::{check_joints, check_options, check_pose};
 use crate::error::KinematicsError;
 use crate::ik::{IkOptions, IkSolution};
@@ -89,7 +89,7 @@ struct Search<'a> {
 
 /// Violations this small are rounding, and are clamped away.
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
-/// Weight of geometric infeasibility against radians beyond limits when the least bad candidate is sought.
+/// Weight of geometric infeasibility against radians beyond limits when the least bad solution is sought.
 const INFEASIBILITY_RAD: f64 = 10.0;
 const NUM_REFINEMENTS: usize = 24;
 const NUM_BISECTIONS: usize = 12;
@@ -128,8 +128,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn candidates(&self, q7: f64) -> [Option<Candidate>; NUM_BRANCHES] {
-        candidates(&self.base_from_flange, q7, self.seed[0])
+    fn analytic_solutions(&self, q7: f64) -> [Option<AnalyticSolution>; NUM_BRANCHES] {
+        analytic_solutions(&self.base_from_flange, q7, self.seed[0])
     }
 
     /// The best grid point of every feasible stretch of every branch.
@@ -137,8 +137,8 @@ impl<'a> Search<'a> {
         let mut open: [Option<Branch>; NUM_BRANCHES] = [None; NUM_BRANCHES];
         let mut closed = Vec::new();
         for (grid_idx, q7) in self.grid.iter().enumerate() {
-            for (branch_idx, candidate) in self.candidates(*q7).iter().enumerate() {
-                match self.feasible_cost(candidate) {
+            for (branch_idx, solution) in self.analytic_solutions(*q7).iter().enumerate() {
+                match self.feasible_cost(solution) {
                     Some((q, cost)) => {
                         if open[branch_idx].is_none_or(|b| cost < b.cost) {
                             open[branch_idx] = Some(Branch { branch_idx, grid_idx, q, cost });
@@ -152,13 +152,13 @@ impl<'a> Search<'a> {
         closed
     }
 
-    fn feasible_cost(&self, candidate: &Option<Candidate>) -> Option<(JointVector, f64)> {
-        let candidate = candidate.as_ref()?;
-        if candidate.infeasibility > 0.0 {
+    fn feasible_cost(&self, solution: &Option<AnalyticSolution>) -> Option<(JointVector, f64)> {
+        let solution = solution.as_ref()?;
+        if solution.infeasibility > 0.0 {
             return None;
         }
-        let margins = self.limits.margins(&candidate.q);
-        (margins.min() >= -LIMIT_ROUNDING_RAD).then(|| (candidate.q, self.cost(&candidate.q)))
+        let margins = self.limits.margins(&solution.q);
+        (margins.min() >= -LIMIT_ROUNDING_RAD).then(|| (solution.q, self.cost(&solution.q)))
     }
 
     fn cost(&self, q: &JointVector) -> f64 {
@@ -176,8 +176,9 @@ impl<'a> Search<'a> {
 
     /// Lowers a branch's cost over q7 between the neighbouring grid points, as far as the branch is feasible.
     fn refine(&self, branch: Branch) -> JointVector {
-        let cost_at =
-            |q7: f64| self.feasible_cost(&self.candidates(q7)[branch.branch_idx]).unwrap_or((branch.q, f64::INFINITY));
+        let cost_at = |q7: f64| {
+            self.feasible_cost(&self.analytic_solutions(q7)[branch.branch_idx]).unwrap_or((branch.q, f64::INFINITY))
+        };
         let q7 = branch.q[6];
         let (low, high) = self.neighbours(branch.grid_idx);
         let [low, high] = [low, high].map(|end| {
@@ -240,17 +241,17 @@ impl<'a> Search<'a> {
 
     /// Looks between the grid points, then for the nearest pose and the reason of the failure.
     fn rescue(&self) -> Result<IkSolution, KinematicsError> {
-        let mut least_bad = self.least_bad_branches();
-        least_bad.truncate(NUM_RESCUES);
-        for candidate in &least_bad {
-            if self.badness(candidate) <= LIMIT_ROUNDING_RAD
-                && let Some(solution) = self.accept(&candidate.q)
+        let mut least_infeasible = self.least_infeasible_solutions();
+        least_infeasible.truncate(NUM_RESCUES);
+        for solution in &least_infeasible {
+            if self.badness(solution) <= LIMIT_ROUNDING_RAD
+                && let Some(solution) = self.accept(&solution.q)
             {
                 return Ok(solution);
             }
         }
 
-        let starts = least_bad.iter().map(|c| c.q).chain([self.seed, self.options.posture]);
+        let starts = least_infeasible.iter().map(|c| c.q).chain([self.seed, self.options.posture]);
         let miss = |s: &IkSolution| s.position_residual_m.hypot(self.options.metres_per_rad * s.angle_residual_rad);
         let nearest = starts
             .map(|start| self.solution(&self.descend(&start)))
@@ -260,10 +261,10 @@ impl<'a> Search<'a> {
             return Ok(solution);
         }
         let nearest = Box::new(nearest);
-        let reaches_without_limits = least_bad.iter().find(|c| c.infeasibility <= 0.0);
+        let reaches_without_limits = least_infeasible.iter().find(|c| c.infeasibility <= 0.0);
         Err(match reaches_without_limits {
-            Some(candidate) => KinematicsError::JointLimit {
-                violation: self.limits.violation_at(&candidate.q, self.limits.margins(&candidate.q).argmin().0),
+            Some(solution) => KinematicsError::JointLimit {
+                violation: self.limits.violation_at(&solution.q, self.limits.margins(&solution.q).argmin().0),
                 nearest,
             },
             None => KinematicsError::OutOfReach {
@@ -274,15 +275,15 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// How much a candidate breaks limits and geometry: 0 where it is a solution.
-    fn badness(&self, candidate: &Candidate) -> f64 {
-        let beyond: f64 = self.limits.margins(&candidate.q).iter().map(|m| (-m).max(0.0)).sum();
-        beyond + INFEASIBILITY_RAD * candidate.infeasibility
+    /// How much a solution breaks limits and geometry: 0 where it is a solution.
+    fn badness(&self, solution: &AnalyticSolution) -> f64 {
+        let beyond: f64 = self.limits.margins(&solution.q).iter().map(|m| (-m).max(0.0)).sum();
+        beyond + INFEASIBILITY_RAD * solution.infeasibility
     }
 
     /// The local minima over q7 of each branch's badness, refined, least bad first.
-    fn least_bad_branches(&self) -> Vec<Candidate> {
-        let on_grid: Vec<_> = self.grid.iter().map(|q7| self.candidates(*q7)).collect();
+    fn least_infeasible_solutions(&self) -> Vec<AnalyticSolution> {
+        let on_grid: Vec<_> = self.grid.iter().map(|q7| self.analytic_solutions(*q7)).collect();
         let mut minima = Vec::new();
         for branch_idx in 0..NUM_BRANCHES {
             let badness_on_grid: Vec<f64> =
@@ -299,16 +300,16 @@ impl<'a> Search<'a> {
         minima.sort_by(|a, b| a.0.total_cmp(&b.0));
         minima.truncate(2 * NUM_RESCUES);
 
-        let mut refined: Vec<Candidate> = minima
+        let mut refined: Vec<AnalyticSolution> = minima
             .into_iter()
             .filter_map(|(_, branch_idx, grid_idx)| {
                 let badness_at = |q7: f64| {
-                    let candidate = self.candidates(q7)[branch_idx];
-                    (candidate, candidate.map_or(f64::INFINITY, |c| self.badness(&c)))
+                    let solution = self.analytic_solutions(q7)[branch_idx];
+                    (solution, solution.map_or(f64::INFINITY, |c| self.badness(&c)))
                 };
                 let (low, high) = self.neighbours(grid_idx);
-                let (candidate, _) = golden_section(low, high, badness_at);
-                candidate
+                let (solution, _) = golden_section(low, high, badness_at);
+                solution
             })
             .collect();
         refined.sort_by(|a, b| self.badness(a).total_cmp(&self.badness(b)));

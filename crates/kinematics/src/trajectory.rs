@@ -99,7 +99,7 @@ impl Trajectory {
     /// rad, rad/s and rad/s². The path in joint space is curved and depends on the limits.
     ///
     /// # Errors
-    /// As [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] where the state cannot be brought to rest inside
+    /// As [`Trajectory::point_to_point`], and [`KinematicsError::Trajectory`] where the arm cannot be stopped from the state inside
     /// the position limits.
     pub fn from_motion(
         start: &JointVector,

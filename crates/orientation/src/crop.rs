@@ -21,7 +21,7 @@ const SIDE_PER_DIAGONAL: f64 = 1.1;
 pub const OUTSIDE: [u8; 3] = [124, 116, 104];
 
 /// Most places that are averaged for one pixel of a crop, along each axis: a reduction of eight.
-const MOST_TAPS: usize = 8;
+const MAX_TAPS: usize = 8;
 
 /// A square of an image, at times turned: what a crop shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +65,7 @@ impl CropWindow {
     /// so that a crop of a large image looks like one of a small image.
     pub fn read(&self, image: &RgbImage, size_px: u32) -> RgbImage {
         let scale = self.side / f64::from(size_px);
-        let taps = (scale.ceil() as usize).clamp(1, MOST_TAPS);
+        let taps = (scale.ceil() as usize).clamp(1, MAX_TAPS);
         let step = |axis: Vector2<f64>| axis * (scale / taps as f64);
         let (right, down) = (step(self.x_axis()), step(self.y_axis()));
         let share = 1.0 / (taps * taps) as f32;

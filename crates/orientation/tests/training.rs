@@ -7,7 +7,7 @@ use std::time::Duration;
 use burn::tensor::Device;
 use image::{Rgb, RgbImage};
 use sdg_geometry::Angle;
-use sdg_orientation::training::{Event, LabelledCrop, OrientationTraining, Taught, train};
+use sdg_orientation::training::{LabelledCrop, OrientationEvent, OrientationTraining, TrainedOrientation, train};
 use sdg_orientation::{OrientationConfig, OrientationError};
 use sdg_training::{Ending, OneCycle};
 
@@ -47,7 +47,10 @@ fn settings(steps: usize) -> OrientationTraining {
     }
 }
 
-fn run(settings: &OrientationTraining, observe: &mut dyn FnMut(&Event) -> ControlFlow<()>) -> Taught {
+fn run(
+    settings: &OrientationTraining,
+    observe: &mut dyn FnMut(&OrientationEvent) -> ControlFlow<()>,
+) -> TrainedOrientation {
     let untaught = network().init(&Device::flex().autodiff(), 4).unwrap();
     let held_out: Vec<LabelledCrop> = (0..24).map(|i| bar(7.3 + 15.0 * f64::from(i))).collect();
     train(untaught, settings, &bars, &held_out, observe).unwrap()
@@ -58,7 +61,7 @@ fn ten_steps_on_bars_lower_the_loss_the_same_way_twice() {
     let losses = || {
         let mut losses = Vec::new();
         let taught = run(&settings(10), &mut |event| {
-            if let Event::Step { loss, .. } = event {
+            if let OrientationEvent::Step { loss, .. } = event {
                 losses.push(*loss);
             }
             ControlFlow::Continue(())
@@ -92,7 +95,7 @@ fn bars_are_learnt_in_a_few_steps() {
 #[test]
 fn a_run_can_be_ended_from_outside_and_by_the_clock() {
     let stopped = run(&settings(50), &mut |event| match event {
-        Event::Step { step: 1, .. } => ControlFlow::Break(()),
+        OrientationEvent::Step { step: 1, .. } => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     });
     assert_eq!((stopped.steps, stopped.ending), (2, Ending::Interrupted));

@@ -8,9 +8,9 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{GraspLine, PlanarGrasp, PlanarSimilarity, Polygon};
 use sdg_report::{
-    Animation, AnimationOptions, Attempt, Axis, Chart, Color, DetectionError, DetectionMark, Figure, GallerySize,
-    KeyFigure, Report, Section, Series, ShareChart, Step, Tone, Verdict, attempts_table, draw_demonstration,
-    draw_detection, median, outcome_matrix, shade_polygon,
+    Animation, AnimationOptions, AttemptSummary, Axis, Chart, Color, DetectionError, DetectionMark, Figure,
+    GallerySize, KeyFigure, Report, Section, Series, ShareChart, Step, Tone, Verdict, attempts_table,
+    draw_demonstration, draw_detection, median, outcome_matrix, shade_polygon,
 };
 
 const SIZE: (u32, u32) = (640, 480);
@@ -188,12 +188,12 @@ fn detections() -> Section {
         .notice(Tone::Warning, "One of six was refused: laid over the image, the demonstration did not agree with it.")
 }
 
-fn attempts() -> Vec<Attempt> {
+fn attempts() -> Vec<AttemptSummary> {
     let mut random = Pcg64Mcg::seed_from_u64(11);
     (1..=10)
         .map(|number| {
             let success = number != 7;
-            Attempt {
+            AttemptSummary {
                 number,
                 object_mm: [random.random_range(430.0..620.0), random.random_range(-160.0..160.0)],
                 object_angle_deg: random.random_range(-180.0..180.0),

@@ -55,7 +55,7 @@ pub struct DetectionError {
 
 /// One attempt to grasp.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Attempt {
+pub struct AttemptSummary {
     /// Its number, from 1.
     pub number: usize,
     /// Where the part lay in the robot's base frame, x and y in millimetres.
@@ -78,7 +78,7 @@ pub struct Attempt {
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
-pub fn attempts_table(attempts: &[Attempt]) -> Table {
+pub fn attempts_table(attempts: &[AttemptSummary]) -> Table {
     let mut table = Table::new(vec![
         Column::number("#"),
         Column::text("outcome"),
@@ -142,8 +142,8 @@ pub fn attempts_table(attempts: &[Attempt]) -> Table {
 ///
 /// `right_mm` and `right_deg` are the largest errors of a detection that counts as right.
 #[must_use]
-pub fn outcome_matrix(attempts: &[Attempt], right_mm: f64, right_deg: f64) -> Matrix {
-    let seen = |attempt: &Attempt| match attempt.detection_error {
+pub fn outcome_matrix(attempts: &[AttemptSummary], right_mm: f64, right_deg: f64) -> Matrix {
+    let seen = |attempt: &AttemptSummary| match attempt.detection_error {
         Some(error) if error.distance_mm <= right_mm && error.angle_deg <= right_deg => 0,
         Some(_) => 1,
         None => 2,
@@ -176,8 +176,8 @@ mod tests {
     use super::*;
     use crate::html_checker::assert_well_formed;
 
-    fn attempt(number: usize, step: Step, success: bool, why: &str) -> Attempt {
-        Attempt {
+    fn attempt(number: usize, step: Step, success: bool, why: &str) -> AttemptSummary {
+        AttemptSummary {
             number,
             object_mm: [512.0, -34.0],
             object_angle_deg: 127.0,
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn outcomes_are_counted_by_what_was_seen() {
-        let beside = Attempt {
+        let beside = AttemptSummary {
             detection_error: Some(DetectionError { distance_mm: 30.0, angle_deg: 0.5 }),
             ..attempt(4, Step::Close, false, "closed on nothing")
         };

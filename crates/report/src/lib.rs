@@ -50,7 +50,7 @@ mod table;
 
 pub use animation::{Animation, AnimationOptions, AnimationRecorder};
 pub use atomic_file::write_atomically;
-pub use attempts::{Attempt, DetectionError, Step, attempts_table, median, outcome_matrix};
+pub use attempts::{AttemptSummary, DetectionError, Step, attempts_table, median, outcome_matrix};
 pub use chart::{Axis, Chart, Matrix, Scale, Series, ShareChart};
 pub use draw::{
     Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detection, draw_grasp_jaws,

@@ -17,7 +17,7 @@ pub enum RobotError {
     /// No motion can be planned.
     #[error(transparent)]
     Planning(#[from] KinematicsError),
-    /// The arm was brought to rest on its path.
+    /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
     /// Something held the arm up.

@@ -1,4 +1,4 @@
-//! A checked motion, cycle by cycle, that can be brought to rest on its own path.
+//! A checked motion, cycle by cycle, that can be stopped on its own path.
 //!
 //! To stop, the motion's own time is slowed down to a standstill: `q(s(t))` with `ds/dt` from 1 to 0 along a smooth step. The arm
 //! so stays on the path that was checked, and velocities only shrink. What is added to the acceleration is the velocity times

@@ -1,17 +1,17 @@
-//! A demonstration laid over an image and judged by both witnesses: edges and surface.
+//! A demonstration laid over an image, compared by its edges and by its surface.
 //!
 //! ```text
-//! start ─ ShapeTemplate::refine: edges alone ─ sure? ─ done
+//! start ─ ShapeTemplate::refine: edges alone ─ agreement at least `sure_agreement`? ─ done
 //!   │                  │
 //!   └─ climb both ─ better ─ climb both ─┘
-//!                     └─ still poor: climbed from all around ─ refined once more, where the surface does not object
+//!                     └─ still poor: climbed from six poses around it ─ refined by edges, kept where both still agree
 //! ```
-//! Edges alone place a part to a fraction of a pixel, and may place it on the wrong edges: a pipe slides along itself until
-//! one flank lies on its shadow. What the edges then say is worse, and so is the surface, but neither is asked while the
-//! edges settle. Where the outcome is poor, the two together are climbed from it and from the start. On 480 pictures of
+//! The edges alone place a part to a fraction of a pixel, but may match the wrong edges: a pipe is shifted along itself
+//! until one flank lies on its shadow. There both agreements are low, yet the refinement by edges uses neither. Such
+//! poses are therefore refined by edges and surface together, from the outcome and from the start. On 480 pictures of
 //! eight parts, from starts some pixels off, 25 of 960 ended beside the part and 60 more than 3 px off; now 0 and 7. Right
-//! poses agreed by 0.32 to 0.59 in the poorest hundredth of each part; now by 0.49 to 0.62. The most that
-//! anything wrong agreed rose from 0.48 to 0.56.
+//! poses agreed by 0.32 to 0.59 in the poorest hundredth of each part; now by 0.49 to 0.62. The highest agreement of
+//! anything wrong rose from 0.48 to 0.56.
 
 use std::ops::RangeInclusive;
 
@@ -19,7 +19,7 @@ use image::RgbImage;
 use nalgebra::Vector2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
-use crate::config::{AgreementConfig, SettlingConfig};
+use crate::config::{AgreementConfig, RefinementConfig};
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::structure::Structure;
@@ -29,16 +29,16 @@ use crate::template::ShapeTemplate;
 /// Steps of the climb, in pixels by which the part's rim moves: first and last. Chosen by hand, not measured apart; what the
 /// climbs as a whole gain was measured, see above.
 const STEPS_PX: (f64, f64) = (3.0, 0.3);
-/// Least gain of a step. Chosen by hand, not measured.
-const LEAST_GAIN: f64 = 1e-4;
-/// A bound for climbs that creep. Chosen by hand, not measured.
-const MOST_LOOKS: usize = 120;
-/// What the edges may cost in agreement when they have the last word: they are more exact than what is climbed. Chosen
+/// Smallest gain of a step. Chosen by hand, not measured.
+const MIN_GAIN: f64 = 1e-4;
+/// Bounds climbs of many small steps. Chosen by hand, not measured.
+const MAX_EVALUATIONS: usize = 120;
+/// Loss of agreement that the last refinement by edges may cause: its pose is more exact than one that was climbed. Chosen
 /// by hand, not measured.
-const LAST_WORD: f64 = 0.005;
+const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
-/// A pose that agrees less than this is nothing, and not made something by refining it. Chosen by hand, not measured.
-pub(crate) const MIN_POLISHED: f64 = 0.25;
+/// Poses that agree less are not refined further. Chosen by hand, not measured.
+pub(crate) const MIN_REFINED: f64 = 0.25;
 
 /// A demonstration and an image that it is laid over.
 #[derive(Debug, Clone, Copy)]
@@ -59,7 +59,7 @@ pub struct Comparison<'a> {
     pub field: &'a GradientField,
 }
 
-/// What both witnesses say of a pose.
+/// How well edges and surface agree at a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
     /// [`ShapeTemplate::agreement`], in `[0, 1]`.
@@ -80,7 +80,7 @@ impl Agreement {
     }
 }
 
-/// Everything that an image says of a pose, for whoever decides.
+/// All measurements of a pose in an image, from which a caller makes a score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
     /// [`ShapeTemplate::agreement`], in `[0, 1]`.
@@ -93,12 +93,12 @@ pub struct Evidence {
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
-    /// [`Likeness::log_odds`]; `None` where edges and surface agree by less than [`crate::SearchConfig::least_agreement`].
+    /// [`Likeness::log_odds`]; `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`].
     pub likeness: Option<f64>,
 }
 
 impl Comparison<'_> {
-    /// Everything that the image says of a pose. Slower than [`Self::agreement`], which suffices to climb.
+    /// All measurements at a pose. Slower than [`Self::agreement`], which suffices to climb.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
         let (evidence, agreement) = self.evidence_without_likeness(image_from_demonstration);
         let likeness =
@@ -139,17 +139,18 @@ impl Comparison<'_> {
         self.template.refine(self.field, start).image_from_demonstration
     }
 
-    /// `refined`, which the edges made of `start`, or something better nearby where that is poor. Scales stay in `scales`.
-    pub fn settled(
+    /// `refined`, which the edges made of `start`, or a pose nearby of higher agreement where that is poor. Scales stay in
+    /// `scales`.
+    pub fn refine_pose(
         &self,
         start: &PlanarSimilarity,
         refined: PlanarSimilarity,
         scales: &RangeInclusive<f64>,
     ) -> PlanarSimilarity {
-        let SettlingConfig { sure_agreement, min_restart_agreement, .. } = self.template.config.settling;
+        let RefinementConfig { sure_agreement, min_restart_agreement, .. } = self.template.config.refinement;
         let both = |pose: &PlanarSimilarity| self.agreement(pose).both();
         let agreement = both(&refined);
-        if agreement >= sure_agreement || agreement.max(both(start)) < MIN_POLISHED {
+        if agreement >= sure_agreement || agreement.max(both(start)) < MIN_REFINED {
             return refined;
         }
         let climbed = [refined, *start].map(|from| self.climbed(from, scales));
@@ -164,7 +165,7 @@ impl Comparison<'_> {
             }
         }
         let last = self.refined_by_edges(&best);
-        if scales.contains(&last.scale) && both(&last) >= agreement - LAST_WORD { last } else { best }
+        if scales.contains(&last.scale) && both(&last) >= agreement - MAX_LOSS_BY_EDGES { last } else { best }
     }
 
     /// The pose moved to all sides, six of them: chosen by hand, more cost time in proportion.
@@ -172,16 +173,16 @@ impl Comparison<'_> {
         let center = pose.apply(&self.template.center);
         std::array::from_fn(|i| {
             let (sin, cos) = (i as f64 * std::f64::consts::TAU / 6.0).sin_cos();
-            let to = center + self.template.config.settling.restart_px * Vector2::new(cos, sin);
+            let to = center + self.template.config.refinement.restart_px * Vector2::new(cos, sin);
             PlanarSimilarity::about(center, to, Angle::ZERO, 1.0).compose(pose)
         })
     }
 
-    /// Compass search for the best agreement of both witnesses about `from`; the pose and its agreement.
+    /// Compass search for the best agreement of edges and surface together about `from`; the pose and its agreement.
     fn climbed(&self, from: PlanarSimilarity, scales: &RangeInclusive<f64>) -> (PlanarSimilarity, f64) {
         let (mut best, mut agreement) = (from, self.agreement(&from).both());
-        let (mut step_px, mut looks) = (STEPS_PX.0, 0);
-        while step_px > STEPS_PX.1 && looks < MOST_LOOKS {
+        let (mut step_px, mut num_evaluations) = (STEPS_PX.0, 0);
+        while step_px > STEPS_PX.1 && num_evaluations < MAX_EVALUATIONS {
             let mut is_better = false;
             for direction in 0..4 {
                 for sign in [1.0, -1.0] {
@@ -189,9 +190,9 @@ impl Comparison<'_> {
                     if !scales.contains(&next.scale) {
                         continue;
                     }
-                    looks += 1;
+                    num_evaluations += 1;
                     let seen = self.agreement(&next).both();
-                    if seen > agreement + LEAST_GAIN {
+                    if seen > agreement + MIN_GAIN {
                         (best, agreement, is_better) = (next, seen, true);
                         break;
                     }

@@ -33,7 +33,7 @@ pub struct ShapeConfig {
     /// How edges and surface become one number.
     pub agreement: AgreementConfig,
     /// When and from where a poor pose is refined again.
-    pub settling: SettlingConfig,
+    pub refinement: RefinementConfig,
 }
 
 impl ShapeConfig {
@@ -48,7 +48,7 @@ impl ShapeConfig {
         surface: SurfaceConfig::DEFAULT,
         structure: StructureConfig::DEFAULT,
         agreement: AgreementConfig::DEFAULT,
-        settling: SettlingConfig::DEFAULT,
+        refinement: RefinementConfig::DEFAULT,
     };
 }
 
@@ -175,12 +175,12 @@ impl Default for AgreementConfig {
     }
 }
 
-/// When and from where a poor pose is refined again; see [`crate::Comparison::settled`].
+/// When and from where a poor pose is refined again; see [`crate::Comparison::refine_pose`].
 ///
 /// All of them were fitted on the simulator's pictures: with them 0 instead of 25 of 960 poses ended beside the part, and 7
 /// instead of 60 more than 3 px off.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SettlingConfig {
+pub struct RefinementConfig {
     /// A pose that agrees so well is left where the edges put it.
     pub sure_agreement: f64,
     /// Further climbs begin so many pixels around a pose that stays poor.
@@ -189,12 +189,12 @@ pub struct SettlingConfig {
     pub min_restart_agreement: f64,
 }
 
-impl SettlingConfig {
+impl RefinementConfig {
     /// What [`Default`] gives.
     pub const DEFAULT: Self = Self { sure_agreement: 0.65, restart_px: 10.0, min_restart_agreement: 0.33 };
 }
 
-impl Default for SettlingConfig {
+impl Default for RefinementConfig {
     fn default() -> Self {
         Self::DEFAULT
     }
@@ -210,7 +210,7 @@ pub(crate) fn check_config(config: &ShapeConfig) -> Result<(), ShapeError> {
         ScaleRange::Fixed => 0.0,
         ScaleRange::Within(share) => share,
     };
-    let ShapeConfig { gradient, surface, structure, agreement, settling, .. } = config;
+    let ShapeConfig { gradient, surface, structure, agreement, refinement, .. } = config;
     let in_unit = |value: f64| (0.0..=1.0).contains(&value);
     let checks = [
         ("max_points", "at least 20", config.max_points as f64, config.max_points >= MIN_POINTS),
@@ -250,13 +250,13 @@ pub(crate) fn check_config(config: &ShapeConfig) -> Result<(), ShapeError> {
         ("structure.visible_from", "in [0, 1]", structure.visible_from, in_unit(structure.visible_from)),
         ("agreement.extent", "in [16, 400]", agreement.extent, (16.0..=400.0).contains(&agreement.extent)),
         ("agreement.surface_share", "in [0, 1]", agreement.surface_share, in_unit(agreement.surface_share)),
-        ("settling.sure_agreement", "in [0, 1]", settling.sure_agreement, in_unit(settling.sure_agreement)),
-        ("settling.restart_px", "in [0, 100]", settling.restart_px, (0.0..=100.0).contains(&settling.restart_px)),
+        ("refinement.sure_agreement", "in [0, 1]", refinement.sure_agreement, in_unit(refinement.sure_agreement)),
+        ("refinement.restart_px", "in [0, 100]", refinement.restart_px, (0.0..=100.0).contains(&refinement.restart_px)),
         (
-            "settling.min_restart_agreement",
+            "refinement.min_restart_agreement",
             "in [0, 1]",
-            settling.min_restart_agreement,
-            in_unit(settling.min_restart_agreement),
+            refinement.min_restart_agreement,
+            in_unit(refinement.min_restart_agreement),
         ),
     ];
     for (name, expected, found, ok) in checks {
@@ -286,7 +286,7 @@ mod tests {
         assert_eq!((config.surface.num_cells, config.surface.cells_share), (6.0, 2.0 / 3.0));
         assert_eq!((config.surface.noise, config.surface.noise_in_cell), (8.0, 6.0));
         assert_eq!((config.agreement.extent, config.agreement.surface_share), (64.0, 0.3));
-        let SettlingConfig { sure_agreement, restart_px, min_restart_agreement } = config.settling;
+        let RefinementConfig { sure_agreement, restart_px, min_restart_agreement } = config.refinement;
         assert_eq!((sure_agreement, restart_px, min_restart_agreement), (0.65, 10.0, 0.33));
     }
 
@@ -303,8 +303,8 @@ mod tests {
         assert!(refused(|config| config.surface.num_cells = 0.0).contains("surface.num_cells"));
         assert!(refused(|config| config.gradient.min_gradient = 0.0).contains("gradient.min_gradient"));
         assert!(refused(|config| config.gradient.noise_factor = f32::NAN).contains("gradient.noise_factor"));
-        assert!(refused(|config| config.settling.sure_agreement = 2.0).contains("settling.sure_agreement"));
-        assert!(refused(|config| config.settling.restart_px = -1.0).contains("settling.restart_px"));
-        assert!(refused(|config| config.settling.min_restart_agreement = 2.0).contains("settling.min_restart"));
+        assert!(refused(|config| config.refinement.sure_agreement = 2.0).contains("refinement.sure_agreement"));
+        assert!(refused(|config| config.refinement.restart_px = -1.0).contains("refinement.restart_px"));
+        assert!(refused(|config| config.refinement.min_restart_agreement = 2.0).contains("refinement.min_restart"));
     }
 }

@@ -1,7 +1,7 @@
 //! The pose on which most edge points agree to a fraction of a pixel.
 //!
 //! Beside the part's own edge an image often shows another of the same direction: the edge of its
-//! shadow, its chamfer, a board it lies along. Least squares on the nearest edges settles between them.
+//! shadow, its chamfer, a board it lies along. Least squares on the nearest edges ends between the two.
 //! Here each edge point keeps all crests of the gradient near it along its normal, and the pose is
 //! sought whose points nearly all have *one* of their crests within a pixel: the shadow lies on one
 //! side only, so following it there breaks the other sides.
@@ -14,7 +14,7 @@ use nalgebra::{Matrix4, Vector4};
 use crate::edge_points::parabola_peak;
 use crate::pose::Pose;
 use crate::refinement::{CaptureRange, step_units};
-use crate::template::{Overlay, TemplateLevel};
+use crate::template::{MatchedLevel, TemplateLevel};
 
 /// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
 /// not measured.
@@ -23,7 +23,7 @@ const LATER_REACH: usize = 3;
 /// Most crests kept for a point. Chosen by hand, not measured.
 const MAX_CRESTS: usize = 3;
 /// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
-const LEAST_TRUST: f32 = 0.2;
+const MIN_TRUST: f32 = 0.2;
 /// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
 const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
 /// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
@@ -51,14 +51,14 @@ pub(crate) enum Starts {
 }
 
 /// Moves `from` to the consensus nearby.
-pub(crate) fn snap(level: &TemplateLevel, overlay: &Overlay<'_>, range: &CaptureRange, from: Pose) -> Snapped {
-    snap_from(level, overlay, range, from, Starts::Around)
+pub(crate) fn snap(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Snapped {
+    snap_from(level, matched, range, from, Starts::Around)
 }
 
 /// As [`snap`], from fewer starts.
 pub(crate) fn snap_from(
     level: &TemplateLevel,
-    overlay: &Overlay<'_>,
+    matched: &MatchedLevel<'_>,
     range: &CaptureRange,
     from: Pose,
     first: Starts,
@@ -67,17 +67,17 @@ pub(crate) fn snap_from(
     let mut best = Snapped { pose: from, score: 0.0, num_rounds: 0 };
     for round in 1..=MAX_ROUNDS {
         let reach = if round == 1 { FIRST_REACH } else { LATER_REACH };
-        let sightings = gather(level, overlay, &best.pose, reach);
+        let sightings = gather(level, matched, &best.pose, reach);
         let (step, score) = if round == 1 {
             starts(is_free, first)
                 .into_iter()
-                .map(|start| settle(&sightings, is_free, start, &WIDTHS))
+                .map(|start| fit_offsets(&sightings, is_free, start, &WIDTHS))
                 .max_by(|a, b| a.1.total_cmp(&b.1))
                 .unwrap_or((Vector4::zeros(), 0.0))
         } else {
-            settle(&sightings, is_free, Vector4::zeros(), &WIDTHS[2..])
+            fit_offsets(&sightings, is_free, Vector4::zeros(), &WIDTHS[2..])
         };
-        let units = step_units(level, overlay, &best.pose);
+        let units = step_units(level, matched, &best.pose);
         let moved = best.pose.moved([0, 1, 2, 3].map(|k| step[k] * units[k]));
         best = Snapped { pose: range.clamped(&moved), score, num_rounds: round };
         if step.amax() < STILL {
@@ -96,9 +96,9 @@ struct Sighting {
     num_crests: usize,
 }
 
-fn gather(level: &TemplateLevel, overlay: &Overlay<'_>, pose: &Pose, reach: usize) -> Vec<Sighting> {
-    let map = pose.level_map(overlay.image_pixel_size);
-    let radius = (level.radius_px * pose.log_scale.exp() / overlay.image_pixel_size).max(1.0) as f32;
+fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach: usize) -> Vec<Sighting> {
+    let map = pose.level_map(matched.image_pixel_size);
+    let radius = (level.radius_px * pose.log_scale.exp() / matched.image_pixel_size).max(1.0) as f32;
     let [center_x, center_y] = map.apply([0.0, 0.0]);
     let mut sightings = Vec::with_capacity(level.points.len());
     for point in &level.points {
@@ -111,7 +111,7 @@ fn gather(level: &TemplateLevel, overlay: &Overlay<'_>, pose: &Pose, reach: usiz
             crests: [(0.0, 0.0); MAX_CRESTS],
             num_crests: 0,
         };
-        sighting.look(overlay, [x, y], [nx, ny], map.turn_double(point.double), reach);
+        sighting.look(matched, [x, y], [nx, ny], map.turn_double(point.double), reach);
         if sighting.num_crests > 0 {
             sightings.push(sighting);
         }
@@ -121,24 +121,24 @@ fn gather(level: &TemplateLevel, overlay: &Overlay<'_>, pose: &Pose, reach: usiz
 
 impl Sighting {
     /// Finds the crests of the gradient's part along `normal`, the nearest first kept.
-    fn look(&mut self, overlay: &Overlay<'_>, at: [f32; 2], normal: [f32; 2], double: [f32; 2], reach: usize) {
+    fn look(&mut self, matched: &MatchedLevel<'_>, at: [f32; 2], normal: [f32; 2], double: [f32; 2], reach: usize) {
         const MAX_LEN: usize = 2 * FIRST_REACH + 3;
         let len = 2 * reach + 3;
         let middle = (reach + 1) as f32;
-        let floor = overlay.image_level.floor();
+        let floor = matched.image_level.floor();
         let mut strengths = [0.0f32; MAX_LEN];
         let mut trusts = [0.0f32; MAX_LEN];
         for k in 0..len {
             let t = k as f32 - middle;
             // Beyond the border there is no crest.
-            if let Some([dx, dy, energy]) = overlay.image_level.bilinear(at[0] + t * normal[0], at[1] + t * normal[1]) {
+            if let Some([dx, dy, energy]) = matched.image_level.bilinear(at[0] + t * normal[0], at[1] + t * normal[1]) {
                 trusts[k] = (dx * double[0] + dy * double[1]).max(0.0);
                 strengths[k] = (trusts[k] * (energy + floor)).sqrt();
             }
         }
         for k in 1..len - 1 {
             let (before, here, after) = (strengths[k - 1], strengths[k], strengths[k + 1]);
-            if here < before || here <= after || trusts[k] < LEAST_TRUST {
+            if here < before || here <= after || trusts[k] < MIN_TRUST {
                 continue;
             }
             let distance = f64::from(k as f32 - middle + parabola_peak(before, here, after));
@@ -215,7 +215,7 @@ fn normal_equations(sightings: &[Sighting], step: &Vector4<f64>, width: f64) -> 
 }
 
 /// Iteratively re-weighted least squares from `start`, narrowing; the step and its consensus.
-fn settle(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, widths: &[f64]) -> (Vector4<f64>, f64) {
+fn fit_offsets(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, widths: &[f64]) -> (Vector4<f64>, f64) {
     let mut step = start;
     for &width in widths {
         for _ in 0..2 {

@@ -12,7 +12,7 @@ const STRENGTH_OVER_FLOOR: f32 = 1.5;
 /// measured.
 const STRENGTH_OVER_STRONG: f32 = 0.08;
 /// The least share of energy in one direction: less is a corner or a texture. Chosen by hand, not measured.
-const LEAST_COHERENCE: f32 = 0.5;
+const MIN_COHERENCE: f32 = 0.5;
 /// |cos 2φ| between an edge's normal and the outline's beyond which the edge is the outline's own: up to 30° between
 /// them. Chosen by hand, not measured.
 const OUTLINE_ALIGNMENT: f64 = 0.5;
@@ -43,7 +43,7 @@ pub(crate) struct EdgeSelection<'a> {
     pub(crate) outline_weight: f64,
 }
 
-struct Candidate {
+struct EdgeCandidate {
     position: Point2<f64>,
     normal: Vector2<f64>,
     strength: f64,
@@ -82,7 +82,7 @@ pub(crate) fn select_edge_points(
 }
 
 /// Edge pixels on the crest of the gradient, moved onto the crest, inside the outline or on it.
-fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelection<'_>) -> Vec<Candidate> {
+fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelection<'_>) -> Vec<EdgeCandidate> {
     // An outline drawn by hand or cut from a mask is about a pixel and a half off, at any level: estimated, not measured.
     let margin_px = 1.5 + pixel_size;
     let bounds = selection.outline.bounds();
@@ -101,7 +101,7 @@ fn find_candidates(level: &GradientLevel, pixel_size: f64, selection: &EdgeSelec
                 .is_some_and(|outline_normal| 2.0 * normal.dot(&outline_normal).powi(2) - 1.0 > OUTLINE_ALIGNMENT);
             // Just outside, only the part's own edge belongs to it.
             if inside || on_outline {
-                candidates.push(Candidate { position, normal, strength, on_outline });
+                candidates.push(EdgeCandidate { position, normal, strength, on_outline });
             }
         }
     }
@@ -119,7 +119,7 @@ fn crest_at(level: &GradientLevel, col: usize, row: usize) -> Option<(Point2<f64
     let [dx, dy, energy] = level.nearest(x, y)?;
     let share = energy / (energy + level.floor());
     let length = dx.hypot(dy);
-    if energy < STRENGTH_OVER_FLOOR.powi(2) * level.floor() || length < LEAST_COHERENCE * share {
+    if energy < STRENGTH_OVER_FLOOR.powi(2) * level.floor() || length < MIN_COHERENCE * share {
         return None;
     }
     let angle = 0.5 * dy.atan2(dx);
@@ -164,7 +164,7 @@ fn outline_normal_near(outline: &Polygon, point: &Point2<f64>, reach: f64) -> Op
 }
 
 /// Indices of at most `max_points` candidates, the strong first, that keep a distance from each other.
-fn spread_out(candidates: &[Candidate], max_points: usize, pixel_size: f64) -> Vec<usize> {
+fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) -> Vec<usize> {
     if candidates.len() <= max_points {
         return (0..candidates.len()).collect();
     }

@@ -72,7 +72,7 @@ mod template;
 
 pub use comparison::{Agreement, Comparison, Evidence};
 pub use config::{
-    AgreementConfig, GradientConfig, ScaleRange, SettlingConfig, ShapeConfig, StructureConfig, SurfaceConfig,
+    AgreementConfig, GradientConfig, RefinementConfig, ScaleRange, ShapeConfig, StructureConfig, SurfaceConfig,
 };
 pub use error::ShapeError;
 pub use following::Reach;

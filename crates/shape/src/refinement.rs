@@ -15,7 +15,7 @@ use sdg_geometry::PlanarSimilarity;
 use crate::consensus::{Snapped, snap};
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
-use crate::template::{LevelSampling, Overlay, ShapeTemplate, TemplateLevel};
+use crate::template::{LevelSampling, MatchedLevel, ShapeTemplate, TemplateLevel};
 
 /// Poses that are followed from the coarsest level. More cost time in proportion. Chosen by hand, not measured.
 const NUM_CANDIDATES: usize = 5;
@@ -69,15 +69,15 @@ impl ShapeTemplate {
         candidates.push(start);
         let mut num_rounds = 0;
         for (idx, level) in self.levels.iter().enumerate().rev() {
-            let overlay = level.overlay(field, &start);
+            let matched = level.matched_level(field, &start);
             let mut snapped: Vec<Snapped> = candidates
                 .iter()
-                .map(|&pose| snap(level, &overlay, range, climb(level, &overlay, range, pose)))
+                .map(|&pose| snap(level, &matched, range, climb(level, &matched, range, pose)))
                 .collect();
             snapped.sort_by(|a, b| b.score.total_cmp(&a.score));
             num_rounds = snapped[0].num_rounds;
             let keep = if idx == 0 { 1 } else { snapped.len().div_ceil(2) };
-            let units = step_units(level, &overlay, &start);
+            let units = step_units(level, &matched, &start);
             candidates.clear();
             for Snapped { pose, .. } in snapped {
                 // Several starts often end on one pose: it is followed once.
@@ -98,24 +98,24 @@ impl ShapeTemplate {
     /// Climbs from `from` within `range` at the coarsest level; the pose and its agreement there.
     pub(crate) fn climb_coarsest(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> (Pose, f64) {
         let level = &self.levels[self.levels.len() - 1];
-        let overlay = level.overlay(field, &range.start);
-        let pose = climb(level, &overlay, range, from);
-        (pose, overlay.mean_alignment(level, &pose, LevelSampling::Bilinear))
+        let matched = level.matched_level(field, &range.start);
+        let pose = climb(level, &matched, range, from);
+        (pose, matched.mean_alignment(level, &pose, LevelSampling::Bilinear))
     }
 
     /// Climbs and snaps from `from` within `range`, coarse to fine.
     pub(crate) fn follow(&self, field: &GradientField, range: &CaptureRange, from: Pose) -> Pose {
         self.levels.iter().rev().fold(from, |pose, level| {
-            let overlay = level.overlay(field, &range.start);
-            snap(level, &overlay, range, climb(level, &overlay, range, pose)).pose
+            let matched = level.matched_level(field, &range.start);
+            snap(level, &matched, range, climb(level, &matched, range, pose)).pose
         })
     }
 
     /// The best poses of a grid over the capture range, on the coarsest level, no two alike.
     fn grid_candidates(&self, field: &GradientField, range: &CaptureRange) -> Vec<Pose> {
         let level = &self.levels[self.levels.len() - 1];
-        let overlay = level.overlay(field, &range.start);
-        let units = step_units(level, &overlay, &range.start).map(|unit| GRID_STEP * unit);
+        let matched = level.matched_level(field, &range.start);
+        let units = step_units(level, &matched, &range.start).map(|unit| GRID_STEP * unit);
         let counts = [0, 1, 2, 3].map(|k| (range.limits[k] / units[k]).ceil() as i32);
         let mut scored: Vec<(f64, [i32; 4])> = Vec::new();
         for scale in -counts[3]..=counts[3] {
@@ -124,7 +124,7 @@ impl ShapeTemplate {
                     for x in -counts[0]..=counts[0] {
                         let cell = [x, y, angle, scale];
                         let pose = range.pose_at_cell(cell, counts);
-                        let score = overlay.mean_alignment(level, &pose, LevelSampling::Nearest);
+                        let score = matched.mean_alignment(level, &pose, LevelSampling::Nearest);
                         scored.push((score - DISTANCE_PENALTY * range.distance(&pose), cell));
                     }
                 }
@@ -191,17 +191,17 @@ impl CaptureRange {
 }
 
 /// Changes of (x, y, angle, ln scale) that each move the edges by about one pixel of the image level.
-pub(crate) fn step_units(level: &TemplateLevel, overlay: &Overlay<'_>, pose: &Pose) -> [f64; 4] {
-    let pixel = overlay.image_pixel_size;
+pub(crate) fn step_units(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose) -> [f64; 4] {
+    let pixel = matched.image_pixel_size;
     let turn = pixel / (level.radius_px * pose.log_scale.exp()).max(1.0);
     [pixel, pixel, turn, turn]
 }
 
 /// Compass search: one coordinate at a time, halving the step when no neighbour is better.
-fn climb(level: &TemplateLevel, overlay: &Overlay<'_>, range: &CaptureRange, from: Pose) -> Pose {
-    let units = step_units(level, overlay, &from);
+fn climb(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Pose {
+    let units = step_units(level, matched, &from);
     let evaluate = |pose: &Pose| {
-        overlay.mean_alignment(level, pose, LevelSampling::Bilinear) - DISTANCE_PENALTY * range.distance(pose)
+        matched.mean_alignment(level, pose, LevelSampling::Bilinear) - DISTANCE_PENALTY * range.distance(pose)
     };
     let mut pose = from;
     let mut best = evaluate(&pose);

@@ -27,7 +27,7 @@ use crate::config::SurfaceConfig;
 /// before there were cells.
 const POINTS: f64 = 900.0;
 /// A cell of fewer points tells nothing. Chosen by hand, not measured.
-const LEAST_IN_CELL: usize = 4;
+const MIN_IN_CELL: usize = 4;
 /// Points this near to the outline show the background when the pose is a pixel off. Chosen by that reasoning, not
 /// measured.
 const EDGE_MARGIN_PX: f64 = 2.0;
@@ -36,7 +36,7 @@ const DARK: f64 = 3.0;
 /// How pale highlights may make a colour, and how strong shadow, as a share of what was taught. Chosen by hand, not measured.
 const STRENGTHS: (f64, f64) = (0.6, 1.4);
 /// Least share of the points that must lie inside the image. Chosen by hand, not measured.
-const LEAST_INSIDE: f64 = 0.5;
+const MIN_INSIDE: f64 = 0.5;
 
 /// The colours inside an outline, at a grid of points.
 #[derive(Debug, Clone)]
@@ -108,7 +108,7 @@ impl Surface {
         let mut shifts = Vec::with_capacity(self.cells.len());
         for cell in &self.cells {
             let sums = Correlation::of(cell, image, image_from_cutout);
-            if sums.count >= LEAST_IN_CELL {
+            if sums.count >= MIN_IN_CELL {
                 let mean = |sum: [f64; 3]| sum.map(|channel| channel / sums.count as f64);
                 shifts.push((hue_distance(&mean(sums.taught), &mean(sums.seen)), sums.count));
             }
@@ -124,14 +124,14 @@ impl Surface {
         let (mut cells, mut weights) = (0.0, 0.0);
         for cell in &self.cells {
             let local = Correlation::of(cell, image, image_from_cutout);
-            if local.count >= LEAST_IN_CELL {
+            if local.count >= MIN_IN_CELL {
                 let weight = local.count as f64 * local.contrast_taught(noise_in_cell);
                 cells += weight * local.value(noise_in_cell);
                 weights += weight;
             }
             whole.merge(&local);
         }
-        if whole.count == 0 || (whole.count as f64) < LEAST_INSIDE * self.points().count() as f64 {
+        if whole.count == 0 || (whole.count as f64) < MIN_INSIDE * self.points().count() as f64 {
             return 0.0;
         }
         let cells = if weights > 0.0 { cells / weights } else { 0.0 };

@@ -109,7 +109,7 @@ impl ShapeTemplate {
 
     pub(crate) fn agreement_at(&self, field: &GradientField, pose: &Pose) -> f64 {
         let level = &self.levels[self.agreement_level_idx];
-        level.overlay(field, pose).mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
+        level.matched_level(field, pose).mean_alignment(level, pose, LevelSampling::Bilinear).max(0.0)
     }
 }
 
@@ -121,20 +121,20 @@ pub(crate) enum LevelSampling {
 }
 
 /// One template level over the image level that shows edges at the same size.
-pub(crate) struct Overlay<'a> {
+pub(crate) struct MatchedLevel<'a> {
     pub(crate) image_level: &'a GradientLevel,
     /// Image pixels per pixel of `image_level`.
     pub(crate) image_pixel_size: f64,
 }
 
 impl TemplateLevel {
-    pub(crate) fn overlay<'a>(&self, field: &'a GradientField, pose: &Pose) -> Overlay<'a> {
+    pub(crate) fn matched_level<'a>(&self, field: &'a GradientField, pose: &Pose) -> MatchedLevel<'a> {
         let idx = field.level_idx_for(self.pixel_size * pose.log_scale.exp());
-        Overlay { image_level: field.level(idx), image_pixel_size: (1u32 << idx) as f64 }
+        MatchedLevel { image_level: field.level(idx), image_pixel_size: (1u32 << idx) as f64 }
     }
 }
 
-impl Overlay<'_> {
+impl MatchedLevel<'_> {
     /// Weighted mean of cos 2(difference of directions), image gradients below the noise counting as 0;
     /// in `[-1, 1]`.
     pub(crate) fn mean_alignment(&self, level: &TemplateLevel, pose: &Pose, sampling: LevelSampling) -> f64 {

@@ -1,4 +1,4 @@
-//! Edges and surface together: poor refinements are brought to rest on the part.
+//! Edges and surface together: poses that the edges refined poorly are refined again.
 
 #![allow(clippy::unwrap_used)]
 
@@ -14,16 +14,16 @@ use sdg_shape::{GradientField, InstantSearch, SearchConfig};
 const BESIDE_PX: f64 = 3.0;
 
 /// What came of a start some pixels and degrees off.
-struct Settled {
+struct Outcome {
     refined_px: f64,
-    settled_px: f64,
+    final_px: f64,
     refined: f64,
     start: f64,
-    settled: f64,
+    last: f64,
 }
 
 /// A part of the test scenes on a random table in random light.
-fn settled(part_idx: usize, seed: u64) -> Settled {
+fn refined_outcome(part_idx: usize, seed: u64) -> Outcome {
     let parts = scenes::parts();
     let part = &parts[part_idx];
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
@@ -48,31 +48,31 @@ fn settled(part_idx: usize, seed: u64) -> Settled {
     let angle = truth.angle + Angle::from_degrees(off(&mut rng, 6.0));
     let start = PlanarSimilarity::about(pivot, Point2::from(target), angle, truth.scale);
     let refined = comparison.refined_by_edges(&start);
-    let settled = comparison.settled(&start, refined, &(0.8..=1.25));
+    let last = comparison.refine_pose(&start, refined, &(0.8..=1.25));
     let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
     let px = |pose: &PlanarSimilarity| scenes::difference(pose, &truth, &pivot).0;
-    assert_eq!(settled, comparison.settled(&start, refined, &(0.8..=1.25)));
-    Settled {
+    assert_eq!(last, comparison.refine_pose(&start, refined, &(0.8..=1.25)));
+    Outcome {
         refined_px: px(&refined),
-        settled_px: px(&settled),
+        final_px: px(&last),
         refined: both(&refined),
         start: both(&start),
-        settled: both(&settled),
+        last: both(&last),
     }
 }
 
 #[test]
-fn nothing_agrees_less_for_being_settled_and_fewer_lie_beside() {
+fn refine_pose_lowers_no_agreement_and_fewer_poses_lie_beside() {
     // Long shadows: edges of the part's own direction right beside it.
-    let all: Vec<Settled> = (0..24).map(|seed| settled(seed as usize % 6, seed)).collect();
+    let all: Vec<Outcome> = (0..24).map(|seed| refined_outcome(seed as usize % 6, seed)).collect();
     for one in &all {
-        assert!(one.settled >= one.refined.max(one.start) - 0.0051, "{} {} {}", one.start, one.refined, one.settled);
+        assert!(one.last >= one.refined.max(one.start) - 0.0051, "{} {} {}", one.start, one.refined, one.last);
     }
-    let beside = |px: fn(&Settled) -> f64| all.iter().filter(|one| px(one) > BESIDE_PX).count();
-    let (before, after) = (beside(|one| one.refined_px), beside(|one| one.settled_px));
+    let beside = |px: fn(&Outcome) -> f64| all.iter().filter(|one| px(one) > BESIDE_PX).count();
+    let (before, after) = (beside(|one| one.refined_px), beside(|one| one.final_px));
     assert!(after < before, "{before} of {} beside the part before, {after} after", all.len());
-    let mean = |value: fn(&Settled) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
-    assert!(mean(|one| one.settled) > mean(|one| one.refined));
+    let mean = |value: fn(&Outcome) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
+    assert!(mean(|one| one.last) > mean(|one| one.refined));
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn what_is_sure_is_left_where_the_edges_put_it() {
     let comparison = taught.comparison(&image, &field);
     let start = PlanarSimilarity { tx: 3.0, ..PlanarSimilarity::IDENTITY };
     let refined = comparison.refined_by_edges(&start);
-    assert_eq!(comparison.settled(&start, refined, &(0.8..=1.25)), refined);
+    assert_eq!(comparison.refine_pose(&start, refined, &(0.8..=1.25)), refined);
 }
 
 #[test]
@@ -99,6 +99,6 @@ fn scales_stay_in_range() {
     let comparison = taught.comparison(&shrunk, &field);
     let half = PlanarSimilarity::about(pivot, Point2::from(pivot.coords * 0.5), Angle::ZERO, 0.56);
     let refined = comparison.refined_by_edges(&half);
-    let narrow = comparison.settled(&half, half, &(0.55..=0.6));
+    let narrow = comparison.refine_pose(&half, half, &(0.55..=0.6));
     assert!((0.55..=0.6).contains(&narrow.scale) && (refined.scale - 0.5).abs() < 0.02, "{narrow:?} {refined:?}");
 }

@@ -211,7 +211,7 @@ fn bad_configurations_are_refused() {
     assert_eq!(refused(SearchConfig { scales: 0.1..=1.0, ..default() }), "scales");
     assert_eq!(refused(SearchConfig { scales: 1.2..=0.9, ..default() }), "scales");
     assert_eq!(refused(SearchConfig { scales: f64::NAN..=1.0, ..default() }), "scales");
-    assert_eq!(refused(SearchConfig { least_agreement: 1.5, ..default() }), "least_agreement");
+    assert_eq!(refused(SearchConfig { min_agreement: 1.5, ..default() }), "min_agreement");
     assert_eq!(refused(SearchConfig { num_points: 7, ..default() }), "num_points");
     assert_eq!(refused(SearchConfig { num_points: 1025, ..default() }), "num_points");
     let shape = ShapeConfig { max_points: 3, ..ShapeConfig::default() };

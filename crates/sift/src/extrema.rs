@@ -46,7 +46,7 @@ pub(crate) fn find(octave: &Octave, config: &SiftConfig) -> Vec<Extremum> {
         .map(|&first| {
             let rows = first..(first + BAND).min(height - BORDER);
             let candidates = arch.dispatch(ScanBand { octave, rows, threshold });
-            candidates.into_iter().filter_map(|at| settle(octave, at, config.intervals)).collect()
+            candidates.into_iter().filter_map(|at| refine_extremum(octave, at, config.intervals)).collect()
         })
         .collect();
     // Neighbouring candidates can settle on the same sample.
@@ -157,7 +157,7 @@ fn smaller(a: f32, b: f32) -> f32 {
 }
 
 /// Steps to the neighbouring sample as long as the fitted extremum lies nearer to it. `None` when it runs away.
-fn settle(octave: &Octave, mut at: Sample, intervals: usize) -> Option<Sample> {
+fn refine_extremum(octave: &Octave, mut at: Sample, intervals: usize) -> Option<Sample> {
     for _ in 0..MAX_STEPS {
         let offset = Derivatives::at(octave, at).offset()?;
         if offset.amax() <= 0.5 {

@@ -98,7 +98,7 @@ pub type KeypointPair = (SiftKeypoint, SiftKeypoint);
 /// 2004 for the number of false alarms.
 pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacConfig) -> Option<SimilarityFit> {
     let search = Search { pairs, config };
-    let mut best: Option<Candidate> = None;
+    let mut best: Option<Hypothesis> = None;
     let mut try_pair = |i: usize, j: usize| {
         let Some(drawn) = search.hypothesis(i, j) else { return };
         let mut candidate = search.evaluate(drawn);
@@ -142,7 +142,7 @@ pub fn fit_similarity(pairs: &[KeypointPair], search_area: f64, config: &RansacC
 }
 
 /// A similarity with those that agree and the sum of their squared distances, in tolerances and cut off at one.
-struct Candidate {
+struct Hypothesis {
     inliers: Vec<usize>,
     cost: f64,
 }
@@ -162,7 +162,7 @@ impl Search<'_> {
         plausible.then_some(drawn)
     }
 
-    fn evaluate(&self, pose: PlanarSimilarity) -> Candidate {
+    fn evaluate(&self, pose: PlanarSimilarity) -> Hypothesis {
         let mut inliers = Vec::new();
         let mut cost = 0.0;
         for k in 0..self.pairs.len() {
@@ -174,7 +174,7 @@ impl Search<'_> {
                 cost += 1.0;
             }
         }
-        Candidate { inliers, cost }
+        Hypothesis { inliers, cost }
     }
 
     fn least_squares(&self, inliers: &[usize]) -> Option<PlanarSimilarity> {

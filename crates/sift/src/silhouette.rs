@@ -150,9 +150,9 @@ impl Silhouette {
             // What one more step moves at the outline's far end, about one radius from the centre.
             let radius = self.area.sqrt() * next.scale;
             let moved = next.apply(&self.centroid) - pose.apply(&self.centroid);
-            let settled = moved.norm() < 0.01 && next.angle.distance(pose.angle) * radius < 0.01;
+            let converged = moved.norm() < 0.01 && next.angle.distance(pose.angle) * radius < 0.01;
             pose = next;
-            if settled {
+            if converged {
                 break;
             }
         }

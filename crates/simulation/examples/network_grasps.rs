@@ -28,7 +28,7 @@ fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<
     let mut arm = network::connect(&server)?;
     let mut robot = Robot::new(&mut arm, Workcell::safety_limits(), Watch::default());
     let report = grasp(&mut robot, &mut twin, &mut (), mount, &GraspConfig::default());
-    let (said, why) = match report {
+    let (verdict, why) = match report {
         Ok(report) => match report.outcome {
             GraspOutcome::Held => (true, String::new()),
             GraspOutcome::Failed { step, why } => (false, format!("{step}: {why}")),
@@ -38,7 +38,7 @@ fn over_network(cell: Workcell, pace: Pace) -> Result<(bool, bool, String), Box<
     drop(arm);
     let is_lifted = twin.is_lifted();
     server.stop()?;
-    Ok((said, is_lifted, why))
+    Ok((verdict, is_lifted, why))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -58,16 +58,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (mut in_process, mut network, mut differing) = (0, 0, Vec::new());
         for seed in 0..num_attempts {
             let report = cell(&spec, seed)?.run_oracle_attempt(&AttemptConfig::default(), seed)?;
-            let (said, is_lifted, why) = over_network(cell(&spec, seed)?, pace)?;
-            if said != is_lifted {
-                println!("{name} seed {seed}: the hand says {said}, the truth {is_lifted}: {why}");
+            let (verdict, is_lifted, why) = over_network(cell(&spec, seed)?, pace)?;
+            if verdict != is_lifted {
+                println!("{name} seed {seed}: the hand says {verdict}, the truth {is_lifted}: {why}");
             }
             let is_held = report.outcome.is_held();
             in_process += u64::from(is_held);
-            network += u64::from(said && is_lifted);
-            if is_held != (said && is_lifted) {
+            network += u64::from(verdict && is_lifted);
+            if is_held != (verdict && is_lifted) {
                 differing.push(seed);
-                println!("{name} seed {seed}: in one process {:?}, over the network {said} {why}", report.outcome);
+                println!("{name} seed {seed}: in one process {:?}, over the network {verdict} {why}", report.outcome);
             }
         }
         println!(

@@ -10,7 +10,7 @@
 //! budget that cuts a run short makes it depend on the machine.
 //!
 //! What is deliberately absent: how a grasp is read off detections (the `grasp` crate passes that in), files, and any
-//! printing: a run tells what happens through [`Event`]s.
+//! printing: a run tells what happens through [`TrainingEvent`]s.
 //!
 //! ```
 //! use sdg_training::{OneCycle, TrainingConfig};
@@ -39,7 +39,7 @@ pub use batch::{SampleSource, first_windows};
 pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
 pub use error::TrainingError;
 pub use pace::Pace;
-pub use progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
+pub use progress::{Ending, History, LossValues, StepRecord, TrainingEvent, ValidationRecord};
 pub use schedule::OneCycle;
 pub use trainer::{Trained, train};
 pub use validation::{HIT_DEGREES, HIT_PX, Outcome, Validation, median};

@@ -72,7 +72,7 @@ pub struct ValidationRecord {
 
 /// What is told while a run goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Event {
+pub enum TrainingEvent {
     /// A step was done.
     Step {
         /// The step.

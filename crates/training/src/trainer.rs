@@ -12,7 +12,7 @@ use crate::config::TrainingConfig;
 use crate::error::TrainingError;
 use crate::optimizer::Stepper;
 use crate::pace::Pace;
-use crate::progress::{Ending, Event, History, LossValues, StepRecord, ValidationRecord};
+use crate::progress::{Ending, History, LossValues, StepRecord, TrainingEvent, ValidationRecord};
 use crate::validation::{Outcome, Validation};
 
 /// A trained detector, without gradients, and the run that made it.
@@ -36,7 +36,7 @@ pub fn train(
     config: &TrainingConfig,
     source: SampleSource<'_>,
     examine: &mut dyn FnMut(&GeneralizedRcnn) -> Result<Vec<Outcome>, TrainingError>,
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+    observe: &mut dyn FnMut(&TrainingEvent) -> ControlFlow<()>,
 ) -> Result<Trained, TrainingError> {
     config.check()?;
     let transform = detector.config().input.clone();
@@ -69,7 +69,7 @@ impl Run<'_> {
         mut self,
         batches: &mut Batches,
         examine: &mut dyn FnMut(&GeneralizedRcnn) -> Result<Vec<Outcome>, TrainingError>,
-        observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+        observe: &mut dyn FnMut(&TrainingEvent) -> ControlFlow<()>,
     ) -> Result<Trained, TrainingError> {
         let mut step = 0;
         let ending = loop {
@@ -114,7 +114,7 @@ impl Run<'_> {
         &mut self,
         step: usize,
         batch: Batch,
-        observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+        observe: &mut dyn FnMut(&TrainingEvent) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, TrainingError> {
         let learning_rate = self.config.schedule.learning_rate(self.pace.progress(step, self.elapsed_secs()));
         let losses = self.detector.losses(&batch.images, &batch.targets, step_seed(self.config.seed, step))?;
@@ -127,14 +127,14 @@ impl Run<'_> {
         self.detector = self.optimizer.step(learning_rate, self.detector.clone(), gradients);
         self.steps.push(record);
         let (planned_steps, elapsed_secs) = (self.pace.planned_steps(), self.elapsed_secs());
-        Ok(observe(&Event::Step { record, planned_steps, elapsed_secs }))
+        Ok(observe(&TrainingEvent::Step { record, planned_steps, elapsed_secs }))
     }
 
     fn validate(
         &mut self,
         steps_done: usize,
         examine: &mut dyn FnMut(&GeneralizedRcnn) -> Result<Vec<Outcome>, TrainingError>,
-        observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+        observe: &mut dyn FnMut(&TrainingEvent) -> ControlFlow<()>,
     ) -> Result<ControlFlow<()>, TrainingError> {
         let detector = self.detector.valid();
         let validation = Validation::from_outcomes(&examine(&detector)?);
@@ -144,7 +144,7 @@ impl Run<'_> {
         if self.best.as_ref().is_none_or(|(_, best)| validation.merit() >= best.validation.merit()) {
             self.best = Some((detector, record));
         }
-        Ok(observe(&Event::Validated(record)))
+        Ok(observe(&TrainingEvent::Validated(record)))
     }
 
     fn consider_early_stop(&mut self, step: usize) {

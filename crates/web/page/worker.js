@@ -11,7 +11,7 @@
 // The address says where to compute: `worker.js?device=webgpu` on the graphics card, which is another module.
 
 /** The limit of the command line: larger files than any camera makes. */
-const MOST_IMAGE_BYTES = 256 * 2 ** 20;
+const MAX_IMAGE_BYTES = 256 * 2 ** 20;
 
 const onCard = new URL(import.meta.url).searchParams.get("device") === "webgpu";
 const ready = load(onCard ? "./webgpu/sdg_web" : "./sdg_web");
@@ -53,8 +53,8 @@ async function prepared(image, verify) {
   if (image instanceof ImageBitmap) {
     return lookAtBitmap(image, verify);
   }
-  if (image.size > MOST_IMAGE_BYTES) {
-    throw new Error(`expected an image of at most ${MOST_IMAGE_BYTES} bytes, found ${image.size}`);
+  if (image.size > MAX_IMAGE_BYTES) {
+    throw new Error(`expected an image of at most ${MAX_IMAGE_BYTES} bytes, found ${image.size}`);
   }
   const bytes = new Uint8Array(await image.arrayBuffer());
   const head = String.fromCharCode(...bytes.subarray(0, 12));

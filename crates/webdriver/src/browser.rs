@@ -261,8 +261,8 @@ impl Browser {
         if status == 200 {
             return Ok(value);
         }
-        let said = |key: &str| value[key].as_str().unwrap_or_default().lines().next().unwrap_or_default().to_owned();
-        Err(WebDriverError::Refused { command: path.to_owned(), error: said("error"), message: said("message") })
+        let message = |key: &str| value[key].as_str().unwrap_or_default().lines().next().unwrap_or_default().to_owned();
+        Err(WebDriverError::Refused { command: path.to_owned(), error: message("error"), message: message("message") })
     }
 }
 

@@ -12,11 +12,11 @@ use super::object::{Arena, Object, Pickle, Text, Value};
 
 /// A ResNet-50 detector with its optimiser's state takes some 30 000. Bounds memory and time: an operation adds some
 /// 200 bytes at most, beside what it copies from the file.
-const MOST_OPERATIONS: u32 = 400_000;
+const MAX_OPERATIONS: u32 = 400_000;
 /// Longer text is no name.
 const LONGEST_NAME: u64 = 1024;
 /// More arguments than any allowed function takes.
-const MOST_ARGUMENTS: usize = 16;
+const MAX_ARGUMENTS: usize = 16;
 
 /// Runs the pickle at the start of `span`.
 ///
@@ -115,9 +115,9 @@ impl Machine<'_> {
     /// Counts operations, and copies as if they were operations.
     fn charge(&mut self, count: usize) -> Result<()> {
         let total = u64::from(self.operations) + count as u64;
-        if total > u64::from(MOST_OPERATIONS) {
+        if total > u64::from(MAX_OPERATIONS) {
             let what = "operations of a pickle".to_owned();
-            return Err(WeightsError::TooLarge { what, most: u64::from(MOST_OPERATIONS), found: total });
+            return Err(WeightsError::TooLarge { what, most: u64::from(MAX_OPERATIONS), found: total });
         }
         self.operations = total as u32;
         Ok(())
@@ -331,7 +331,7 @@ impl Machine<'_> {
         let Some(items) = self.arena.sequence(arguments) else {
             return Err(self.damaged("a tuple of arguments", self.arena.describe(arguments)));
         };
-        if items.len() > MOST_ARGUMENTS {
+        if items.len() > MAX_ARGUMENTS {
             return Err(self.damaged("a few arguments", format!("{}", items.len())));
         }
         let items = items.to_vec();

@@ -150,12 +150,12 @@ impl Arena {
     /// # Errors
     /// Anything else, a negative number, or more axes than any layer has.
     pub fn sizes(&self, value: Value, at: u64) -> Result<Vec<usize>> {
-        const MOST_AXES: usize = 8;
+        const MAX_AXES: usize = 8;
         let damaged = |found: String| {
-            WeightsError::damaged(format!("byte {at}"), format!("a tuple of at most {MOST_AXES} sizes"), found)
+            WeightsError::damaged(format!("byte {at}"), format!("a tuple of at most {MAX_AXES} sizes"), found)
         };
         let items = self.sequence(value).ok_or_else(|| damaged(self.describe(value).to_owned()))?;
-        if items.len() > MOST_AXES {
+        if items.len() > MAX_AXES {
             return Err(damaged(format!("{} items", items.len())));
         }
         let size = |item: &Value| match *item {

@@ -34,16 +34,16 @@ use answers::{json_of, read};
 use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::page;
-use crate::picture::MOST_PICTURE_BYTES;
+use crate::picture::MAX_PICTURE_BYTES;
 use crate::session::Session;
 use crate::views::SessionView;
 
 /// More than the marks of any hand; bounds what a request may make the server hold.
-const MOST_JSON_BYTES: usize = 1 << 20;
+const MAX_JSON_BYTES: usize = 1 << 20;
 
 /// How long the body of a request to `path` may be.
-pub fn most_body_bytes(path: &str) -> usize {
-    if path == "/api/scenes" { MOST_PICTURE_BYTES as usize } else { MOST_JSON_BYTES }
+pub fn max_body_bytes(path: &str) -> usize {
+    if path == "/api/scenes" { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
 }
 
 /// Answers a request that the guard has let pass.

@@ -5,7 +5,7 @@ use super::detections::detect;
 use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::session::Session;
-use crate::views::SceneView;
+use crate::views::TrialPictureView;
 
 /// Answers what is asked of picture `id`; `None` where there is no such address.
 pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
@@ -21,7 +21,7 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 }
 
 /// Takes a picture from the page.
-pub fn add(session: &Session, request: &Request) -> Result<SceneView> {
+pub fn add(session: &Session, request: &Request) -> Result<TrialPictureView> {
     let name = request.head.query_value("name").unwrap_or_else(|| "picture".to_owned());
     session.add_scene(&name, &request.body)
 }

@@ -59,8 +59,8 @@ pub fn read_robot_poses(text: &str) -> Result<Vec<RobotPose>, CalibrationError> 
         lines.map(entry_of_line).collect::<Result<_, _>>()?
     } else {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
-            let said = error.to_string();
-            unreadable(said.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned())
+            let message = error.to_string();
+            unreadable(message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned())
         })?;
         file.poses
     };

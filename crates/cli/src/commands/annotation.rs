@@ -166,7 +166,7 @@ fn write_data_yaml(
         write_atomically(&path, text.as_bytes())?;
         return Ok(Some(path));
     }
-    let there = files::read(&path, files::MOST_ANNOTATION_BYTES)?;
+    let there = files::read(&path, files::MAX_ANNOTATION_BYTES)?;
     let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
         .with_context(|| path.display().to_string())?;
     for (found, expected) in read.iter().zip(objects) {

@@ -8,8 +8,8 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use sdg_detection::RcnnConfig;
+use sdg_detection::golden;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_detection::verification;
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
@@ -251,8 +251,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     if !imported.is_complete() {
         bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
     }
-    let report =
-        verification::verify(&detector, &image, &reference).with_context(|| args.against.display().to_string())?;
+    let report = golden::verify(&detector, &image, &reference).with_context(|| args.against.display().to_string())?;
     let mut stdout = std::io::stdout().lock();
     if args.json {
         writeln!(stdout, "{}", json!({"passed": report.passed(), "stages": report.stages}))?;

@@ -11,9 +11,9 @@ pub(super) const NO_MODEL: &str = "there is no model";
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
     // Unwind safety: whatever the closure was changing is given up with its unit.
     catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
-        let said = panic.downcast_ref::<&str>().map(|said| (*said).to_owned());
-        let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
-        Err(anyhow!("a mistake in this program: {}", said.unwrap_or_else(|| "it panicked".to_owned())))
+        let message = panic.downcast_ref::<&str>().map(|message| (*message).to_owned());
+        let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(anyhow!("a mistake in this program: {}", message.unwrap_or_else(|| "it panicked".to_owned())))
     })
 }
 

@@ -5,24 +5,24 @@ use sdg_grasp::{GraspModel, Verification};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, TestView, VariationConfig, test_view, test_views};
 
-use super::records::{Pictured, Said};
+use super::records::{DetectionRecord, PictureRecord};
 use crate::trial::{Trial, try_view};
 
 /// What a model says of a picture, both ways; the trial is the verified one.
-pub(super) fn show(
+pub(super) fn observe_picture(
     model: &GraspModel,
     object: &ObjectSpec,
     seen: &TestView,
     seed: u64,
     other_part: Option<&str>,
-) -> Result<(Pictured, Trial)> {
+) -> Result<(PictureRecord, Trial)> {
     let verified = try_view(model, object, seen, Verification::ByShape)?;
     let alone = match model.kind().has_network() {
-        true => Some(Said::new(&try_view(model, object, seen, Verification::Off)?)),
+        true => Some(DetectionRecord::new(&try_view(model, object, seen, Verification::Off)?)),
         false => None,
     };
     let other_part = other_part.map(str::to_owned);
-    Ok((Pictured { seed, other_part, verified: Said::new(&verified), alone }, verified))
+    Ok((PictureRecord { seed, other_part, verified: DetectionRecord::new(&verified), alone }, verified))
 }
 
 /// A picture without the part: one to six unseen things, some made to resemble parts. Every second one also has another

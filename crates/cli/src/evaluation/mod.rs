@@ -38,7 +38,9 @@ pub use crate::statistics::{Share, percentile, wilson_interval};
 pub use cell::{Cell, Marks};
 pub use groups::PartGroup;
 pub use page::page;
-pub use records::{AttemptRecord, AttemptsRecord, LookRecord, Pictured, Said, SpeedRecord, TeachingRecord};
+pub use records::{
+    AttemptRecord, AttemptsRecord, DetectionRecord, LookRecord, PictureRecord, SpeedRecord, TeachingRecord,
+};
 pub use settings::{Settings, TeachingSettings};
 pub use store::Store;
 pub use summary::{CellSummary, ModelSummary, Summary};

@@ -4,7 +4,7 @@ use sdg_grasp::TeachingFacts;
 use sdg_report::DetectionError;
 use serde::{Deserialize, Serialize};
 
-use crate::rehearsal::{Attempted, Looks};
+use crate::rehearsal::{Looks, RehearsedAttempt};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// Steps that one value of a teaching's loss stands for.
@@ -61,7 +61,7 @@ impl AttemptRecord {
     pub const TEACH: &str = "teach";
 
     /// As the rehearsal tells it.
-    pub fn new(Attempted { attempt, looks, .. }: &Attempted) -> Self {
+    pub fn new(RehearsedAttempt { attempt, looks, .. }: &RehearsedAttempt) -> Self {
         Self {
             attempt: attempt.number,
             success: attempt.success,
@@ -115,7 +115,7 @@ impl AttemptsRecord {
 
 /// What a model said of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Said {
+pub struct DetectionRecord {
     /// Score of the best detection, accepted or not; zero for none.
     pub score: f64,
     /// The network's own score of it.
@@ -128,7 +128,7 @@ pub struct Said {
     pub error_deg: Option<f64>,
 }
 
-impl Said {
+impl DetectionRecord {
     /// As the trial tells it.
     pub fn new(trial: &Trial) -> Self {
         Self {
@@ -159,24 +159,24 @@ impl Said {
 
 /// A picture and what was said of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Pictured {
+pub struct PictureRecord {
     /// Seed of its scene.
     pub seed: u64,
     /// Another shipped part that lies there, where the taught one does not.
     pub other_part: Option<String>,
     /// With the check against the demonstration.
-    pub verified: Said,
+    pub verified: DetectionRecord,
     /// Without it; `None` for a model that is nothing but the demonstration.
-    pub alone: Option<Said>,
+    pub alone: Option<DetectionRecord>,
 }
 
 /// What a model said of a part's pictures.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LookRecord {
     /// The part is there.
-    pub present: Vec<Pictured>,
+    pub present: Vec<PictureRecord>,
     /// It is not, but other things are.
-    pub absent: Vec<Pictured>,
+    pub absent: Vec<PictureRecord>,
 }
 
 /// How long a detection takes with the machine to itself.

@@ -27,7 +27,7 @@ use super::settings::{Settings, difference};
 use crate::files;
 
 /// Larger than any record.
-const MOST_RECORD_BYTES: u64 = 64 << 20;
+const MAX_RECORD_BYTES: u64 = 64 << 20;
 
 /// An evaluation's folder, held by this process.
 #[derive(Debug)]
@@ -150,7 +150,7 @@ pub(super) fn read_stored(path: &Path) -> Result<Option<(Value, Value)>> {
     if !path.exists() {
         return Ok(None);
     }
-    let bytes = files::read(path, MOST_RECORD_BYTES)?;
+    let bytes = files::read(path, MAX_RECORD_BYTES)?;
     let stored: Stored<Value, Value> = serde_json::from_slice(&bytes).with_context(|| not_a_record(path))?;
     Ok(Some((stored.settings, stored.record)))
 }

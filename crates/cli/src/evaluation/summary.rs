@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::cell::Cell;
 use super::groups::PartGroup;
-use super::records::{AttemptRecord, Said, TeachingRecord};
+use super::records::{AttemptRecord, DetectionRecord, TeachingRecord};
 use super::settings::Settings;
 use super::store::Store;
 use super::units::Evaluation;
@@ -115,8 +115,8 @@ impl Figures {
 struct Gathered {
     attempts: Vec<AttemptRecord>,
     /// `None` where there was no model to ask.
-    present: Vec<Option<Said>>,
-    absent: Vec<Said>,
+    present: Vec<Option<DetectionRecord>>,
+    absent: Vec<DetectionRecord>,
     secs: Vec<f64>,
 }
 
@@ -134,7 +134,7 @@ impl Gathered {
         for attempt in self.attempts.iter().filter(|attempt| !attempt.success) {
             *failures_by_step.entry(attempt.step.clone()).or_default() += 1;
         }
-        let errors: Vec<_> = self.present.iter().flatten().filter_map(Said::error).collect();
+        let errors: Vec<_> = self.present.iter().flatten().filter_map(DetectionRecord::error).collect();
         let mm = || errors.iter().map(|error| error.distance_mm);
         let deg = || errors.iter().map(|error| error.angle_deg);
         Figures {
@@ -142,12 +142,12 @@ impl Gathered {
             held_interval: wilson_interval(held),
             held_at_first_look: Share::of(&self.attempts, |attempt| attempt.is_held_at_first_look()),
             failures_by_step,
-            right: Share::of(&self.present, |said| said.is_some_and(|said| said.is_right())),
+            right: Share::of(&self.present, |record| record.is_some_and(|record| record.is_right())),
             median_mm: percentile(mm(), 50.0),
             p90_mm: percentile(mm(), 90.0),
             median_deg: percentile(deg(), 50.0),
             p90_deg: percentile(deg(), 90.0),
-            false_alarms: Share::of(&self.absent, |said| said.is_accepted()),
+            false_alarms: Share::of(&self.absent, |record| record.is_accepted()),
             frames_per_second: percentile(self.secs.iter().copied(), 50.0).filter(|s| *s > 0.0).map(|s| 1.0 / s),
         }
     }
@@ -250,14 +250,14 @@ fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store
     }
     let look = cell.look(store)?.unwrap_or_default();
     let speed = cell.speed(store)?.unwrap_or_default();
-    let said = |pictured: &super::records::Pictured| match verification {
-        Verification::ByShape => Some(pictured.verified),
-        Verification::Off => pictured.alone,
+    let record = |picture: &super::records::PictureRecord| match verification {
+        Verification::ByShape => Some(picture.verified),
+        Verification::Off => picture.alone,
     };
     Ok(Gathered {
         attempts: if attempted { cell.attempts(verification, store)? } else { Vec::new() },
-        present: look.present.iter().map(said).collect(),
-        absent: look.absent.iter().filter_map(said).collect(),
+        present: look.present.iter().map(record).collect(),
+        absent: look.absent.iter().filter_map(record).collect(),
         secs: match verification {
             Verification::ByShape => speed.verified_secs,
             Verification::Off => speed.alone_secs,
@@ -268,13 +268,13 @@ fn gather(cell: Cell, verification: Verification, attempted: bool, store: &Store
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::records::{AttemptsRecord, LookRecord, Pictured};
+    use crate::evaluation::records::{AttemptsRecord, LookRecord, PictureRecord};
     use sdg_geometry::RotationalSymmetry;
     use sdg_grasp::{Preset, TeachingFacts};
     use sdg_simulation::objects::ObjectSpec;
 
-    fn said(score: f64, error: Option<(f64, f64)>) -> Said {
-        Said {
+    fn record(score: f64, error: Option<(f64, f64)>) -> DetectionRecord {
+        DetectionRecord {
             score,
             network_score: score,
             agreement: Some(score),
@@ -283,8 +283,8 @@ mod tests {
         }
     }
 
-    fn pictured(verified: Said, alone: Said) -> Pictured {
-        Pictured { seed: 0, other_part: None, verified, alone: Some(alone) }
+    fn picture(verified: DetectionRecord, alone: DetectionRecord) -> PictureRecord {
+        PictureRecord { seed: 0, other_part: None, verified, alone: Some(alone) }
     }
 
     fn attempt(number: usize, success: bool, step: &str) -> AttemptRecord {
@@ -325,10 +325,10 @@ mod tests {
         store.write("cells/B-pendulum.attempts-verified.json", &AttemptsRecord::new(attempts)).unwrap();
         let look = LookRecord {
             present: vec![
-                pictured(said(0.9, Some((1.0, 0.5))), said(0.4, Some((1.0, 0.5)))),
-                pictured(said(0.8, Some((30.0, 0.5))), said(0.9, Some((3.0, 9.0)))),
+                picture(record(0.9, Some((1.0, 0.5))), record(0.4, Some((1.0, 0.5)))),
+                picture(record(0.8, Some((30.0, 0.5))), record(0.9, Some((3.0, 9.0)))),
             ],
-            absent: vec![pictured(said(0.1, None), said(0.7, None)), pictured(said(0.0, None), said(0.2, None))],
+            absent: vec![picture(record(0.1, None), record(0.7, None)), picture(record(0.0, None), record(0.2, None))],
         };
         store.write("cells/B-pendulum.look.json", &look).unwrap();
 

@@ -4,7 +4,9 @@ use std::ops::ControlFlow;
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
-use sdg_grasp::{CameraOverTable, Event, History, Lengths, Preset, StepRecord, TeachOptions, seen_from_above, teach};
+use sdg_grasp::{
+    CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above, teach,
+};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::demonstration_view;
 
@@ -61,7 +63,7 @@ impl Teaching<'_> {
         };
         // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
         let mut interrupted = false;
-        let mut observe = |_: &Event| {
+        let mut observe = |_: &TeachingEvent| {
             interrupted |= is_interrupted();
             if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
@@ -69,27 +71,30 @@ impl Teaching<'_> {
         if interrupted {
             return Ok(None);
         }
-        let (record, said) = match taught {
+        let (record, summary) = match taught {
             Ok(taught) => {
                 let bytes = taught.model.to_bytes()?;
                 // The record last: it says that the model is whole.
                 self.store.write_bytes(&cell.model_file(marks), &bytes)?;
                 let facts = taught.model.facts().clone();
-                let said = facts.validation.map_or("nothing to train".to_owned(), |validation| {
+                let summary = facts.validation.map_or("nothing to train".to_owned(), |validation| {
                     format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
                 });
                 let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
-                (TeachingRecord::Taught { facts: Box::new(facts), bytes: bytes.len(), jobs: self.jobs, losses }, said)
+                (
+                    TeachingRecord::Taught { facts: Box::new(facts), bytes: bytes.len(), jobs: self.jobs, losses },
+                    summary,
+                )
             }
             Err(error) => {
                 self.store.remove(&cell.model_file(marks))?;
                 let why = one_line(&error);
-                let said = format!("failed, all its attempts count as failures: {why}");
-                (TeachingRecord::Failed { why }, said)
+                let summary = format!("failed, all its attempts count as failures: {why}");
+                (TeachingRecord::Failed { why }, summary)
             }
         };
         self.store.write_made_with(&cell.teaching_file(marks), &settings.teaching(), &record)?;
-        Ok(Some(said))
+        Ok(Some(summary))
     }
 }
 

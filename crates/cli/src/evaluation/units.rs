@@ -11,7 +11,7 @@ use sdg_simulation::scene::{TestView, test_views};
 use super::attempting::go_on;
 use super::caught::{NO_MODEL, caught};
 use super::cell::{Cell, Marks, attempts_of};
-use super::looking::{part_seed, picture_seed, scene_without, show};
+use super::looking::{observe_picture, part_seed, picture_seed, scene_without};
 use super::records::{LookRecord, SpeedRecord};
 use super::schedule::{Task, run_all};
 use super::store::Store;
@@ -163,7 +163,7 @@ impl Evaluation<'_> {
         progress: &EvaluationProgress,
     ) -> Result<ControlFlow<()>> {
         let started = Instant::now();
-        let said = match unit {
+        let summary = match unit {
             Unit::Teach(cell) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
                 teaching.teach(cell, Marks::Shipped, is_interrupted)?
@@ -171,8 +171,8 @@ impl Evaluation<'_> {
             Unit::Look(object) => self.look(object, is_interrupted)?,
             Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted)?,
         };
-        let Some(said) = said else { return Ok(ControlFlow::Break(())) };
-        progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+        let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
+        progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
         Ok(ControlFlow::Continue(()))
     }
 
@@ -194,8 +194,8 @@ impl Evaluation<'_> {
                 return Ok(None);
             }
             for (_, model, record, drawn) in &mut looks {
-                let (pictured, trial) = show(model, object, &seen, seed, None)?;
-                record.present.push(pictured);
+                let (picture_record, trial) = observe_picture(model, object, &seen, seed, None)?;
+                record.present.push(picture_record);
                 drawn.get_or_insert(trial.drawn);
             }
         }
@@ -206,10 +206,10 @@ impl Evaluation<'_> {
                 return Ok(None);
             }
             for (_, model, record, _) in &mut looks {
-                record.absent.push(show(model, object, &seen, seed, other_part)?.0);
+                record.absent.push(observe_picture(model, object, &seen, seed, other_part)?.0);
             }
         }
-        let mut said = Vec::new();
+        let mut summary = Vec::new();
         for (cell, _, record, drawn) in looks {
             if let Some(drawn) = drawn {
                 let mut png = std::io::Cursor::new(Vec::new());
@@ -219,9 +219,9 @@ impl Evaluation<'_> {
             self.store.write(&cell.file("look"), &record)?;
             let right = record.present.iter().filter(|p| p.verified.is_right()).count();
             let false_alarms = record.absent.iter().filter(|p| p.verified.is_accepted()).count();
-            said.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
+            summary.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
         }
-        Ok(Some(if said.is_empty() { NO_MODEL.to_owned() } else { said.join("; ") }))
+        Ok(Some(if summary.is_empty() { NO_MODEL.to_owned() } else { summary.join("; ") }))
     }
 
     /// Goes on with a cell's attempts.

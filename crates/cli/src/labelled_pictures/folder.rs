@@ -140,7 +140,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
     for path in paths.iter().filter(|path| has_extension(path, &["json"])) {
         let same_name: Vec<&PathBuf> =
             pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
-        let bytes = files::read(path, files::MOST_ANNOTATION_BYTES)?;
+        let bytes = files::read(path, files::MAX_ANNOTATION_BYTES)?;
         let file = match LabelFile::parse(&bytes) {
             // Other programs keep JSON beside pictures, too.
             Err(Error::WrongFile { .. }) if same_name.is_empty() => {

@@ -74,8 +74,8 @@ impl Augmenter {
     pub fn windows(&self, multiple: u32) -> Windows<'_> {
         let mut size = self.frame;
         if let AugmentationStyle::Scenes(style) = &self.config.style {
-            let most_scale = f64::from(style.scale[1]);
-            let diameter = self.parts.iter().map(|p| 2.0 * p.radius * p.nominal_scale * most_scale).fold(0.0, f64::max);
+            let max_scale = f64::from(style.scale[1]);
+            let diameter = self.parts.iter().map(|p| 2.0 * p.radius * p.nominal_scale * max_scale).fold(0.0, f64::max);
             let side = |share: f64, frame: u32| {
                 let least = (share * diameter).ceil().min(f64::from(frame)) as u32;
                 (least.div_ceil(multiple) * multiple).min(frame)

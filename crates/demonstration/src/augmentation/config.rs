@@ -67,7 +67,7 @@ pub struct SceneStyle {
     /// Greatest change of scale across the part by perspective.
     pub max_perspective: f32,
     /// Least share of the part inside the image.
-    pub least_inside: f32,
+    pub min_inside: f32,
     /// Most distractors in a scene; scenes without the part have at least one.
     pub max_distractors: usize,
     /// Share of the distractors that are made from pieces of the part itself.
@@ -94,7 +94,7 @@ impl Default for SceneStyle {
             scale: [0.83, 1.2],
             max_foreshortening: 0.08,
             max_perspective: 0.06,
-            least_inside: 0.75,
+            min_inside: 0.75,
             max_distractors: 5,
             mutant_share: 0.3,
             other_part_share: 0.6,
@@ -139,7 +139,7 @@ impl AugmentationConfig {
                 let shares = [
                     ("positive_share", scenes.positive_share),
                     ("photo_background_share", scenes.photo_background_share),
-                    ("least_inside", scenes.least_inside),
+                    ("min_inside", scenes.min_inside),
                     ("mutant_share", scenes.mutant_share),
                     ("other_part_share", scenes.other_part_share),
                     ("occlusion_probability", scenes.occlusion_probability),

@@ -67,7 +67,7 @@ impl Mutant {
         let mut bank = Vec::new();
         for _ in 0..BANK_SIZE * 3 {
             let mutant = Self::draw(&around, radius, rng);
-            if bank.len() < BANK_SIZE && silhouette.most_alike(&mutant) < TOO_ALIKE_IOU {
+            if bank.len() < BANK_SIZE && silhouette.max_iou(&mutant) < TOO_ALIKE_IOU {
                 bank.push(mutant);
             }
         }
@@ -138,7 +138,7 @@ impl Silhouette {
 
     /// The greatest overlap of the mutant's silhouette with the part's over all turns, centres and areas made equal
     /// as far as a camera's change of height could.
-    fn most_alike(&self, mutant: &Mutant) -> f64 {
+    fn max_iou(&self, mutant: &Mutant) -> f64 {
         let step = mutant.radius / 30.0;
         let mut places = Vec::new();
         for y in -30..30 {
@@ -185,9 +185,9 @@ mod tests {
     #[test]
     fn the_mirror_image_of_a_rectangle_is_the_rectangle_and_that_of_an_l_is_not() {
         let (rectangle, center) = polygon(&[(0.0, 0.0), (160.0, 0.0), (160.0, 40.0), (0.0, 40.0)]);
-        assert!(Silhouette::new(&rectangle, center).most_alike(&mirrored()) > 0.9);
+        assert!(Silhouette::new(&rectangle, center).max_iou(&mirrored()) > 0.9);
         let (l, center) = polygon(&[(0.0, 0.0), (160.0, 0.0), (160.0, 30.0), (30.0, 30.0), (30.0, 80.0), (0.0, 80.0)]);
-        assert!(Silhouette::new(&l, center).most_alike(&mirrored()) < TOO_ALIKE_IOU);
+        assert!(Silhouette::new(&l, center).max_iou(&mirrored()) < TOO_ALIKE_IOU);
     }
 
     #[test]
@@ -203,6 +203,6 @@ mod tests {
             bank.iter().map(|m| format!("{:?}", m.kind).chars().take(5).collect()).collect();
         assert!(kinds.len() >= 4, "{kinds:?}");
         let silhouette = Silhouette::new(&l, center);
-        assert!(bank.iter().all(|mutant| silhouette.most_alike(mutant) < TOO_ALIKE_IOU));
+        assert!(bank.iter().all(|mutant| silhouette.max_iou(mutant) < TOO_ALIKE_IOU));
     }
 }

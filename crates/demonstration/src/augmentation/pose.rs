@@ -13,7 +13,7 @@ const OVERHANG_SHARE: f32 = 0.15;
 /// Tries before the part is left where the photo has it.
 const TRIES: usize = 40;
 
-/// Draws a pose with at least `style.least_inside` of the part inside an image of `width` × `height`.
+/// Draws a pose with at least `style.min_inside` of the part inside an image of `width` × `height`.
 pub(crate) fn draw_pose(
     part: &Prepared,
     style: &SceneStyle,
@@ -31,7 +31,7 @@ pub(crate) fn draw_pose(
         let x = f64::from(uniform(rng, left as f32, right as f32));
         let y = f64::from(uniform(rng, top as f32, bottom as f32));
         let pose = Homography::translation(x, y).compose(&centered);
-        if share_inside(part, &pose, width, height) >= f64::from(style.least_inside) {
+        if share_inside(part, &pose, width, height) >= f64::from(style.min_inside) {
             return pose;
         }
     }

@@ -7,13 +7,13 @@ use super::lab::Lab;
 /// Gaussians of a mixture.
 const NUM_COMPONENTS: usize = 5;
 /// Added to every variance, in squared units of L*a*b*: no camera tells colours apart better.
-const LEAST_VARIANCE: f64 = 1.0;
+const MIN_VARIANCE: f64 = 1.0;
 /// Fewer samples make no Gaussian.
-const LEAST_SAMPLES: usize = 4;
+const MIN_SAMPLES: usize = 4;
 /// Squared distances, in variances, within which 99 % of a Gaussian's samples lie in three dimensions.
 const EXPLAINED: f32 = 11.3;
 /// A Gaussian of fewer samples casts no shadow of its own.
-const LEAST_SHADED_WEIGHT: f32 = 0.05;
+const MIN_SHADED_WEIGHT: f32 = 0.05;
 /// How much of the lightness a shadow leaves at least.
 const DARKEST_SHADE: f32 = 0.5;
 /// Variance of hue in a shadow, beyond that in the light: other lamps reach into it.
@@ -32,11 +32,11 @@ struct Component {
 
 impl Component {
     fn fit(samples: &[Vector3<f64>], of: usize) -> Option<Self> {
-        if samples.len() < LEAST_SAMPLES {
+        if samples.len() < MIN_SAMPLES {
             return None;
         }
         let (mean, scatter) = moments(samples);
-        let covariance = scatter + Matrix3::identity() * LEAST_VARIANCE;
+        let covariance = scatter + Matrix3::identity() * MIN_VARIANCE;
         let precision = covariance.try_inverse()?;
         let weight = samples.len() as f64 / of as f64;
         Some(Self {
@@ -63,7 +63,7 @@ impl Component {
     fn explains_shaded(&self, color: &Vector3<f32>) -> bool {
         let shade = (color.x + BLACK) / (self.mean.x + BLACK);
         let brightest = 1.0 + 3.0 * self.covariance.m11.sqrt() / (self.mean.x + BLACK);
-        if self.weight < LEAST_SHADED_WEIGHT || !(DARKEST_SHADE..brightest).contains(&shade) {
+        if self.weight < MIN_SHADED_WEIGHT || !(DARKEST_SHADE..brightest).contains(&shade) {
             return false;
         }
         let off = |axis: usize| {

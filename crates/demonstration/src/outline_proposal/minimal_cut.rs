@@ -14,7 +14,7 @@ pub(crate) const SURELY_OUTSIDE: f32 = 1e3;
 /// Cost of a boundary where the picture is flat, for each pixel of its length.
 const BOUNDARY_COST: f32 = 10.0;
 /// Share of that cost which is left on the strongest edges: keeps outlines smooth.
-const LEAST_COST_SHARE: f32 = 0.05;
+const MIN_COST_SHARE: f32 = 0.05;
 /// Passes over the picture.
 const PASSES: usize = 60;
 /// 1 / √8.
@@ -41,7 +41,7 @@ impl Edges {
         let softness = 1.0 / (2.0 * mean).max(f32::MIN_POSITIVE);
         let cost = contrasts
             .iter()
-            .map(|c| BOUNDARY_COST * (LEAST_COST_SHARE + (1.0 - LEAST_COST_SHARE) * (-softness * c).exp()))
+            .map(|c| BOUNDARY_COST * (MIN_COST_SHARE + (1.0 - MIN_COST_SHARE) * (-softness * c).exp()))
             .collect();
         Self { width, cost }
     }

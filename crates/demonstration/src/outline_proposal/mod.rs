@@ -31,19 +31,19 @@ use lab::Lab;
 use minimal_cut::{Edges, minimal_cut};
 
 /// Pixels of the frame that is cut; larger ones are shrunk. Bounds the time.
-const MOST_PIXELS: f64 = 60_000.0;
+const MAX_PIXELS: f64 = 60_000.0;
 /// Surroundings around the box, as a share of its longer side …
 const MARGIN_SHARE: f64 = 0.2;
 /// … and at least, in pixels of the photo.
-const LEAST_MARGIN_PX: f64 = 12.0;
+const MIN_MARGIN_PX: f64 = 12.0;
 /// How often colours are learnt again from the last cut.
 const ROUNDS: usize = 6;
 /// A piece smaller than this share of the box is no part.
-const LEAST_AREA_SHARE: f64 = 0.02;
+const MIN_AREA_SHARE: f64 = 0.02;
 /// Where less of the box than this is left when shadows are taken out, the part itself has a shadow's colour.
-const LEAST_UNSHADED_SHARE: f64 = 0.05;
+const MIN_UNSHADED_SHARE: f64 = 0.05;
 /// No pixel's colour alone decides: shadows, highlights and noise have the colours of the other side.
-const MOST_EVIDENCE: f32 = 10.0;
+const MAX_EVIDENCE: f32 = 10.0;
 
 /// Proposes the outline of the part that a person drew a box around.
 ///
@@ -59,7 +59,7 @@ pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     let Some(outline) = outer_outline(&mask) else { return nothing_found() };
     // Pieces of the mask reach the edges of whole pixels, the box may lie within one.
     let outline = frame.in_photo(&outline, &inside);
-    if outline.area() >= LEAST_AREA_SHARE * inside.area() && !outline.crosses_itself() {
+    if outline.area() >= MIN_AREA_SHARE * inside.area() && !outline.crosses_itself() {
         outline
     } else {
         nothing_found()
@@ -84,17 +84,17 @@ struct Frame {
 impl Frame {
     /// `None` for a box of less than a few pixels.
     fn cut_out(image: &RgbImage, bbox: &BoundingBox) -> Option<Self> {
-        const LEAST_SIDE_PX: f64 = 4.0;
-        if bbox.width() < LEAST_SIDE_PX || bbox.height() < LEAST_SIDE_PX {
+        const MIN_SIDE_PX: f64 = 4.0;
+        if bbox.width() < MIN_SIDE_PX || bbox.height() < MIN_SIDE_PX {
             return None;
         }
-        let margin = (MARGIN_SHARE * bbox.width().max(bbox.height())).max(LEAST_MARGIN_PX);
+        let margin = (MARGIN_SHARE * bbox.width().max(bbox.height())).max(MIN_MARGIN_PX);
         let left = (bbox.x1 - margin).floor().max(0.0) as u32;
         let top = (bbox.y1 - margin).floor().max(0.0) as u32;
         let right = ((bbox.x2 + margin).ceil() as u32).min(image.width());
         let bottom = ((bbox.y2 + margin).ceil() as u32).min(image.height());
         let view = imageops::crop_imm(image, left, top, right - left, bottom - top).to_image();
-        let shrink = (MOST_PIXELS / (f64::from(view.width()) * f64::from(view.height()))).sqrt().min(1.0);
+        let shrink = (MAX_PIXELS / (f64::from(view.width()) * f64::from(view.height()))).sqrt().min(1.0);
         let small = |side: u32| ((f64::from(side) * shrink).round() as u32).max(1);
         let (width, height) = (small(view.width()), small(view.height()));
         let shrunk = if shrink < 1.0 { imageops::thumbnail(&view, width, height) } else { view };
@@ -167,7 +167,7 @@ impl Frame {
                         return minimal_cut::SURELY_OUTSIDE;
                     }
                     let evidence = surroundings.log_density(color) - part.log_density(color);
-                    evidence.clamp(-MOST_EVIDENCE, MOST_EVIDENCE)
+                    evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE)
                 })
                 .collect();
             minimal_cut(&evidence, &edges, &mut share);
@@ -195,11 +195,11 @@ impl Frame {
             (unexplained, share)
         };
         let (unshaded, share) = guess(&|color| surroundings.explains(color) || surroundings.explains_shaded(color));
-        if share >= LEAST_UNSHADED_SHARE {
+        if share >= MIN_UNSHADED_SHARE {
             return Some(unshaded);
         }
         let (unexplained, share) = guess(&|color| surroundings.explains(color));
-        (share >= LEAST_AREA_SHARE).then_some(unexplained)
+        (share >= MIN_AREA_SHARE).then_some(unexplained)
     }
 
     /// The colours of the marked pixels, and those of the others.

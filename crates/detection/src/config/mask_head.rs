@@ -29,20 +29,20 @@ pub enum MaskBalance {
     #[default]
     Cells,
     /// More where the part fills little of its box: the root of how many cells there are beside it for one of it, at most
-    /// [`MaskBalance::MOST`]. A pipe fills a tenth of its box, and a head taught for 300 steps learnt that nothing is
+    /// [`MaskBalance::MAX`]. A pipe fills a tenth of its box, and a head taught for 300 steps learnt that nothing is
     /// ever part of it.
     ThinParts,
 }
 
 impl MaskBalance {
     /// The most that a cell of the part weighs.
-    pub const MOST: f32 = 4.0;
+    pub const MAX: f32 = 4.0;
 
     /// The weight of a cell of the part, by how many of all `cells` are.
     pub(crate) fn weight(self, inside: f32, cells: usize) -> f32 {
         match self {
             Self::Cells => 1.0,
-            Self::ThinParts => ((cells as f32 - inside) / inside.max(1.0)).sqrt().clamp(1.0, Self::MOST),
+            Self::ThinParts => ((cells as f32 - inside) / inside.max(1.0)).sqrt().clamp(1.0, Self::MAX),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::target::{ObjectMask, union};
 const SUBCELLS: f64 = 5.0;
 
 /// The least side of a box, pixels, that a mask is stretched over; smaller ones would blow up.
-const LEAST_SIDE_PX: f32 = 0.1;
+const MIN_SIDE_PX: f32 = 0.1;
 
 /// Gives the wanted mask of an object over a box, `S·S` values from 0 to 1, row by row.
 ///
@@ -62,7 +62,7 @@ fn pool_mask(mask: &Mask, roi: &Corners, size: usize, alignment: RoiAlignment) -
 
 /// Draws polygons, stretched from a box to `S×S` cells, as the union of what each covers.
 fn rasterize_in_box(polygons: &[Polygon], roi: &Corners, size: usize) -> Vec<bool> {
-    let scale = |low: f32, high: f32| f64::from(size as f32 / (high - low).max(LEAST_SIDE_PX));
+    let scale = |low: f32, high: f32| f64::from(size as f32 / (high - low).max(MIN_SIDE_PX));
     let (scale_x, scale_y) = (scale(roi[0], roi[2]), scale(roi[1], roi[3]));
     let mut inside = vec![false; size * size];
     for polygon in polygons {

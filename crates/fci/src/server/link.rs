@@ -17,7 +17,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 
 /// What a listening thread or a reading one tells the loop.
 #[derive(Debug)]
-enum Event {
+enum LinkEvent {
     Connected(TcpStream, SocketAddr),
     Message(u64, Header, Vec<u8>),
     Gone(u64),
@@ -47,8 +47,8 @@ pub struct Link {
     kind: HeaderKind,
     address: SocketAddr,
     udp: UdpSocket,
-    events: Receiver<Event>,
-    sender: Sender<Event>,
+    events: Receiver<LinkEvent>,
+    sender: Sender<LinkEvent>,
     client: Option<Client>,
     num_sessions: u64,
     is_stopping: Arc<AtomicBool>,
@@ -95,16 +95,16 @@ impl Link {
     pub fn poll(&mut self) -> Option<Incoming> {
         loop {
             match self.events.try_recv() {
-                Ok(Event::Connected(stream, address)) => self.welcome(stream, address),
-                Ok(Event::Message(session, header, payload)) if self.is_of(session) => {
+                Ok(LinkEvent::Connected(stream, address)) => self.welcome(stream, address),
+                Ok(LinkEvent::Message(session, header, payload)) if self.is_of(session) => {
                     return Some(Incoming::Request(header, payload));
                 }
-                Ok(Event::Gone(session)) if self.is_of(session) => {
+                Ok(LinkEvent::Gone(session)) if self.is_of(session) => {
                     self.close();
                     return Some(Incoming::Gone);
                 }
                 // Of a client that is no longer served.
-                Ok(Event::Message(..) | Event::Gone(..)) => {}
+                Ok(LinkEvent::Message(..) | LinkEvent::Gone(..)) => {}
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => return None,
             }
         }
@@ -213,27 +213,27 @@ impl Drop for Link {
     }
 }
 
-fn accept(listener: &TcpListener, sender: &Sender<Event>, is_stopping: &AtomicBool) {
+fn accept(listener: &TcpListener, sender: &Sender<LinkEvent>, is_stopping: &AtomicBool) {
     for stream in listener.incoming() {
         if is_stopping.load(Ordering::Relaxed) {
             return;
         }
         let Ok(stream) = stream else { continue };
         let Ok(address) = stream.peer_addr() else { continue };
-        if sender.send(Event::Connected(stream, address)).is_err() {
+        if sender.send(LinkEvent::Connected(stream, address)).is_err() {
             return;
         }
     }
 }
 
-fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: &Sender<Event>) {
+fn read_requests(mut stream: TcpStream, session: u64, kind: HeaderKind, sender: &Sender<LinkEvent>) {
     loop {
         let event = match read_message(&mut stream, kind) {
-            Ok(Ok((header, payload))) => Event::Message(session, header, payload),
+            Ok(Ok((header, payload))) => LinkEvent::Message(session, header, payload),
             // A header that cannot be ends the connection as its closing does.
-            Ok(Err(_)) | Err(_) => Event::Gone(session),
+            Ok(Err(_)) | Err(_) => LinkEvent::Gone(session),
         };
-        let is_end = matches!(event, Event::Gone(..));
+        let is_end = matches!(event, LinkEvent::Gone(..));
         if sender.send(event).is_err() || is_end {
             return;
         }

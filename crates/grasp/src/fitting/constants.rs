@@ -57,14 +57,14 @@ pub(super) const CONSTANTS: &[Constant] = &[
     searched("search.shape.agreement.extent", SHAPE, &[32.0, 64.0, 128.0], |c| {
         Field::Double(&mut c.search.shape.agreement.extent)
     }),
-    searched("search.shape.settling.sure_agreement", SHAPE, &[0.55, 0.65, 0.75], |c| {
-        Field::Double(&mut c.search.shape.settling.sure_agreement)
+    searched("search.shape.refinement.sure_agreement", SHAPE, &[0.55, 0.65, 0.75], |c| {
+        Field::Double(&mut c.search.shape.refinement.sure_agreement)
     }),
-    searched("search.shape.settling.min_restart_agreement", SHAPE, &[0.25, 0.33, 0.41], |c| {
-        Field::Double(&mut c.search.shape.settling.min_restart_agreement)
+    searched("search.shape.refinement.min_restart_agreement", SHAPE, &[0.25, 0.33, 0.41], |c| {
+        Field::Double(&mut c.search.shape.refinement.min_restart_agreement)
     }),
-    searched("search.shape.settling.restart_px", SHAPE, &[5.0, 10.0, 20.0], |c| {
-        Field::Double(&mut c.search.shape.settling.restart_px)
+    searched("search.shape.refinement.restart_px", SHAPE, &[5.0, 10.0, 20.0], |c| {
+        Field::Double(&mut c.search.shape.refinement.restart_px)
     }),
     searched("search.shape.surface.cells_share", SHAPE, &[0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0], |c| {
         Field::Double(&mut c.search.shape.surface.cells_share)

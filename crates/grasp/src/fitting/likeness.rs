@@ -7,7 +7,7 @@ use super::pictures::{FitPart, FitPicture};
 use crate::error::Result;
 use crate::taught::TaughtDemonstration;
 use crate::teach::symmetry::HiddenTurns;
-use crate::verification::{Overlay, Scene, search};
+use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
 /// Wrong poses of a picture that count: those that agree best.
 const WRONG_A_PICTURE: usize = 3;
@@ -33,23 +33,23 @@ pub fn likeness_examples(part: &FitPart) -> Result<Vec<LikenessExample>> {
     let turns = HiddenTurns::new(std::slice::from_ref(&part.demonstration), part.symmetry);
     let mut examples = Vec::new();
     for (picture_idx, picture) in part.pictures.iter().enumerate() {
-        let mut example = |overlay: &Overlay<'_>, is_right| {
-            let pair = likeness.pair(&picture.image, &overlay.image_from_cutout);
+        let mut example = |placed: &PlacedDemonstration<'_>, is_right| {
+            let pair = likeness.pair(&picture.image, &placed.image_from_cutout);
             examples.push(LikenessExample { picture_idx, pair, is_right });
         };
-        let mut found = search(&Scene::new(&picture.image, std::slice::from_ref(&taught)));
+        let mut found = search(&SearchedImage::new(&picture.image, std::slice::from_ref(&taught)));
         found.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
         let mut is_instance_seen = vec![false; picture.instances.len()];
         let mut num_wrong = 0;
-        for overlay in &found {
-            match instance_of(overlay, picture, part, &turns) {
+        for placed in &found {
+            match instance_of(placed, picture, part, &turns) {
                 Some(idx) if !is_instance_seen[idx] => {
                     is_instance_seen[idx] = true;
-                    example(overlay, true);
+                    example(placed, true);
                 }
-                None if num_wrong < WRONG_A_PICTURE && !picture.is_undecided(overlay) => {
+                None if num_wrong < WRONG_A_PICTURE && !picture.is_undecided(placed) => {
                     num_wrong += 1;
-                    example(overlay, false);
+                    example(placed, false);
                 }
                 _ => {}
             }
@@ -58,6 +58,11 @@ pub fn likeness_examples(part: &FitPart) -> Result<Vec<LikenessExample>> {
     Ok(examples)
 }
 
-fn instance_of(overlay: &Overlay<'_>, picture: &FitPicture, part: &FitPart, turns: &HiddenTurns) -> Option<usize> {
-    picture.instances.iter().position(|instance| is_right(overlay, instance, part, turns))
+fn instance_of(
+    placed: &PlacedDemonstration<'_>,
+    picture: &FitPicture,
+    part: &FitPart,
+    turns: &HiddenTurns,
+) -> Option<usize> {
+    picture.instances.iter().position(|instance| is_right(placed, instance, part, turns))
 }

@@ -6,11 +6,11 @@ use super::pictures::{FitInstance, FitPart, FitPicture};
 use crate::check_config::CheckConfig;
 use crate::error::Result;
 use crate::taught::TaughtDemonstration;
-use crate::teach::STRANGERS_INSTANT;
-use crate::teach::strangers::Strangers;
+use crate::teach::NUM_NEGATIVE_SCENES_INSTANT;
+use crate::teach::negatives::NegativeScenes;
 use crate::teach::symmetry::HiddenTurns;
 use crate::verdict::Clues;
-use crate::verification::{Overlay, Scene, search};
+use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
 /// How far a right pose's grasp may lie from the true one, as a share of the diagonal of the demonstration's box, in the
 /// picture's size; and how far it may be turned. The tolerances of `sdg evaluate --pictures`.
@@ -63,7 +63,7 @@ impl PartObservations {
 pub(super) struct PreparedPart<'a> {
     part: &'a FitPart,
     turns: HiddenTurns,
-    negatives: Strangers,
+    negatives: NegativeScenes,
     taught: TaughtDemonstration,
 }
 
@@ -78,7 +78,7 @@ impl<'a> PreparedPart<'a> {
                 Ok(Self {
                     part,
                     turns: HiddenTurns::new(demonstrations, part.symmetry),
-                    negatives: Strangers::new(demonstrations, seed, STRANGERS_INSTANT)?,
+                    negatives: NegativeScenes::new(demonstrations, seed, NUM_NEGATIVE_SCENES_INSTANT)?,
                     taught: TaughtDemonstration::new(&part.demonstration)?,
                 })
             })
@@ -105,13 +105,13 @@ impl<'a> PreparedPart<'a> {
         resemblance: f64,
     ) -> PictureObservations {
         let mut poses = Vec::new();
-        for overlay in search(&Scene::new(&picture.image, taught)) {
+        for placed in search(&SearchedImage::new(&picture.image, taught)) {
             let instance_idx =
-                picture.instances.iter().position(|instance| is_right(&overlay, instance, self.part, &self.turns));
-            if instance_idx.is_none() && picture.is_undecided(&overlay) {
+                picture.instances.iter().position(|instance| is_right(&placed, instance, self.part, &self.turns));
+            if instance_idx.is_none() && picture.is_undecided(&placed) {
                 continue;
             }
-            let Overlay { evidence, log_size, .. } = overlay;
+            let PlacedDemonstration { evidence, log_size, .. } = placed;
             poses.push(PoseObservation {
                 clues: Clues { evidence, log_size, network: None, resemblance },
                 instance_idx,
@@ -122,9 +122,14 @@ impl<'a> PreparedPart<'a> {
 }
 
 /// Whether a pose is that of an instance, turns that look the same not counted.
-pub(super) fn is_right(overlay: &Overlay<'_>, instance: &FitInstance, part: &FitPart, turns: &HiddenTurns) -> bool {
+pub(super) fn is_right(
+    placed: &PlacedDemonstration<'_>,
+    instance: &FitInstance,
+    part: &FitPart,
+    turns: &HiddenTurns,
+) -> bool {
     let truth = PlanarGrasp::from_line(&instance.grasp, 0.0);
-    let found = overlay.demonstration.grasp(&overlay.image_from_marks);
+    let found = placed.demonstration.grasp(&placed.image_from_marks);
     let found = turns.nearest(&found, truth.angle, 0, &instance.image_from_demonstration);
     let bbox = &part.demonstration.annotation.bbox;
     let diagonal = bbox.width().hypot(bbox.height()) * instance.image_from_demonstration.scale;
@@ -134,8 +139,8 @@ pub(super) fn is_right(overlay: &Overlay<'_>, instance: &FitInstance, part: &Fit
 
 impl FitPicture {
     /// Whether a pose lies on a part of which it is not decided whether it is the part.
-    pub(super) fn is_undecided(&self, overlay: &Overlay<'_>) -> bool {
-        let middle = overlay.outline().bounds().center();
+    pub(super) fn is_undecided(&self, placed: &PlacedDemonstration<'_>) -> bool {
+        let middle = placed.outline().bounds().center();
         self.undecided.iter().any(|bbox| bbox.contains(&middle))
     }
 }

@@ -35,7 +35,7 @@ fn part(idx: u8) -> FitPart {
 #[test]
 fn a_fit_reports_today_and_the_best_of_the_grid() {
     let (training, held_out) = ([part(0), part(1)], [part(2), part(3)]);
-    let names = ["search.shape.settling.restart_px", "search.shape.structure.visible_from"];
+    let names = ["search.shape.refinement.restart_px", "search.shape.structure.visible_from"];
     let options = FitOptions { seed: 1, only: names.map(str::to_owned).to_vec() };
     let mut heard = Vec::new();
     let report = fit(&training, &held_out, &options, &mut |event| match event {

@@ -38,7 +38,7 @@ use crate::taught::TaughtDemonstration;
 /// Chosen by hand, not measured.
 const MAX_CANDIDATES: usize = 16;
 /// Below this the network itself does not believe it. Detectron2's own threshold at test time.
-const LEAST_NETWORK_SCORE: f64 = 0.05;
+const MIN_NETWORK_SCORE: f64 = 0.05;
 
 /// A model's detector, and how it is read. Model S has none.
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ pub(crate) enum Reading {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
     /// Best first, those that cannot be read as a pose left out.
-    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) candidates: Vec<PoseCandidate>,
     /// Every box with its score, beyond the candidates, too.
     boxes: Vec<(BoundingBox, f64)>,
 }
@@ -79,7 +79,7 @@ impl Proposals {
 
 /// A detection with the model's reading of it, not yet verified.
 #[derive(Debug, Clone)]
-pub(crate) struct Candidate {
+pub(crate) struct PoseCandidate {
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
     /// Each with the network's score; empty where the model has none.
@@ -179,7 +179,7 @@ impl Network {
         let transformed = self.detector.image_transform().apply(image)?;
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
         let mut proposals = Proposals::default();
-        for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= LEAST_NETWORK_SCORE) {
+        for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= MIN_NETWORK_SCORE) {
             proposals.boxes.push((detections.boxes[i], detections.scores[i]));
             if i < MAX_CANDIDATES {
                 proposals.candidates.extend(self.read(image, &detections, i, demonstrations).await?);
@@ -194,7 +194,7 @@ impl Network {
         detections: &Detections,
         i: usize,
         demonstrations: &[TaughtDemonstration],
-    ) -> Result<Option<Candidate>> {
+    ) -> Result<Option<PoseCandidate>> {
         let bbox = &detections.boxes[i];
         let keypoints = keypoints::scored(detections, i);
         let placement = match &self.reading {
@@ -213,7 +213,15 @@ impl Network {
             };
             let network_score = detections.scores[i];
             let bbox = *bbox;
-            Some(Candidate { network_score, bbox, keypoints, grasp, demonstration_idx, image_from_cutout, turn_source })
+            Some(PoseCandidate {
+                network_score,
+                bbox,
+                keypoints,
+                grasp,
+                demonstration_idx,
+                image_from_cutout,
+                turn_source,
+            })
         }))
     }
 }

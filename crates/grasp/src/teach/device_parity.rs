@@ -82,7 +82,7 @@ fn every_stage_of_every_network_agrees() {
 /// Those on something. Where the part is not, nothing draws a pose to one place: it ends where its start leads, which the
 /// last bits decide.
 fn placed(detections: &[GraspDetection]) -> Vec<&GraspDetection> {
-    let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.least_agreement;
+    let is_placed = |agreement: f64| agreement >= CheckConfig::DEFAULT.search.min_agreement;
     detections.iter().filter(|detection| detection.agreement.is_none_or(is_placed)).collect()
 }
 
@@ -131,7 +131,7 @@ fn teaching_goes_the_same_way() {
             &small_plan(&options),
             &options,
             &mut |event| {
-                if let Event::Step { record, .. } = event {
+                if let TeachingEvent::Step { record, .. } = event {
                     losses.push(record.losses.total());
                 }
                 ControlFlow::Continue(())

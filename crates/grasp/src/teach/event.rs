@@ -4,7 +4,7 @@ use sdg_training::{StepRecord, ValidationRecord};
 
 /// What is told while a model is taught.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Event {
+pub enum TeachingEvent {
     /// A step of model A's orientation CNN, which is taught before the detector.
     OrientationStep {
         /// From zero.
@@ -29,13 +29,13 @@ pub enum Event {
     Validated(ValidationRecord),
 }
 
-impl From<sdg_training::Event> for Event {
-    fn from(event: sdg_training::Event) -> Self {
+impl From<sdg_training::TrainingEvent> for TeachingEvent {
+    fn from(event: sdg_training::TrainingEvent) -> Self {
         match event {
-            sdg_training::Event::Step { record, planned_steps, elapsed_secs } => {
+            sdg_training::TrainingEvent::Step { record, planned_steps, elapsed_secs } => {
                 Self::Step { record, planned_steps, elapsed_secs }
             }
-            sdg_training::Event::Validated(record) => Self::Validated(record),
+            sdg_training::TrainingEvent::Validated(record) => Self::Validated(record),
         }
     }
 }

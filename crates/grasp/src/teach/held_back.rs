@@ -11,7 +11,7 @@ use crate::facts::TurnSource;
 use crate::models::Network;
 use crate::sighting::{Sighting, best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::Scene;
+use crate::verification::SearchedImage;
 
 /// Samples that no network is trained on.
 pub(super) struct HeldBack<'a> {
@@ -72,9 +72,9 @@ impl HeldBack<'_> {
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
         for sample in self.samples {
             let proposals = network.proposals(&sample.image, demonstrations)?;
-            let sightings = sightings(&proposals, &Scene::new(&sample.image, demonstrations));
+            let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, demonstrations));
             let hit = |sighting: &Sighting| {
-                let grasp = sighting.overlay.demonstration.grasp(&sighting.overlay.image_from_marks);
+                let grasp = sighting.placed.demonstration.grasp(&sighting.placed.image_from_marks);
                 sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)
             };
             let highest = |right: bool, proposed: bool| {

@@ -14,12 +14,12 @@ mod device_parity;
 mod event;
 mod fine_tuning;
 mod held_back;
+pub(crate) mod negatives;
 mod orientation;
 mod other_parts;
 mod paper;
 mod plan;
 mod r50;
-pub(crate) mod strangers;
 pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -47,12 +47,12 @@ use crate::network_evidence::NetworkEvidence;
 use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
-pub use event::Event;
+pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
+use negatives::NegativeScenes;
 pub(crate) use plan::Plan;
 pub use plan::Preset;
-use strangers::Strangers;
 use symmetry::HiddenTurns;
 
 /// How to teach.
@@ -156,7 +156,7 @@ pub struct Taught {
 pub fn teach(
     demonstrations: &[Demonstration],
     options: &TeachOptions,
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+    observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
 ) -> Result<Taught> {
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
@@ -215,8 +215,8 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
 
 /// Scenes of other things that the agreement is calibrated on: for a network, and for model S, which is to be there in
 /// less than a second. Chosen by hand for time, not measured.
-const STRANGERS: u64 = 24;
-pub(crate) const STRANGERS_INSTANT: u64 = 8;
+const NUM_NEGATIVE_SCENES: u64 = 24;
+pub(crate) const NUM_NEGATIVE_SCENES_INSTANT: u64 = 8;
 
 /// The demonstrations as the model keeps them.
 fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<TaughtDemonstration>> {
@@ -231,7 +231,8 @@ fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Ve
 
 /// Model S: the demonstrations alone.
 fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
-    let resemblance = Strangers::new(demonstrations, options.seed, STRANGERS_INSTANT)?.observe(None)?.resemblance();
+    let resemblance =
+        NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES_INSTANT)?.observe(None)?.resemblance();
     let demonstrations = taught(demonstrations, options)?;
     let model = GraspModel {
         preset: options.preset.name().to_owned(),
@@ -262,7 +263,7 @@ pub(crate) fn teach_network(
     demonstrations: &[Demonstration],
     plan: &Plan,
     options: &TeachOptions,
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+    observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
     start: Instant,
 ) -> Result<Taught> {
     let plan = options.steps.map_or_else(|| plan.clone(), |steps| plan.clone().with_steps(steps));
@@ -315,7 +316,7 @@ pub(crate) fn teach_network(
             let network = Network { detector: detector.clone(), reading: reading.clone() };
             held_back.examine(&network, &taught).map_err(|error| TrainingError::Examination(error.into()))
         },
-        &mut |event| observe(&Event::from(*event)),
+        &mut |event| observe(&TeachingEvent::from(*event)),
     )?;
     let own = own_config(options.kind, &plan.network).init(&options.device, options.seed)?;
     let detector = state_dict::import(own, &state_dict::export(&detector)).0;
@@ -327,11 +328,11 @@ pub(crate) fn teach_network(
     let other_parts = other_parts::highest_scores(demonstrations, &to_hold_back, &network, options.seed)?;
     let calibrated = held_back.calibrate(&network, &of_any_size, &other_parts)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
-    if (hits as f64) < plan.least_hit_rate * positives as f64 {
+    if (hits as f64) < plan.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
-    let strangers = Strangers::new(demonstrations, options.seed, STRANGERS)?;
-    let others = strangers.observe(Some(&network))?;
+    let negatives = NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES)?;
+    let others = negatives.observe(Some(&network))?;
     let elsewhere: Vec<f64> = calibrated.elsewhere.iter().copied().chain(others.network_scores()).collect();
     let evidence = NetworkEvidence::new(&calibrated.on_part, &elsewhere, &calibrated.network);
     let facts = TeachingFacts {

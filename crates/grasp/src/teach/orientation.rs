@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 
 use sdg_demonstration::Demonstration;
 use sdg_orientation::OrientationCnn;
-use sdg_orientation::training::{self, Event as CnnEvent};
+use sdg_orientation::training::{self, OrientationEvent};
 use sdg_training::Ending;
 
 use super::TeachOptions;
-use super::event::Event;
+use super::event::TeachingEvent;
 use super::plan::OrientationPlan;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
@@ -22,14 +22,14 @@ pub(super) fn teach(
     demonstrations: &[Demonstration],
     plan: &OrientationPlan,
     options: &TeachOptions,
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
+    observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
 ) -> Result<(OrientationCnn, OrientationFacts)> {
     let mut training = plan.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
     let taught =
         training::teach(demonstrations, &plan.network, &training, &options.device, &mut |event| match *event {
-            CnnEvent::Step { step, planned_steps, loss, elapsed_secs } => {
-                observe(&Event::OrientationStep { step, planned_steps, loss, elapsed_secs })
+            OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {
+                observe(&TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs })
             }
             _ => ControlFlow::Continue(()),
         })?;

@@ -17,7 +17,7 @@ use crate::facts::ModelKind;
 
 /// As often as an orientation CNN may fold the circle: what is left of it, 5°, is no turn to speak of. Chosen by that
 /// reasoning.
-const MOST_FOLD: usize = 72;
+const MAX_FOLD: usize = 72;
 
 /// The `edge` network as it is taught: with a keypoint head, which models without keypoints leave out afterwards.
 ///
@@ -29,7 +29,7 @@ fn with_keypoints(mut network: RcnnConfig) -> RcnnConfig {
 }
 
 /// A network that leads the demonstration to fewer parts is of no use. Chosen by hand, not measured.
-const LEAST_HIT_RATE: f64 = 0.5;
+const MIN_HIT_RATE: f64 = 0.5;
 
 /// A network, its training and its augmentation under one name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -104,11 +104,11 @@ impl Preset {
             Self::Paper => (OrientationConfig::paper(), OrientationTraining::paper(seed)),
         };
         let fold = match symmetry {
-            RotationalSymmetry::Fold(count) => (count as usize).min(MOST_FOLD),
+            RotationalSymmetry::Fold(count) => (count as usize).min(MAX_FOLD),
             RotationalSymmetry::Full => {
                 // Every answer is right: there is nothing to learn.
                 training.steps = 1;
-                MOST_FOLD
+                MAX_FOLD
             }
             _ => 1,
         };
@@ -129,7 +129,7 @@ impl Preset {
                 // At the photo's own size, so that verification is calibrated on what it will see.
                 _ => AugmentationConfig::default(),
             },
-            least_hit_rate: LEAST_HIT_RATE,
+            min_hit_rate: MIN_HIT_RATE,
             orientation: (kind == ModelKind::A).then(|| self.orientation(symmetry, seed)),
             num_other_parts: 0,
         };
@@ -162,7 +162,7 @@ pub(crate) struct Plan {
     /// What it is validated and calibrated on.
     pub(crate) held_back: AugmentationConfig,
     /// Least share of parts that a network must lead the demonstration to, so that it is kept.
-    pub(crate) least_hit_rate: f64,
+    pub(crate) min_hit_rate: f64,
     /// Model A's other network.
     pub(crate) orientation: Option<OrientationPlan>,
     /// Generated parts that lie about while the part is taught, beside it and in its place.

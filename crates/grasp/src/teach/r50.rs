@@ -12,21 +12,21 @@ pub(super) const SHORT_SIDE_PX: u32 = 480;
 /// demonstration's show one: fewer regions go through the heads, of which the keypoint head takes 7 GFLOP for each. The
 /// numbers were chosen by hand for time; what they cost was not measured.
 pub(super) fn on_two_cores(mut config: RcnnConfig) -> RcnnConfig {
-    const MOST_PROPOSALS: usize = 100;
-    const MOST_DETECTIONS: usize = 5;
+    const MAX_PROPOSALS: usize = 100;
+    const MAX_DETECTIONS: usize = 5;
     const ROIS_PER_IMAGE: usize = 128;
-    const MOST_KEYPOINT_OR_MASK_ROIS: usize = 2;
+    const MAX_KEYPOINT_OR_MASK_ROIS: usize = 2;
     if let ResizeRule::ShortSide { short_px, .. } = &mut config.input.resize {
         *short_px = SHORT_SIDE_PX;
     }
-    config.rpn.post_nms_top_n.test = MOST_PROPOSALS;
+    config.rpn.post_nms_top_n.test = MAX_PROPOSALS;
     config.roi_heads.sampler.batch_size_per_image = ROIS_PER_IMAGE;
-    config.roi_heads.box_head.detections_per_image = MOST_DETECTIONS;
+    config.roi_heads.box_head.detections_per_image = MAX_DETECTIONS;
     if let Some(head) = &mut config.roi_heads.keypoint_head {
-        head.max_train_rois_per_image = Some(MOST_KEYPOINT_OR_MASK_ROIS);
+        head.max_train_rois_per_image = Some(MAX_KEYPOINT_OR_MASK_ROIS);
     }
     if let Some(head) = &mut config.roi_heads.mask_head {
-        head.max_train_rois_per_image = Some(MOST_KEYPOINT_OR_MASK_ROIS);
+        head.max_train_rois_per_image = Some(MAX_KEYPOINT_OR_MASK_ROIS);
     }
     config
 }

@@ -79,14 +79,14 @@ mod tests {
     #[test]
     fn samples_are_turned_by_no_more_than_can_be_seen() {
         let augmenter = Augmenter::new(&[square()], AugmentationConfig::default(), 3).unwrap();
-        for (symmetry, most_degrees) in
+        for (symmetry, max_degrees) in
             [(RotationalSymmetry::Fold(4), 45.0), (RotationalSymmetry::Full, 1e-9), (RotationalSymmetry::None, 180.0)]
         {
             let turns = HiddenTurns::new(&[square()], symmetry);
             for i in 0..20 {
                 for object in turns.canonical(augmenter.sample(i)).objects {
                     let pose = object.image_from_demonstration;
-                    assert!(pose.angle.degrees().abs() <= most_degrees + 1e-9, "{symmetry:?} {pose:?}");
+                    assert!(pose.angle.degrees().abs() <= max_degrees + 1e-9, "{symmetry:?} {pose:?}");
                     // The keypoints went with it; the warp tilts a little.
                     let truth = pose.apply(&square().annotation.grasp.unwrap().start);
                     assert!((object.keypoints[0].point() - truth).norm() < 12.0, "{symmetry:?} {:?}", object.keypoints);

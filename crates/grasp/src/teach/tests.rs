@@ -60,7 +60,7 @@ fn whole_plan(options: &TeachOptions) -> Plan {
 pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
     shrink(&mut plan.network);
-    plan.least_hit_rate = 0.0;
+    plan.min_hit_rate = 0.0;
     plan.samples = plan.samples.with_output_size(96, 72);
     plan.training.steps = STEPS;
     plan.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
@@ -155,7 +155,7 @@ fn one_network_serves_the_models_that_are_taught_alike() {
 #[test]
 fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
-    let taught = teach(&[demonstration()], &options, &mut |_: &Event| panic!("nothing is trained")).unwrap();
+    let taught = teach(&[demonstration()], &options, &mut |_: &TeachingEvent| panic!("nothing is trained")).unwrap();
     // How long it takes depends on the machine: `sdg evaluate` measures that.
     assert!(taught.history.is_none() && taught.model.facts().steps == 0);
     let model = &taught.model;
@@ -220,7 +220,7 @@ fn an_interrupt_before_there_is_a_network_leaves_nothing() {
     for (kind, reason) in [(ModelKind::A, "orientation CNN"), (ModelKind::D, "no model to keep")] {
         let options = TeachOptions { kind, ..TeachOptions::new(1) };
         let plan = small_plan(&options);
-        let stop = &mut |_: &Event| ControlFlow::Break(());
+        let stop = &mut |_: &TeachingEvent| ControlFlow::Break(());
         let refused = teach_network(&[demonstration()], &plan, &options, stop, Instant::now()).unwrap_err();
         assert!(refused.to_string().contains(reason), "{refused}");
     }

@@ -13,7 +13,7 @@ use super::follow::{Effort, Followed, SizedPart};
 use crate::facts::TurnSource;
 use crate::model::Placement;
 use crate::sighting::Sighting;
-use crate::verification::Overlay;
+use crate::verification::PlacedDemonstration;
 
 /// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
 /// motion.
@@ -89,7 +89,7 @@ pub(super) struct Track {
     /// `None` before the first frame.
     steady_agreement: Option<f64>,
     likeness: Option<Likeness>,
-    /// Where the marks lie against the outline, as the last search settled them.
+    /// Where the marks lie against the outline, as the last search refined them.
     cutout_from_marks: PlanarSimilarity,
     network_score: f64,
     keypoint_scores: Vec<f64>,
@@ -217,7 +217,7 @@ impl Track {
         time: Duration,
         followed: &Followed,
     ) -> Option<f64> {
-        let min_agreement = self.part.demonstration(detector).check().search.least_agreement;
+        let min_agreement = self.part.demonstration(detector).check().search.min_agreement;
         if followed.agreement < min_agreement {
             return None;
         }
@@ -238,7 +238,7 @@ impl Track {
     }
 
     /// How the track is refined in a frame from the last one.
-    pub(super) fn usual_effort(&self, number: u64) -> Effort {
+    pub(super) fn default_effort(&self, number: u64) -> Effort {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
@@ -254,7 +254,7 @@ impl Track {
         followed: &Followed,
         likeness: Option<f64>,
     ) -> Sighting<'a> {
-        let overlay = Overlay {
+        let placed = PlacedDemonstration {
             demonstration: self.part.demonstration(detector),
             demonstration_idx: self.part.demonstration_idx,
             image_from_cutout: followed.image_from_cutout,
@@ -265,7 +265,7 @@ impl Track {
             light: followed.light,
         };
         Sighting {
-            overlay,
+            placed,
             network_score: self.network_score,
             keypoint_scores: self.keypoint_scores.clone(),
             turn_source: self.turn_source,

@@ -210,7 +210,7 @@ impl Tracker {
             .map(|track| {
                 let effort = match track.standing {
                     Standing::Lost(since) if captured.saturating_sub(since) > retry_for => return None,
-                    Standing::Followed | Standing::Lost(_) => track.usual_effort(number),
+                    Standing::Followed | Standing::Lost(_) => track.default_effort(number),
                     Standing::Arriving { .. } => Effort::Captured,
                 };
                 let followed = track.refine(detector, picture, captured, effort)?;

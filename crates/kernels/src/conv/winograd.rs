@@ -72,7 +72,7 @@ pub(super) fn pack(isa: Isa, weight: &[f32], shape: &ConvShape, direction: Direc
         // SAFETY: a unit writes its own panel of every frequency, inside `packed`.
         unsafe {
             let target = raw.at(panel * PANEL * channels);
-            filter_transform::filters(isa, &gathered, channels, width, flipped, target, frequency_len);
+            filter_transform::filter_transform(isa, &gathered, channels, width, flipped, target, frequency_len);
         }
     });
     packed
@@ -129,21 +129,21 @@ impl Winograd<'_> {
     /// Nothing else touches these tiles of the output.
     unsafe fn tiles(&self, first: usize, count: usize, shared_out: bool) {
         let (channels, columns) = (self.source.channels, self.filters.columns);
-        let mut seen = Frequencies::new(count, channels);
+        let mut transformed_input = Frequencies::new(count, channels);
         let mut products = Frequencies::new(count, columns);
-        let (seen_step, products_step) = (seen.step, products.step);
+        let (input_step, products_step) = (transformed_input.step, products.step);
         // Parts of the tiles that are transformed apart.
         let part = if shared_out { count.div_ceil(MIN_UNITS) } else { count };
         let parts = count.div_ceil(part);
 
-        let raw = SharedSlice::new(&mut seen.values).raw();
+        let raw = SharedSlice::new(&mut transformed_input.values).raw();
         for_each_unit_if(shared_out, parts, |unit| {
             let range = unit * part..count.min((unit + 1) * part);
             // SAFETY: a unit has its own tiles.
             unsafe {
                 let target = raw.at(range.start * channels);
                 let tiles = first + range.start..first + range.end;
-                transform::see(self.isa, self.source, self.padding, self.tiling, tiles, target, seen_step);
+                transform::input_transform(self.isa, self.source, self.padding, self.tiling, tiles, target, input_step);
             }
         });
 
@@ -153,10 +153,10 @@ impl Winograd<'_> {
             for panel in 0..panels {
                 let (right, width) = self.filters.panel(frequency, panel);
                 let first_column = panel * PANEL;
-                let (next_panel, next_seen) = if panel + 1 < panels {
+                let (next_panel, next_input) = if panel + 1 < panels {
                     (self.filters.panel(frequency, panel + 1).0, &[][..])
                 } else if frequency + 1 < FREQUENCIES {
-                    let next = &seen.values[(frequency + 1) * seen_step..][..count * channels];
+                    let next = &transformed_input.values[(frequency + 1) * input_step..][..count * channels];
                     (self.filters.panel(frequency + 1, 0).0, next)
                 } else {
                     (&[][..], &[][..])
@@ -165,14 +165,19 @@ impl Winograd<'_> {
                     rows: count,
                     columns: PANEL.min(columns - first_column),
                     depth: [1, channels],
-                    left: Operand { values: &seen.values[frequency * seen_step..], step: channels, inner: 1, outer: 0 },
+                    left: Operand {
+                        values: &transformed_input.values[frequency * input_step..],
+                        step: channels,
+                        inner: 1,
+                        outer: 0,
+                    },
                     right: Operand { values: right, step: 1, inner: width, outer: 0 },
                     at: frequency * products_step + first_column,
                     row_step: columns,
                     first_column,
                     epilogue: Epilogue::default(),
                     accumulate: false,
-                    ahead: Ahead { runs: [next_panel, next_seen] },
+                    ahead: Ahead { runs: [next_panel, next_input] },
                 };
                 // SAFETY: a unit has its own frequency.
                 unsafe { product.run(self.isa, raw) };
@@ -192,7 +197,7 @@ impl Winograd<'_> {
             };
             let mut finite = true;
             // SAFETY: a unit has its own tiles of the output.
-            unsafe { transform::show(self.isa, values, products_step, &place, tiles, &mut finite) };
+            unsafe { transform::output_transform(self.isa, values, products_step, &place, tiles, &mut finite) };
             if !finite {
                 self.finite.store(false, Ordering::Relaxed);
             }

@@ -149,7 +149,7 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
         assert_rests_at_both_ends(&trajectory);
         assert!(pose_error(&panda.forward(trajectory.end()), &end).norm() < 1e-8);
 
-        let mut most_used: f64 = 0.0;
+        let mut max_used: f64 = 0.0;
         for i in 0..=400 {
             let time = trajectory.duration_secs() * i as f64 / 400.0;
             let (q, qd, qdd) = trajectory.sample(time);
@@ -157,13 +157,13 @@ fn straight_paths_keep_joint_and_cartesian_limits() {
             let speed = twist.fixed_rows::<3>(0).norm();
             let angular_speed = twist.fixed_rows::<3>(3).norm();
             assert!(speed <= cartesian.velocity_m_s && angular_speed <= cartesian.angular_velocity_rad_s);
-            most_used = most_used
+            max_used = max_used
                 .max(share(&qd, &limits.velocity_max))
                 .max(share(&qdd, &limits.acceleration_max))
                 .max(speed / cartesian.velocity_m_s)
                 .max(angular_speed / cartesian.angular_velocity_rad_s);
         }
-        shortest_share = shortest_share.min(most_used);
+        shortest_share = shortest_share.min(max_used);
     }
     // Some limit binds, or the motion would be slower than it need be (jerk, which can bind alone, is not counted here).
     assert!(shortest_share > 0.7, "{shortest_share}");
@@ -182,13 +182,13 @@ fn a_low_jerk_limit_binds_and_holds_on_a_curved_path() {
     const NUM: usize = 4000;
     assert_within_limits(&trajectory, &limits, NUM);
     let step = trajectory.duration_secs() / NUM as f64;
-    let most_jerk = (1..=NUM)
+    let max_jerk = (1..=NUM)
         .map(|i| {
             let [before, after] = [i - 1, i].map(|i| trajectory.sample(step * i as f64).2);
             share(&((after - before) / step), &limits.jerk_max)
         })
         .fold(0.0, f64::max);
-    assert!(most_jerk > 0.9, "{most_jerk}");
+    assert!(max_jerk > 0.9, "{max_jerk}");
 }
 
 #[test]

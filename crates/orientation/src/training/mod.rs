@@ -37,4 +37,4 @@ pub use augmented::{AugmentedCrops, LabelledCrop};
 pub use config::{CropStyle, EarlyStop, OrientationTraining};
 pub use jitter::BoxJitter;
 pub use measured::{AngleErrors, HIT_DEGREES};
-pub use trainer::{Event, Taught, teach, train};
+pub use trainer::{OrientationEvent, TrainedOrientation, teach, train};

@@ -25,7 +25,7 @@ const READY: usize = 2;
 /// What happens during a run.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Event {
+pub enum OrientationEvent {
     /// A step was made.
     Step {
         /// From zero.
@@ -50,7 +50,7 @@ pub enum Event {
 
 /// A taught network, without gradients, and the run that made it.
 #[derive(Debug, Clone)]
-pub struct Taught {
+pub struct TrainedOrientation {
     /// The network after the last step.
     pub network: OrientationCnn,
     /// How far it is off on held-back crops.
@@ -75,8 +75,8 @@ pub fn teach(
     network: &OrientationConfig,
     training: &OrientationTraining,
     device: &Device,
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
-) -> Result<Taught> {
+    observe: &mut dyn FnMut(&OrientationEvent) -> ControlFlow<()>,
+) -> Result<TrainedOrientation> {
     training.validate()?;
     let untaught = network.init(&device.clone().autodiff(), training.seed)?;
     let crops = AugmentedCrops::new(demonstrations, &training.crops, network.input_px, training.seed)?;
@@ -93,8 +93,8 @@ pub fn train(
     training: &OrientationTraining,
     scene: &(dyn Fn(u64) -> Vec<LabelledCrop> + Sync),
     held_out: &[LabelledCrop],
-    observe: &mut dyn FnMut(&Event) -> ControlFlow<()>,
-) -> Result<Taught> {
+    observe: &mut dyn FnMut(&OrientationEvent) -> ControlFlow<()>,
+) -> Result<TrainedOrientation> {
     training.validate()?;
     let start = Instant::now();
     let mut optimizer = AdamWConfig::new()
@@ -118,7 +118,7 @@ pub fn train(
             }
             let gradients = GradientsParams::from_grads(loss.backward(), &network);
             network = optimizer.step(learning_rate, network, gradients);
-            let event = Event::Step { step, planned_steps: pace.planned_steps(), loss: value, elapsed_secs };
+            let event = OrientationEvent::Step { step, planned_steps: pace.planned_steps(), loss: value, elapsed_secs };
             step += 1;
             if observe(&event).is_break() {
                 break Ending::Interrupted;
@@ -132,7 +132,7 @@ pub fn train(
             if early_stop.is_reached(&errors) {
                 pace.start_cool_down(step, elapsed_secs, early_stop.cool_down);
             }
-            if observe(&Event::Validated { steps_done: step, errors, elapsed_secs }).is_break() {
+            if observe(&OrientationEvent::Validated { steps_done: step, errors, elapsed_secs }).is_break() {
                 break Ending::Interrupted;
             }
         };
@@ -140,8 +140,8 @@ pub fn train(
         let errors = AngleErrors::measure(&network, held_out)?;
         let elapsed_secs = start.elapsed().as_secs_f64();
         // The run is over: there is nothing left to interrupt.
-        let _ = observe(&Event::Validated { steps_done: step, errors: errors.clone(), elapsed_secs });
-        Ok(Taught { network, errors, steps: step, ending, elapsed_secs })
+        let _ = observe(&OrientationEvent::Validated { steps_done: step, errors: errors.clone(), elapsed_secs });
+        Ok(TrainedOrientation { network, errors, steps: step, ending, elapsed_secs })
     })
 }
 

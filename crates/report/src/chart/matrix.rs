@@ -13,7 +13,7 @@ const LETTER_WIDTH: f64 = 6.4;
 /// Sine and cosine of the turn of headings that do not fit over their columns.
 const SLANT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Shade of a cell that holds a single count of many: still to be seen.
-const LEAST_SHADE: f64 = 0.16;
+const MIN_SHADE: f64 = 0.16;
 
 /// Counts in rows and columns, drawn as shaded cells: the confusion of what should be with what came of it.
 ///
@@ -117,7 +117,7 @@ impl Matrix {
             (_, None) => "plain",
         };
         let share = count as f64 / total.max(1) as f64;
-        let shade = if count == 0 { 1.0 } else { LEAST_SHADE + (1.0 - LEAST_SHADE) * share };
+        let shade = if count == 0 { 1.0 } else { MIN_SHADE + (1.0 - MIN_SHADE) * share };
         // Past the middle of the scale, the number stands on a dark ground (on a light one in the dark theme).
         let ink = if count > 0 && shade > 0.55 { " on" } else { "" };
         format!(

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! CheckedMotion ─ Playback ─ one joint position a millisecond ─► robot's joint impedance
-//!                    ▲ Watch sees every state, and may bring the motion to rest on its path
+//!                    ▲ Watch sees every state, and may stop the motion on its path
 //! ```
 //! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
 

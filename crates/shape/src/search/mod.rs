@@ -22,7 +22,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use crate::comparison::{Agreement, Comparison, Evidence, MIN_POLISHED};
+use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
@@ -45,7 +45,7 @@ pub struct SearchConfig {
     /// known, is faster and mistakes less. The default was chosen by hand.
     pub scales: RangeInclusive<f64>,
     /// Matches that agree less are not reported, in `[0, 1]`. The default was chosen by hand.
-    pub least_agreement: f64,
+    pub min_agreement: f64,
     /// Most matches reported. The default was chosen by hand.
     pub max_matches: usize,
     /// Edge points compared at every pose of the sweep over the image, 8 to 1024. The sweep's time is proportional to
@@ -70,7 +70,7 @@ impl Default for SearchConfig {
     fn default() -> Self {
         Self {
             scales: 0.75..=1.3,
-            least_agreement: 0.5,
+            min_agreement: 0.5,
             max_matches: 16,
             num_points: Self::DEFAULT_NUM_POINTS,
             max_starts: Self::DEFAULT_MAX_STARTS,
@@ -109,7 +109,7 @@ const SWEEP_EXTENT: f64 = 50.0;
 /// Edge points read at that level, from which every pose samples. Chosen by hand, not measured.
 const SWEEP_POINTS: usize = 128;
 /// With fewer edge points than this at a level, the next finer one is swept. Chosen by hand, not measured.
-const LEAST_SWEEP_POINTS: usize = 32;
+const MIN_SWEEP_POINTS: usize = 32;
 /// Bounds of [`SearchConfig::num_points`]: fewer points tell no pose from another, and the responses of 1024 points add up
 /// within the sweep's 16 bits. The upper bound is derived, the lower one chosen by hand.
 const NUM_POINTS_BOUNDS: (usize, usize) = (8, 1024);
@@ -129,7 +129,7 @@ const WORTH_MORE: f64 = 0.4;
 const SAME_SIZE: f64 = 0.2;
 const SAME_RESPONSE: f64 = 0.85;
 /// A start that responds less is not worth a climb. Chosen by hand, not measured.
-const LEAST_RESPONSE: f64 = 0.2;
+const MIN_RESPONSE: f64 = 0.2;
 /// How far a climb may go from its start: in places, and in steps of angle and scale. A little more than to the
 /// next start. Chosen by that reasoning, not measured.
 const FOLLOW_PLACES: f64 = 2.5;
@@ -198,11 +198,11 @@ impl InstantSearch {
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
-        let starts = sweep(&responses, &self.bank, self.config.max_starts, LEAST_RESPONSE);
+        let starts = sweep(&responses, &self.bank, self.config.max_starts, MIN_RESPONSE);
         let best = self.apart(self.follow_best(image, field, starts));
         let polished = self.polish(image, field, best);
         let mut matches = self.apart(polished);
-        matches.retain(|found| found.agreement >= self.config.least_agreement);
+        matches.retain(|found| found.agreement >= self.config.min_agreement);
         matches.truncate(self.config.max_matches);
         let comparison = self.comparison(image, field);
         parallel::map(&matches, |found| Match {
@@ -279,15 +279,15 @@ impl InstantSearch {
     /// The demonstration over an image, whose gradients are `field`.
     pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
         let Self { template, surface, structure, likeness, .. } = self;
-        let min_agreement = self.config.least_agreement;
+        let min_agreement = self.config.min_agreement;
         Comparison { template, surface, structure, likeness, min_agreement, image, field }
     }
 
     /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
     fn polish(&self, image: &RgbImage, field: &GradientField, found: Vec<Found>) -> Vec<Found> {
-        let sure = self.config.shape.settling.sure_agreement;
+        let sure = self.config.shape.refinement.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
-            found.into_iter().partition(|found| (MIN_POLISHED..sure).contains(&found.agreement));
+            found.into_iter().partition(|found| (MIN_REFINED..sure).contains(&found.agreement));
         let count =
             poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_NUM_POLISHED, MAX_NUM_POLISHED);
         let (first, rest) = poor.split_at(count.min(poor.len()));
@@ -298,10 +298,11 @@ impl InstantSearch {
 
     fn polished(&self, image: &RgbImage, field: &GradientField, found: &Found) -> Found {
         let comparison = self.comparison(image, field);
-        let settled = comparison.settled(&found.pose, comparison.refined_by_edges(&found.pose), &self.config.scales);
-        let settled = self.found(image, field, settled);
-        let is_in_range = self.config.scales.contains(&settled.pose.scale);
-        if is_in_range && settled.agreement > found.agreement { settled } else { *found }
+        let refined =
+            comparison.refine_pose(&found.pose, comparison.refined_by_edges(&found.pose), &self.config.scales);
+        let refined = self.found(image, field, refined);
+        let is_in_range = self.config.scales.contains(&refined.pose.scale);
+        if is_in_range && refined.agreement > found.agreement { refined } else { *found }
     }
 
     /// The best first; of those that claim the same area, the best alone.
@@ -384,7 +385,7 @@ fn sweep_points(
     };
     let points_at = |idx: usize| select_edge_points(field.level(idx), (1u32 << idx) as f64, &selection);
     let (mut idx, mut points) = (coarsest, points_at(coarsest));
-    while idx > 0 && points.len() < LEAST_SWEEP_POINTS {
+    while idx > 0 && points.len() < MIN_SWEEP_POINTS {
         idx -= 1;
         points = points_at(idx);
     }
@@ -400,7 +401,7 @@ fn check_config(config: &SearchConfig) -> Result<(), ShapeError> {
     let checks = [
         ("scales", "from 0.5 on", least, within(least)),
         ("scales", "up to 2, and no less than they begin with", largest, within(largest) && largest >= least),
-        ("least_agreement", "in [0, 1]", config.least_agreement, (0.0..=1.0).contains(&config.least_agreement)),
+        ("min_agreement", "in [0, 1]", config.min_agreement, (0.0..=1.0).contains(&config.min_agreement)),
         (
             "num_points",
             "from 8 to 1024",

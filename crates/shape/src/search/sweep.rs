@@ -34,8 +34,8 @@ pub(crate) struct Start {
     pub(crate) response: f64,
 }
 
-/// The `count` best local maxima, none below `least_response`: first the best of each scale, then the second of each.
-pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_response: f64) -> Vec<Start> {
+/// The `count` best local maxima, none below `min_response`: first the best of each scale, then the second of each.
+pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, min_response: f64) -> Vec<Start> {
     let (width, height) = (responses.width, responses.height);
     if width == 0 || height == 0 || bank.num_points == 0 {
         return Vec::new();
@@ -51,7 +51,7 @@ pub(crate) fn sweep(responses: &Responses, bank: &Bank, count: usize, least_resp
     });
 
     let full = f64::from(FULL) * bank.num_points as f64;
-    let least = (least_response * full).ceil() as i16;
+    let least = (min_response * full).ceil() as i16;
     let of_groups: Vec<usize> = (0..groups.count).collect();
     let mut starts = parallel::map(&of_groups, |&group| {
         let field = PeakField::new(responses, |offset| swept[offset / STRETCH].sums[group][offset % STRETCH]);

@@ -187,7 +187,7 @@ impl TriangleMesh {
             }
             face_normals.push(normal);
         }
-        let least_cosine = CREASE_DEG.to_radians().cos();
+        let min_cosine = CREASE_DEG.to_radians().cos();
         self.faces
             .iter()
             .zip(face_normals)
@@ -195,7 +195,7 @@ impl TriangleMesh {
                 self.corners(face).map(|corner| {
                     let sum: Vector3<f64> = around[&key(corner)]
                         .iter()
-                        .filter(|(normal, _)| normal.dot(&own) >= least_cosine)
+                        .filter(|(normal, _)| normal.dot(&own) >= min_cosine)
                         .map(|(normal, angle)| normal * *angle)
                         .sum();
                     sum.try_normalize(0.0).unwrap_or(own)

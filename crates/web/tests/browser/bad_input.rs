@@ -32,14 +32,14 @@ fn wrong_files_are_told_apart() {
     assert!(text(&bytes).contains(r#""format_version":"9""#));
     std::fs::write(&newer, &bytes).unwrap();
     choose(&browser, "#model-file", &[newer]);
-    let said = complaint(&browser);
-    assert!(said.contains("newer.sdg: expected a grasp model of format version 2, found version 9"), "{said}");
+    let text = complaint(&browser);
+    assert!(text.contains("newer.sdg: expected a grasp model of format version 2, found version 9"), "{text}");
 
     choose(&browser, "#model-file", &[demonstration()]);
     let wait = "return document.getElementById('alert').textContent.startsWith('image.png')";
     browser.wait_for("the next complaint", wait).unwrap();
-    let said = complaint(&browser);
-    assert_eq!(said, "image.png: expected a grasp model file of this project, found a PNG image");
+    let text = complaint(&browser);
+    assert_eq!(text, "image.png: expected a grasp model file of this project, found a PNG image");
 
     open_model(&browser, &model);
     let enormous = made.path("enormous.png");
@@ -52,12 +52,12 @@ fn wrong_files_are_told_apart() {
     choose(&browser, "#image-files", &pictures);
     let done = "const texts = [...document.querySelectorAll('#pictures small')].map((small) => small.textContent);
         return texts.length === 4 && texts[3] === 'One grasp' ? texts : false";
-    let said = browser.wait_for("the last picture to be looked at", done).unwrap();
+    let text = browser.wait_for("the last picture to be looked at", done).unwrap();
     for (idx, part) in [(0, "10000"), (1, "PNG"), (2, "an empty file")] {
-        assert!(said[idx].as_str().unwrap().contains(part), "{said}");
+        assert!(text[idx].as_str().unwrap().contains(part), "{text}");
     }
     let stage = browser.run("return document.getElementById('empty').textContent", &[]).unwrap();
-    assert_eq!(stage, said[0], "the stage shows what is wrong with the chosen picture");
+    assert_eq!(stage, text[0], "the stage shows what is wrong with the chosen picture");
     assert_quiet(&browser);
 }
 
@@ -67,8 +67,8 @@ fn a_browser_without_vectors_is_told_so() {
     let site = site();
     // V8 offers WebAssembly's vectors on processors with SSE 4.1 only.
     let browser = open_page(&site, &["--js-flags=--no-enable-sse4-1"]);
-    let said = complaint(&browser);
-    assert!(said.contains("not its SIMD instructions"), "{said}");
+    let text = complaint(&browser);
+    assert!(text.contains("not its SIMD instructions"), "{text}");
     let enabled = browser.run("return document.querySelectorAll('input:enabled, button:enabled').length", &[]).unwrap();
     assert_eq!(enabled, 0);
     browser.screenshot(&screenshots().join("web-no-simd.png")).unwrap();

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
 use sdg_grasp::{GraspError, Verification};
-use sdg_report::Attempt;
+use sdg_report::AttemptSummary;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
@@ -54,7 +54,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
 }
 
 /// A line for each attempt; breaks when Ctrl-C was pressed.
-pub fn show_attempt(attempt: &Attempt, of: u32, interrupt: &Interrupt) -> ControlFlow<()> {
+pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) -> ControlFlow<()> {
     let error = attempt
         .detection_error
         .map(|e| format!(", detected {:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg))

@@ -172,16 +172,16 @@ impl AxesEvaluation<'_> {
         progress: &EvaluationProgress,
     ) -> Result<ControlFlow<()>> {
         let started = Instant::now();
-        let said = match unit {
+        let summary = match unit {
             Unit::Teach(cell, marks) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
                 teaching.teach(cell, marks, is_interrupted)?
             }
-            Unit::Pictures(object, axis) => self.show(object, axis, is_interrupted)?,
+            Unit::Pictures(object, axis) => self.detect_in_pictures(object, axis, is_interrupted)?,
             Unit::Grasps(cell, object, condition) => self.grasp(cell, object, condition, is_interrupted)?,
         };
-        let Some(said) = said else { return Ok(ControlFlow::Break(())) };
-        progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+        let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
+        progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
         Ok(ControlFlow::Continue(()))
     }
 
@@ -197,7 +197,7 @@ impl AxesEvaluation<'_> {
     }
 
     /// Shows every model that has not seen them a part's pictures of an axis.
-    fn show(
+    fn detect_in_pictures(
         &self,
         object: &ObjectSpec,
         axis: Axis,
@@ -229,7 +229,7 @@ impl AxesEvaluation<'_> {
                 record.seconds += started.elapsed().as_secs_f64() + drawing_secs / num_shown;
             }
         }
-        let mut said = Vec::new();
+        let mut summary = Vec::new();
         for (cell, _, record) in shown {
             self.store.write_made_with(&axis_file(cell, axis), &self.axis_settings(), &record)?;
             let found: usize = record
@@ -238,9 +238,9 @@ impl AxesEvaluation<'_> {
                 .map(|picture| (0..picture.visible.len()).filter(|&i| picture.verified.has_found(i)).count())
                 .sum();
             let wrong: usize = record.pictures.iter().map(|picture| picture.verified.num_wrong()).sum();
-            said.push(format!("{} found {found}, {wrong} wrong", cell.model));
+            summary.push(format!("{} found {found}, {wrong} wrong", cell.model));
         }
-        Ok(Some(said.join("; ")))
+        Ok(Some(summary.join("; ")))
     }
 
     /// Goes on with a cell's attempts under an error.

@@ -72,9 +72,9 @@ impl CamerasEvaluation<'_> {
                 return Ok(ControlFlow::Break(()));
             }
             let started = Instant::now();
-            let said = caught(|| self.work(*unit, is_interrupted))?;
-            let Some(said) = said else { return Ok(ControlFlow::Break(())) };
-            progress.unit_done(&format!("{unit}: {said} ({:.0} s)", started.elapsed().as_secs_f64()));
+            let summary = caught(|| self.work(*unit, is_interrupted))?;
+            let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
+            progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
             Ok(ControlFlow::Continue(()))
         };
         run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)
@@ -131,11 +131,11 @@ impl CamerasEvaluation<'_> {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
                 teaching.teach(cell, Marks::InPlanView, is_interrupted)
             }
-            Unit::Pictures(cell, object, set) => self.show(cell, object, set, is_interrupted),
+            Unit::Pictures(cell, object, set) => self.detect_in_pictures(cell, object, set, is_interrupted),
         }
     }
 
-    fn show(
+    fn detect_in_pictures(
         &self,
         cell: Cell,
         object: &ObjectSpec,

@@ -23,17 +23,17 @@ pub(super) fn costs(summary: &Summary) -> Titled {
     ]);
     for model in &summary.models {
         let paper = paper::row(model.model);
-        let said = |pick: fn(&paper::PaperRow) -> &'static str| Cell::text(paper.as_ref().map_or("–", pick));
+        let paper_cell = |pick: fn(&paper::PaperRow) -> &'static str| Cell::text(paper.as_ref().map_or("–", pick));
         table = table.row(vec![
             Cell::text(model.model.letter()),
             Cell::text(samples(model)),
             Cell::text(model.teaching_secs.map_or("–".to_owned(), minutes)),
             number(model.largest_bytes.map(|bytes| bytes as f64 / 1e6), 2),
             number(model.verified.frames_per_second, 1),
-            said(|row| row.samples),
-            said(|row| row.teaching),
-            said(|row| row.size),
-            said(|row| row.frames_per_second),
+            paper_cell(|row| row.samples),
+            paper_cell(|row| row.teaching),
+            paper_cell(|row| row.size),
+            paper_cell(|row| row.frames_per_second),
         ]);
     }
     let jobs = summary.cells.iter().find_map(|cell| match cell.teaching {

@@ -47,7 +47,7 @@ unsafe fn filter_line_adjoint<L: Lanes>(u: [L; 6]) -> [L; 3] {
 ///
 /// # Safety
 /// `target` is good for `channels · width` floats at each frequency, which stand `step` apart.
-pub(super) unsafe fn filters(
+pub(super) unsafe fn filter_transform(
     isa: Isa,
     gathered: &[f32],
     channels: usize,
@@ -114,7 +114,7 @@ unsafe fn filter_lanes<L: Lanes>(
 ///
 /// # Safety
 /// `source` is good for reading sixteen floats at every frequency and channel.
-pub(super) unsafe fn filter_gradients(
+pub(super) unsafe fn filter_transform_adjoint(
     isa: Isa,
     source: *const f32,
     step: usize,

@@ -30,7 +30,7 @@ const B3: f32 = B * B2;
 
 /// Bᵀ d.
 #[inline(always)]
-unsafe fn see_line<L: Lanes>(d: [L; 6]) -> [L; 6] {
+unsafe fn input_transform_1d<L: Lanes>(d: [L; 6]) -> [L; 6] {
     // SAFETY: registers only.
     unsafe {
         let minus_two = L::splat(-2.0);
@@ -55,7 +55,7 @@ unsafe fn see_line<L: Lanes>(d: [L; 6]) -> [L; 6] {
 
 /// Aᵀ m.
 #[inline(always)]
-unsafe fn show_line<L: Lanes>(m: [L; 6]) -> [L; 4] {
+unsafe fn output_transform_1d<L: Lanes>(m: [L; 6]) -> [L; 4] {
     // SAFETY: registers only.
     unsafe {
         let (sum_a, difference_a) = (m[1].add(m[2]), m[1].sub(m[2]));
@@ -69,9 +69,9 @@ unsafe fn show_line<L: Lanes>(m: [L; 6]) -> [L; 4] {
     }
 }
 
-/// A y, the adjoint of [`show_line`].
+/// A y, the adjoint of [`output_transform_1d`].
 #[inline(always)]
-unsafe fn show_line_adjoint<L: Lanes>(y: [L; 4]) -> [L; 6] {
+unsafe fn output_transform_adjoint_1d<L: Lanes>(y: [L; 4]) -> [L; 6] {
     // SAFETY: registers only.
     unsafe {
         let even_a = y[2].mul_add(L::splat(A2), y[0]);
@@ -88,7 +88,7 @@ unsafe fn show_line_adjoint<L: Lanes>(y: [L; 4]) -> [L; 6] {
 ///
 /// # Safety
 /// `target` is good for all tiles of every frequency, which stand `step` apart.
-pub(super) unsafe fn see(
+pub(super) unsafe fn input_transform(
     isa: Isa,
     source: Maps<'_>,
     padding: [usize; 2],
@@ -102,14 +102,14 @@ pub(super) unsafe fn see(
     let mut zeros = Scratch::take(source.channels);
     zeros.fill(0.0);
     // SAFETY: pixels are inside the maps or the zeros; the target is the caller's promise.
-    unsafe { see_input(isa, source, padding, tiling, tiles, target, step, &zeros) };
+    unsafe { input_transform_tiles(isa, source, padding, tiling, tiles, target, step, &zeros) };
 }
 
 /// `A ȳ Aᵀ` of tiles of the output's gradient: `[36, tiles, C]`.
 ///
 /// # Safety
-/// As for [`see`].
-pub(super) unsafe fn see_gradient(
+/// As for [`input_transform`].
+pub(super) unsafe fn output_transform_adjoint(
     isa: Isa,
     gradient: Maps<'_>,
     tiling: Tiling,
@@ -121,12 +121,12 @@ pub(super) unsafe fn see_gradient(
     assert!(gradient.values.len() >= gradient.num_images * gradient.size[0] * gradient.size[1] * gradient.channels);
     let mut zeros = Scratch::take(gradient.channels);
     zeros.fill(0.0);
-    // SAFETY: as in `see`.
-    unsafe { see_output(isa, gradient, [0, 0], tiling, tiles, target, step, &zeros) };
+    // SAFETY: as in `input_transform`.
+    unsafe { output_transform_adjoint_tiles(isa, gradient, [0, 0], tiling, tiles, target, step, &zeros) };
 }
 
 lanes_kernel! {
-    unsafe fn see_input(
+    unsafe fn input_transform_tiles(
         source: Maps<'_>,
         padding: [usize; 2],
         tiling: Tiling,
@@ -134,11 +134,11 @@ lanes_kernel! {
         target: *mut f32,
         step: usize,
         zeros: &[f32],
-    ) = see_input_lanes
+    ) = input_transform_lanes
 }
 
 lanes_kernel! {
-    unsafe fn see_output(
+    unsafe fn output_transform_adjoint_tiles(
         source: Maps<'_>,
         padding: [usize; 2],
         tiling: Tiling,
@@ -146,11 +146,11 @@ lanes_kernel! {
         target: *mut f32,
         step: usize,
         zeros: &[f32],
-    ) = see_output_lanes
+    ) = output_transform_adjoint_lanes
 }
 
 #[inline(always)]
-unsafe fn see_input_lanes<L: Lanes>(
+unsafe fn input_transform_lanes<L: Lanes>(
     source: Maps<'_>,
     padding: [usize; 2],
     tiling: Tiling,
@@ -173,7 +173,7 @@ unsafe fn see_input_lanes<L: Lanes>(
                     for row in 0..INPUT_TILE {
                         values[row] = L::load(pixels[row][column].add(channel));
                     }
-                    let values = see_line(values);
+                    let values = input_transform_1d(values);
                     for row in 0..INPUT_TILE {
                         middle[row][column] = values[row];
                     }
@@ -185,7 +185,7 @@ unsafe fn see_input_lanes<L: Lanes>(
 }
 
 #[inline(always)]
-unsafe fn see_output_lanes<L: Lanes>(
+unsafe fn output_transform_adjoint_lanes<L: Lanes>(
     source: Maps<'_>,
     padding: [usize; 2],
     tiling: Tiling,
@@ -208,13 +208,13 @@ unsafe fn see_output_lanes<L: Lanes>(
                     for row in 0..OUTPUT_TILE {
                         values[row] = L::load(pixels[row][column].add(channel));
                     }
-                    let values = show_line_adjoint(values);
+                    let values = output_transform_adjoint_1d(values);
                     for row in 0..INPUT_TILE {
                         middle[row][column] = values[row];
                     }
                 }
                 for row in 0..INPUT_TILE {
-                    let values = show_line_adjoint(middle[row]);
+                    let values = output_transform_adjoint_1d(middle[row]);
                     for column in 0..INPUT_TILE {
                         values[column].store(target.add((row * INPUT_TILE + column) * step));
                     }
@@ -244,13 +244,13 @@ fn point_at_pixels<const SIDE: usize>(
     }
 }
 
-/// [`see_line`] along the rows, to every frequency.
+/// [`input_transform_1d`] along the rows, to every frequency.
 #[inline(always)]
 unsafe fn store_frequencies<L: Lanes>(middle: [[L; INPUT_TILE]; INPUT_TILE], target: *mut f32, step: usize) {
     for row in 0..INPUT_TILE {
         // SAFETY: the target is the caller's promise.
         unsafe {
-            let values = see_line(middle[row]);
+            let values = input_transform_1d(middle[row]);
             for column in 0..INPUT_TILE {
                 values[column].store(target.add((row * INPUT_TILE + column) * step));
             }
@@ -271,7 +271,7 @@ pub(super) struct OutputPlace<'a> {
 ///
 /// # Safety
 /// Nothing else touches these tiles of the output.
-pub(super) unsafe fn show(
+pub(super) unsafe fn output_transform(
     isa: Isa,
     products: &[f32],
     step: usize,
@@ -289,21 +289,21 @@ pub(super) unsafe fn show(
         assert!(vector.len() >= place.channels);
     }
     // SAFETY: asserted above.
-    unsafe { show_tiles(isa, products, step, place, tiles, finite) };
+    unsafe { output_transform_tiles(isa, products, step, place, tiles, finite) };
 }
 
 lanes_kernel! {
-    unsafe fn show_tiles(
+    unsafe fn output_transform_tiles(
         products: &[f32],
         step: usize,
         place: &OutputPlace<'_>,
         tiles: Range<usize>,
         finite: &mut bool,
-    ) = show_lanes
+    ) = output_transform_lanes
 }
 
 #[inline(always)]
-unsafe fn show_lanes<L: Lanes>(
+unsafe fn output_transform_lanes<L: Lanes>(
     products: &[f32],
     step: usize,
     place: &OutputPlace<'_>,
@@ -331,7 +331,7 @@ unsafe fn show_lanes<L: Lanes>(
                     for row in 0..INPUT_TILE {
                         values[row] = L::load(from.add((row * INPUT_TILE + column) * step));
                     }
-                    let values = show_line(values);
+                    let values = output_transform_1d(values);
                     for row in 0..OUTPUT_TILE {
                         middle[row][column] = values[row];
                     }
@@ -348,7 +348,7 @@ unsafe fn show_lanes<L: Lanes>(
                     if row >= rows {
                         break;
                     }
-                    let values = show_line(middle[row]);
+                    let values = output_transform_1d(middle[row]);
                     for column in 0..OUTPUT_TILE {
                         if column >= columns {
                             break;

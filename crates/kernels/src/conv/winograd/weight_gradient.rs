@@ -1,8 +1,8 @@
 //! The weight's gradient in the frequencies: sums over tiles instead of pixels, then back to 3×3.
 
-use super::filter_transform::filter_gradients;
+use super::filter_transform::filter_transform_adjoint;
 use super::tiling::{FREQUENCIES, Frequencies, Tiling};
-use super::transform::{see, see_gradient};
+use super::transform::{input_transform, output_transform_adjoint};
 use crate::conv::direct::Maps;
 use crate::conv::shape::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
@@ -70,7 +70,7 @@ pub(in crate::conv) fn weight_gradient(
         // SAFETY: the sums hold sixteen filters from here at every frequency and channel.
         unsafe {
             let source = total.as_ptr().add(unit * LANES);
-            filter_gradients(isa, source, sums.step(), in_channels, out_channels, &mut cells);
+            filter_transform_adjoint(isa, source, sums.step(), in_channels, out_channels, &mut cells);
         }
         // SAFETY: every unit has its own filters.
         let grad = unsafe { shared.range(unit * LANES * run, LANES * run) };
@@ -101,26 +101,26 @@ impl Sums<'_> {
     unsafe fn add(&self, tiles: std::ops::Range<usize>, block: usize, at: usize, sums: Raw, shared_out: bool) {
         let (rows, columns) = (self.x.channels, self.output_grad.channels);
         let most = block.min(tiles.len());
-        let mut seen = Frequencies::new(most, rows);
-        let mut shown = Frequencies::new(most, columns);
+        let mut transformed_input = Frequencies::new(most, rows);
+        let mut transformed_gradient = Frequencies::new(most, columns);
         // Rows of a product that are worked off together, so that small products are shared out too.
         let row_groups = if shared_out { (rows / 96).max(1) } else { 1 };
         let mut start = tiles.start;
         while start < tiles.end {
             let count = most.min(tiles.end - start);
             let part = if shared_out { count.div_ceil(CHUNKS) } else { count };
-            let (seen_step, shown_step) = (seen.step, shown.step);
-            let raw_seen = SharedSlice::new(&mut seen.values).raw();
-            let raw_shown = SharedSlice::new(&mut shown.values).raw();
+            let (input_step, gradient_step) = (transformed_input.step, transformed_gradient.step);
+            let raw_input = SharedSlice::new(&mut transformed_input.values).raw();
+            let raw_gradient = SharedSlice::new(&mut transformed_gradient.values).raw();
             for_each_unit_if(shared_out, count.div_ceil(part), |unit| {
                 let range = unit * part..count.min((unit + 1) * part);
                 let tiles = start + range.start..start + range.end;
                 // SAFETY: a unit has its own tiles.
                 unsafe {
-                    let target = raw_seen.at(range.start * rows);
-                    see(self.isa, self.x, self.padding, self.tiling, tiles.clone(), target, seen_step);
-                    let target = raw_shown.at(range.start * columns);
-                    see_gradient(self.isa, self.output_grad, self.tiling, tiles, target, shown_step);
+                    let target = raw_input.at(range.start * rows);
+                    input_transform(self.isa, self.x, self.padding, self.tiling, tiles.clone(), target, input_step);
+                    let target = raw_gradient.at(range.start * columns);
+                    output_transform_adjoint(self.isa, self.output_grad, self.tiling, tiles, target, gradient_step);
                 }
             });
             for_each_unit_if(shared_out, FREQUENCIES * row_groups, |unit| {
@@ -132,13 +132,13 @@ impl Sums<'_> {
                         columns: PANEL.min(columns - first_column),
                         depth: [1, count],
                         left: Operand {
-                            values: &seen.values[frequency * seen_step + group.start..],
+                            values: &transformed_input.values[frequency * input_step + group.start..],
                             step: 1,
                             inner: rows,
                             outer: 0,
                         },
                         right: Operand {
-                            values: &shown.values[frequency * shown_step + first_column..],
+                            values: &transformed_gradient.values[frequency * gradient_step + first_column..],
                             step: 1,
                             inner: columns,
                             outer: 0,

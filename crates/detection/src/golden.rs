@@ -68,19 +68,19 @@ pub struct StageComparison {
 
 /// All comparisons, in the order of the stages.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-pub struct VerificationReport {
+pub struct GoldenReport {
     /// One a tensor.
     pub stages: Vec<StageComparison>,
 }
 
-impl VerificationReport {
+impl GoldenReport {
     /// Whether there was something to compare and all of it is inside its tolerance.
     pub fn passed(&self) -> bool {
         !self.stages.is_empty() && self.stages.iter().all(|stage| stage.passed)
     }
 }
 
-impl fmt::Display for VerificationReport {
+impl fmt::Display for GoldenReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for stage in &self.stages {
             let verdict = if stage.passed { "ok" } else { "FAILED" };
@@ -116,14 +116,14 @@ impl RcnnConfig {
 ///
 /// # Errors
 /// An image without pixels, or targets in the reference that do not fit each other.
-pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDict) -> Result<VerificationReport> {
+pub fn verify(detector: &GeneralizedRcnn, image: &RgbImage, reference: &StateDict) -> Result<GoldenReport> {
     let mut comparer = Comparer::new(reference);
     let transformed = detector.image_transform().apply(image)?;
     comparer.inference(&detector.valid(), &transformed);
     if reference.keys().any(|name| name.starts_with("losses.") || name.starts_with("gradients.")) {
         comparer.training(detector, &transformed)?;
     }
-    Ok(VerificationReport { stages: comparer.stages })
+    Ok(GoldenReport { stages: comparer.stages })
 }
 
 /// Runs `detector` on `image` and gives what [`verify`] would compare, as a reference for another device or another

@@ -16,13 +16,13 @@ use crate::models::{Network, Proposals};
 use crate::prepared::scaling;
 use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{Scene, halved};
+use crate::verification::{SearchedImage, halved};
 
 /// With fewer scenes in which anything agrees at all there is no mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
 
 /// Scenes without the part, and the part as it is looked for in them: at the default tolerance, whatever the model's own is.
-pub(crate) struct Strangers {
+pub(crate) struct NegativeScenes {
     scenes: Vec<Sample>,
     demonstrations: Vec<TaughtDemonstration>,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Strangers {
 /// Photos of more pixels are halved before scenes are composed of them. Chosen for time: model S is to be taught in a second.
 const MAX_PIXELS: u64 = 2_000_000;
 
-impl Strangers {
+impl NegativeScenes {
     /// Composes `count` scenes of the demonstrations' size.
     ///
     /// # Errors
@@ -66,10 +66,10 @@ impl Strangers {
     fn observe_with(&self, network: Option<&Network>, demonstrations: &[TaughtDemonstration]) -> Result<Resemblances> {
         let mut highest = Vec::with_capacity(self.scenes.len());
         for sample in &self.scenes {
-            let scene = Scene::new(&sample.image, demonstrations);
+            let searched = SearchedImage::new(&sample.image, demonstrations);
             let proposals = network.map_or(Ok(Proposals::default()), |n| n.proposals(&sample.image, demonstrations))?;
-            let sightings = sightings(&proposals, &scene);
-            highest.extend(best_agreement(&sightings).map(|best| (best.overlay.agreement, best.network_score)));
+            let sightings = sightings(&proposals, &searched);
+            highest.extend(best_agreement(&sightings).map(|best| (best.placed.agreement, best.network_score)));
         }
         Ok(Resemblances { highest })
     }
@@ -125,11 +125,12 @@ mod tests {
     fn other_things_resemble_the_part_less_than_it_resembles_itself() {
         let demonstrations = [demonstration()];
         let taught = [TaughtDemonstration::new(&demonstrations[0]).unwrap()];
-        let strangers = Strangers::new(&demonstrations, 3, 12).unwrap();
-        let resemblance = strangers.observe(None).unwrap().resemblance();
-        let best =
-            |image| search(&Scene::new(image, &taught)).iter().map(|overlay| overlay.agreement).fold(0.0, f64::max);
-        let agreements: Vec<f64> = strangers.scenes.iter().map(|sample| best(&sample.image)).collect();
+        let negatives = NegativeScenes::new(&demonstrations, 3, 12).unwrap();
+        let resemblance = negatives.observe(None).unwrap().resemblance();
+        let best = |image| {
+            search(&SearchedImage::new(image, &taught)).iter().map(|placed| placed.agreement).fold(0.0, f64::max)
+        };
+        let agreements: Vec<f64> = negatives.scenes.iter().map(|sample| best(&sample.image)).collect();
         // Some resemble it, or there would be nothing to tell apart.
         assert!(
             resemblance > 0.1 && agreements.iter().all(|&agreement| agreement < 0.6),
