@@ -1,0 +1,231 @@
+//! Last layers made from the features of a few views of a part, before anything of that part is learnt.
+//!
+//! ```text
+//! views ─ box head ─ hidden [F] of each ─ mean: prototype p ─ class score  s·(p - m)·h - n·|p - m|² + c·h + b
+//!       └ keypoint head ─ map [C, P, P] of each, read at the keypoint ─ mean: descriptor d ─ map  t·(d - e)·f, doubled
+//! ```
+//!
+//! Shapes: F hidden width, C channels, P side of a pooled square, K keypoints, M prototypes. h and f are the features of
+//! what is classified; m, n, s, c, b and e, t are learnt in pretraining, for all parts at once. Both are linear in h and f,
+//! so that they are a row of the box predictor and a kernel of the keypoint head's transposed convolution.
+//!
+//! # Source
+//! Snell, Swersky and Zemel, Prototypical Networks for Few-shot Learning (2017); Qi, Brown and Lowe, Low-Shot Learning
+//! with Imprinted Weights (2018).
+
+use burn::module::{Module, Param};
+use burn::tensor::{Tensor, TensorData};
+use sdg_geometry::Keypoint;
+
+use crate::boxes::Corners;
+use crate::error::Result;
+use crate::generalized_rcnn::GeneralizedRcnn;
+use crate::image_transform::{TransformedImage, pad_batch};
+use crate::initialization::{Distribution, Initializer};
+use crate::roi_pooler::Roi;
+use crate::state_dict::{StateDict, WeightTensor};
+use crate::target::{ResizedTarget, Target};
+
+/// First factors of the products of features: small, so that pretraining starts from undecided scores.
+const FIRST_SCALE: f64 = 0.05;
+
+/// What makes last layers of features.
+#[derive(Module, Debug)]
+pub struct Imprint {
+    /// For the box predictor.
+    pub class: ClassImprint,
+    /// For the keypoint head.
+    pub keypoint: KeypointImprint,
+}
+
+impl Imprint {
+    /// Draws the parameters for a box head of so many hidden values and a keypoint head of so many channels.
+    pub fn init(hidden: usize, channels: usize, init: &mut Initializer) -> Self {
+        let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
+        Self {
+            class: ClassImprint {
+                mean: constant(hidden, 0.0),
+                common: constant(hidden, 0.0),
+                scale: constant(1, FIRST_SCALE),
+                norm_scale: constant(1, 0.5 * FIRST_SCALE),
+                bias: constant(1, 0.0),
+            },
+            keypoint: KeypointImprint { mean: constant(channels, 0.0), scale: constant(1, FIRST_SCALE) },
+        }
+    }
+}
+
+/// A row of the box predictor from a prototype.
+#[derive(Module, Debug)]
+pub struct ClassImprint {
+    /// m, `[F]`.
+    pub mean: Param<Tensor<1>>,
+    /// c, `[F]`: what speaks for any part.
+    pub common: Param<Tensor<1>>,
+    /// s, `[1]`.
+    pub scale: Param<Tensor<1>>,
+    /// n, `[1]`.
+    pub norm_scale: Param<Tensor<1>>,
+    /// b, `[1]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+impl ClassImprint {
+    /// Weights `[M, F]` and biases `[M]` of the classes whose prototypes are `[M, F]`, against a background of zero.
+    pub fn classifier(&self, prototypes: Tensor<2>) -> (Tensor<2>, Tensor<1>) {
+        let [m, _] = prototypes.dims();
+        let centred = prototypes - self.mean.val().unsqueeze();
+        let norms: Tensor<1> = centred.clone().square().sum_dim(1).reshape([m]);
+        let weights = centred * self.scale.val().unsqueeze() + self.common.val().unsqueeze();
+        (weights, self.bias.val() - norms * self.norm_scale.val())
+    }
+}
+
+/// A kernel of the keypoint head from a descriptor.
+#[derive(Module, Debug)]
+pub struct KeypointImprint {
+    /// e, `[C]`.
+    pub mean: Param<Tensor<1>>,
+    /// t, `[1]`.
+    pub scale: Param<Tensor<1>>,
+}
+
+impl KeypointImprint {
+    /// Weights `[M, C]` of the keypoints whose descriptors are `[M, C]`.
+    pub fn weights(&self, descriptors: Tensor<2>) -> Tensor<2> {
+        (descriptors - self.mean.val().unsqueeze()) * self.scale.val().unsqueeze()
+    }
+}
+
+/// Cells of a pooled square of `side` cells and their weights, by which the square is read linearly at a keypoint; `None`
+/// where it is unlabelled or outside of the box. Pixels of the resized image.
+pub fn reading_weights(keypoint: &Keypoint, corners: &Corners, side: usize) -> Option<[(usize, f32); 4]> {
+    let [x1, y1, x2, y2] = corners.map(f64::from);
+    let is_inside = (x1..=x2).contains(&keypoint.x) && (y1..=y2).contains(&keypoint.y);
+    if !keypoint.is_labelled() || !is_inside || x2 <= x1 || y2 <= y1 {
+        return None;
+    }
+    let along = |value: f64, low: f64, high: f64| {
+        let last = (side - 1) as f64;
+        let at = ((value - low) / (high - low) * side as f64 - 0.5).clamp(0.0, last);
+        let first = at.floor().min((last - 1.0).max(0.0));
+        (first as usize, (at - first) as f32)
+    };
+    let ((column, right), (row, down)) = (along(keypoint.x, x1, x2), along(keypoint.y, y1, y2));
+    let cell = |dy: usize, dx: usize| (row + dy).min(side - 1) * side + (column + dx).min(side - 1);
+    Some([
+        (cell(0, 0), (1.0 - down) * (1.0 - right)),
+        (cell(0, 1), (1.0 - down) * right),
+        (cell(1, 0), down * (1.0 - right)),
+        (cell(1, 1), down * right),
+    ])
+}
+
+/// Kernel of four cells that doubles a map linearly, as the transposed convolution has it.
+const DOUBLING: [f32; 4] = [0.25, 0.75, 0.75, 0.25];
+
+/// Images that go through the network at a time.
+const BATCH: usize = 16;
+
+impl Imprint {
+    /// Gives the last layers of a detector of one class, by the parameters' names: class scores, and keypoint maps on top
+    /// of those that the detector has. Of each image, the first object is a view; nothing where there is none.
+    ///
+    /// # Errors
+    /// Targets that do not fit the images.
+    pub fn last_layers(
+        &self,
+        detector: &GeneralizedRcnn,
+        images: &[TransformedImage],
+        targets: &[Target],
+    ) -> Result<StateDict> {
+        let targets = detector.resized_targets(images, targets)?;
+        let (mut prototype, mut num_views) = (None, 0);
+        let mut descriptors = Descriptors::default();
+        for (images, targets) in images.chunks(BATCH).zip(targets.chunks(BATCH)) {
+            let shown = |(image_idx, target): (usize, &ResizedTarget)| {
+                let (corners, keypoints) = (target.boxes.first()?, target.keypoints.first()?);
+                Some((Roi { image_idx, corners: *corners }, keypoints.clone()))
+            };
+            let (rois, keypoints): (Vec<Roi>, Vec<_>) = targets.iter().enumerate().filter_map(shown).unzip();
+            if rois.is_empty() {
+                continue;
+            }
+            let padded = pad_batch(images, detector.config().input.size_divisibility);
+            let data = TensorData::new(padded.pixels, padded.dims);
+            let features = detector.backbone.forward(Tensor::from_data(data, &detector.device()));
+            let hidden = detector.roi_heads.box_head.forward(&features, &rois).sum_dim(0);
+            prototype = Some(prototype.map_or(hidden.clone(), |sum| sum + hidden));
+            num_views += rois.len();
+            if let Some(head) = &detector.roi_heads.keypoint_head {
+                descriptors.add(head.hidden(&features, &rois), &rois, &keypoints);
+            }
+        }
+        let mut layers = StateDict::new();
+        let Some(sum) = prototype else { return Ok(layers) };
+        let (weights, biases) = self.class.classifier(sum / num_views as f64);
+        let [weights, biases] = [values(weights), values(biases)];
+        let zeros = vec![0.0; weights.len()];
+        // Behind the part stands the background, which everything is measured against.
+        let rows = WeightTensor { shape: vec![2, weights.len()], values: [weights, zeros].concat() };
+        layers.insert("roi_heads.box_predictor.cls_score.weight".into(), rows);
+        let biases = WeightTensor { shape: vec![2], values: vec![biases[0], 0.0] };
+        layers.insert("roi_heads.box_predictor.cls_score.bias".into(), biases);
+        if let (Some(head), Some(means)) = (&detector.roi_heads.keypoint_head, descriptors.means()) {
+            let [num_keypoints, channels] = means.dims();
+            let own = values(self.keypoint.weights(means));
+            let kernel = head.score_lowres.weight.val();
+            let mut shared = values(kernel.reshape([channels * num_keypoints * 16]));
+            for (idx, cell) in shared.iter_mut().enumerate() {
+                let (tap, pair) = (idx % 16, idx / 16);
+                let (channel, keypoint) = (pair / num_keypoints, pair % num_keypoints);
+                *cell += own[keypoint * channels + channel] * DOUBLING[tap / 4] * DOUBLING[tap % 4];
+            }
+            let kernel = WeightTensor { shape: vec![channels, num_keypoints, 4, 4], values: shared };
+            layers.insert("roi_heads.keypoint_head.score_lowres.weight".into(), kernel);
+        }
+        Ok(layers)
+    }
+}
+
+/// What the keypoint head shows at each keypoint, summed over views.
+#[derive(Default)]
+struct Descriptors {
+    /// `[K, C]`.
+    sum: Option<Tensor<2>>,
+    /// Views of each keypoint.
+    counts: Vec<f32>,
+}
+
+impl Descriptors {
+    /// Adds views: `maps` `[R, C, P, P]`.
+    fn add(&mut self, maps: Tensor<4>, rois: &[Roi], keypoints: &[Vec<Keypoint>]) {
+        let [count, channels, side, _] = maps.dims();
+        let num_keypoints = keypoints.first().map_or(0, Vec::len);
+        self.counts.resize(num_keypoints, 0.0);
+        let mut readings = vec![0f32; num_keypoints * count * side * side];
+        for (row, (roi, keypoints)) in rois.iter().zip(keypoints).enumerate() {
+            for (k, keypoint) in keypoints.iter().enumerate() {
+                let Some(weights) = reading_weights(keypoint, &roi.corners, side) else { continue };
+                self.counts[k] += 1.0;
+                let start = (k * count + row) * side * side;
+                weights.iter().for_each(|(cell, weight)| readings[start + cell] += weight);
+            }
+        }
+        let readings = TensorData::new(readings, [num_keypoints, count * side * side]);
+        let cells: Tensor<2> = maps.permute([0, 2, 3, 1]).reshape([count * side * side, channels]);
+        let read = Tensor::<2>::from_data(readings, &cells.device()).matmul(cells);
+        self.sum = Some(self.sum.take().map_or(read.clone(), |sum| sum + read));
+    }
+
+    /// `[K, C]`; `None` where a keypoint was in no view.
+    fn means(self) -> Option<Tensor<2>> {
+        let sum = self.sum.filter(|_| self.counts.iter().all(|count| *count > 0.0))?;
+        let counts = Tensor::<1>::from_floats(self.counts.as_slice(), &sum.device()).reshape([self.counts.len(), 1]);
+        Some(sum / counts)
+    }
+}
+
+fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().iter::<f32>().collect()
+}
