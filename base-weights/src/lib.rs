@@ -1,9 +1,10 @@
 //! Pretraining of preset `edge` on generated parts.
 //!
 //! ```text
-//! seed ─ Pictures ─ PretrainNetwork: losses ─ AdamW on one cycle ─ checkpoint ─ export ─ BaseWeightsFile (f16)
-//!                                                          Episodes: part after part ─────────┤
-//! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps ────────────────────────────┘
+//! seed ─ Pictures ─┬─ DetectorTask: PretrainNetwork ────┬─ Run: AdamW on one cycle ─ checkpoint ─┐
+//!                  └─ OrientationTask: OrientationCnn ──┘                                        │
+//!                                        BaseWeightsFile (f16): trunk, heads, imprint ─ export ──┘
+//! unseen parts ─ demonstration ─ teach for 15, 30, 60, 120 steps
 //!                                 └ recall and false alarms of the network alone (`compare`)
 //! ```
 //!
@@ -14,9 +15,11 @@
 
 pub mod checkpoint;
 pub mod compare;
-pub mod episodes;
+pub mod detector;
+pub mod export;
 pub mod network;
+pub mod orientation;
 pub mod outcome;
 pub mod pictures;
-pub mod pretrain;
+pub mod run;
 pub mod table;

@@ -1,17 +1,22 @@
 //! `sdg-base-weights`: pretrains preset `edge`, exports what teaching starts from, and compares weights.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use clap::{Parser, Subcommand};
+use anyhow::{Context, Result};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
 use sdg_base_weights::compare::Comparison;
-use sdg_base_weights::episodes::{EpisodeSettings, Episodes};
+use sdg_base_weights::detector::DetectorTask;
+use sdg_base_weights::export::export;
+use sdg_base_weights::network::pretrain_config;
+use sdg_base_weights::orientation::OrientationTask;
 use sdg_base_weights::outcome::{Outcome, outcomes};
-use sdg_base_weights::pretrain::{Settings, export, start_or_resume};
+use sdg_base_weights::run::{Run, Settings, Task};
 use sdg_base_weights::table::table;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
+use sdg_orientation::OrientationConfig;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -26,57 +31,29 @@ struct Arguments {
 enum Command {
     /// Pretrains, or goes on where a run was stopped.
     Pretrain {
-        /// Where the run keeps what it goes on from.
-        #[arg(long)]
-        checkpoint: PathBuf,
+        /// detector, or the orientation CNN of model A.
+        #[arg(long, value_enum, default_value_t = Pretrained::Detector)]
+        network: Pretrained,
         /// Decides parts, pictures and every random choice.
         #[arg(long, default_value_t = 1)]
         seed: u64,
-        /// Parts that are told apart.
-        #[arg(long, default_value_t = 128)]
+        /// Parts that are drawn from.
+        #[arg(long, default_value_t = 1024)]
         parts: usize,
         /// Steps of the whole run.
-        #[arg(long, default_value_t = 4000)]
+        #[arg(long, default_value_t = 8000)]
         steps: usize,
-        /// Steps between checkpoints.
-        #[arg(long, default_value_t = 200)]
-        every: usize,
-        /// Ends after so many minutes; the next call goes on.
-        #[arg(long)]
-        minutes: Option<f64>,
-        /// flex, or a device that this build has.
-        #[arg(long, default_value = "flex")]
-        device: String,
-    },
-    /// Teaches part after part for a few steps and moves towards what comes of it, or goes on where a run was stopped.
-    Episodes {
-        /// Where the run keeps what it goes on from.
-        #[arg(long)]
-        checkpoint: PathBuf,
-        /// Base weights to start from; none for nothing.
-        #[arg(long)]
-        start: Option<PathBuf>,
-        /// Decides parts, pictures and every random choice.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// Episodes of the whole run.
-        #[arg(long, default_value_t = 500)]
-        episodes: usize,
-        /// Episodes between checkpoints.
-        #[arg(long, default_value_t = 20)]
-        every: usize,
-        /// Ends after so many minutes; the next call goes on.
-        #[arg(long)]
-        minutes: Option<f64>,
-        /// flex, or a device that this build has.
-        #[arg(long, default_value = "flex")]
-        device: String,
+        #[command(flatten)]
+        pace: PaceArguments,
     },
     /// Writes what teaching starts from, in half precision.
     Export {
-        /// A checkpoint.
+        /// A checkpoint of a detector.
         #[arg(long)]
-        checkpoint: PathBuf,
+        detector: PathBuf,
+        /// A checkpoint of an orientation CNN; none for weights that model A cannot start from.
+        #[arg(long)]
+        orientation: Option<PathBuf>,
         /// The file to write.
         #[arg(long)]
         out: PathBuf,
@@ -121,17 +98,48 @@ enum Command {
     },
 }
 
+/// What is pretrained.
+#[derive(Clone, Copy, ValueEnum)]
+enum Pretrained {
+    Detector,
+    Orientation,
+}
+
+/// How a run is kept, and how long it goes on.
+#[derive(Args)]
+struct PaceArguments {
+    /// Where the run keeps what it goes on from.
+    #[arg(long)]
+    checkpoint: PathBuf,
+    /// Steps between checkpoints.
+    #[arg(long, default_value_t = 200)]
+    every: usize,
+    /// Ends after so many minutes; the next call goes on.
+    #[arg(long)]
+    minutes: Option<f64>,
+    /// flex, or a device that this build has.
+    #[arg(long, default_value = "flex")]
+    device: String,
+}
+
+/// Steps between lines about the losses.
+const TOLD_EVERY: usize = 50;
+
 fn main() -> Result<()> {
     match Arguments::parse().command {
-        Command::Pretrain { checkpoint, seed, parts, steps, every, minutes, device } => {
-            pretrain(&checkpoint, Settings::new(seed, parts, steps), every, minutes, &device)
+        Command::Pretrain { network, seed, parts, steps, pace } => {
+            let settings = Settings::new(seed, parts, steps);
+            match network {
+                Pretrained::Detector => pretrain(DetectorTask::new(&settings, pretrain_config())?, settings, &pace),
+                Pretrained::Orientation => {
+                    pretrain(OrientationTask::new(&settings, OrientationConfig::edge())?, settings, &pace)
+                }
+            }
         }
-        Command::Episodes { checkpoint, start, seed, episodes, every, minutes, device } => {
-            let settings = EpisodeSettings::new(seed, episodes);
-            episodes_of(&checkpoint, start.as_deref(), settings, every, minutes, &device)
-        }
-        Command::Export { checkpoint, out, commit } => {
-            let bytes = exported(&checkpoint, &commit)?.to_bytes();
+        Command::Export { detector, orientation, out, commit } => {
+            let detector = Checkpoint::read(&detector)?;
+            let orientation = orientation.map(|path| Checkpoint::read(&path)).transpose()?;
+            let bytes = export(&detector, orientation.as_ref(), &commit)?.to_bytes();
             write_whole(&out, &bytes)?;
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
@@ -151,30 +159,28 @@ fn main() -> Result<()> {
     }
 }
 
-fn pretrain(checkpoint: &Path, settings: Settings, every: usize, minutes: Option<f64>, device: &str) -> Result<()> {
-    let device = device.parse::<ComputeBackend>()?.open()?;
+fn pretrain<T: Task>(task: T, settings: Settings, pace: &PaceArguments) -> Result<()> {
+    let device = pace.device.parse::<ComputeBackend>()?.open()?;
+    let checkpoint = &pace.checkpoint;
     let start = Instant::now();
-    let mut run = start_or_resume(checkpoint, settings, &device)?;
-    println!("at step {}, {:.1} s to prepare", run.step(), start.elapsed().as_secs_f64());
-    let (mut sums, mut count) = (Vec::<f64>::new(), 0usize);
+    let mut run = Run::start_or_resume(task, checkpoint, settings, &device)?;
+    println!("at step {}", run.step());
+    let mut sums: BTreeMap<&str, f64> = BTreeMap::new();
+    let mut count = 0usize;
     while !run.is_over() {
-        let losses = run.advance()?;
-        let values = [losses.rpn_cls, losses.rpn_loc, losses.cls, losses.box_reg, losses.keypoint, losses.mask];
-        sums.resize(values.len(), 0.0);
-        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        for (name, loss) in run.advance()? {
+            *sums.entry(name).or_default() += loss;
+        }
         count += 1;
-        let is_out_of_time = minutes.is_some_and(|minutes| start.elapsed().as_secs_f64() > 60.0 * minutes);
-        if run.step().is_multiple_of(50) || is_out_of_time || run.is_over() {
-            let means: Vec<String> = sums.iter().map(|sum| format!("{:.3}", sum / count as f64)).collect();
-            println!(
-                "step {:5} {:7.1} s  rpn_cls rpn_loc cls box_reg keypoint mask {}",
-                run.step(),
-                start.elapsed().as_secs_f64(),
-                means.join(" ")
-            );
-            (sums, count) = (Vec::new(), 0);
+        let elapsed_secs = start.elapsed().as_secs_f64();
+        let is_out_of_time = pace.minutes.is_some_and(|minutes| elapsed_secs > 60.0 * minutes);
+        if run.step().is_multiple_of(TOLD_EVERY) || is_out_of_time || run.is_over() {
+            let means: Vec<String> =
+                sums.iter().map(|(name, sum)| format!("{name} {:.3}", sum / count as f64)).collect();
+            println!("step {:5} {elapsed_secs:7.1} s  {}", run.step(), means.join("  "));
+            (sums, count) = (BTreeMap::new(), 0);
         }
-        if run.step().is_multiple_of(every) || is_out_of_time || run.is_over() {
+        if run.step().is_multiple_of(pace.every) || is_out_of_time || run.is_over() {
             run.checkpoint().write(checkpoint)?;
         }
         if is_out_of_time {
@@ -182,61 +188,6 @@ fn pretrain(checkpoint: &Path, settings: Settings, every: usize, minutes: Option
         }
     }
     Ok(())
-}
-
-fn episodes_of(
-    checkpoint: &Path,
-    start_file: Option<&Path>,
-    mut settings: EpisodeSettings,
-    every: usize,
-    minutes: Option<f64>,
-    device: &str,
-) -> Result<()> {
-    let device = device.parse::<ComputeBackend>()?.open()?;
-    let start = Instant::now();
-    let start_weights =
-        start_file.map(|path| std::fs::read(path).with_context(|| path.display().to_string())).transpose()?;
-    settings.start_sha256 = start_weights.as_ref().map(|bytes| sha256(bytes));
-    let mut run = if checkpoint.exists() {
-        let read = Checkpoint::<EpisodeSettings>::read(checkpoint)?;
-        if read.settings != settings {
-            bail!("{}: expected a run of {settings:?}, found one of {:?}", checkpoint.display(), read.settings);
-        }
-        Episodes::start(settings, &read.parameters, read.step, &device)?
-    } else {
-        let weights = start_weights.map(|bytes| BaseWeightsFile::from_bytes(&bytes)).transpose()?;
-        Episodes::start(settings, &weights.map(|file| file.parameters).unwrap_or_default(), 0, &device)?
-    };
-    println!("at episode {}, {:.1} s to prepare", run.episode(), start.elapsed().as_secs_f64());
-    let mut losses = Vec::new();
-    while !run.is_over() {
-        losses.push(run.advance()?);
-        let is_out_of_time = minutes.is_some_and(|minutes| start.elapsed().as_secs_f64() > 60.0 * minutes);
-        if run.episode().is_multiple_of(every) || is_out_of_time || run.is_over() {
-            let mean = losses.iter().sum::<f64>() / losses.len() as f64;
-            losses.clear();
-            println!(
-                "episode {:5} {:7.1} s  loss after teaching {mean:.3}",
-                run.episode(),
-                start.elapsed().as_secs_f64()
-            );
-            run.checkpoint().write(checkpoint)?;
-        }
-        if is_out_of_time {
-            break;
-        }
-    }
-    Ok(())
-}
-
-/// What teaching starts from, of a checkpoint of either method.
-fn exported(path: &Path, commit: &str) -> Result<BaseWeightsFile> {
-    if let Ok(checkpoint) = Checkpoint::<Settings>::read(path) {
-        return export(&checkpoint, commit);
-    }
-    let checkpoint = Checkpoint::<EpisodeSettings>::read(path)?;
-    let device = ComputeBackend::default().open()?;
-    Ok(Episodes::start(checkpoint.settings, &checkpoint.parameters, checkpoint.step, &device)?.export(commit))
 }
 
 /// A fine-tuning with some values changed, those of its training too; `None` for null.

@@ -19,7 +19,7 @@ const GROUP: usize = 8;
 const GROUP_FROM: usize = 20;
 
 /// Parts of which less is visible are not asked for.
-const MIN_VISIBLE_SHARE: f64 = 0.35;
+pub(crate) const MIN_VISIBLE_SHARE: f64 = 0.35;
 
 /// Seeds of the parts that are learnt from. Parts to measure on have seeds below [`FIRST_PART_SEED`].
 pub const FIRST_PART_SEED: u64 = 1 << 32;
@@ -76,13 +76,23 @@ impl Pictures {
         group
     }
 
+    /// Picture `index` of a group of parts, with the truth.
+    pub fn mixed_sample(&self, group: &[usize], index: u64) -> MixedSample {
+        self.scenes.mixed_sample_of(group, index)
+    }
+
+    /// Whether a part's turn can be told.
+    pub fn has_turn(&self, part_idx: usize) -> bool {
+        !self.is_symmetric[part_idx]
+    }
+
     /// Picture `index` of a group of parts as the network gets it, and what is in it, in pixels of the network's input. A
     /// part's label is its place in the group.
     ///
     /// # Errors
     /// A picture that the network refuses.
     pub fn picture(&self, group: &[usize], index: u64) -> Result<(TransformedImage, ResizedTarget)> {
-        let MixedSample { image, instances } = self.scenes.mixed_sample_of(group, index);
+        let MixedSample { image, instances } = self.mixed_sample(group, index);
         let transformed = self.transform.apply(&image)?;
         let [sx, sy] = transformed.resized_from_original();
         let (width, height) = (f64::from(image.width()), f64::from(image.height()));

@@ -1,12 +1,14 @@
 //! A run that was stopped goes on as if nothing had happened.
 #![allow(clippy::unwrap_used)]
 
-use sdg_base_weights::checkpoint::Checkpoint;
+use sdg_base_weights::detector::DetectorTask;
 use sdg_base_weights::network::pretrain_config;
-use sdg_base_weights::pretrain::{Run, Settings};
+use sdg_base_weights::orientation::OrientationTask;
+use sdg_base_weights::run::{Run, Settings, Task};
 use sdg_detection::RcnnConfig;
 use sdg_detection::config::ResizeRule;
 use sdg_grasp::Device;
+use sdg_orientation::OrientationConfig;
 
 const STEPS: usize = 50;
 
@@ -28,41 +30,74 @@ fn settings() -> Settings {
     Settings { batch_size: 2, ..Settings::new(7, 5, STEPS) }
 }
 
-fn advance(run: &mut Run, steps: usize) -> Vec<f64> {
-    (0..steps).map(|_| run.advance().unwrap().total()).collect()
+fn task(config: RcnnConfig) -> DetectorTask {
+    DetectorTask::new(&settings(), config).unwrap()
 }
 
-#[test]
-fn fifty_steps_are_the_same_bits_whether_stopped_or_not() {
-    let (settings, device) = (settings(), Device::flex());
-    let config = narrow();
-    let mut whole = Run::start(settings.clone(), &config, &device).unwrap();
+fn advance<T: Task>(run: &mut Run<T>, steps: usize) -> Vec<f64> {
+    (0..steps).map(|_| run.advance().unwrap().iter().map(|(_, loss)| loss).sum()).collect()
+}
+
+/// Fifty steps at once, and in two runs with a checkpoint between; gives the losses.
+fn stopped_and_not<T: Task>(task: impl Fn() -> T, settings: &Settings) -> Vec<f64> {
+    let device = Device::flex();
+    let mut whole = Run::start(task(), settings.clone(), &device).unwrap();
     let losses = advance(&mut whole, STEPS);
     assert!(whole.is_over());
 
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.safetensors");
-    let mut first = Run::start(settings, &config, &device).unwrap();
+    let mut first = Run::start(task(), settings.clone(), &device).unwrap();
     let mut stopped = advance(&mut first, 17);
     first.checkpoint().write(&file).unwrap();
     drop(first);
-    let mut second = Run::resume(&Checkpoint::<Settings>::read(&file).unwrap(), &config, &device).unwrap();
+    let mut second = Run::start_or_resume(task(), &file, settings.clone(), &device).unwrap();
     assert_eq!(second.step(), 17);
     stopped.extend(advance(&mut second, STEPS - 17));
 
     assert_eq!(losses, stopped);
     assert_eq!(whole.checkpoint(), second.checkpoint());
+    losses
+}
+
+fn mean(losses: &[f64]) -> f64 {
+    losses.iter().sum::<f64>() / losses.len() as f64
+}
+
+#[test]
+fn fifty_steps_of_the_detector_are_the_same_bits_whether_stopped_or_not() {
+    let losses = stopped_and_not(|| task(narrow()), &settings());
     // Something was learnt meanwhile.
-    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
 }
 
 #[test]
-fn a_checkpoint_of_another_network_is_refused() {
+fn fifty_steps_of_the_orientation_cnn_are_the_same_bits_whether_stopped_or_not() {
+    let config = OrientationConfig {
+        input_px: 32,
+        stage_channels: vec![8, 16],
+        stage_convs: vec![1, 1],
+        hidden: 32,
+        ..OrientationConfig::edge()
+    };
+    let task = || OrientationTask::new(&settings(), config.clone()).unwrap();
+    let losses = stopped_and_not(task, &settings());
+    assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
+}
+
+#[test]
+fn a_checkpoint_of_another_network_or_run_is_refused() {
     let device = Device::flex();
-    let run = Run::start(settings(), &narrow(), &device).unwrap();
+    let run = Run::start(task(narrow()), settings(), &device).unwrap();
     let mut other = narrow();
     other.fpn.channels = 16;
-    let error = Run::resume(&run.checkpoint(), &other, &device).err().unwrap().to_string();
+    let error = Run::resume(task(other), &run.checkpoint(), &device).err().unwrap().to_string();
     assert!(error.contains("expected a checkpoint of this network"), "{error}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.safetensors");
+    run.checkpoint().write(&file).unwrap();
+    let longer = Settings { steps: STEPS + 1, ..settings() };
+    let error = Run::start_or_resume(task(narrow()), &file, longer, &device).err().unwrap().to_string();
+    assert!(error.contains("expected a run of") && error.contains("steps: 51"), "{error}");
 }

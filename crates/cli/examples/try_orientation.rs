@@ -58,7 +58,8 @@ fn try_settings(name: &str, views: &[View], settings: &str) -> Result<()> {
     let (network, training) = parse(settings)?;
     let demonstration = shipped::demonstration(name)?;
     let before_teaching = processor_seconds();
-    let taught = teach(&[demonstration], &network, &training, &Device::flex(), &mut |_| ControlFlow::Continue(()))?;
+    let taught =
+        teach(&[demonstration], &network, None, &training, &Device::flex(), &mut |_| ControlFlow::Continue(()))?;
     let taught_secs = processor_seconds() - before_teaching;
 
     // The jitter that the network was taught with by default, whatever this one was taught with.

@@ -83,7 +83,13 @@ pub fn read(
     let parameters: StateDict =
         values.into_iter().map(|(name, (shape, values))| (name, WeightTensor { shape, values })).collect();
     let reinitialized = architecture.parameters().into_keys().filter(|name| !parameters.contains_key(name)).collect();
-    Ok(BaseWeights { sha256: sha256_of(path).with_context(named)?, parameters, reinitialized, imprint: Default::default() })
+    Ok(BaseWeights {
+        sha256: sha256_of(path).with_context(named)?,
+        parameters,
+        reinitialized,
+        imprint: StateDict::new(),
+        orientation: None,
+    })
 }
 
 /// Weights know images by their channels' order and range: the same kernels on other numbers see nothing.

@@ -209,7 +209,11 @@ impl GeneralizedRcnn {
         images.iter().zip(found).map(|(image, found)| original_detections(image, &found, mask_head)).collect()
     }
 
-    pub(crate) fn resized_targets(&self, images: &[TransformedImage], targets: &[Target]) -> Result<Vec<ResizedTarget>> {
+    pub(crate) fn resized_targets(
+        &self,
+        images: &[TransformedImage],
+        targets: &[Target],
+    ) -> Result<Vec<ResizedTarget>> {
         if images.is_empty() {
             return Err(DetectionError::EmptyBatch);
         }

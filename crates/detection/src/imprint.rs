@@ -41,17 +41,10 @@ pub struct Imprint {
 impl Imprint {
     /// Draws the parameters for a box head of so many hidden values and a keypoint head of so many channels.
     pub fn init(hidden: usize, channels: usize, init: &mut Initializer) -> Self {
+        let class = ClassImprint::init(hidden, init);
         let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
-        Self {
-            class: ClassImprint {
-                mean: constant(hidden, 0.0),
-                common: constant(hidden, 0.0),
-                scale: constant(1, FIRST_SCALE),
-                norm_scale: constant(1, 0.5 * FIRST_SCALE),
-                bias: constant(1, 0.0),
-            },
-            keypoint: KeypointImprint { mean: constant(channels, 0.0), scale: constant(1, FIRST_SCALE) },
-        }
+        let keypoint = KeypointImprint { mean: constant(channels, 0.0), scale: constant(1, FIRST_SCALE) };
+        Self { class, keypoint }
     }
 }
 
@@ -71,6 +64,18 @@ pub struct ClassImprint {
 }
 
 impl ClassImprint {
+    /// Draws the parameters for so many hidden values.
+    pub fn init(hidden: usize, init: &mut Initializer) -> Self {
+        let mut constant = |count: usize, value| init.param([count], Distribution::Constant(value));
+        Self {
+            mean: constant(hidden, 0.0),
+            common: constant(hidden, 0.0),
+            scale: constant(1, FIRST_SCALE),
+            norm_scale: constant(1, 0.5 * FIRST_SCALE),
+            bias: constant(1, 0.0),
+        }
+    }
+
     /// Weights `[M, F]` and biases `[M]` of the classes whose prototypes are `[M, F]`, against a background of zero.
     pub fn classifier(&self, prototypes: Tensor<2>) -> (Tensor<2>, Tensor<1>) {
         let [m, _] = prototypes.dims();

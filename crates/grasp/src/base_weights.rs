@@ -10,6 +10,8 @@ use sdg_detection::initialization::Initializer;
 use sdg_detection::state_dict::{self, ImportReport, StateDict, WeightTensor};
 use sdg_detection::{GeneralizedRcnn, Target, TransformedImage};
 
+use sdg_orientation::training::OrientationStart;
+
 use crate::error::{GraspError, Result};
 
 /// Imported weights for the network of a preset.
@@ -26,6 +28,8 @@ pub struct BaseWeights {
     pub reinitialized: BTreeSet<String>,
     /// What makes last layers of a part's own views; empty for weights without.
     pub imprint: StateDict,
+    /// What model A's orientation CNN starts from; `None` for weights without.
+    pub orientation: Option<OrientationStart>,
 }
 
 impl BaseWeights {
@@ -142,7 +146,13 @@ mod tests {
     fn base(config: &RcnnConfig) -> BaseWeights {
         let network = config.init(&Device::flex(), 7).unwrap();
         let parameters = state_dict::export(&network);
-        BaseWeights { sha256: "0".repeat(64), parameters, reinitialized: BTreeSet::new(), imprint: StateDict::new() }
+        BaseWeights {
+            sha256: "0".repeat(64),
+            parameters,
+            reinitialized: BTreeSet::new(),
+            imprint: StateDict::new(),
+            orientation: None,
+        }
     }
 
     #[test]

@@ -5,7 +5,9 @@
 //!            preset          the preset that they are for
 //!            reinitialized   names of the parameters that teaching draws anew   (JSON)
 //!            anything else that tells how they were made: commit, seed, steps, parts, licence
-//! tensors    NAME            f16
+//! tensors    NAME            f16: the detector's parameters
+//!            imprint.*       f16: what makes its last layers of a part's views
+//!            orientation.*, orientation_imprint.*   f16: the same of the orientation CNN
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,6 +16,7 @@ use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_orientation::training::OrientationStart;
 
 use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
@@ -108,12 +111,20 @@ impl BaseWeightsFile {
                 .map(|(n, v)| (n.clone(), v.clone()))
                 .collect(),
             reinitialized: self.reinitialized.iter().filter(own).cloned().collect(),
-            imprint: self
-                .parameters
-                .iter()
-                .filter_map(|(name, tensor)| Some((name.strip_prefix("imprint.")?.to_owned(), tensor.clone())))
-                .collect(),
+            imprint: self.named("imprint."),
+            orientation: Some(OrientationStart {
+                parameters: self.named("orientation."),
+                imprint: self.named("orientation_imprint."),
+            })
+            .filter(|start| !start.parameters.is_empty()),
         })
+    }
+
+    /// The values whose names begin so, without that beginning.
+    fn named(&self, beginning: &str) -> StateDict {
+        let named =
+            |(name, tensor): (&String, &WeightTensor)| Some((name.strip_prefix(beginning)?.to_owned(), tensor.clone()));
+        self.parameters.iter().filter_map(named).collect()
     }
 }
 

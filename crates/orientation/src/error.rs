@@ -50,6 +50,13 @@ pub enum OrientationError {
     #[cfg(feature = "training")]
     #[error(transparent)]
     Demonstration(#[from] sdg_demonstration::Error),
+    /// Parameters to start from that are another network's.
+    #[cfg(feature = "training")]
+    #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
+    Start {
+        /// The first parameter that does not fit.
+        name: String,
+    },
     /// A loss that is NaN or infinite.
     #[cfg(feature = "training")]
     #[error("the orientation loss became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]

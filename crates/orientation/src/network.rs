@@ -146,13 +146,21 @@ impl OrientationCnn {
     /// - `crops`: `[N, 3, S, S]`
     /// - output: `[N, K]`
     pub fn forward(&self, crops: Tensor<4>) -> Tensor<2> {
+        self.classes.forward(self.features(crops))
+    }
+
+    /// Gives the values that the classes are told from, `[N, H]` of the hidden layer.
+    ///
+    /// # Shapes
+    /// - `crops`: `[N, 3, S, S]`
+    pub fn features(&self, crops: Tensor<4>) -> Tensor<2> {
         let [n, channels, height, width] = crops.dims();
         let side = self.config.input_px as usize;
         assert_eq!([channels, height, width], [3, side, side], "crops are [N, 3, S, S]");
         let convs = self.stages.iter().flat_map(|stage| &stage.convs);
         let map = convs.fold(crops, |x, conv| conv.forward(x));
         let flat: Tensor<2> = map.reshape([n as i64, -1]);
-        self.classes.forward(activation::relu(self.hidden.forward(flat)))
+        activation::relu(self.hidden.forward(flat))
     }
 
     /// Reads the angle of the part on a crop.

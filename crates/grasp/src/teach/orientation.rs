@@ -26,8 +26,9 @@ pub(super) fn teach(
 ) -> Result<(OrientationCnn, OrientationFacts)> {
     let mut training = plan.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
+    let start = options.base_weights.as_ref().and_then(|weights| weights.orientation.as_ref());
     let taught =
-        training::teach(demonstrations, &plan.network, &training, &options.device, &mut |event| match *event {
+        training::teach(demonstrations, &plan.network, start, &training, &options.device, &mut |event| match *event {
             OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {
                 observe(&TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs })
             }

@@ -8,6 +8,7 @@ use sdg_demonstration::{Augmenter, Demonstration, Sample, SampleObject};
 use sdg_geometry::{Angle, BoundingBox};
 
 use super::config::CropStyle;
+use super::jitter::BoxJitter;
 use crate::crop::CropWindow;
 use crate::error::Result;
 
@@ -71,12 +72,27 @@ impl AugmentedCrops {
         // A window cannot be turned about a part of which only the box is known.
         let turned = self.style.turned && object.outline.is_some();
         let turn = Angle::from_degrees(if turned { rng.random_range(-180.0..180.0) } else { 0.0 });
-        let seen = self.style.jitter.apply(&box_in_turned_frame(object, turn, &sample.image)?, rng);
+        LabelledCrop::of(object, &sample.image, turn, &self.style.jitter, self.size_px, rng)
+    }
+}
+
+impl LabelledCrop {
+    /// The crop of an object by a window turned by `turn`, around a box that is a little off; `None` where the object is not
+    /// to be seen. Windows are turned about objects with an outline alone.
+    pub fn of(
+        object: &SampleObject,
+        image: &RgbImage,
+        turn: Angle,
+        jitter: &BoxJitter,
+        size_px: u32,
+        rng: &mut Pcg64Mcg,
+    ) -> Option<Self> {
+        let seen = jitter.apply(&box_in_turned_frame(object, turn, image)?, rng);
         let straight = CropWindow::around(&seen).ok()?;
         let window = CropWindow { center: image_from_turned(turn) * straight.center, turn, ..straight };
         let (start, end) = (object.keypoints.first()?.point(), object.keypoints.last()?.point());
         let direction = Angle::from_direction(end.x - start.x, end.y - start.y);
-        Some(LabelledCrop { crop: window.read(&sample.image, self.size_px), angle: window.crop_angle(direction) })
+        Some(Self { crop: window.read(image, size_px), angle: window.crop_angle(direction) })
     }
 }
 
@@ -99,7 +115,7 @@ fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::{BoxJitter, OrientationTraining};
+    use crate::training::OrientationTraining;
     use image::Rgb;
     use sdg_demonstration::Annotation;
     use sdg_geometry::{GraspLine, Polygon};

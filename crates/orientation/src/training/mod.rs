@@ -31,10 +31,12 @@ mod augmented;
 mod config;
 mod jitter;
 mod measured;
+mod start;
 mod trainer;
 
 pub use augmented::{AugmentedCrops, LabelledCrop};
 pub use config::{CropStyle, EarlyStop, OrientationTraining};
 pub use jitter::BoxJitter;
 pub use measured::{AngleErrors, HIT_DEGREES};
+pub use start::OrientationStart;
 pub use trainer::{OrientationEvent, TrainedOrientation, teach, train};

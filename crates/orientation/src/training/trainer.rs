@@ -15,6 +15,7 @@ use sdg_training::{Ending, Pace};
 use super::augmented::{AugmentedCrops, LabelledCrop};
 use super::config::OrientationTraining;
 use super::measured::AngleErrors;
+use super::start::OrientationStart;
 use crate::config::OrientationConfig;
 use crate::error::{OrientationError, Result};
 use crate::network::{OrientationCnn, crop_batch};
@@ -63,7 +64,10 @@ pub struct TrainedOrientation {
     pub elapsed_secs: f64,
 }
 
-/// Teaches a new network from demonstrations.
+/// Crops that classes are made from where a network starts from pretrained parameters.
+const NUM_CLASS_CROPS: usize = 960;
+
+/// Teaches a network from demonstrations, from nothing or from pretrained parameters.
 ///
 /// `observe` hears of every step and every validation and may end the run; the network is then returned as it is, and
 /// its errors say whether it is of any use.
@@ -73,6 +77,7 @@ pub struct TrainedOrientation {
 pub fn teach(
     demonstrations: &[Demonstration],
     network: &OrientationConfig,
+    start: Option<&OrientationStart>,
     training: &OrientationTraining,
     device: &Device,
     observe: &mut dyn FnMut(&OrientationEvent) -> ControlFlow<()>,
@@ -80,6 +85,14 @@ pub fn teach(
     training.validate()?;
     let untaught = network.init(&device.clone().autodiff(), training.seed)?;
     let crops = AugmentedCrops::new(demonstrations, &training.crops, network.input_px, training.seed)?;
+    let untaught = match start {
+        Some(start) => {
+            let views: Vec<LabelledCrop> =
+                (0..).flat_map(|scene_idx| crops.scene(scene_idx)).take(NUM_CLASS_CROPS).collect();
+            start.apply(untaught, &views)?
+        }
+        None => untaught,
+    };
     let held_out: Vec<LabelledCrop> = (0..training.validation_crops as u64).filter_map(|i| crops.held_out(i)).collect();
     train(untaught, training, &|scene_idx| crops.scene(scene_idx), &held_out, observe)
 }

@@ -1,0 +1,70 @@
+//! What teaching starts from: the trunk and all heads but what is a part's own, and what makes that of its views.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context, Result, bail};
+use burn::tensor::Device;
+use sdg_detection::state_dict::{self, StateDict};
+use sdg_grasp::BaseWeightsFile;
+
+use crate::checkpoint::Checkpoint;
+use crate::network::pretrain_config;
+use crate::run::Settings;
+
+/// The file of a detector's checkpoint and, for model A, of an orientation CNN's.
+///
+/// # Errors
+/// A checkpoint of another network.
+pub fn export(
+    detector: &Checkpoint<Settings>,
+    orientation: Option<&Checkpoint<Settings>>,
+    commit: &str,
+) -> Result<BaseWeightsFile> {
+    let wanted = state_dict::export(&pretrain_config().init_blank(&Device::flex())?);
+    let anew = |name: &str| name.contains("box_predictor.cls_score.");
+    let mut parameters = StateDict::new();
+    let mut reinitialized = BTreeSet::new();
+    for (name, blank) in wanted {
+        if anew(&name) {
+            reinitialized.insert(name);
+            continue;
+        }
+        let key = format!("detector.{name}");
+        let found = detector.parameters.get(&key).with_context(|| format!("expected {key} in the checkpoint"))?;
+        if found.shape != blank.shape {
+            bail!("{key}: expected shape {:?}, found {:?}", blank.shape, found.shape);
+        }
+        parameters.insert(name, found.clone());
+    }
+    take(&detector.parameters, "imprint.", "imprint.", &mut parameters)?;
+    if let Some(Checkpoint { parameters: of_orientation, .. }) = orientation {
+        take(of_orientation, "network.", "orientation.", &mut parameters)?;
+        take(of_orientation, "imprint.", "orientation_imprint.", &mut parameters)?;
+        parameters.retain(|name, _| !name.starts_with("orientation.classes."));
+    }
+    let mut origin = BTreeMap::from([
+        ("commit".to_owned(), commit.to_owned()),
+        ("licence".to_owned(), "MIT OR Apache-2.0".to_owned()),
+    ]);
+    for (network, checkpoint) in [("detector", Some(detector)), ("orientation", orientation)] {
+        let Some(Checkpoint { settings: Settings { seed, num_parts, batch_size, .. }, step, .. }) = checkpoint else {
+            continue;
+        };
+        origin.insert(
+            network.to_owned(),
+            format!("seed {seed}, {step} steps, {num_parts} parts, {} pictures", step * batch_size),
+        );
+    }
+    Ok(BaseWeightsFile { preset: "edge".into(), reinitialized, parameters, origin })
+}
+
+/// Takes the parameters of one name under another.
+fn take(from: &StateDict, name: &str, other_name: &str, to: &mut StateDict) -> Result<()> {
+    let before = to.len();
+    let named = from.iter().filter_map(|(key, tensor)| Some((key.strip_prefix(name)?, tensor)));
+    to.extend(named.map(|(key, tensor)| (format!("{other_name}{key}"), tensor.clone())));
+    if to.len() == before {
+        bail!("expected parameters {name}* in the checkpoint, found none");
+    }
+    Ok(())
+}
