@@ -13,7 +13,7 @@ use anyhow::{Context, Result};
 use image::RgbImage;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity};
-use sdg_grasp::{BaseWeights, FineTuning, GraspError, GraspModel, ModelKind, TeachOptions, Verification, teach};
+use sdg_grasp::{BaseWeights, FineTuning, GraspError, GraspModel, ModelKind, Start, TeachOptions, Verification, teach};
 use sdg_part_generator::{LookAlike, OtherKind, Part, PhotoConfig, Sample, SceneConfig, Scenes};
 
 use crate::outcome::{Outcome, outcomes};
@@ -52,6 +52,13 @@ fn scene_config() -> SceneConfig {
         min_inside_share: 0.95,
         ..SceneConfig::default()
     }
+}
+
+/// The surest detection in a picture, and its error in pixels of the photo where it is right.
+struct Best {
+    is_accepted: bool,
+    score: f64,
+    error: Option<f64>,
 }
 
 impl Trial {
@@ -115,6 +122,7 @@ impl Trial {
             look_alikes: self.look_alikes.len(),
             look_alike_alarms: 0,
             placed: 0,
+            separated: 0,
             error_px: None,
             cpu_secs: (cpu_secs * 10.0).round() / 10.0,
             steps_done: 0,
@@ -131,39 +139,41 @@ impl Trial {
             }
             Err(error) => return Err(error.into()),
         };
+        let best_of = |samples: &[Sample]| -> Result<Vec<Option<Best>>> {
+            samples.iter().map(|sample| self.best(&model, sample)).collect()
+        };
+        let [with, without, look_alikes] = [best_of(&self.with)?, best_of(&self.without)?, best_of(&self.look_alikes)?];
+        let accepted = |best: &[Option<Best>]| best.iter().flatten().filter(|best| best.is_accepted).count();
+        (outcome.alarms, outcome.look_alike_alarms) = (accepted(&without), accepted(&look_alikes));
+        let mut absent: Vec<f64> = without.iter().map(|best| best.as_ref().map_or(0.0, |best| best.score)).collect();
+        absent.sort_by(|one, other| other.total_cmp(one));
+        let all_but_one = absent.get(1).copied().unwrap_or(0.0);
         let mut errors = Vec::new();
-        for sample in &self.with {
-            let Some((accepted, error)) = self.best(&model, sample)? else { continue };
-            outcome.placed += usize::from(error.is_some());
-            match error {
-                Some(error) if accepted => {
-                    outcome.found += 1;
-                    errors.push(error);
+        for best in with.into_iter().flatten() {
+            match best.error {
+                Some(error) => {
+                    outcome.placed += 1;
+                    outcome.separated += usize::from(best.score > all_but_one);
+                    outcome.found += usize::from(best.is_accepted);
+                    errors.extend(best.is_accepted.then_some(error));
                 }
-                None if accepted => outcome.wrong += 1,
-                _ => {}
+                None => outcome.wrong += usize::from(best.is_accepted),
             }
         }
-        let alarms = |samples: &[Sample]| -> Result<usize> {
-            samples
-                .iter()
-                .map(|sample| Ok(usize::from(self.best(&model, sample)?.is_some_and(|(accepted, _)| accepted))))
-                .sum()
-        };
-        outcome.alarms = alarms(&self.without)?;
-        outcome.look_alike_alarms = alarms(&self.look_alikes)?;
         outcome.error_px = sdg_training::median(&mut errors).map(|error| (error * 100.0).round() / 100.0);
         Ok(outcome)
     }
 
-    /// The surest detection: whether it is accepted, and its error in pixels of the photo where it is right.
-    fn best(&self, model: &GraspModel, sample: &Sample) -> Result<Option<(bool, Option<f64>)>> {
+    /// The surest detection.
+    fn best(&self, model: &GraspModel, sample: &Sample) -> Result<Option<Best>> {
         let found = model.detect(&sample.image, Verification::Off)?;
-        let Some(best) = found.first() else { return Ok(None) };
-        let error = sample.instances.first().and_then(|instance| {
-            self.error(&best.grasp, &instance.grasp.start, &instance.grasp.end, &instance.image_from_demonstration)
-        });
-        Ok(Some((best.is_accepted(), error)))
+        Ok(found.first().map(|best| Best {
+            is_accepted: best.is_accepted(),
+            score: best.network_score,
+            error: sample.instances.first().and_then(|instance| {
+                self.error(&best.grasp, &instance.grasp.start, &instance.grasp.end, &instance.image_from_demonstration)
+            }),
+        }))
     }
 
     /// The distance to the truth, where distance and turn are small enough; turns that look the same are none.
@@ -249,7 +259,7 @@ impl Comparison<'_> {
                 let options = TeachOptions {
                     kind: ModelKind::C,
                     symmetry: trial.part.symmetry(),
-                    base_weights: self.weights.clone(),
+                    start: self.weights.clone().map_or(Start::Nothing, Start::Weights),
                     steps: Some(steps),
                     fine_tuning: self.fine_tuning.clone(),
                     ..TeachOptions::new(self.seed)
@@ -305,6 +315,7 @@ mod tests {
             look_alikes: 5,
             look_alike_alarms: 2,
             placed: 8,
+            separated: 7,
             error_px: None,
             cpu_secs: 4.0,
             steps_done: 15,

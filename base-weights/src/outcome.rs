@@ -29,6 +29,10 @@ pub struct Outcome {
     pub look_alike_alarms: usize,
     /// Pictures with the part in which the surest detection, accepted or not, is right.
     pub placed: usize,
+    /// Of those placed, the ones whose score is above that of all but one of the pictures with other parts alone: what the
+    /// best threshold would accept at one false alarm.
+    #[serde(default)]
+    pub separated: usize,
     /// Median error of what is right, in pixels of the photo.
     pub error_px: Option<f64>,
     /// Processor time of teaching, seconds.

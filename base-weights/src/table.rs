@@ -14,20 +14,20 @@ pub fn table(outcomes: &[Outcome], only: &[String]) -> String {
     let parts_of = |row: &Vec<&Outcome>| row.iter().map(|outcome| outcome.part).collect::<BTreeSet<u64>>();
     let common = rows.values().map(parts_of).reduce(|a, b| &a & &b).unwrap_or_default();
     let mut text = format!("Parts {common:?}\n\n");
-    text +=
-        "| weights | steps | found | wrong | placed | false alarms | look-alikes taken | processor s | not learnt |\n";
-    text += "|---|--:|--:|--:|--:|--:|--:|--:|--:|\n";
+    text += "| weights | steps | found | wrong | placed | separated | false alarms | look-alikes taken | processor s | not learnt |\n";
+    text += "|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
     for ((weights, steps), row) in &rows {
         let row: Vec<&Outcome> = row.iter().copied().filter(|outcome| common.contains(&outcome.part)).collect();
         let sum = |value: fn(&Outcome) -> usize| row.iter().map(|outcome| value(outcome)).sum::<usize>();
         let secs = row.iter().map(|outcome| outcome.cpu_secs).sum::<f64>() / row.len().max(1) as f64;
         let _ = writeln!(
             text,
-            "| {weights} | {steps} | {} of {} | {} | {} | {} of {} | {} of {} | {secs:.0} | {} |",
+            "| {weights} | {steps} | {} of {} | {} | {} | {} | {} of {} | {} of {} | {secs:.0} | {} |",
             sum(|o| o.found),
             sum(|o| o.with),
             sum(|o| o.wrong),
             sum(|o| o.placed),
+            sum(|o| o.separated),
             sum(|o| o.alarms),
             sum(|o| o.without),
             sum(|o| o.look_alike_alarms),
@@ -56,7 +56,7 @@ mod tests {
         let text = [line("a", 1, 7), line("a", 2, 8), line("a", 3, 1), line("b", 1, 3), line("b", 2, 4)].join("\n");
         let table = table(&outcomes(&text), &[]);
         assert!(table.starts_with("Parts {1, 2}"), "{table}");
-        assert!(table.contains("| a | 60 | 15 of 20 | 2 | 18 | 4 of 20 | 6 of 10 | 20 | 0 |"), "{table}");
+        assert!(table.contains("| a | 60 | 15 of 20 | 2 | 18 | 0 | 4 of 20 | 6 of 10 | 20 | 0 |"), "{table}");
         assert!(table.contains("| b | 60 | 7 of 20 |"), "{table}");
         let all = outcomes(&text);
         assert!(super::table(&all, &["a".into()]).contains("| a | 60 | 16 of 30 |"));

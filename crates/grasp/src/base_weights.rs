@@ -38,6 +38,11 @@ impl BaseWeights {
         self.parameters.keys().any(|name| name.starts_with("roi_heads.keypoint_head."))
     }
 
+    /// Whether they are of our own pretraining, which makes last layers of a part's views.
+    pub(crate) fn is_ours(&self) -> bool {
+        !self.imprint.is_empty()
+    }
+
     /// The detector with last layers made from views of the part, where the weights can make them.
     ///
     /// # Errors
@@ -48,7 +53,7 @@ impl BaseWeights {
         images: &[TransformedImage],
         targets: &[Target],
     ) -> Result<GeneralizedRcnn> {
-        if self.imprint.is_empty() {
+        if !self.is_ours() {
             return Ok(detector);
         }
         let heads = &detector.config().roi_heads;

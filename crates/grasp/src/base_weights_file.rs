@@ -26,6 +26,12 @@ use crate::safetensors_file::{self, TensorBytes, values_from_halves};
 const FORMAT_NAME: &str = "sdg base weights";
 const FORMAT: &str = "sdg base weights 1";
 
+/// The base weights that are shipped, made by `make base-weights`, and the file's SHA-256.
+#[cfg(feature = "base-weights")]
+pub(crate) const SHIPPED: &[u8] = include_bytes!("../weights/edge.safetensors");
+#[cfg(feature = "base-weights")]
+pub(crate) const SHIPPED_SHA256: &str = include_str!("../weights/edge.sha256");
+
 /// Base weights of our own and how they were made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeightsFile {

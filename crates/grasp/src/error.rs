@@ -157,10 +157,10 @@ pub enum GraspError {
     /// The network refused its input.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),
-    /// A preset with frozen stages and no weights to put there.
+    /// A preset that starts from weights, and none given.
     #[cfg(feature = "teach")]
     #[error(
-        "the preset {preset} fine-tunes imported weights and freezes a part of them: expected base weights, found none"
+        "the preset {preset} starts from weights, and this build carries none for it: expected base weights, found none"
     )]
     NeedsBaseWeights {
         /// The preset's name.

@@ -87,6 +87,6 @@ pub use sdg_detection::keep_freed_memory;
 pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::{TaughtDemonstration, TaughtMarks};
 #[cfg(feature = "teach")]
-pub use teach::{FineTuning, Preset, Taught, TeachOptions, TeachingEvent, teach};
+pub use teach::{FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, teach};
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;

@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, Taught, TeachOptions, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, Start, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -64,7 +64,7 @@ pub struct TeachArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
     /// Weights to start from: base weights of `make base-weights`, any file that `sdg weights convert` reads or writes, a
-    /// grasp model, or none
+    /// grasp model, or none to start from nothing; without it, preset edge starts from the base weights in this program
     #[arg(long, value_name = "FILE")]
     pub base_weights: Option<PathBuf>,
     /// Start this part from nothing all the same, such as roi_heads.box_predictor; repeat for several
@@ -212,9 +212,11 @@ fn command(args: &TeachArgs) -> String {
 /// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
 fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
-    let Some(path) = args.base_weights.as_ref().filter(|path| path.as_os_str() != NO_BASE_WEIGHTS) else {
+    let Some(path) = &args.base_weights else { return Ok(None) };
+    if path.as_os_str() == NO_BASE_WEIGHTS {
+        options.start = Start::Nothing;
         return Ok(None);
-    };
+    }
     let Some(network) = options.network() else {
         return Err(Usage(format!(
             "--base-weights: model {} has no network that could start from weights",
@@ -223,7 +225,7 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         .into());
     };
     if let Some((own, origin)) = base_weights::read_own(path, options, &args.reinitialized)? {
-        options.base_weights = Some(own);
+        options.start = Start::Weights(own);
         if !args.json {
             let made: Vec<String> = origin.iter().map(|(name, value)| format!("{name} {value}")).collect();
             println!("base weights {}: {}", path.display(), made.join(", "));
@@ -240,7 +242,7 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
         told = Some(report.clone());
         Ok(())
     })?;
-    options.base_weights = Some(base_weights);
+    options.start = Start::Weights(base_weights);
     Ok(told.map(|report: Report| json!(report)))
 }
 

@@ -20,6 +20,7 @@ mod other_parts;
 mod paper;
 mod plan;
 mod r50;
+mod start;
 pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -33,7 +34,6 @@ use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
 use sdg_geometry::{GraspLine, RotationalSymmetry};
 use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
-use crate::base_weights::BaseWeights;
 use crate::calibration::Calibration;
 use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
@@ -53,6 +53,7 @@ use held_back::HeldBack;
 use negatives::NegativeScenes;
 pub(crate) use plan::Plan;
 pub use plan::Preset;
+pub use start::Start;
 use symmetry::HiddenTurns;
 
 /// How to teach.
@@ -68,7 +69,7 @@ pub struct TeachOptions {
     pub time_budget: Option<Duration>,
     /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
     pub steps: Option<usize>,
-    /// How to teach from base weights of our own; `None` to teach from them as from nothing.
+    /// How to teach; `None` for the preset's way from nothing, and for [`FineTuning::new`] from base weights of our own.
     pub fine_tuning: Option<FineTuning>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
@@ -76,8 +77,8 @@ pub struct TeachOptions {
     pub size_tolerance: RangeInclusive<f64>,
     /// What [`crate::seen_from_above`] says where the demonstrations come from there.
     pub lengths: Option<Lengths>,
-    /// Weights that the detector starts from; `None` to start from nothing.
-    pub base_weights: Option<BaseWeights>,
+    /// What the networks start from.
+    pub start: Start,
     /// Where to compute; without gradients.
     pub device: Device,
 }
@@ -95,12 +96,12 @@ impl TeachOptions {
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
-            base_weights: None,
+            start: Start::default(),
             device: Device::flex(),
         }
     }
 
-    /// The detector that is taught, which [`Self::base_weights`] must fit; `None` for model S, which has none.
+    /// The detector that is taught, which weights to start from must fit; `None` for model S, which has none.
     pub fn network(&self) -> Option<RcnnConfig> {
         models::rcnn_kind(self.kind).map(|rcnn| self.preset.network(rcnn, true))
     }
@@ -114,18 +115,15 @@ impl TeachOptions {
     fn initial_detector(&self, config: &RcnnConfig) -> Result<GeneralizedRcnn> {
         let device = self.device.clone().autodiff();
         let detector = config.init(&device, self.seed)?;
-        match &self.base_weights {
-            Some(base_weights) => {
+        match &self.start {
+            Start::Weights(base_weights) => {
                 // Weights of ours have every head that is taught, imported ones those of the model alone.
                 let start =
                     if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
                 let own = base_weights.apply(start.init(&device, self.seed)?)?;
                 Ok(state_dict::import(detector, &state_dict::export(&own)).0)
             }
-            None if self.preset.needs_base_weights() => {
-                Err(GraspError::NeedsBaseWeights { preset: self.preset.name() })
-            }
-            None => Ok(detector),
+            Start::Shipped | Start::Nothing => Ok(detector),
         }
     }
 }
@@ -161,6 +159,7 @@ pub fn teach(
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
     let Some(rcnn) = models::rcnn_kind(options.kind) else { return instant(demonstrations, options, start) };
+    let options = &options.with_start()?;
     let plan = options.preset.plan(rcnn, options);
     teach_network(demonstrations, &plan, options, observe, start)
 }
@@ -301,8 +300,8 @@ pub(crate) fn teach_network(
         frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
         windows: &|i| turns.canonical(windows.sample(recurring(i))),
     };
-    let detector = match &options.base_weights {
-        Some(base_weights) if !base_weights.imprint.is_empty() => {
+    let detector = match options.start.weights() {
+        Some(base_weights) if base_weights.is_ours() => {
             let (images, targets) = first_windows(NUM_VIEWS, &plan.network.input, &source)?;
             base_weights.imprint(detector, &images, &targets)?
         }
@@ -349,7 +348,7 @@ pub(crate) fn teach_network(
             error_degrees: decimal(calibrated.error_degrees),
         }),
         orientation: orientation_facts,
-        base_weights_sha256: options.base_weights.as_ref().map(|base_weights| base_weights.sha256.clone()),
+        base_weights_sha256: options.start.weights().map(|base_weights| base_weights.sha256.clone()),
     };
     let model = GraspModel {
         preset: options.preset.name().to_owned(),

@@ -26,7 +26,7 @@ pub(super) fn teach(
 ) -> Result<(OrientationCnn, OrientationFacts)> {
     let mut training = plan.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
-    let start = options.base_weights.as_ref().and_then(|weights| weights.orientation.as_ref());
+    let start = options.start.weights().and_then(|weights| weights.orientation.as_ref());
     let taught =
         training::teach(demonstrations, &plan.network, start, &training, &options.device, &mut |event| match *event {
             OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {

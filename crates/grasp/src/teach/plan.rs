@@ -10,8 +10,9 @@ use sdg_orientation::OrientationConfig;
 use sdg_orientation::training::OrientationTraining;
 use sdg_training::TrainingConfig;
 
-use super::{TeachOptions, paper, r50};
+use super::{FineTuning, TeachOptions, paper, r50};
 use crate::NUM_KEYPOINTS;
+use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 
@@ -118,7 +119,7 @@ impl Preset {
     /// How a model with a network is taught.
     pub(super) fn plan(self, rcnn: RcnnKind, options: &TeachOptions) -> Plan {
         let &TeachOptions { kind, seed, symmetry, .. } = options;
-        let network = self.network(rcnn, options.base_weights.is_some());
+        let network = self.network(rcnn, options.start.weights().is_some());
         let plan = Plan {
             network: if self == Self::Edge { with_keypoints(network) } else { network },
             training: self.training(kind, seed),
@@ -133,7 +134,12 @@ impl Preset {
             orientation: (kind == ModelKind::A).then(|| self.orientation(symmetry, seed)),
             num_other_parts: 0,
         };
-        options.fine_tuning.iter().fold(plan, |plan, fine_tuning| fine_tuning.adapt(plan))
+        let starts_from_ours = options.start.weights().is_some_and(BaseWeights::is_ours);
+        let usual = || starts_from_ours.then(|| FineTuning::new(seed));
+        match options.fine_tuning.clone().or_else(usual) {
+            Some(fine_tuning) => fine_tuning.adapt(plan),
+            None => plan,
+        }
     }
 }
 
