@@ -65,7 +65,7 @@ pub struct TrainedOrientation {
 
 /// Teaches a new network from demonstrations.
 ///
-/// `observe` hears of every step and every validation and may end the run; the network is then returned as it is, and
+/// `observe` is called after every step and every validation and may end the run; the network is then returned as it is, and
 /// its errors say whether it is of any use.
 ///
 /// # Errors
