@@ -21,7 +21,7 @@ pub struct Checkpoint<S> {
     pub step: usize,
     /// The network's parameters.
     pub parameters: StateDict,
-    /// What the optimiser remembers between steps; nothing where every episode has its own.
+    /// The optimiser's state between steps; empty where every episode has an optimiser of its own.
     pub optimizer: AdamWState,
 }
 

@@ -1,4 +1,4 @@
-//! What base weights are worth: model C taught from them for a few steps on parts that nobody has seen, check off.
+//! How much base weights help: model C taught from them for a few steps on parts unseen in pretraining, check off.
 //!
 //! Each part is taught from its photo and then shown pictures with it, pictures with other parts alone, and pictures with
 //! its mirror image or itself with one feature moved. The network alone answers.

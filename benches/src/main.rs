@@ -12,6 +12,7 @@
 //! what they computed (how many boxes, which scores), which must agree before anything is timed. Left out: installing
 //! the peers (`make bench`) and checking our kernels (their own tests).
 #![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "a program that measures")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod browser;

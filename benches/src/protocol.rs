@@ -15,7 +15,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-/// Numbers that tell what was computed: whoever does the same work has the same.
+/// Numbers that identify what was computed: equal where the same work was done.
 pub type Facts = BTreeMap<String, f64>;
 
 /// What a worker says first.
@@ -23,7 +23,6 @@ pub type Facts = BTreeMap<String, f64>;
 pub struct Ready {
     /// Seconds of the run that does not count, all its pieces; `None` where there was none.
     pub seconds: Option<f64>,
-    /// What was computed.
     pub facts: Facts,
     /// Multiplications and additions of the network's products, 1e9 of them, where the worker counts.
     pub gflop: Option<f64>,
@@ -44,15 +43,12 @@ pub enum Answer {
 /// From driver to worker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
-    /// Runs to make.
     pub repeat: usize,
 }
 
 /// Something to be timed.
 pub struct Work {
-    /// One run.
     pub run: Box<dyn FnMut() -> Result<()>>,
-    /// What it computes.
     pub facts: Facts,
     /// How many pieces one run makes; times are told for one.
     pub pieces: usize,

@@ -5,9 +5,7 @@ use crate::network::Network;
 /// Somebody to be compared with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peer {
-    /// Name for `peers/worker.py`.
     pub id: &'static str,
-    /// Name in tables.
     pub title: &'static str,
     /// The ratio that we mean to reach, peer's seconds over ours.
     pub wanted: Option<f64>,
@@ -22,7 +20,7 @@ pub struct WorkSpec {
     pub title: &'static str,
     /// The network whose weights both sides load.
     pub network: Option<Network>,
-    /// With whom; nobody where only our own time is told.
+    /// The peer; none where only our own time is measured.
     pub peers: &'static [Peer],
     /// Whether it takes minutes: run once, and not by `--quick`.
     pub long: bool,
@@ -106,9 +104,7 @@ pub const WORKS: &[WorkSpec] = &[
 /// Whose program does a work.
 #[derive(Debug, Clone, Copy)]
 pub enum Side {
-    /// This project's.
     Ours,
-    /// A peer's.
     Peer(&'static Peer),
 }
 

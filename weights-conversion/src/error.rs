@@ -5,15 +5,11 @@ use std::io;
 /// Why a checkpoint could not be read or converted. Each message says what was expected and found.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WeightsError {
     /// The file system refused something.
     #[error("cannot {action}: {source}")]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// What the system said.
-        source: io::Error,
-    },
+    Io { action: &'static str, source: io::Error },
     /// Bytes of no format that is read here.
     #[error("expected a pickled checkpoint (protocol 2 to 5), a torch checkpoint or a safetensors file, found {found}")]
     NotACheckpoint {
@@ -27,7 +23,6 @@ pub enum WeightsError {
     ForbiddenGlobal {
         /// Module and name, as the file spells them.
         name: String,
-        /// Where in the file.
         offset: u64,
     },
     /// A file that was cut short, altered, or written by something unknown.
@@ -37,7 +32,6 @@ pub enum WeightsError {
         part: String,
         /// What ought to be there.
         expected: String,
-        /// What is.
         found: String,
     },
     /// A file that asks for more than any checkpoint needs.
@@ -45,9 +39,7 @@ pub enum WeightsError {
     TooLarge {
         /// What there is too much of.
         what: String,
-        /// The bound.
         most: u64,
-        /// What was asked for.
         found: u64,
     },
     /// Names of no naming scheme that is known here.
@@ -55,20 +47,13 @@ pub enum WeightsError {
         "expected names as Detectron2, torchvision or Caffe2 write them, found {count} tensors such as {}",
         .examples.join(", ")
     )]
-    UnknownNames {
-        /// Number of tensors.
-        count: usize,
-        /// A few of them.
-        examples: Vec<String>,
-    },
+    UnknownNames { count: usize, examples: Vec<String> },
     /// An architecture that the names do not tell.
     #[error("{part}: expected {expected}, found {found}")]
     Architecture {
         /// The part of the network.
         part: &'static str,
-        /// What it may be.
         expected: String,
-        /// What it is.
         found: String,
     },
     /// The checkpoint does not fill the network.
@@ -77,29 +62,20 @@ pub enum WeightsError {
          to leave a part as initialised, name it: --reinit roi_heads.box_predictor"
     )]
     Incomplete {
-        /// Parameters without a tensor.
         missing: usize,
         /// Parameters whose tensor has another shape.
         mismatched: usize,
-        /// One of them.
         first: String,
     },
     /// A part to re-initialise that the network has not.
     #[error("expected a part of the network to re-initialise, such as {}, found \"{found}\"", .known.join(", "))]
-    UnknownPart {
-        /// Parts that it has.
-        known: Vec<String>,
-        /// What was asked for.
-        found: String,
-    },
+    UnknownPart { known: Vec<String>, found: String },
     /// A value that weights cannot have.
     #[error("{name}: expected finite values{limit}, found {found}")]
     Value {
-        /// The parameter.
         name: String,
         /// " up to 65504" where half precision is asked for.
         limit: &'static str,
-        /// The value.
         found: f32,
     },
 }

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Values stay in the file until they are written, so a conversion needs the memory of one layer. Checkpoints are
-//! programs for Python's pickle machine and come from strangers: this crate imitates the few functions that weights
+//! programs for Python's pickle machine and may be hostile: this crate imitates the few functions that weights
 //! need, refuses every other by name, and checks every size before it takes memory.
 //!
 //! Left out: running the network (`sdg weights verify` does), downloads, torch's pre-2017 tar files, compressed zips.

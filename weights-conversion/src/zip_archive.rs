@@ -1,7 +1,7 @@
 //! The part of the zip format that torch uses: entries stored as they are, with checksums, zip64 included.
 //!
 //! Entries are read in place and never unpacked to disk. A name that would climb out of a folder is refused all the
-//! same: no honest writer makes one.
+//! same: no regular writer makes one.
 
 use std::collections::BTreeMap;
 

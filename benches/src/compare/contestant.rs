@@ -13,7 +13,7 @@ use crate::compare::prepare::{Files, Paths};
 use crate::protocol::{Answer, Ready, Request};
 use crate::registry::{Side, WorkSpec};
 
-/// Between turns: time for the other side's threads to go to sleep, some of which spin for a while after their work.
+/// Between turns: time for the other side's threads to block, some of which spin for a while after their work.
 const BREATH: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.

@@ -5,13 +5,11 @@ use std::process::Command;
 /// The machine and the state of the repository.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
-    /// The processor's name.
     pub processor: String,
     /// Cores that this process may use.
     pub cores: usize,
     /// The widest instructions that matter here.
     pub instructions: &'static str,
-    /// Main memory, GiB.
     pub memory_gib: f64,
     /// The commit that was measured, with a plus sign where files differ from it.
     pub commit: String,

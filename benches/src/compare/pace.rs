@@ -16,7 +16,6 @@ pub struct Pace {
 /// What a work's warm-ups say about how to measure it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Rounds.
     pub rounds: usize,
     /// Runs of each side in its turn.
     pub repeats: Vec<usize>,

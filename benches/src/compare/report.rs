@@ -14,7 +14,6 @@ use crate::results::{duration, median, rewrite, write_whole};
 /// One side of a work, measured.
 #[derive(Debug, Clone)]
 pub struct Measured {
-    /// Who.
     pub side: Side,
     /// Seconds of every run.
     pub seconds: Vec<f64>,
@@ -42,7 +41,7 @@ impl Measured {
     }
 }
 
-/// A row of `peers.json`. Where nobody does the same work, the peer's columns are null.
+/// A row of `peers.json`. Where no peer does the same work, its columns are null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     work: &'static str,

@@ -1,4 +1,4 @@
-//! What the marks are good for, and what is odd about them: told at once, while they can still be mended.
+//! Which models the marks suffice for, and warnings about marks that look wrong, after every change.
 
 use sdg_demonstration::ModelKind;
 use sdg_geometry::Polygon;
@@ -11,7 +11,7 @@ use crate::marks::Marks;
 const BORDER_PX: f64 = 1.0;
 /// Least overlap (IoU) of the box with the outline's own.
 const MIN_BOX_AGREEMENT: f64 = 0.8;
-/// A line shorter than this gives its angle by luck: a pixel's slip is more than five degrees.
+/// A shorter line has no reliable angle: an error of one pixel turns it by more than five degrees.
 const MIN_LINE_PX: f64 = 12.0;
 /// Fewer pixels show too little of a part.
 const MIN_PART_PX: f64 = 24.0;
@@ -43,7 +43,7 @@ pub struct ModelAdvice {
 pub struct Remark {
     /// A name for programs.
     pub code: &'static str,
-    /// For people.
+    /// One line for the person at the page.
     pub text: String,
     /// What the page offers to do about it.
     pub fix: Option<Fix>,

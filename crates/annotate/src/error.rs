@@ -14,34 +14,20 @@ pub type TeacherError = Box<dyn std::error::Error + Send + Sync>;
 /// Why the page could not be opened, or one of its requests not be answered.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
     /// There is nothing to mark.
     #[error("expected at least one image to mark, or a camera to take it with, found none")]
     NoImage,
     /// A file could not be read or written.
     #[error("{}: {action}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// The system's complaint.
-        source: io::Error,
-    },
+    File { path: PathBuf, action: &'static str, source: io::Error },
     /// A file is larger than any that makes sense.
     #[error("{}: expected at most {most} bytes, found {found}", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// The bound.
-        most: u64,
-        /// Its size.
-        found: u64,
-    },
+    TooLarge { path: PathBuf, most: u64, found: u64 },
     /// A picture or its marks are not what they should be.
     #[error("{name}: {source}")]
     Demonstration {
-        /// The picture or annotation.
         name: String,
         /// What is wrong with it.
         source: sdg_demonstration::Error,
@@ -51,55 +37,25 @@ pub enum Error {
     Write(#[from] sdg_report::ReportError),
     /// The marks are not enough for what was asked.
     #[error("{name}: expected {expected}, found {found}")]
-    NotMarked {
-        /// The picture.
-        name: String,
-        /// What is needed.
-        expected: &'static str,
-        /// What is there.
-        found: &'static str,
-    },
+    NotMarked { name: String, expected: &'static str, found: &'static str },
     /// No picture of that number.
     #[error("expected a picture numbered below {count}, found {id}")]
-    NoSuchPicture {
-        /// The number asked for.
-        id: usize,
-        /// How many there are.
-        count: usize,
-    },
+    NoSuchPicture { id: usize, count: usize },
     /// More pictures than a session keeps.
     #[error("expected at most {most} pictures to try, found one more")]
-    TooManyPictures {
-        /// The bound.
-        most: usize,
-    },
+    TooManyPictures { most: usize },
     /// The page was opened without a camera.
     #[error("expected a page with a camera, found none: open it with --from")]
     NoCamera,
     /// A frame that was not shown, or so long ago that it is not kept any more.
     #[error("expected a frame that was shown lately, found frame {number}")]
-    NoSuchFrame {
-        /// Its number.
-        number: u64,
-    },
+    NoSuchFrame { number: u64 },
     /// The camera is not in a state for this.
     #[error("expected {expected}, found {found}")]
-    Camera {
-        /// What is needed.
-        expected: &'static str,
-        /// What is wrong.
-        found: String,
-    },
+    Camera { expected: &'static str, found: String },
     /// The request makes no sense.
     #[error("{what}: expected {expected}, found {found}")]
-    Request {
-        /// Which part of it.
-        what: &'static str,
-        /// What belongs there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    Request { what: &'static str, expected: String, found: String },
     /// Something else is going on that must end first.
     #[error("{0}")]
     Busy(&'static str),
@@ -117,7 +73,6 @@ pub enum Error {
     Port {
         /// The port asked for; 0 for any.
         port: u16,
-        /// The system's complaint.
         source: io::Error,
     },
 }

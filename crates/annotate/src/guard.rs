@@ -1,4 +1,4 @@
-//! Who may talk to the page: the browser that was given its address, from the page itself.
+//! Which requests are answered: those with the token, this server's host name and no foreign origin.
 //!
 //! Every program on this computer can reach the port, and every web page in the browser can make it send requests there.
 //! So each request must name this very server ([`Guard::check`]'s `Host`: a foreign name that was made to point here is

@@ -1,4 +1,4 @@
-//! Live pictures, which this crate does not take itself: whoever has a camera implements [`LivePictures`].
+//! Live pictures, which this crate does not take itself: the caller implements [`LivePictures`].
 //!
 //! A frame that was shown to the page is kept for a while, so that the photo that is taken is the one that the person saw, and
 //! detections are drawn on the picture that they were found in.
@@ -81,7 +81,7 @@ impl LiveFaultKind {
     }
 }
 
-/// The camera that a sitting is opened with.
+/// The camera that a session is opened with.
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
     /// Its pictures.
@@ -92,7 +92,7 @@ pub struct LiveOptions {
     pub photo_path: PathBuf,
 }
 
-/// The camera of a sitting, and the frames that were shown.
+/// The camera of a session, and the frames that were shown.
 #[derive(Debug)]
 pub(crate) struct LiveDesk {
     pub(crate) options: LiveOptions,

@@ -1,4 +1,4 @@
-//! Names of files that are written for the person at the page.
+//! Names of the files that the page writes.
 
 use std::path::{Path, PathBuf};
 

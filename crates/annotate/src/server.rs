@@ -1,4 +1,4 @@
-//! The server: this computer only, one port, one sitting, a thread for each connection.
+//! The server: this computer only, one port, one session, a thread for each connection.
 //!
 //! A browser keeps six connections at most, and what they ask for reads files and computes: threads do that more simply
 //! than tasks would, and teaching has its own.
@@ -25,7 +25,7 @@ const LINGER: Duration = Duration::from_secs(2);
 /// More connections than the page's browsers keep.
 const MAX_CONNECTIONS: usize = 64;
 
-/// A bound port and the sitting behind it.
+/// A bound port and the session behind it.
 pub struct Server {
     listener: TcpListener,
     guard: Guard,
@@ -45,7 +45,7 @@ impl Server {
         Ok(Self { listener, guard: Guard::new(port)?, session: Arc::new(session), port })
     }
 
-    /// The address that opens the page; whoever has it has the page.
+    /// The address that opens the page; it holds the token, so it gives access.
     pub fn url(&self) -> String {
         self.guard.url()
     }

@@ -1,6 +1,6 @@
 //! One session of the page: the pictures given, what is marked on them, and what was tried.
 //!
-//! Everything that a request may reach hangs on a number in a list made here. No path comes from the page.
+//! Requests name pictures by their index in a list made here. No path comes from the page.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -21,7 +21,7 @@ use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest};
 use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView, TrialPictureView};
 
-/// Pictures to try that one sitting keeps.
+/// Pictures to try that one session keeps.
 const MAX_SCENES: usize = 500;
 /// The longest name of an object.
 const MAX_LABEL_CHARS: usize = 80;
@@ -187,10 +187,10 @@ impl Session {
         Ok(self.state().scene(id)?.clone())
     }
 
-    /// Takes a picture that came from the page; it is kept in a folder of this sitting.
+    /// Takes a picture that came from the page; it is kept in a folder of this session.
     ///
     /// # Errors
-    /// Bytes that are no picture, more pictures than a sitting keeps.
+    /// Bytes that are no picture, more pictures than a session keeps.
     pub fn add_scene(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
         let count = self.state().scenes.len();
         if count >= MAX_SCENES {
@@ -285,7 +285,7 @@ impl Session {
     /// Makes a frame that was shown a picture to try.
     ///
     /// # Errors
-    /// No camera, a frame that is not kept any more, more pictures than a sitting keeps.
+    /// No camera, a frame that is not kept any more, more pictures than a session keeps.
     pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
         let bytes = png(&*self.live_desk()?.frame(number)?)?;
         self.add_scene(&format!("live-{number}.png"), &bytes)

@@ -1,4 +1,4 @@
-//! What the page needs of grasp models, which this crate does not see: whoever has them implements these traits.
+//! What the page needs of grasp models, which this crate does not depend on: the caller implements these traits.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -15,7 +15,7 @@ const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
-    /// Teaches a model; minutes for one with a network. `observe` hears of the progress and may end the teaching, which
+    /// Teaches a model; minutes for one with a network. `observe` is called with the progress and may end the teaching, which
     /// then keeps what there is.
     ///
     /// # Errors

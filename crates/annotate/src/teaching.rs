@@ -1,4 +1,4 @@
-//! Teaching in the background, and its news for whoever asks.
+//! Teaching on a thread, and its progress.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -24,20 +24,20 @@ pub enum Status {
     /// None was asked for yet.
     #[default]
     Idle,
-    /// It goes on.
+    /// Not ended yet.
     Running,
     /// It was asked to end with what there is.
     Stopping,
     /// There is a model.
     Done,
-    /// There is none.
+    /// It failed; there is no model.
     Failed,
 }
 
 /// The news of a teaching.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct News {
-    /// How it stands.
+    /// State of the teaching.
     pub status: Status,
     /// The model being taught.
     pub model: Option<ModelKind>,
@@ -76,7 +76,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Teaching {
-    /// How it stands.
+    /// State of the teaching.
     pub fn news(&self) -> News {
         locked(&self.news).clone()
     }

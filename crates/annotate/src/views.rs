@@ -1,4 +1,4 @@
-//! A sitting as the page sees it: what is answered, as JSON.
+//! The session as the page gets it, as JSON.
 
 use serde::Serialize;
 
@@ -11,14 +11,14 @@ use crate::marks::Marks;
 pub enum Saved {
     /// There is nothing to write.
     Nothing,
-    /// They do.
+    /// They are in the file.
     Written {
         /// The file's name.
         file: String,
     },
     /// They do not, and why.
     Refused {
-        /// For people.
+        /// One line for the person at the page.
         why: String,
     },
 }
@@ -26,13 +26,13 @@ pub enum Saved {
 /// A marked picture as the page sees it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImageView {
-    /// Its number.
+    /// Its index in the session.
     pub id: usize,
     /// Its file's name.
     pub name: String,
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// What is marked.
     pub marks: Marks,
@@ -47,13 +47,13 @@ pub struct ImageView {
 /// A picture to try, as the page sees it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TrialPictureView {
-    /// Its number.
+    /// Its index in the session.
     pub id: usize,
     /// Its file's name.
     pub name: String,
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// The number of the marked picture that it became.
     pub became: Option<usize>,

@@ -3,20 +3,17 @@
 /// Why a camera file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CameraFileError {
     /// Not YAML, or not with the names that ROS gives.
     #[error("expected a camera file as ROS's camera_calibration writes it, found: {found}")]
-    Unreadable {
-        /// What the parser says.
-        found: String,
-    },
+    Unreadable { found: String },
     /// A lens model other than `plumb_bob`.
     #[error(
         "expected distortion_model plumb_bob with 4 or 5 coefficients, found {found} with {coefficients}; calibrate again with that \
          model (in OpenCV: without CALIB_RATIONAL_MODEL and not as fisheye)"
     )]
     Lens {
-        /// The model's name.
         found: String,
         /// How many coefficients it has.
         coefficients: usize,
@@ -29,32 +26,18 @@ pub enum CameraFileError {
     Matrix {
         /// The matrix, row by row.
         found: Vec<f64>,
-        /// Pixels in a row.
         width: u32,
-        /// Pixels down.
         height: u32,
     },
     /// A pose that is none.
     #[error("expected {name} to be {expected}, found {found:?}")]
-    Pose {
-        /// The field.
-        name: String,
-        /// What it must be.
-        expected: &'static str,
-        /// What it is.
-        found: Vec<f64>,
-    },
+    Pose { name: String, expected: &'static str, found: Vec<f64> },
     /// The file has intrinsics alone.
     #[error("expected the camera's pose over the table (`table:`), found none; `sdg camera table` measures it")]
     NoPose,
     /// A camera that hangs where none does.
     #[error("expected the camera 0.05 to 20 m above the table, found {height:.2} m{hint}")]
-    Height {
-        /// Metres over the table.
-        height: f64,
-        /// What may be wrong.
-        hint: &'static str,
-    },
+    Height { height: f64, hint: &'static str },
     /// A picture of another camera.
     #[error(
         "expected pictures of {width} × {height} pixels, as the camera was calibrated, found {found_width} × {found_height}"
@@ -62,11 +45,9 @@ pub enum CameraFileError {
     OtherSize {
         /// Pixels in a row of the calibrated camera.
         width: u32,
-        /// Its rows.
         height: u32,
         /// Pixels in a row of the picture.
         found_width: u32,
-        /// Its rows.
         found_height: u32,
     },
     /// An existing file that is not laid out as ROS's tools do.
@@ -76,60 +57,30 @@ pub enum CameraFileError {
     NotUpdatable,
     /// A workspace without extent.
     #[error("expected table.workspace_m with each range from low to high, found x {x:?}, y {y:?}")]
-    Workspace {
-        /// Range of x.
-        x: [f64; 2],
-        /// Range of y.
-        y: [f64; 2],
-    },
+    Workspace { x: [f64; 2], y: [f64; 2] },
 }
 
 /// Why a board, a calibration or a pose cannot be had.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CalibrationError {
     /// A number of squares that no board of ours has.
     #[error("expected {least} to {most} squares along each side of the board, found {columns} x {rows}")]
-    BoardSize {
-        /// Squares along x.
-        columns: u32,
-        /// Squares along y.
-        rows: u32,
-        /// The smallest number allowed.
-        least: u32,
-        /// The largest number allowed.
-        most: u32,
-    },
+    BoardSize { columns: u32, rows: u32, least: u32, most: u32 },
     /// Squares of a size that none have.
     #[error("expected squares of 0.5 to 500 mm, found {} mm", 1000.0 * .found_m)]
-    SquareSize {
-        /// Metres.
-        found_m: f64,
-    },
+    SquareSize { found_m: f64 },
     /// A ruler's reading that no printer gives.
     #[error(
         "expected the printed 100 mm line to measure 90 to 110 mm, found {measured_mm} mm: measure the line below the board, in millimetres"
     )]
-    Ruler {
-        /// What was measured.
-        measured_mm: f64,
-    },
+    Ruler { measured_mm: f64 },
     /// A board that is larger than the paper.
     #[error(
         "expected {columns} x {rows} squares that fit on {paper}: at most {fits_mm:.1} mm each, found {square_mm:.1} mm"
     )]
-    Paper {
-        /// The paper's name.
-        paper: &'static str,
-        /// Squares along x.
-        columns: u32,
-        /// Squares along y.
-        rows: u32,
-        /// A square's side.
-        square_mm: f64,
-        /// The largest that fits.
-        fits_mm: f64,
-    },
+    Paper { paper: &'static str, columns: u32, rows: u32, square_mm: f64, fits_mm: f64 },
     /// A file that `sdg camera board` did not write.
     #[error("expected a board as `sdg camera board` writes it, found a file that does not tell its squares")]
     NoBoardFile,
@@ -151,10 +102,7 @@ pub enum CalibrationError {
         "expected enough of the board to know which of its squares are seen, found {corners} corners and no place on the board that its dots \
          agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
     )]
-    BoardUnclear {
-        /// Corners in the grid.
-        corners: usize,
-    },
+    BoardUnclear { corners: usize },
     /// The board has more squares than told.
     #[error(
         "expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}: give its squares with --squares"
@@ -174,7 +122,6 @@ pub enum CalibrationError {
     TooFewPictures {
         /// The smallest number that suffices.
         least: usize,
-        /// How many there are.
         found: usize,
         /// What else to know, or empty.
         hint: &'static str,
@@ -185,7 +132,6 @@ pub enum CalibrationError {
          length open{}; tilt the board by 20 to 40 degrees to the left, to the right, upwards and downwards", .hint
     )]
     PosesAlike {
-        /// How they are alike.
         found: String,
         /// The focal length's error, or empty.
         hint: String,
@@ -201,43 +147,24 @@ pub enum CalibrationError {
     Horizon {
         /// The angle between the optical axis and the sheet's normal.
         tilt_deg: f64,
-        /// The largest allowed.
         max_deg: f64,
     },
     /// Robot poses that cannot be read.
     #[error("expected robot poses as documented in docs/calibration.md, found: {found}")]
-    PosesUnreadable {
-        /// What the parser says.
-        found: String,
-    },
+    PosesUnreadable { found: String },
     /// A robot pose that is none.
     #[error("expected base_from_flange.{name} of {picture} to be {expected}, found {found:?}")]
-    RobotPose {
-        /// Whose pose.
-        picture: String,
-        /// The field.
-        name: &'static str,
-        /// What it must be.
-        expected: &'static str,
-        /// What it is.
-        found: Vec<f64>,
-    },
+    RobotPose { picture: String, name: &'static str, expected: &'static str, found: Vec<f64> },
     /// Robot poses that leave the transform open.
     #[error(
         "expected robot poses that turn the flange about two axes, found {found}: add poses turned by 20 to 40 degrees about {missing}"
     )]
-    TurnsAlike {
-        /// What they do.
-        found: String,
-        /// What to turn about.
-        missing: String,
-    },
+    TurnsAlike { found: String, missing: String },
     /// Robot poses and pictures that do not belong together.
     #[error("expected robot poses and pictures that agree, found {found}{hint}")]
     HandEyeDisagrees {
         /// By how much they do not.
         found: String,
-        /// What would explain it.
         hint: String,
     },
 }

@@ -5,21 +5,18 @@ use crate::fault::Fault;
 /// Why there is no frame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum CameraError {
     /// Text that is no camera's address.
     #[error("expected {expected}, found \"{found}\"")]
     Address {
         /// What it should have been.
         expected: String,
-        /// What it is.
         found: String,
     },
     /// An address that another crate opens.
     #[error("{address}: expected a caller that opens simulated cameras; the crate camera does not")]
-    OpenedElsewhere {
-        /// The address.
-        address: String,
-    },
+    OpenedElsewhere { address: String },
     /// The camera does not open.
     #[error("{address}: {why}")]
     Open {
@@ -31,11 +28,9 @@ pub enum CameraError {
     /// A setting that the camera does not have or does not take.
     #[error("{address}: expected a camera with the setting {setting}, found {found}")]
     Setting {
-        /// The address.
         address: String,
         /// What was to be set.
         setting: &'static str,
-        /// What there is instead.
         found: String,
     },
     /// What is wrong for now; the next call goes on.
@@ -43,23 +38,16 @@ pub enum CameraError {
     Fault {
         /// The camera's address, without a password.
         camera: String,
-        /// What is wrong.
         fault: Fault,
     },
     /// The camera ended for good: to open it again would end likewise.
     #[error("{camera}: {why}")]
-    Ended {
-        /// The camera's address.
-        camera: String,
-        /// What ended it.
-        why: String,
-    },
+    Ended { camera: String, why: String },
     /// A port of 127.0.0.1 cannot be taken.
     #[error("expected a free port of 127.0.0.1, found port {port}: {source}")]
     Port {
         /// The port; 0 stands for any.
         port: u16,
-        /// What the system says.
         source: std::io::Error,
     },
 }

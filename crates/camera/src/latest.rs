@@ -10,7 +10,7 @@ use crate::error::CameraError;
 use crate::fault::Fault;
 use crate::frame::{Camera, Frame};
 
-/// Errors that nobody took: the oldest are dropped beyond this.
+/// Bound of errors that were not read: the oldest are dropped.
 const MAX_ERRORS: usize = 16;
 
 /// The newest frame of a camera that a thread reads; older ones are dropped and counted.

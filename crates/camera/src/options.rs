@@ -33,7 +33,7 @@ impl Encoding {
 pub struct OpenOptions {
     /// Pixels in a row; the nearest size there is.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// Frames a second: of a V4L2 camera, or how often a snapshot is fetched over HTTP. `None`: as the camera likes, and
     /// [`DEFAULT_SNAPSHOT_FPS`](Self::DEFAULT_SNAPSHOT_FPS) snapshots a second.

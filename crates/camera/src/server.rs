@@ -37,7 +37,7 @@ const PAGE: &str = "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><
 /// | `/stream` | `multipart/x-mixed-replace`, a JPEG in each part |
 /// | `/snapshot.jpg` | the newest picture; status 503 before the first |
 ///
-/// [`publish`](Self::publish) never waits: a picture is encoded when the first browser wants it, and a slow browser gets the newest one
+/// [`publish`](Self::publish) never waits: a picture is encoded when the first browser requests it, and a slow browser gets the newest one
 /// when it is ready for it. Only requests that name 127.0.0.1 or localhost with this port are answered, and none from other pages: a
 /// name that was made to point here, or a page elsewhere, does not get the pictures.
 pub struct MjpegServer {
@@ -57,7 +57,7 @@ struct Shared {
 struct Published {
     number: u64,
     picture: RgbImage,
-    /// Encoded by whoever wants it first.
+    /// Encoded on the first request.
     jpeg: OnceLock<Vec<u8>>,
 }
 

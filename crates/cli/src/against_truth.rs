@@ -1,6 +1,6 @@
 //! A grasp found in a picture against the simulator's truth: where it leads the hand, and how far beside.
 //!
-//! The one place that knows it: rehearsals, tried pictures and evaluations all measure here.
+//! Rehearsals, tried pictures and evaluations all measure by this.
 
 use nalgebra::Isometry3;
 use sdg_geometry::{PlanarGrasp, PosedCamera};

@@ -1,4 +1,4 @@
-//! Annotation files on disk: some formats keep half of what they say in a file beside.
+//! Annotation files on disk: some formats keep labels in a second file.
 
 use std::path::{Path, PathBuf};
 

@@ -63,7 +63,7 @@ pub fn open(path: &Path) -> Result<(Source, Checkpoint)> {
 /// Reads the weights in `path` for `network`, all but the parts that are named in `reinitialized`. Of a backbone alone
 /// the rest of the network starts from nothing without being named.
 ///
-/// `tell` hears the report before anything is refused.
+/// `tell` is called with the report before anything is refused.
 ///
 /// # Errors
 /// A file that cannot be read, weights for another network or for images given otherwise, a part that the network has not.

@@ -75,7 +75,7 @@ pub fn preset_of_kind(name: &str, kind: RcnnKind) -> Result<RcnnConfig> {
 /// The preset whose numerics a checkpoint was made for.
 ///
 /// # Errors
-/// Names of nobody who has a preset here.
+/// Names of programs that have no preset here.
 pub fn preset_for(naming: Naming) -> Result<&'static str> {
     match naming {
         Naming::Detectron2 | Naming::Detectron2Backbone | Naming::Caffe2Resnet => Ok("r50-detectron2"),

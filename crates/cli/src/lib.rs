@@ -17,6 +17,7 @@
 //! assert!(matches!(args.command, Command::Demo(demo) if demo.object == "pendulum" && demo.attempts == 3));
 //! ```
 #![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "the library of a program: nothing but this workspace uses it")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 #[cfg(feature = "simulation")]

@@ -30,7 +30,6 @@ pub struct Rehearsal<'a> {
     pub model: &'a GraspModel,
     /// The part on the table.
     pub object: &'a ObjectSpec,
-    /// How many attempts.
     pub attempts: u32,
     /// Decides part poses, robot starts, lights, table and distractors.
     pub seed: u64,
@@ -103,7 +102,6 @@ pub struct Looks {
 
 /// One attempt, and what there is to see of it.
 pub struct RehearsedAttempt {
-    /// How it went.
     pub attempt: AttemptSummary,
     /// How often the camera looked.
     pub looks: Looks,
@@ -114,7 +112,7 @@ pub struct RehearsedAttempt {
 }
 
 impl Rehearsal<'_> {
-    /// Runs the attempts one after the other; `observe` hears of each and may end the rehearsal.
+    /// Runs the attempts one after the other; `observe` is called after each and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
         let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
         let mut filmed_success = false;
@@ -224,7 +222,7 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
 }
 
-/// The model as the workcell's eyes.
+/// The model as the workcell's perception.
 struct ModelPerception<'a> {
     rehearsal: &'a Rehearsal<'a>,
     told: ObjectSpec,

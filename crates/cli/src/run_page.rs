@@ -17,11 +17,8 @@ use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// What every page is made from.
 pub struct RunPage<'a> {
-    /// The model.
     pub model: &'a GraspModel,
-    /// The part.
     pub object: &'a ObjectSpec,
-    /// The attempts.
     pub rehearsed: &'a Rehearsed,
     /// The command that makes the same run again.
     pub command: &'a str,
@@ -35,7 +32,6 @@ pub struct TaughtHere<'a> {
     pub history: Option<&'a History>,
     /// Pictures with and without the part.
     pub trials: &'a [Trial],
-    /// Decides the augmentation.
     pub seed: u64,
 }
 

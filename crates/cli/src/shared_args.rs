@@ -36,7 +36,7 @@ impl TaughtCameraArgs {
     }
 }
 
-/// Smallest and largest size of a part over the usual one.
+/// Smallest and largest size of a part over the nominal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SizeTolerance {
     /// From 0.5 to 1.
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_size_tolerance_holds_the_usual_size() {
+    fn a_size_tolerance_holds_the_nominal_size() {
         assert_eq!(size_tolerance("0.75-1.35"), Ok(SizeTolerance { low: 0.75, high: 1.35 }));
         for text in ["", "0.75", "1.1-1.3", "0.9-0.95", "0.1-1.2", "0.9-3", "0.9..1.1"] {
             assert!(size_tolerance(text).unwrap_err().contains("such as 0.75-1.35"), "{text}");

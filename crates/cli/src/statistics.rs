@@ -8,7 +8,6 @@ const Z_95: f64 = 1.959_963_984_540_054;
 /// So many of so many.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Share {
-    /// How many did.
     pub count: usize,
     /// Out of how many.
     pub of: usize,

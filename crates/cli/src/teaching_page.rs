@@ -1,4 +1,4 @@
-//! What a page has to say of a teaching: what was shown, what the network learnt from it, how that went.
+//! A teaching as a page: demonstrations, samples, losses and validation.
 
 use anyhow::Result;
 use image::RgbImage;
@@ -28,7 +28,6 @@ pub struct TeachingPage<'a> {
     pub taught: &'a Taught,
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
-    /// Decides the augmentation.
     pub seed: u64,
     /// The command that makes the same model again.
     pub command: &'a str,

@@ -1,4 +1,4 @@
-//! Teaching as it is seen: a bar on a terminal, plain lines elsewhere; always on standard error.
+//! A teaching's progress on standard error: a bar on a terminal, plain lines elsewhere.
 
 use std::io::IsTerminal;
 use std::ops::ControlFlow;

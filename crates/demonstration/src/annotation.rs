@@ -22,9 +22,9 @@ pub struct Annotation {
 /// The image that an annotation is read for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageFacts<'a> {
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// The image's file name, by which a COCO file of several images is searched; folders are ignored.
     pub file_name: Option<&'a str>,

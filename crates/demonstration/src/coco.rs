@@ -172,7 +172,7 @@ fn read_keypoints(keypoints: &Node, category: Option<&Node>, draft: &mut Draft) 
     Ok(())
 }
 
-/// A COCO file in the making: images and the objects on them.
+/// A COCO file while it is written: images and the objects on them.
 ///
 /// ```
 /// use sdg_demonstration::CocoFile;

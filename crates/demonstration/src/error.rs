@@ -11,6 +11,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// `shapes[2].points[0]` for JSON of the wrong content.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
     /// The bytes are neither a PNG nor a JPEG.
     #[error("not a readable image: expected a PNG or JPEG file, found {found}")]
@@ -20,20 +21,10 @@ pub enum Error {
     },
     /// The image starts well and then breaks off or is damaged.
     #[error("damaged {format} image: {reason}")]
-    DamagedImage {
-        /// `PNG` or `JPEG`.
-        format: &'static str,
-        /// The decoder's complaint.
-        reason: String,
-    },
+    DamagedImage { format: &'static str, reason: String },
     /// Width or height is zero.
     #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]
-    EmptyImage {
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-    },
+    EmptyImage { width: u32, height: u32 },
     /// More pixels than the limit allows; found in the header, before anything was allocated.
     #[error(
         "enormous image: expected at most {max_pixels} pixels, found {width}×{height} = {}",
@@ -44,17 +35,11 @@ pub enum Error {
         width: u32,
         /// Pixels down, by the file's header.
         height: u32,
-        /// [`crate::ImageLimits::max_pixels`].
         max_pixels: u64,
     },
     /// The annotation is not JSON at all, nor of a format that is something else.
     #[error("annotation is not JSON ({place}): {reason}")]
-    NotJson {
-        /// Line and column.
-        place: String,
-        /// The parser's complaint.
-        reason: String,
-    },
+    NotJson { place: String, reason: String },
     /// JSON, but neither COCO nor LabelMe; or nothing that annotations are written in.
     #[error(
         "wrong annotation file: expected COCO JSON (`images`, `annotations`), LabelMe JSON (`shapes`), YOLO-pose labels \
@@ -66,20 +51,12 @@ pub enum Error {
     },
     /// A value in the annotation is missing or of the wrong kind.
     #[error("annotation, {place}: expected {expected}, found {found}")]
-    Malformed {
-        /// Path inside the JSON.
-        place: String,
-        /// What belongs there.
-        expected: String,
-        /// What stands there.
-        found: String,
-    },
+    Malformed { place: String, expected: String, found: String },
     /// A coordinate is NaN or infinite.
     #[error("annotation, {place}: expected a finite number, found {found}")]
     NotFinite {
         /// Path inside the JSON, or line and column.
         place: String,
-        /// The offending literal.
         found: String,
     },
     /// The annotation belongs to an image of another size.
@@ -99,37 +76,23 @@ pub enum Error {
         image[0], image[1]
     )]
     OutsideImage {
-        /// What lies outside.
         place: String,
-        /// Pixels from the left.
         x: f64,
-        /// Pixels from the top.
         y: f64,
         /// Width and height of the image.
         image: [u32; 2],
     },
     /// A box, line or outline without extent.
     #[error("annotation, {place}: expected {expected}, found {found}")]
-    ZeroSize {
-        /// What has no extent.
-        place: String,
-        /// The least extent.
-        expected: String,
-        /// The extent found.
-        found: String,
-    },
+    ZeroSize { place: String, expected: String, found: String },
     /// Two edges of the outline cross.
     #[error("annotation, {place}: expected an outline that does not cross itself, found edges that cross")]
-    SelfCrossing {
-        /// The polygon's path.
-        place: String,
-    },
+    SelfCrossing { place: String },
     /// There is no object in the annotation of this image.
     #[error("annotation holds no object: expected {expected}, found {found}")]
     NoObject {
         /// What would make an object.
         expected: String,
-        /// What is there.
         found: String,
     },
     /// Several shapes of one kind and nothing that says which belong together.
@@ -140,10 +103,7 @@ pub enum Error {
     },
     /// One object was expected and several are annotated.
     #[error("expected one annotated object, found {found}")]
-    SeveralObjects {
-        /// How many.
-        found: usize,
-    },
+    SeveralObjects { found: usize },
     /// The COCO file has no image of that name, or several images and no name was given.
     #[error("annotation of several images: expected {expected}, found {found}")]
     ImageNotFound {
@@ -154,36 +114,19 @@ pub enum Error {
     },
     /// A format of two files, of which one is not there.
     #[error("annotation in two files: expected {expected}, found {found}")]
-    MissingBeside {
-        /// The two.
-        expected: &'static str,
-        /// What is there.
-        found: &'static str,
-    },
+    MissingBeside { expected: &'static str, found: &'static str },
     /// A format that is read but not written.
     #[error("annotations are not written in the format `{format}`: expected coco, labelme or yolo-pose")]
-    ReadOnlyFormat {
-        /// Its name.
-        format: &'static str,
-    },
+    ReadOnlyFormat { format: &'static str },
     /// What a model needs and the annotation lacks.
     #[error("annotation of `{label}` lacks {missing}: {why}")]
     Lacking {
-        /// The object's label.
         label: String,
-        /// The missing part.
         missing: &'static str,
         /// Who needs it, and how to add it.
         why: String,
     },
     /// An augmentation setting makes no sense.
     #[error("augmentation, {setting}: expected {expected}, found {found}")]
-    Setting {
-        /// The field's name.
-        setting: &'static str,
-        /// The range allowed.
-        expected: String,
-        /// The value given.
-        found: String,
-    },
+    Setting { setting: &'static str, expected: String, found: String },
 }

@@ -23,9 +23,9 @@ pub enum AnnotationFormat {
 pub struct DeclaredImage {
     /// The image's file name, as it stands there.
     pub file_name: Option<String>,
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
 }
 

@@ -1,4 +1,4 @@
-//! A JSON value that knows its place, so that a complaint can say where.
+//! A JSON value with its place in the file, so that an error can name it.
 
 use serde_json::{Map, Value};
 

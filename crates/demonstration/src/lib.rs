@@ -9,7 +9,7 @@
 //!
 //! Everything from outside is checked here, once: [`decode_image`] reads the size before it takes memory,
 //! [`Annotation::read`] says what was expected, what was found and where. [`Augmenter`] then makes any number of
-//! samples by random access: sample *i* of a seed is the same whoever asks.
+//! samples by random access: sample *i* of a seed is the same on every call.
 //!
 //! What is deliberately absent: files, threads and clocks (bytes in, bytes out; the crate runs in a browser), tensors
 //! and training targets (`sdg-training`), and mirror images, which would be other parts.

@@ -1,4 +1,4 @@
-//! An annotation file in the making.
+//! An annotation file while it is written.
 
 /// An annotation file in the making, and what it had no room for.
 #[derive(Debug, Clone, PartialEq)]

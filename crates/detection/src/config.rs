@@ -1,4 +1,4 @@
-//! The configuration of a detector: every knob in which the R-CNN implementations differ.
+//! The configuration of a detector: every setting in which the R-CNN implementations differ.
 //!
 //! Nothing here computes. Each enum names a choice that a bare bool or number would hide; the two
 //! ends of most choices are Detectron2 and torchvision. A configuration is plain data and

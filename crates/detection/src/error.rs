@@ -5,6 +5,7 @@ use thiserror::Error;
 /// An input that the detector cannot work with. Each message says what was expected and found.
 #[derive(Debug, Error, Clone, PartialEq)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum DetectionError {
     /// A configuration value is outside its range, or two values contradict each other.
     #[error("detector configuration: {field} must be {expected}, found {found}")]
@@ -13,7 +14,6 @@ pub enum DetectionError {
         field: &'static str,
         /// What the field may be.
         expected: String,
-        /// What it is.
         found: String,
     },
     /// A configuration cannot be read.
@@ -24,12 +24,7 @@ pub enum DetectionError {
     },
     /// A batch holds another number of targets than of images.
     #[error("a batch needs one target an image: expected {expected} targets, found {found}")]
-    BatchSize {
-        /// Number of images.
-        expected: usize,
-        /// Number of targets.
-        found: usize,
-    },
+    BatchSize { expected: usize, found: usize },
     /// The batch is empty.
     #[error("a training batch needs at least one image, found none")]
     EmptyBatch,
@@ -40,19 +35,12 @@ pub enum DetectionError {
         image_idx: usize,
         /// The part of the target.
         field: &'static str,
-        /// What it should be.
         expected: String,
-        /// What it is.
         found: String,
     },
     /// An image has no pixels.
     #[error("an image needs at least 1x1 pixels, found {width}x{height}")]
-    EmptyImage {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
+    EmptyImage { width: u32, height: u32 },
 }
 
 /// Result of the fallible functions of this crate.

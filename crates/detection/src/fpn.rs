@@ -1,4 +1,4 @@
-//! The feature pyramid: every level sees what the coarser ones know.
+//! The feature pyramid: every level adds the next coarser one, upsampled.
 //!
 //! ```text
 //! res5 ─ lateral ─────────┬─ output ─ p5 ─ every second cell ─ p6

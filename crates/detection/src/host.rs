@@ -1,6 +1,6 @@
 //! From the device to the host: what is decided there (top-k, NMS, decoding) has to be read first.
 //!
-//! Inference is written asynchronously, because a browser hands results of its graphics card to nobody else. Everywhere
+//! Inference is written asynchronously, because a browser gives results of its graphics card to asynchronous code only. Everywhere
 //! else burn's `read_sync` makes an ordinary function of it, which in a browser on a graphics card panics.
 
 use burn::tensor::{Tensor, Transaction, read_sync};

@@ -9,7 +9,7 @@
 //!   ─ Detections in pixels of the original image
 //! ```
 //!
-//! Every knob in which Detectron2 and torchvision differ is a value of [`RcnnConfig`]; the
+//! Every setting in which Detectron2 and torchvision differ is a value of [`RcnnConfig`]; the
 //! [`presets`] set them. The network runs on the device; anchors, matching, sampling, decoding and
 //! NMS run on the host in plain Rust, where they are small. Everything random takes a seed.
 //!

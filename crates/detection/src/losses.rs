@@ -1,4 +1,4 @@
-//! The penalties that training lowers, as sums; each caller divides by its own count.
+//! The losses, as sums; each caller divides by its own count.
 
 use burn::tensor::{Int, Tensor, TensorData, activation};
 

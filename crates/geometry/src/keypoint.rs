@@ -21,7 +21,7 @@ pub enum Visibility {
 pub struct Keypoint {
     /// Pixels to the right.
     pub x: f64,
-    /// Pixels down.
+    /// Height, in pixels.
     pub y: f64,
     /// Whether the place may be relied on.
     pub visibility: Visibility,

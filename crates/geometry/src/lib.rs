@@ -1,4 +1,4 @@
-//! The shapes that every other crate speaks in: boxes, polygons, masks, keypoints, angles, the pinhole camera
+//! The value types that the other crates share: boxes, polygons, masks, keypoints, angles, the pinhole camera
 //! and the planar grasp.
 //!
 //! ```text

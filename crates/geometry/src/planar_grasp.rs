@@ -12,7 +12,7 @@ use crate::{Angle, GraspLine, Keypoint};
 pub struct PlanarGrasp {
     /// Pixels to the right.
     pub x: f64,
-    /// Pixels down.
+    /// Height, in pixels.
     pub y: f64,
     /// Direction of the marked line, y down.
     pub angle: Angle,

@@ -1,4 +1,4 @@
-//! Fits what a grasp in the plan view says of its own errors, on generated parts, and prints what would change. It changes
+//! Fits the standard errors of a grasp in the plan view on generated parts, and prints what would change. It changes
 //! nothing.
 //!
 //! `cargo run --release -p sdg-grasp --example fit_uncertainty -- [PARTS [SEED]]`

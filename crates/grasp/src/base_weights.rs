@@ -17,10 +17,10 @@ use crate::error::{GraspError, Result};
 /// Imported weights for the network of a preset.
 ///
 /// Every parameter of the network has a value here or is named as one that starts from nothing: what is left out by
-/// mistake would be taught from random values, and nobody would notice.
+/// mistake would be taught from random values, unnoticed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaseWeights {
-    /// SHA-256 of the file that the weights come from, in hexadecimal digits; the taught model remembers it.
+    /// SHA-256 of the file that the weights come from, in hexadecimal digits; the taught model's file keeps it.
     pub sha256: String,
     /// Values by the parameters' names.
     pub parameters: StateDict,

@@ -1,4 +1,4 @@
-//! The network's score, so that 0.5 is the place to decide where nothing verifies it (`--no-verify`).
+//! The network's score, calibrated so that 0.5 separates right from wrong without verification (`--no-verify`).
 //!
 //! ```text
 //! network score ─ logistic, fitted on held-back augmentations ─ score of an unverified detection

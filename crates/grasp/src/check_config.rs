@@ -1,5 +1,4 @@
-//! What decides how a demonstration is searched for and from which evidence on it counts as found, and what each value
-//! rests on.
+//! Settings of the search, the refinement and the score, with the origin of each value.
 //!
 //! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
 //! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
@@ -22,7 +21,7 @@ pub struct CheckConfig {
 }
 
 impl CheckConfig {
-    /// Sizes of a part over the usual one that are looked for where nothing else is said: hand-held photographs of one part
+    /// Sizes of a part over the nominal one that are looked for where nothing else is said: hand-held photographs of one part
     /// vary by 0.81 to 1.14, and cameras by 0.75 to 1.3 of their height. Chosen from that.
     pub const DEFAULT_SIZE_TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
     /// The same for a camera that is always as far from the part as it was for the photo: the simulated workcell's. A lever that
@@ -33,7 +32,7 @@ impl CheckConfig {
     /// Most detections in one picture where nothing else is said. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
 
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     ///
     /// The search's least agreement was chosen by hand: right poses agree by more, but for one of a hundred.
     pub const DEFAULT: Self = Self {
@@ -123,7 +122,7 @@ pub struct ScoreConfig {
 }
 
 impl ScoreConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = SCORE;
 
     /// The same where pictures show lengths. A part of another size is then another part, whatever else speaks for it.

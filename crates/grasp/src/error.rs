@@ -3,6 +3,7 @@
 /// Why a model could not be taught, read or used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GraspError {
     /// A letter or name that is no model's.
     #[error(transparent)]
@@ -12,7 +13,6 @@ pub enum GraspError {
     UnknownPreset {
         /// The presets that this version has.
         known: Vec<&'static str>,
-        /// What was asked for.
         found: String,
     },
     /// A device that no version has.
@@ -20,7 +20,6 @@ pub enum GraspError {
     UnknownBackend {
         /// The names that there are.
         known: Vec<&'static str>,
-        /// What was asked for.
         found: String,
     },
     /// A device that was not compiled in.
@@ -28,20 +27,10 @@ pub enum GraspError {
         "expected a device out of {}, which this build has; found \"{asked}\": build sdg-cli with --features {asked}",
         .built.join(", ")
     )]
-    BackendNotBuilt {
-        /// What was asked for.
-        asked: &'static str,
-        /// What this build has.
-        built: Vec<&'static str>,
-    },
+    BackendNotBuilt { asked: &'static str, built: Vec<&'static str> },
     /// A device that this machine does not have.
     #[error("expected a device for {backend} on this machine, found {found}")]
-    NoSuchDevice {
-        /// The backend.
-        backend: &'static str,
-        /// What is there instead.
-        found: String,
-    },
+    NoSuchDevice { backend: &'static str, found: String },
     /// Bytes that are no grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {
@@ -52,36 +41,21 @@ pub enum GraspError {
     #[error(
         "expected a grasp model of format version {expected}, found version {found}: it was written by another sdg"
     )]
-    OtherVersion {
-        /// The version read here.
-        expected: u32,
-        /// The version found.
-        found: String,
-    },
+    OtherVersion { expected: u32, found: String },
     /// A grasp model file that contradicts itself or was cut short.
     #[error("the grasp model file is damaged: expected {expected}, found {found}")]
     Damaged {
         /// What ought to be there.
         expected: String,
-        /// What is.
         found: String,
     },
     /// An image that holds nothing to look at.
     #[error("expected an image of at least {least} × {least} pixels, found {width} × {height}")]
-    ImageTooSmall {
-        /// The least side.
-        least: u32,
-        /// Width found.
-        width: u32,
-        /// Height found.
-        height: u32,
-    },
+    ImageTooSmall { least: u32, width: u32, height: u32 },
     /// A grasp whose ray misses the grasp plane.
     #[error("the ray through pixel ({x:.1}, {y:.1}) does not meet the plane at a height of {height_m} m")]
     OffPlane {
-        /// Pixels to the right.
         x: f64,
-        /// Pixels down.
         y: f64,
         /// Height of the plane, in metres.
         height_m: f64,
@@ -113,7 +87,6 @@ pub enum GraspError {
     ContradictingDemonstrations {
         /// What the first ones say.
         expected: String,
-        /// What another one says.
         found: String,
     },
     /// A part with too few pixels in its photo.
@@ -122,7 +95,6 @@ pub enum GraspError {
          or with more pixels"
     )]
     PartTooSmall {
-        /// The least extent.
         least: f64,
         /// Width of the part's box.
         width: f64,
@@ -138,11 +110,9 @@ pub enum GraspError {
     /// A value of a configuration out of its range.
     #[error("expected {name} {expected}, found {found}")]
     InvalidConfig {
-        /// Field of [`crate::CheckConfig`].
         name: &'static str,
         /// The accepted range, in words.
         expected: &'static str,
-        /// The value given.
         found: f64,
     },
     /// A name that no constant has which can be fitted.
@@ -151,7 +121,6 @@ pub enum GraspError {
     UnknownConstant {
         /// The constants that there are.
         known: Vec<&'static str>,
-        /// What was asked for.
         found: String,
     },
     /// The network refused its input.
@@ -162,15 +131,11 @@ pub enum GraspError {
     #[error(
         "the preset {preset} starts from weights, and this build carries none for it: expected base weights, found none"
     )]
-    NeedsBaseWeights {
-        /// The preset's name.
-        preset: &'static str,
-    },
+    NeedsBaseWeights { preset: &'static str },
     /// Base weights for another network.
     #[cfg(feature = "teach")]
     #[error("base weights: {fitting} parameters fit the network; found {found}")]
     BaseWeights {
-        /// Parameters that fit.
         fitting: usize,
         /// The first thing that does not.
         found: String,
@@ -198,9 +163,7 @@ pub enum GraspError {
     NotLearnt {
         /// Samples in which the demonstration, laid over where the network proposed, came to lie on the part.
         hits: usize,
-        /// Samples with the part.
         positives: usize,
-        /// Steps done.
         steps: usize,
     },
 }

@@ -147,7 +147,7 @@ impl GraspModel {
         self.with_check(|check| check.search.num_points = num_points)
     }
 
-    /// The same model with other bounds of a part's size over the usual one; its file tells those that it was taught with.
+    /// The same model with other bounds of a part's size over the nominal one; its file tells those that it was taught with.
     ///
     /// # Errors
     /// Bounds that do not lie within 0.5 to 1 and 1 to 2.
@@ -177,7 +177,7 @@ impl GraspModel {
         Ok(model)
     }
 
-    /// Bounds of a part's size over the usual one, within which it is looked for.
+    /// Bounds of a part's size over the nominal one, within which it is looked for.
     pub fn size_tolerance(&self) -> RangeInclusive<f64> {
         self.demonstrations[0].check().search.scales.clone()
     }
@@ -210,7 +210,7 @@ impl GraspModel {
         lacks
     }
 
-    /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for whoever wants to see
+    /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for callers that show
     /// what was refused and why: [`GraspDetection::is_accepted`] tells.
     ///
     /// # Errors

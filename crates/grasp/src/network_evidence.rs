@@ -1,6 +1,7 @@
-//! What a network's proposal, or that it proposes nothing, says of a place.
+//! Log-odds of a place from a network's proposal, or from having none.
 //!
-//! A network of two minutes fires at other things, and one that misses every third part says little by its silence.
+//! A network taught for two minutes gives detections on other things, and that it misses every third part makes no
+//! proposal weak evidence.
 //! How much, teaching counts on samples that it was not trained on:
 //!
 //! ```text

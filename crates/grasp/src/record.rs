@@ -39,7 +39,7 @@ pub struct DetectionRecord {
 pub struct GraspRecord {
     /// Pixels to the right.
     pub x: f64,
-    /// Pixels down.
+    /// Height, in pixels.
     pub y: f64,
     /// Direction of the marked line, in (-180, 180], y down; the jaws close across it.
     pub angle_deg: f64,

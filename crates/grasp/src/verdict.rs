@@ -106,7 +106,7 @@ impl Contributions {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Clues {
     pub(crate) evidence: Evidence,
-    /// ln of its size over the nearest that is usual.
+    /// ln of its size over the nearest nominal size.
     pub(crate) log_size: f64,
     /// ln of how much likelier the network's score there is on the part than elsewhere; `None` where it was not asked.
     pub(crate) network: Option<f64>,

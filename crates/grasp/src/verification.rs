@@ -104,7 +104,7 @@ pub(crate) struct PlacedDemonstration<'a> {
     /// Edges and surface together, in `[0, 1]`.
     pub(crate) agreement: f64,
     pub(crate) evidence: Evidence,
-    /// ln of its size over the nearest that is usual.
+    /// ln of its size over the nearest nominal size.
     pub(crate) log_size: f64,
     /// Mean brightness there over that of the demonstration.
     pub(crate) light: f64,

@@ -31,7 +31,7 @@ impl Conv2dParams {
         Some(output)
     }
 
-    /// Size of the transposed convolution's output map, or `None` where the padding eats all of it.
+    /// Size of the transposed convolution's output map, or `None` where the padding leaves nothing of it.
     ///
     /// # Shapes
     /// `input` is `[Hi, Wi]`, `kernel` is `[Kh, Kw]`; the result is `[Ho, Wo]`.

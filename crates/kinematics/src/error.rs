@@ -6,44 +6,23 @@ use crate::joints::LimitViolation;
 /// Errors of this crate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum KinematicsError {
     /// An input holds NaN or an infinity.
     #[error("{what} must be finite numbers, found {found}")]
-    NotFinite {
-        /// Which input.
-        what: &'static str,
-        /// The input as given.
-        found: String,
-    },
+    NotFinite { what: &'static str, found: String },
     /// A pose's quaternion is not of unit length.
     #[error("{what} must have a unit quaternion, found one of length {found}")]
-    NotARotation {
-        /// Which input.
-        what: &'static str,
-        /// Length of the quaternion.
-        found: f64,
-    },
+    NotARotation { what: &'static str, found: f64 },
     /// An option is outside its range.
     #[error("{option} must be {expected}, found {found}")]
-    InvalidOption {
-        /// Which option.
-        option: &'static str,
-        /// What it may be.
-        expected: &'static str,
-        /// What it is.
-        found: f64,
-    },
+    InvalidOption { option: &'static str, expected: &'static str, found: f64 },
     /// A joint configuration is outside the position limits.
     #[error(
         "{what}: joint {} must lie in [{:.4}, {:.4}] rad, found {:.4}",
         .violation.joint, .violation.min_rad, .violation.max_rad, .violation.found_rad
     )]
-    JointOutOfRange {
-        /// Which input.
-        what: &'static str,
-        /// The worst joint.
-        violation: LimitViolation,
-    },
+    JointOutOfRange { what: &'static str, violation: LimitViolation },
     /// No configuration reaches the pose, whatever the joint limits.
     #[error(
         "the pose is out of reach: at ({:.3}, {:.3}, {:.3}) m the tcp misses it by {:.4} m and {:.2}° at best{}",
@@ -80,7 +59,6 @@ pub enum KinematicsError {
     PathJointLimit {
         /// Share of the path done, 0 to 1.
         at_share: f64,
-        /// The limit that binds.
         violation: LimitViolation,
     },
     /// A straight path passes a singularity or leaves the reach of the arm.
@@ -95,10 +73,7 @@ pub enum KinematicsError {
     },
     /// The trajectory generator refused its input or failed.
     #[error("no trajectory within the limits: {reason}")]
-    Trajectory {
-        /// What the generator says.
-        reason: String,
-    },
+    Trajectory { reason: String },
 }
 
 fn list_joints(joints: &[usize]) -> String {

@@ -46,7 +46,7 @@ impl Panda {
 
     /// Finds the best configuration of each way of the arm (elbow, shoulder, stretch of joint 7), best first.
     ///
-    /// For a caller that has further wishes, such as a straight path that must follow from there.
+    /// For a caller with further conditions, such as a straight path that begins there.
     ///
     /// # Errors
     /// As [`Panda::inverse`]; the list is never empty.

@@ -16,7 +16,7 @@ const NEGLIGIBLE_COST: f64 = 1e-26;
 
 /// Levenberg–Marquardt from `start`, joints held inside `limits` by projection.
 ///
-/// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit that wants further out is left out of the
+/// Minimises |Δposition|² + (`metres_per_rad` · Δangle)². A joint at its limit whose step points outwards is left out of the
 /// step, so the others slide along the limit instead of stopping there.
 pub(crate) fn descend(
     panda: &Panda,

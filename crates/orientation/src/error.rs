@@ -5,47 +5,20 @@ use thiserror::Error;
 /// An input that the orientation CNN cannot work with. Each message says what was expected and found.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum OrientationError {
     /// A setting is outside its range, or two contradict each other.
     #[error("orientation CNN: {field} must be {expected}, found {found}")]
-    Config {
-        /// The setting's name.
-        field: &'static str,
-        /// What it may be.
-        expected: String,
-        /// What it is.
-        found: String,
-    },
+    Config { field: &'static str, expected: String, found: String },
     /// An image has no pixels.
     #[error("an image to crop needs at least 1x1 pixels, found {width}x{height}")]
-    EmptyImage {
-        /// Width in pixels.
-        width: u32,
-        /// Height in pixels.
-        height: u32,
-    },
+    EmptyImage { width: u32, height: u32 },
     /// A box that nothing can be cropped by.
     #[error("a box to crop by needs finite corners and a positive area, found ({x1}, {y1}) to ({x2}, {y2})")]
-    BadBox {
-        /// Left edge.
-        x1: f64,
-        /// Upper edge.
-        y1: f64,
-        /// Right edge.
-        x2: f64,
-        /// Lower edge.
-        y2: f64,
-    },
+    BadBox { x1: f64, y1: f64, x2: f64, y2: f64 },
     /// A crop of another size than the network's input.
     #[error("the orientation CNN reads crops of {expected}x{expected} pixels, found {width}x{height}")]
-    CropSize {
-        /// The network's input.
-        expected: u32,
-        /// Width of the crop.
-        width: u32,
-        /// Height of the crop.
-        height: u32,
-    },
+    CropSize { expected: u32, width: u32, height: u32 },
     /// A demonstration that cannot be taught.
     #[cfg(feature = "training")]
     #[error(transparent)]
@@ -61,9 +34,7 @@ pub enum OrientationError {
     #[cfg(feature = "training")]
     #[error("the orientation loss became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
     Diverged {
-        /// The step, from zero.
         step: usize,
-        /// The loss.
         loss: f64,
         /// The learning rate of that step.
         learning_rate: f64,

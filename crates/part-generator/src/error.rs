@@ -3,26 +3,20 @@
 /// Why scenes could not be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum GeneratorError {
     /// No part to draw.
     #[error("expected at least one part, found none")]
     NoPart,
     /// A picture too small or too large.
     #[error("expected pictures of 32 to 4096 pixels a side, found {width}x{height}")]
-    PictureSize {
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-    },
+    PictureSize { width: u32, height: u32 },
     /// A value of the configuration outside its range.
     #[error("expected {name} {expected}, found {found}")]
     InvalidConfig {
-        /// The field.
         name: &'static str,
         /// The accepted range, in words.
         expected: &'static str,
-        /// The value given.
         found: f64,
     },
 }

@@ -9,7 +9,7 @@
 //! A part is a height field with materials, built from a recipe of flat shapes that raise, cut and paint it: flat
 //! stampings, turned, bent, cast and moulded parts. Scenes are drawn by following lines of sight through a pinhole
 //! camera onto those height fields, with soft shadows, mirrored surroundings, and what lens and sensor do. Sample *i* of
-//! a seed is the same to the bit whoever asks, in whatever order and on however many threads.
+//! a seed is the same to the bit, in whatever order samples are made and on any number of threads.
 //!
 //! **Frames.** A part's: millimetres, x right, y down as seen from above, z up from the table. A picture's: pixels, the
 //! centre of the first pixel at (0.5, 0.5). Angles are radians from x to y, so clockwise as seen.

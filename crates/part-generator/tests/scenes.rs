@@ -1,4 +1,4 @@
-//! Samples are the same whoever asks, and their truth agrees with the picture.
+//! Samples depend on seed and index only, and their truth agrees with the picture.
 #![allow(clippy::unwrap_used)]
 
 use rayon::prelude::*;

@@ -7,29 +7,22 @@ use thiserror::Error;
 /// A report, an animation or a file that could not be made.
 #[derive(Debug, Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ReportError {
     /// A folder is missing and could not be created.
     #[error("cannot create the folder {}: {source}", path.display())]
-    Folder {
-        /// The folder asked for.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
+    Folder { path: PathBuf, source: std::io::Error },
     /// A file could not be written; its previous contents, if any, are untouched.
     #[error("cannot write {}: {step} failed: {source}; nothing was changed", path.display())]
     Write {
-        /// The file asked for.
         path: PathBuf,
         /// What was being done: creating, writing, flushing or renaming.
         step: &'static str,
-        /// The system's reason.
         source: std::io::Error,
     },
     /// The path names no file: it ends in `..`, is empty, or is a folder.
     #[error("cannot write {}: expected the path of a file, found {found}", path.display())]
     NotAFile {
-        /// The path given.
         path: PathBuf,
         /// What the path is instead.
         found: &'static str,
@@ -40,11 +33,8 @@ pub enum ReportError {
     /// A frame or picture without pixels, or one too large for its format.
     #[error("{what}: expected between 1x1 and {limit}x{limit} pixels, found {width}x{height}")]
     PictureSize {
-        /// Which picture.
         what: &'static str,
-        /// Columns found.
         width: u32,
-        /// Rows found.
         height: u32,
         /// The most that the format takes on a side.
         limit: u32,
@@ -64,18 +54,8 @@ pub enum ReportError {
     },
     /// The JPEG encoder refused a picture.
     #[error("cannot encode a picture of {width}x{height} pixels as JPEG: {source}")]
-    Jpeg {
-        /// Columns.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-        /// The encoder's reason.
-        source: image::ImageError,
-    },
+    Jpeg { width: u32, height: u32, source: image::ImageError },
     /// The GIF encoder refused a frame.
     #[error("cannot encode an animation as GIF: {source}")]
-    Gif {
-        /// The encoder's reason.
-        source: gif::EncodingError,
-    },
+    Gif { source: gif::EncodingError },
 }

@@ -10,7 +10,7 @@
 //! SVG. It follows the reader's light or dark theme, folds to a phone's width, and prints.
 //!
 //! What is deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the
-//! crate compiles in seconds and whoever has numbers can report them. [`write_atomically`] is exported for every
+//! crate compiles in seconds and any caller with numbers can report them. [`write_atomically`] is exported for every
 //! file that must be there whole or not at all.
 //!
 //! ```

@@ -10,7 +10,7 @@ pub enum Tone {
     Plain,
     /// As it should be.
     Good,
-    /// Worth a look.
+    /// Needs attention.
     Warning,
     /// Not as it should be.
     Bad,

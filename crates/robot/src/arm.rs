@@ -49,7 +49,7 @@ pub struct ArmState {
     pub q: JointVector,
     /// Measured joint velocities, rad/s.
     pub dq: JointVector,
-    /// Commanded joint positions, rad: where the controller wants the arm.
+    /// Commanded joint positions, rad: the controller's reference.
     pub q_commanded: JointVector,
     /// Estimated torques that come from outside, Nm; zeros where the arm does not estimate them.
     pub tau_external_nm: JointVector,

@@ -10,6 +10,7 @@ use crate::watch::StopReason;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum RobotError {
     /// A motion breaks a limit; it was not begun.
     #[error("the motion was not begun: {0}")]
@@ -34,7 +35,6 @@ pub enum RobotError {
     Lost {
         /// Arm or hand, with its address.
         peer: String,
-        /// What was seen.
         why: String,
     },
     /// The hand failed.
@@ -45,14 +45,7 @@ pub enum RobotError {
     Perception(String),
     /// A setting outside its range, or one that the arm cannot do.
     #[error("{what}: expected {expected}, found {found}")]
-    Configuration {
-        /// Which setting.
-        what: String,
-        /// What it may be.
-        expected: String,
-        /// What it is.
-        found: String,
-    },
+    Configuration { what: String, expected: String, found: String },
     /// What lies below reports something else.
     #[error(transparent)]
     Device(Box<dyn Error + Send + Sync>),

@@ -1,4 +1,4 @@
-//! One grasp sequence for every arm, and the limits between each motion and the arm.
+//! One grasp sequence for every arm, and the limits that each motion is checked against.
 //!
 //! ```text
 //! workcell file ─► SafetyLimits, GraspConfig

@@ -1,4 +1,4 @@
-//! How fast the sequence goes, as shares of Franka's limits.
+//! Speed of the sequence, as shares of Franka's limits.
 
 use sdg_kinematics::{CartesianLimits, JointLimits};
 
@@ -9,7 +9,7 @@ type Shares = [f64; 3];
 
 /// The largest share of the joints' velocity limits, and that of rehearsals: beyond it nothing was ever tried.
 pub const MAX_SPEED: f64 = 0.6;
-/// The speed of a real arm where nobody asks for another.
+/// The speed of a real arm unless another is set.
 pub const DEFAULT_SPEED: f64 = 0.1;
 
 /// How fast each kind of motion goes.

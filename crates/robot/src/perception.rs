@@ -1,4 +1,4 @@
-//! What the sequence asks of whoever looks, and of whoever looks on.
+//! What the sequence takes from perception, and what it tells an observer.
 
 use std::fmt;
 use std::time::Instant;
@@ -90,5 +90,5 @@ pub trait StepObserver<A: Arm> {
     }
 }
 
-/// Nobody looks on.
+/// An observer that does nothing.
 impl<A: Arm> StepObserver<A> for () {}

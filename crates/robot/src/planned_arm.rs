@@ -1,4 +1,4 @@
-//! An arm that moves on paper only: what a sequence would do, before it is done.
+//! An arm that does not move: what a sequence would do, before it is done.
 
 use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
 use crate::error::Result;

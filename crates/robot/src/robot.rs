@@ -1,4 +1,4 @@
-//! An arm behind its limits: the only way by which the sequence moves it.
+//! An arm with its limits: every motion is planned and checked here.
 
 use sdg_kinematics::{CartesianLimits, JointLimits, JointPath, JointVector, NUM_JOINTS, Panda, Trajectory};
 
@@ -7,7 +7,7 @@ use crate::error::{Result, RobotError};
 use crate::safety::{SafetyLimits, Violation};
 use crate::watch::{StopReason, Watch};
 
-/// A motion must begin this near to where the controller wants the arm, rad: what a person cannot see.
+/// A motion must begin this near to the controller's reference, rad: a difference that a person cannot see.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 /// How often a motion is slowed down so that the tcp keeps to its limits, and to which share of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
@@ -66,7 +66,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.note(state)
     }
 
-    /// Where the controller wants the arm, rad: where the next motion begins.
+    /// The controller's reference, rad: where the next motion begins.
     ///
     /// # Errors
     /// As [`Arm::state`].

@@ -1,4 +1,4 @@
-//! What decides how a demonstration is compared with images, and what each value rests on.
+//! Settings of the comparison of a demonstration with images, with the origin of each value.
 //!
 //! Values that were fitted stand here, so that they can be fitted again: `cargo run --release -p sdg-grasp --example
 //! fit_constants` does so on generated parts. docs/decisions/010-constants.md lists these and all other constants of this
@@ -37,7 +37,7 @@ pub struct ShapeConfig {
 }
 
 impl ShapeConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self {
         max_points: 300,
         outline_weight: 2.0,
@@ -89,7 +89,7 @@ pub struct GradientConfig {
 }
 
 impl GradientConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self { min_gradient: 1.5, noise_factor: 3.0 };
 }
 
@@ -116,7 +116,7 @@ pub struct SurfaceConfig {
 }
 
 impl SurfaceConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self { num_cells: 6.0, cells_share: 2.0 / 3.0, noise: 8.0, noise_in_cell: 6.0 };
 }
 
@@ -141,7 +141,7 @@ pub struct StructureConfig {
 }
 
 impl StructureConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self { num_points: 900.0, num_regions: 12.0, noise: 0.02, visible_from: 0.4 };
 }
 
@@ -165,7 +165,7 @@ pub struct AgreementConfig {
 }
 
 impl AgreementConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self { extent: 64.0, surface_share: 0.3 };
 }
 
@@ -190,7 +190,7 @@ pub struct RefinementConfig {
 }
 
 impl RefinementConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self { sure_agreement: 0.65, restart_px: 10.0, min_restart_agreement: 0.33 };
 }
 

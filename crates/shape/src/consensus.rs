@@ -91,7 +91,7 @@ pub(crate) fn snap_from(
 struct Sighting {
     row: Vector4<f64>,
     weight: f64,
-    /// (distance, trust) of each crest.
+    /// (distance, weight) of each crest.
     crests: [(f64, f64); MAX_CRESTS],
     num_crests: usize,
 }

@@ -3,6 +3,7 @@
 /// Why a [`crate::ShapeTemplate`] could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum ShapeError {
     /// The outline is not an area: too few vertices, or a coordinate that is not a number.
     #[error("expected an outline of at least 3 finite vertices, found {found}")]
@@ -17,9 +18,7 @@ pub enum ShapeError {
     OutlineTooSmall {
         /// Smallest extent accepted, in pixels.
         expected_px: f64,
-        /// Image width in pixels.
         width: u32,
-        /// Image height in pixels.
         height: u32,
         /// Width of the outline's part inside the image, in pixels.
         found_width_px: f64,
@@ -30,23 +29,16 @@ pub enum ShapeError {
     #[error(
         "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness"
     )]
-    TooFewEdges {
-        /// Fewest edge points accepted.
-        expected: usize,
-        /// Edge points found.
-        found: usize,
-    },
+    TooFewEdges { expected: usize, found: usize },
     /// A file of weights does not hold those of the network that compares photo and picture.
     #[error("weights of the comparing network: {0}")]
     Weights(String),
     /// A configuration value lies outside its range.
     #[error("expected {name} {expected}, found {found}")]
     InvalidConfig {
-        /// Field of [`crate::ShapeConfig`].
         name: &'static str,
         /// The accepted range, in words.
         expected: &'static str,
-        /// The value given.
         found: f64,
     },
 }

@@ -1,6 +1,6 @@
 //! The demonstration laid over an image: is the part there, and where to a fraction of a pixel?
 //!
-//! A detector taught from one photo fires on other parts too, and its poses are off by some pixels.
+//! A detector taught from one photo also gives detections on other parts, and its poses are off by some pixels.
 //! Laying the demonstration over the image decides both. The part's edges are read from the
 //! demonstration once; at a predicted pose their directions are compared with the directions of the
 //! image's gradients (sign ignored, since the background changes), and the pose climbs from there in
@@ -16,6 +16,22 @@
 //! [`Comparison`] scores edges and surface together and gathers the [`Evidence`] for a pose.
 //! [`InstantSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
 //! best. [`ShapeConfig`] holds what was fitted, with its origin.
+//!
+//! # Legend
+//!
+//! | symbol | is |
+//! |---|---|
+//! | demonstration, image | the two pictures; pixels, y down, the first pixel's centre at (0.5, 0.5) |
+//! | pose | `image_from_demonstration`: shift (x, y), angle, scale `s`; while it is refined, about the part's centre, with ln `s` |
+//! | level m | of a pyramid: its pixel is 2^m pixels wide |
+//! | φ | direction of a gradient, without sign; kept as (cos 2φ, sin 2φ) times a length in [0, 1] |
+//! | edge point | a point of the demonstration's edges: offset from the centre, normal, weight; weights of a level sum to 1 |
+//! | alignment | cos 2(φ of the edge point − φ of the image there), in [-1, 1] |
+//! | agreement | weighted mean of alignments (edges), or of correlations (surface), in [0, 1] |
+//! | crest | a local maximum of the gradient's energy along an edge point's normal |
+//! | bank | the template turned and scaled in all variants that the search tries |
+//! | place, pitch | where the search puts the part's centre, and the distance between two such places |
+//! | likeness | log-odds of a small network that photo and picture show the same part |
 //!
 //! What this crate leaves out: it knows no grasp and no camera, and a part lies flat: poses are turns, shifts and scales
 //! in the image plane. Threads only with the feature `parallel`, and results do not depend on them.

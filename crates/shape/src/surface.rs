@@ -1,4 +1,4 @@
-//! What lies inside the outline: the second witness beside the edges.
+//! What lies inside the outline, compared as correlations of brightness and colour.
 //!
 //! A lever of nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured, where the part
 //! itself in bad light gave 0.64), but where the part has a bushing it has a hole. The surface sees that: brightness and

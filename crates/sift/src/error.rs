@@ -3,39 +3,28 @@
 /// Why features could not be computed or a rotation not be estimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum SiftError {
     /// A setting outside its range.
     #[error("expected {name} {expected}, found {found}")]
     BadSetting {
-        /// The setting's name.
         name: &'static str,
         /// The range it must lie in.
         expected: &'static str,
-        /// The value found.
         found: f64,
     },
     /// Pixel data of another length than width × height.
     #[error("expected {expected} intensities for {width} × {height} pixels, found {found}")]
     WrongLength {
-        /// Width in pixels.
         width: u32,
-        /// Height in pixels.
         height: u32,
-        /// Width × height.
         expected: u64,
         /// The number of intensities found.
         found: u64,
     },
     /// An intensity that is NaN or infinite.
     #[error("expected finite intensities, found {value} at pixel ({x}, {y})")]
-    NotFinite {
-        /// Column, in pixels.
-        x: u32,
-        /// Row, in pixels.
-        y: u32,
-        /// The value found.
-        value: f32,
-    },
+    NotFinite { x: u32, y: u32, value: f32 },
     /// A mask of another size than its image.
     #[error(
         "expected a mask of {image_width} × {image_height} pixels, as its image, found {mask_width} × {mask_height}"
@@ -54,10 +43,5 @@ pub enum SiftError {
     #[error(
         "expected a template with at least {expected} keypoints or a mask with an area, found {found} keypoints and no mask"
     )]
-    BareTemplate {
-        /// Keypoints needed.
-        expected: usize,
-        /// Keypoints found.
-        found: usize,
-    },
+    BareTemplate { expected: usize, found: usize },
 }

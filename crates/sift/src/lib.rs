@@ -1,4 +1,4 @@
-//! SIFT: keypoints that survive turning, scaling and relighting, their descriptors, matching, and the turn of a part
+//! SIFT: keypoints invariant to rotation, scale and light, their descriptors, matching, and the turn of a part
 //! against its demonstration.
 //!
 //! ```text

@@ -1,4 +1,4 @@
-//! The similarity that most matches agree on.
+//! The similarity with the most inliers among matches.
 //!
 //! Every match already says how the part turned and grew, so a pair of matches is tried only where both say the same
 //! as the line between them; and each match must agree in place, turn and scale to count. Whether as many agree as

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p sdg-simulation --example render_demonstrations [FOLDER [CHECK_FOLDER]]`
 //!
-//! The pendulum is annotated in LabelMe's format, the others in COCO's, so that both are tried by whoever uses them.
+//! The pendulum is annotated in LabelMe's format, the others in COCO's, so that users try both.
 //! With a second folder, the annotations are also drawn over enlarged pictures there, to be checked by eye.
 
 use std::fs;

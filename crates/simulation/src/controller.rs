@@ -8,7 +8,7 @@
 use crate::data::Data;
 use crate::panda::{ArmVector, NUM_ARM_JOINTS, PandaIds};
 
-/// Where a joint-space reference wants the arm at one instant.
+/// A joint-space reference at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmReference {
     /// Positions in radians.

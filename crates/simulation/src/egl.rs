@@ -54,7 +54,7 @@ struct Unused(egl::Context);
 // SAFETY: an EGL context may be made current on any thread as long as it is current on no other (EGL 1.5, section 3.7.3).
 unsafe impl Send for Unused {}
 
-/// Contexts that nobody uses now. The driver compiles its shaders anew for each new context, which takes longer than a
+/// Contexts not in use. The driver compiles its shaders anew for each new context, which takes longer than a
 /// picture; one that was used before has them.
 static UNUSED: Mutex<Vec<Unused>> = Mutex::new(Vec::new());
 

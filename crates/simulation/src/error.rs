@@ -7,6 +7,7 @@ use sdg_robot::RobotError;
 /// An error of the simulation; a grasp that fails is not one of them (see `sdg_robot::GraspOutcome`).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum SimulationError {
     /// libmujoco is not the version that the bindings describe.
     #[error(transparent)]
@@ -33,7 +34,6 @@ pub enum SimulationError {
     MuJoCo {
         /// The function that was called.
         call: &'static str,
-        /// MuJoCo's own words.
         message: String,
     },
 
@@ -42,7 +42,6 @@ pub enum SimulationError {
     Unstable {
         /// Simulated time at which it was noticed, in seconds.
         time_secs: f64,
-        /// MuJoCo's own words.
         message: String,
     },
 
@@ -53,7 +52,6 @@ pub enum SimulationError {
         kind: &'static str,
         /// The name that was asked for.
         name: String,
-        /// The names that exist.
         existing: Vec<String>,
     },
 
@@ -67,7 +65,6 @@ pub enum SimulationError {
     /// A file of the object or the scene could not be read.
     #[error("{}: {reason}", path.display())]
     File {
-        /// The file.
         path: PathBuf,
         /// What is wrong with it: expected and found.
         reason: String,

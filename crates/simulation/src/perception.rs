@@ -1,4 +1,4 @@
-//! What the workcell asks of whoever looks at its pictures.
+//! The trait by which the workcell asks for a grasp in its pictures.
 
 use sdg_robot::GraspTarget;
 

@@ -333,12 +333,12 @@ impl Workcell {
         }
     }
 
-    /// Sets where the controller wants the arm in the next period.
+    /// Sets the controller's reference for the next period.
     pub(crate) fn set_reference(&mut self, reference: ArmReference) {
         self.reference = reference;
     }
 
-    /// Where the controller wants the arm.
+    /// The controller's reference.
     pub(crate) fn commanded(&self) -> sdg_kinematics::JointVector {
         self.reference.position
     }

@@ -55,7 +55,7 @@ fn bar_cell(x: f64, y: f64, yaw_rad: f64) -> Workcell {
     unlit_cell(SceneVariation::nominal(Some((&spec, pose))))
 }
 
-/// A workcell whose pictures are drawn fast: nobody looks at them here.
+/// A workcell whose pictures are drawn fast, since these tests do not use them.
 fn unlit_cell(scene: SceneVariation) -> Workcell {
     let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
     Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }).unwrap()

@@ -8,7 +8,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use sdg_detection::state_dict::{StateDict, WeightTensor};
 use sdg_kernels::{AdamWParams, adamw};
 
-/// The optimiser and what it remembers of every parameter.
+/// The optimiser and its state for every parameter.
 ///
 /// burn's own AdamW is composed of tensor operations; on two cores it took a fifth of a training step of the `edge`
 /// preset, see [`sdg_kernels::adamw`].
@@ -44,7 +44,7 @@ impl AdamW {
     }
 }
 
-/// What [`AdamW`] remembers between steps, by the parameters' names: enough to go on with the same bits.
+/// The state of [`AdamW`] between steps, by the parameters' names: enough to go on with the same bits.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AdamWState {
     /// Steps done.
@@ -54,7 +54,7 @@ pub struct AdamWState {
 }
 
 impl AdamW {
-    /// What the optimiser of `module` remembers.
+    /// The state of the optimiser of `module`.
     pub fn state<M: Module>(&self, module: &M) -> AdamWState {
         let mut moments = StateDict::new();
         for (name, id, ..) in named_parameters(module) {

@@ -9,7 +9,7 @@ use sdg_detection::GeneralizedRcnn;
 use crate::adamw::AdamW;
 use crate::config::{Optimizer, TrainingConfig};
 
-/// An optimiser with what it remembers.
+/// An optimiser with its state.
 pub(crate) enum Stepper {
     AdamW(AdamW),
     Sgd(ModuleOptimizer),

@@ -70,7 +70,7 @@ pub struct ValidationRecord {
     pub validation: Validation,
 }
 
-/// What is told while a run goes on.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TrainingEvent {
     /// A step was done.

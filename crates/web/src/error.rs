@@ -3,6 +3,7 @@
 /// Why a model could not be opened or an image not be looked at.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WebError {
     /// The model file, or the look itself.
     #[error(transparent)]
@@ -12,12 +13,5 @@ pub enum WebError {
     Image(#[from] sdg_demonstration::Error),
     /// Pixels of another number than the size says.
     #[error("expected {width} × {height} pixels of four bytes, found {found} bytes")]
-    Pixels {
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
-        /// Bytes handed over.
-        found: usize,
-    },
+    Pixels { width: u32, height: u32, found: usize },
 }

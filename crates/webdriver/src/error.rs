@@ -6,29 +6,19 @@ use std::path::PathBuf;
 /// Why the browser did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum WebDriverError {
     /// ChromeDriver is not there or did not start.
     #[error(
         "cannot start {program} (Debian's packages chromium and chromium-driver; `make test-browser` installs them): {source}"
     )]
-    NoDriver {
-        /// The program.
-        program: &'static str,
-        /// What the system says.
-        source: io::Error,
-    },
+    NoDriver { program: &'static str, source: io::Error },
     /// A connection that broke, or a file that could not be written.
     #[error("{what}: {source}")]
-    Io {
-        /// What was being done.
-        what: String,
-        /// What the system says.
-        source: io::Error,
-    },
+    Io { what: String, source: io::Error },
     /// ChromeDriver refused.
     #[error("{command}: {error}: {message}")]
     Refused {
-        /// The command's path.
         command: String,
         /// WebDriver's word for it, such as "no such element".
         error: String,
@@ -38,19 +28,15 @@ pub enum WebDriverError {
     /// An answer that WebDriver does not know.
     #[error("{command}: expected {expected}, found {found}")]
     Unexpected {
-        /// The command's path.
         command: String,
         /// What the specification has there.
         expected: &'static str,
-        /// What came.
         found: String,
     },
     /// The page did not become as expected in time.
     #[error("waited {seconds} s for {what}; the page says: {page}")]
     Timeout {
-        /// What was waited for.
         what: String,
-        /// For how long.
         seconds: f32,
         /// The start of the page's text.
         page: String,

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Both programs are Debian's (packages chromium and chromium-driver); `make test-browser` installs them. A browser has
-//! a profile of its own, which goes with it, and asks nobody on the network for anything by itself.
+//! a profile of its own, which goes with it, and sends no request to the network by itself.
 //!
 //! Left out on purpose: other browsers, windows and frames, waiting in the driver ([`Browser::wait_for`] asks the page),
 //! and any use outside tests.

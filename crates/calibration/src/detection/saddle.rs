@@ -75,7 +75,7 @@ pub(super) fn find(picture: &Luminance) -> Vec<Saddle> {
 }
 
 impl Saddle {
-    /// Both edges' directions.
+    /// Directions of both edges.
     pub(super) fn edges(&self) -> [Vector2<f64>; 2] {
         // Along the eigenvectors e and f the form is a s² + b t² with a b < 0: it vanishes at t = ± s √(-a / b).
         let eigen = self.hessian.symmetric_eigen();

@@ -108,7 +108,7 @@ fn take_up_to(left: &mut u64, bytes: &mut &[u8], out: &mut Vec<u8>) {
 /// What a read gave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// Some bytes.
+    /// More bytes follow.
     More,
     /// None until the deadline.
     Late,

@@ -4,7 +4,7 @@
 //! Url ── exchange: connect, request, head, redirects ── Body: framing ─┬─ Multipart ── MotionJpeg   (one connection)
 //!                                                                      └─ one picture ── Snapshots  (a connection each)
 //! ```
-//! A small client of its own: what cameras speak needs no more, and everything that a server can send is bounded in memory and
+//! A small client of its own: cameras need no more of HTTP, and everything that a server can send is bounded in memory and
 //! in time. Absent: TLS, compression, cookies, proxies, digest authentication, keep-alive between snapshots.
 
 mod body;

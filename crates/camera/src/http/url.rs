@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::error::CameraError;
 
-/// An `http://` address, with user and password where the camera wants them.
+/// An `http://` address, with user and password where the camera requires them.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Url {
     /// Host and port as in the `Host` header: without the port where it is 80.

@@ -20,7 +20,7 @@ use crate::yuv::{rgb24_to_rgb, yuyv_to_rgb};
 
 /// Between looks at whether a buffer is filled: the wait has an end so, which the system's own has not.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
-/// Buffers that were filled while nobody read for longer than this are thrown away: they are as old.
+/// Buffers that were filled while no picture was read for longer than this are dropped: they are that old.
 const MAX_AGE: Duration = Duration::from_millis(200);
 /// V4L2's exposure times are in units of 100 µs.
 const EXPOSURES_A_SECOND: f64 = 1e4;

@@ -268,7 +268,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     }
 }
 
-/// The original's outputs; gradients come under the names of whoever made them.
+/// The original's outputs; gradients keep the names of the program that made them.
 fn read_reference(path: &Path) -> Result<StateDict> {
     const GRADIENTS: &str = "gradients.";
     let (mut source, outputs) = open(path)?;

@@ -11,9 +11,7 @@ use crate::files;
 /// One model on one part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cell<'a> {
-    /// The model.
     pub model: ModelKind,
-    /// The part's name.
     pub object: &'a str,
 }
 

@@ -7,7 +7,6 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartGroup {
-    /// The paper's eight.
     Paper,
     /// Four of another kind, held out of every choice.
     HeldOut,

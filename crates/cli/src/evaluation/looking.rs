@@ -41,7 +41,7 @@ pub(super) fn scene_without(object: &ObjectSpec, number: u64, seed: u64) -> Resu
 }
 
 /// The seed of a part's scenes, as `sdg rehearse --seed` takes it: the same for every model, another for every part. With
-/// one for all parts, one unlucky lamp would count eight times, and the intervals would promise too much.
+/// one for all parts, one unfavourable lamp would count eight times, and the intervals would be too narrow.
 pub(super) fn part_seed(seed: u64, object: &ObjectSpec) -> u64 {
     let place = ObjectSpec::names().position(|name| name == object.name).unwrap_or(0);
     seed.wrapping_mul(1000).wrapping_add(place as u64)

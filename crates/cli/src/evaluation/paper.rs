@@ -1,10 +1,9 @@
-//! What the paper reports, to stand beside our figures.
+//! The paper's figures.
 
 use sdg_grasp::ModelKind;
 
 /// A row of the paper's Table II, and of its text where the table leaves it out.
 pub struct PaperRow {
-    /// Training samples.
     pub samples: &'static str,
     /// From samples to model, on a GTX 1080 Ti, minutes and seconds.
     pub teaching: &'static str,

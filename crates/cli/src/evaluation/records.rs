@@ -1,4 +1,4 @@
-//! What a unit of work leaves behind.
+//! Records of units of work, as the store keeps them.
 
 use sdg_grasp::TeachingFacts;
 use sdg_report::DetectionError;
@@ -26,7 +26,6 @@ pub enum TeachingRecord {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         losses: Vec<f64>,
     },
-    /// There is none.
     Failed {
         /// Why, in one line.
         why: String,
@@ -50,7 +49,6 @@ pub struct AttemptRecord {
     pub error_deg: Option<f64>,
     /// How often the camera looked.
     pub looks: Looks,
-    /// Wall-clock time.
     pub seconds: f64,
 }
 
@@ -99,7 +97,6 @@ impl AttemptRecord {
 pub struct AttemptsRecord {
     /// How attempts are recorded: [`Self::VERSION`]. Those of another version are made again.
     pub version: u32,
-    /// One each.
     pub attempts: Vec<AttemptRecord>,
 }
 

@@ -8,7 +8,6 @@ use anyhow::Result;
 /// A unit of work and those that must be done before it.
 #[derive(Debug, Clone)]
 pub struct Task<U> {
-    /// What to do.
     pub unit: U,
     /// Indices of the tasks that it waits for; all smaller than its own, so that no circle can be.
     pub after: Vec<usize>,

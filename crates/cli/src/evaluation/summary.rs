@@ -18,7 +18,6 @@ use crate::statistics::{Share, percentile, wilson_interval};
 /// much that is, of all groups.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// Which parts.
     pub group: PartGroup,
     /// What decides the results.
     pub settings: Settings,
@@ -35,7 +34,6 @@ pub struct Summary {
 /// A model on all parts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
-    /// The letter.
     pub model: ModelKind,
     /// The model whose network it reads; itself unless it shares one.
     pub network: ModelKind,
@@ -49,7 +47,6 @@ pub struct ModelSummary {
     pub teaching_secs: Option<f64>,
     /// The longest of them.
     pub longest_teaching_secs: Option<f64>,
-    /// The largest file.
     pub largest_bytes: Option<usize>,
     /// With the check against the demonstration.
     pub verified: Figures,
@@ -60,15 +57,12 @@ pub struct ModelSummary {
 /// A model on one part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CellSummary {
-    /// The letter.
     pub model: ModelKind,
-    /// The part's name.
     pub object: String,
     /// How its teaching ended; `None` before it has.
     pub teaching: Option<TeachingRecord>,
     /// With the check against the demonstration.
     pub verified: Figures,
-    /// Without it.
     pub alone: Option<Figures>,
     /// Attempts that failed with the check.
     pub failures: Vec<AttemptRecord>,

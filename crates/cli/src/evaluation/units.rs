@@ -1,4 +1,4 @@
-//! What there is to do, and the doing of it.
+//! The units of work, and how each is done.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -36,13 +36,10 @@ enum Unit<'a> {
 
 /// Models, parts, and the folder for what becomes of them.
 pub struct Evaluation<'a> {
-    /// The models.
     pub models: &'a [ModelKind],
-    /// The parts.
     pub objects: &'a [ObjectSpec],
     /// Network, training and augmentation: what the store's settings name.
     pub preset: Preset,
-    /// Results and settings.
     pub store: &'a Store,
     /// Whether every grasp is also tried without the check against the demonstration.
     pub unverified: bool,

@@ -1,4 +1,4 @@
-//! A folder of labelled pictures: which label file speaks of which picture, and what each says.
+//! A folder of labelled pictures: which label file belongs to which picture, and what each holds.
 //!
 //! LabelMe keeps a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes COCO
 //! beside the picture. A label file of a picture's name belongs to that picture, whatever name it gives (people rename
@@ -37,7 +37,6 @@ pub struct Instance {
 /// A picture and what is labelled on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelledPicture {
-    /// The picture.
     pub path: PathBuf,
     /// The file that labels it.
     pub labels: PathBuf,
@@ -57,7 +56,6 @@ impl LabelledPicture {
 /// A file of the folder that does not count, and the reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOut {
-    /// The file's name.
     pub file: String,
     /// Why it was left out, for people.
     pub why: String,
@@ -66,7 +64,6 @@ pub struct LeftOut {
 /// The pictures to test a model on.
 #[derive(Debug, Clone)]
 pub struct LabelledFolder {
-    /// By name.
     pub pictures: Vec<LabelledPicture>,
     /// What else is there.
     pub left_out: Vec<LeftOut>,

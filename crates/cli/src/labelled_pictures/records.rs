@@ -11,11 +11,8 @@ use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, judge, sweep};
 
 /// A model tested on a folder.
 pub struct Evaluated<'a> {
-    /// The folder.
     pub folder: &'a Path,
-    /// The model's file.
     pub model_file: &'a Path,
-    /// The model.
     pub model: &'a GraspModel,
     /// Whether detections were laid over the demonstration.
     pub verification: Verification,

@@ -27,7 +27,6 @@ const NUM_SWEEP_STEPS: u32 = 50;
 pub struct Truth {
     /// The grasp; only an optional instance may lack it.
     pub grasp: Option<TrueGrasp>,
-    /// The box.
     pub bbox: BoundingBox,
     /// Whether it may be missed.
     pub optional: bool,
@@ -81,7 +80,6 @@ pub struct Tested {
 /// A detection on an instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Place in [`Tested::truths`].
     pub instance_idx: usize,
     /// How far off it is; `None` on an optional instance without a grasp.
     pub error: Option<HitError>,
@@ -233,11 +231,9 @@ fn without_grasp(truths: &[Truth], taken: &[bool], bbox: &BoundingBox) -> Option
 pub struct Totals {
     /// Parts found, of those that must be.
     pub found: Share,
-    /// Parts not found.
     pub missed: usize,
     /// Detections on pictures with the part that hit nothing.
     pub wrong: usize,
-    /// Optional instances found.
     pub optional: Share,
     /// Pictures with the part on which something is right and nothing is wrong.
     pub clean: Share,

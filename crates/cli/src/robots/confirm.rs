@@ -9,11 +9,10 @@ use anyhow::{Context, Result};
 pub(crate) enum Consent {
     /// The arm may move.
     Given,
-    /// It may not.
     Refused,
 }
 
-/// Asks on the terminal; `--yes` has answered. Without a terminal nobody can be asked, and the answer is no.
+/// Asks on the terminal; `--yes` has answered. Without a terminal the answer is no.
 ///
 /// # Errors
 /// A terminal that cannot be read.

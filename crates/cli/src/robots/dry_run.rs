@@ -8,7 +8,7 @@ use sdg_robot::{
     SafetyLimits, Watch, grasp,
 };
 
-/// A grasp on paper.
+/// A grasp that is planned and not carried out.
 #[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs the start"))]
 pub(crate) struct DryRun {
     start: ArmState,

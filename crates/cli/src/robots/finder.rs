@@ -1,4 +1,4 @@
-//! A grasp model as the eyes of an arm.
+//! A grasp model as an arm's perception.
 //!
 //! ```text
 //! Pictures ─ picture, when it was taken ─ PlanDetector over the table ─ best pose in the base frame ─ GraspTarget

@@ -45,7 +45,7 @@ impl Page {
             .args(["annotate", "--no-browser", "--json"])
             .args(arguments)
             .current_dir(folder.path())
-            // It is ended without a word, and what it keeps for the sitting goes with the folder.
+            // It is ended without a word, and what it keeps for the session goes with the folder.
             .env("TMPDIR", folder.path())
             .stdout(Stdio::piped())
             .spawn()

@@ -16,7 +16,7 @@ use crate::{Demonstration, Error, Result};
 /// Width and height of a window against the part's largest diameter. With less the part fits only at some turns.
 const WINDOW_OVER_PART: [f64; 2] = [1.3, 1.05];
 
-/// Makes samples from demonstrations: sample *i* of seed *s* is always the same, whoever asks and in whatever order.
+/// Makes samples from demonstrations: sample *i* of seed *s* is always the same, in whatever order samples are made.
 ///
 /// Everything that does not depend on the sample is worked out by [`new`](Self::new); a sample then takes `&self`
 /// alone, so that any number of threads may ask.

@@ -1,4 +1,4 @@
-//! How far each pixel is inside or outside an outline.
+//! Signed distance of each pixel to an outline.
 
 use nalgebra::Point2;
 use sdg_geometry::Polygon;

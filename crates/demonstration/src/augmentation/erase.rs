@@ -1,4 +1,4 @@
-//! The photo without the part: the hole is filled from its rim, and grained like its surroundings.
+//! The photo without the part: the hole is filled from its rim, with the noise of its surroundings.
 
 use image::{Rgb, RgbImage};
 use sdg_geometry::Polygon;

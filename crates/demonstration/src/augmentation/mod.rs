@@ -1,4 +1,4 @@
-//! Many pictures from one, each with its truth.
+//! Augmented samples of a demonstration, each with its annotation.
 //!
 //! ```text
 //! Demonstration ── prepared: reduced photo, distance to the outline, background without the part, mutants

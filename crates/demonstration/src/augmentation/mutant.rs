@@ -1,4 +1,4 @@
-//! Things made from the part's own pieces that are not the part: the hardest distractors.
+//! Distractors made from the part's own pieces.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use sdg_geometry::Polygon;

@@ -1,4 +1,4 @@
-//! What is worked out once for each demonstration, so that a sample is only warps and paint.
+//! What is computed once for each demonstration, so that a sample takes only warps and painting.
 
 use image::imageops::{self, FilterType};
 use nalgebra::Point2;

@@ -1,4 +1,4 @@
-//! Randomness by address: every sample has its own generator, made from (seed, stream, index).
+//! Random numbers by index: every sample has its own generator, made from (seed, stream, index).
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -22,7 +22,7 @@ pub(crate) enum Stream {
     OtherParts = 4,
 }
 
-/// The generator of sample `index`, the same whoever asks and in whatever order.
+/// The generator of sample `index`, the same in whatever order samples are made.
 pub(crate) fn sample_rng(seed: u64, stream: Stream, index: u64) -> SampleRng {
     generator_at(seed, stream as u64, index)
 }

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 
-/// Red, green, blue in `[0, 1]` as displayed (not linear light); the fourth float belongs to whoever made the raster.
+/// Red, green, blue in `[0, 1]` as displayed (not linear light); the fourth float has a meaning of its maker's.
 ///
 /// Four floats are one SIMD register, so that a bilinear look-up is four loads.
 #[derive(Debug, Clone)]

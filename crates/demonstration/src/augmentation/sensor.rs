@@ -1,4 +1,4 @@
-//! What lens, sensor and compression do to a picture.
+//! Effects of lens, sensor and compression on a picture.
 
 use std::io::Cursor;
 

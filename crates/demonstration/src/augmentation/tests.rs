@@ -1,4 +1,4 @@
-//! Samples against their truth.
+//! Samples compared with their annotations.
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;

@@ -1,4 +1,4 @@
-//! What goes through the heads, and what comes out.
+//! Inputs and outputs of the ROI heads.
 
 use crate::boxes::Corners;
 use crate::roi_pooler::Roi;

@@ -118,7 +118,7 @@ impl Session {
         Ok(self.take_kept(id))
     }
 
-    /// Forgets responses that nobody waits for.
+    /// Drops responses that no call waits for.
     pub(crate) fn forget_responses(&mut self) {
         self.kept.clear();
     }

@@ -19,7 +19,7 @@ pub const MIN_SINGULAR_VALUE: f64 = 0.05;
 /// Keeps the inverse bounded near singular poses; at 1e-3 a pose is still followed to a micrometre in the next cycle.
 const DAMPING: f64 = 1e-3;
 
-/// Where the client wants the end effector: `O_T_EE_c`, `O_dP_EE_c`, `O_ddP_EE_c`, `elbow_c` and its derivatives.
+/// The client's reference of the end effector: `O_T_EE_c`, `O_dP_EE_c`, `O_ddP_EE_c`, `elbow_c` and its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CartesianReference {
     /// `base_from_ee`.

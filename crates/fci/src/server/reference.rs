@@ -10,7 +10,7 @@ pub const PERIOD_SECS: f64 = 1e-3;
 /// Differences of doubles are no violations.
 pub(super) const ROUNDING: f64 = 1.0 + 1e-6;
 
-/// Where the robot's controller wants the joints: `q_d`, `dq_d`, `ddq_d`.
+/// The controller's reference of the joints: `q_d`, `dq_d`, `ddq_d`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointReference {
     /// rad.

@@ -108,7 +108,7 @@ impl RobotCore {
         self.motion.as_ref().map(|motion| motion.communication.has_started())
     }
 
-    /// Whether nothing moves and nobody waits for an answer.
+    /// Whether nothing moves and no request waits for an answer.
     pub fn is_settled(&self) -> bool {
         let is_still = self.observation.dq.amax() < STILL || self.idle_cycles > MAX_SETTLING_CYCLES;
         self.motion.is_none() && self.waiting.is_empty() && self.references.joints.is_at_rest() && is_still

@@ -43,7 +43,7 @@ impl Default for MotionCommand {
     }
 }
 
-/// What the client wants in one millisecond.
+/// The client's command for one millisecond.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RobotCommand {
     /// Number of the state that this answers.

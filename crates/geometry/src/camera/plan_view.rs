@@ -40,7 +40,7 @@ pub struct PlanView {
     pub top_m: f64,
     /// Pixels in a row.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
 }
 

@@ -1,4 +1,4 @@
-//! How wrong the decisions of a configuration are.
+//! The loss of a configuration's decisions.
 
 use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::ScoreConfig;

@@ -1,4 +1,4 @@
-//! The constants of [`CheckConfig`] fitted on pictures with truth, for whoever maintains them.
+//! The constants of [`CheckConfig`] fitted on pictures with truth: for maintainers.
 //!
 //! ```text
 //! parts with pictures ─ observe: search, evidence for right and wrong poses ─┬─ score: logistic regression ─┐
@@ -75,7 +75,7 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` hears how it goes.
+/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` is called with the progress.
 ///
 /// # Errors
 /// A name that no constant has, fewer than two parts on either side, and a part that cannot be taught.

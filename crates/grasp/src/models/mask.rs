@@ -1,4 +1,4 @@
-//! Model D: the mask shows the part, SIFT or the outline say how it lies.
+//! Model D: place from the mask, turn from SIFT keypoints or the outline.
 
 use std::fmt;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What each model looks with, and how it reads what it sees: where the demonstration lies in the image.
+//! The network of each model, and how its output is read as a pose of the demonstration.
 //!
 //! | model | network | place | turn |
 //! |---|---|---|---|
@@ -37,7 +37,7 @@ use crate::taught::TaughtDemonstration;
 /// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
 /// Chosen by hand, not measured.
 const MAX_CANDIDATES: usize = 16;
-/// Below this the network itself does not believe it. Detectron2's own threshold at test time.
+/// Boxes of a lower score are dropped: Detectron2's threshold at test time.
 const MIN_NETWORK_SCORE: f64 = 0.05;
 
 /// A model's detector, and how it is read. Model S has none.

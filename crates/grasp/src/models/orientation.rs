@@ -1,4 +1,4 @@
-//! Model A: the box says where the part is, a CNN on the box's crop how it is turned.
+//! Model A: place from the box, turn from a CNN on the box's crop.
 
 use image::RgbImage;
 use sdg_geometry::BoundingBox;

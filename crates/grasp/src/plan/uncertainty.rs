@@ -1,4 +1,4 @@
-//! How far a grasp may lie beside the truth: what is known of it before the truth is.
+//! Standard errors of a grasp's place and angle.
 //!
 //! ```text
 //! noise  = pixels · pixel · exp(by_disagreement (1 − agreement))

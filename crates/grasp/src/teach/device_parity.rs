@@ -30,7 +30,7 @@ fn devices() -> Vec<(ComputeBackend, Device)> {
     others.filter(|backend| backend.is_built()).map(|backend| (backend, backend.open().unwrap())).collect()
 }
 
-/// The photo's marks as a step of training wants them, in pixels of the resized image.
+/// The photo's marks as a step of training takes them, in pixels of the resized image.
 fn targets(network: &RcnnConfig) -> StateDict {
     let Demonstration { image, annotation } = demonstration();
     let transformed = sdg_detection::ImageTransform::new(&network.input).apply(&image).unwrap();

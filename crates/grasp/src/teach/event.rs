@@ -1,8 +1,8 @@
-//! What is told while a model is taught.
+//! Progress of a teaching.
 
 use sdg_training::{StepRecord, ValidationRecord};
 
-/// What is told while a model is taught.
+/// Progress of a teaching.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TeachingEvent {
     /// A step of model A's orientation CNN, which is taught before the detector.

@@ -1,4 +1,4 @@
-//! Held-back samples: how good a network is, and where its score is to be cut.
+//! Held-back samples: a network's hit rate, errors and score threshold.
 
 use sdg_demonstration::{Sample, SampleObject};
 use sdg_geometry::{Keypoint, PlanarGrasp};

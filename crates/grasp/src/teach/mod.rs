@@ -73,7 +73,7 @@ pub struct TeachOptions {
     pub fine_tuning: Option<FineTuning>,
     /// Turns of the part that look the same: they are neither taught nor held against the model.
     pub symmetry: RotationalSymmetry,
-    /// Sizes over the usual one at which the part is looked for.
+    /// Sizes over the nominal one at which the part is looked for.
     pub size_tolerance: RangeInclusive<f64>,
     /// What [`crate::seen_from_above`] says where the demonstrations come from there.
     pub lengths: Option<Lengths>,
@@ -146,7 +146,7 @@ pub struct Taught {
     pub history: Option<History>,
 }
 
-/// Teaches a grasp model. `observe` hears of every step and validation and may end the teaching, which then keeps the
+/// Teaches a grasp model. `observe` is called after every step and validation and may end the teaching, which then keeps the
 /// best network so far, if it is any good.
 ///
 /// # Errors

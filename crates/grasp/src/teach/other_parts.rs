@@ -1,4 +1,4 @@
-//! Generated parts that lie about while a part is taught: what a workshop has besides it.
+//! Generated parts as negatives in the scenes that a part is taught on.
 //!
 //! They are none of the shipped parts, and not the ones that anything is measured on: a seed of their own draws them.
 

@@ -16,7 +16,7 @@ use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
 use crate::facts::ModelKind;
 
-/// As often as an orientation CNN may fold the circle: what is left of it, 5°, is no turn to speak of. Chosen by that
+/// As often as an orientation CNN may fold the circle: what is left of it, 5°, is negligible. Chosen by that
 /// reasoning.
 const MAX_FOLD: usize = 72;
 

@@ -1,6 +1,6 @@
 //! Parts that look alike at several turns.
 //!
-//! A sample knows by how much its part was turned; whoever looks at it does not. A network asked all the same would
+//! A sample's record has the part's turn, which its picture does not show. A network trained on it would
 //! learn the mean of the turns, and a validation would call right answers wrong. So keypoints are taught where they
 //! would be at the smallest turn that looks the same, and turns that cannot be seen are no error.
 

@@ -55,7 +55,7 @@ pub(super) struct Followed {
     pub(super) agreement: f64,
     /// Without likeness.
     pub(super) evidence: Evidence,
-    /// ln of its size over the nearest that is usual.
+    /// ln of its size over the nearest nominal size.
     pub(super) log_size: f64,
     /// Mean brightness over that of the demonstration.
     pub(super) light: f64,
@@ -99,7 +99,7 @@ impl SizedPart {
         &detector.model().demonstrations()[self.demonstration_idx]
     }
 
-    /// ln of a scale over the nearest that is usual.
+    /// ln of a scale over the nearest nominal size.
     pub(super) fn log_size(&self, scale: f64) -> f64 {
         self.range.log_size(scale)
     }

@@ -14,7 +14,7 @@
 //! comparing network, which takes more time than all else, is asked only when the agreement of edges and surface has fallen since
 //! it was last asked; searches ask it too. A track whose score falls below [`TrackerConfig::lose_below`] is lost in that frame.
 //!
-//! What is deliberately absent: clocks and threads. Frames bring their times, and whoever owns the [`Tracker`] runs the searches
+//! What is deliberately absent: clocks and threads. Frames carry their times, and the owner of the [`Tracker`] runs the searches
 //! where and when it likes, so that the same code runs on two cores, in a browser, and in a test that is the same on any machine.
 
 mod arrival;
@@ -85,7 +85,7 @@ pub struct TrackerConfig {
 }
 
 impl TrackerConfig {
-    /// What [`Default`] gives.
+    /// The values of [`Default`], as a constant.
     pub const DEFAULT: Self = Self {
         search_every: Duration::from_millis(250),
         lose_below: 0.35,

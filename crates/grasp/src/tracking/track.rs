@@ -18,14 +18,14 @@ use crate::verification::PlacedDemonstration;
 /// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
 /// motion.
 const VELOCITY_GAIN: f64 = 0.4;
-/// Share of a new frame in the usual agreement and in the usual size. Chosen by hand.
+/// Share of a new frame in the running means of agreement and size. Chosen by hand.
 const STEADY_GAIN: f64 = 0.05;
 /// Every so many frames a track is captured: snapped from frame to frame, a long part slid along itself by 2 pixels. Chosen by
 /// hand.
 const CAPTURE_EVERY: u64 = 3;
 /// Longest time over which a pose is carried forward by its velocity. Chosen by hand.
 const MAX_FORWARD_SECS: f64 = 0.1;
-/// An agreement of less than this share of the usual one is tried again with more effort. Chosen by hand.
+/// An agreement of less than this share of its running mean is tried again with more effort. Chosen by hand.
 const POOR_SHARE: f64 = 0.85;
 /// Larger differences between a search and the edges alone are no correction but another place. In pixels of the cut-out, and in
 /// radians; chosen by hand.
@@ -232,7 +232,7 @@ impl Track {
         self.likeness.map(|likeness| likeness.log_odds)
     }
 
-    /// ln of its size over the nearest that is usual, without the noise from frame to frame.
+    /// ln of its size over the nearest nominal size, without the noise from frame to frame.
     pub(super) fn log_size(&self) -> f64 {
         self.part.log_size(self.steady_scale)
     }
@@ -242,7 +242,7 @@ impl Track {
         if (number + self.id).is_multiple_of(CAPTURE_EVERY) { Effort::Captured } else { Effort::Snapped }
     }
 
-    /// Whether an agreement is so far below the usual one that the part is not there.
+    /// Whether an agreement is so far below its running mean that the part is not there.
     pub(super) fn is_poor(&self, followed: &Followed) -> bool {
         self.steady_agreement.is_some_and(|steady| followed.agreement < POOR_SHARE * steady)
     }

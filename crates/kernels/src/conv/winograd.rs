@@ -35,7 +35,7 @@ pub(super) use weight_gradient::weight_gradient;
 
 /// Tiles a unit of work has: the transformed values of 48 tiles and 64 channels are 442 KB.
 const UNIT_TILES: usize = 48;
-/// Units to aim at, so that no thread waits long for the last. A lone thread waits for nobody: it takes few tiles at a
+/// Units to aim at, so that no thread waits long for the last. A single thread takes few tiles at a
 /// time through all steps, which stay in its cache (a browser's 64→64 on 64×80: 5.2 ms with eight, 3.5 with one).
 const MIN_UNITS: usize = if cfg!(all(feature = "parallel", not(target_arch = "wasm32"))) { 8 } else { 1 };
 

@@ -21,7 +21,7 @@ pub struct LabelledCrop {
     pub angle: Angle,
 }
 
-/// Makes crops from augmented scenes: those of scene *i* of a seed are always the same, whoever asks.
+/// Makes crops from augmented scenes: those of scene *i* of a seed are always the same.
 pub struct AugmentedCrops {
     augmenter: Augmenter,
     style: CropStyle,

@@ -69,7 +69,7 @@ const NUM_CLASS_CROPS: usize = 960;
 
 /// Teaches a network from demonstrations, from nothing or from pretrained parameters.
 ///
-/// `observe` hears of every step and every validation and may end the run; the network is then returned as it is, and
+/// `observe` is called after every step and every validation and may end the run; the network is then returned as it is, and
 /// its errors say whether it is of any use.
 ///
 /// # Errors

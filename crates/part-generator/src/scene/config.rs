@@ -71,9 +71,9 @@ impl Condition {
 /// What scenes are like: probabilities and ranges. Every picture is drawn from all of them independently.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneConfig {
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// The demonstration that the truth refers to.
     pub photo: PhotoConfig,

@@ -26,9 +26,9 @@ const MIN_CONTRAST: f32 = 0.5;
 /// How the photo is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhotoConfig {
-    /// Pixels across.
+    /// Width, in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height, in pixels.
     pub height: u32,
     /// Range of the part's diagonal over the picture's shorter side.
     pub fill: [f64; 2],

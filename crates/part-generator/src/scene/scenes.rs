@@ -40,7 +40,7 @@ pub(super) struct Subject {
     pub(super) covers: Vec<Arc<Part>>,
 }
 
-/// Pictures of scenes: sample *i* of a seed is the same whoever asks, in whatever order.
+/// Pictures of scenes: sample *i* of a seed is the same in whatever order samples are made.
 pub struct Scenes {
     pub(super) config: SceneConfig,
     pub(super) seed: u64,

@@ -132,7 +132,7 @@ impl Matrix {
         )
     }
 
-    /// The counts in words, zeros left out, for those who hear the page.
+    /// The counts in words, zeros left out, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}.", self.title);
         for (label, counts) in &self.rows {

@@ -125,7 +125,7 @@ impl ShareChart {
         svg + "</svg>"
     }
 
-    /// The shares in words, for those who hear the page.
+    /// The shares in words, for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}.", self.title);
         for ShareRow { label, percent, interval: [low, high], reference } in &self.rows {

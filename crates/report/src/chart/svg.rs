@@ -86,7 +86,7 @@ impl Chart {
         svg + "</svg>"
     }
 
-    /// One sentence for those who hear the page.
+    /// One sentence for screen readers.
     fn description(&self) -> String {
         let mut text = format!("{}: {} over {}.", self.title, self.y_axis.title(), self.x_axis.title());
         for series in &self.series {

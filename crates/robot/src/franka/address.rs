@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// Ports of arm and hand where nobody says otherwise.
+/// Ports of arm and hand unless another is set.
 const ROBOT_PORT: u16 = 1337;
 
 /// `HOST` or `HOST:PORT`; the hand is one port further, as Franka has it.

@@ -44,7 +44,7 @@ impl HandWorker {
         done
     }
 
-    /// Stops the fingers; whoever waits for them goes on.
+    /// Stops the fingers; a call that waits for them returns.
     pub(super) fn stop(&self) {
         // A hand that is gone does not move either.
         let _ = self.stop.stop();

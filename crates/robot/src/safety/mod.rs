@@ -1,4 +1,4 @@
-//! The limits between every motion and the arm.
+//! Limits that every motion is checked against before it begins.
 //!
 //! ```text
 //! Trajectory ── SafetyLimits::check ──► CheckedMotion ── Arm::follow

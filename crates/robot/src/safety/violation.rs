@@ -5,21 +5,19 @@ use crate::safety::capsules::SelfCollision;
 /// The first limit that a motion breaks; times in seconds from the motion's start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Violation {
     /// The motion does not begin where the arm is.
     #[error("it starts {apart_rad:.3} rad from where joint {joint} is, at most {max_rad:.3} are allowed")]
     StartsElsewhere {
         /// Joint number, 1 to 7.
         joint: usize,
-        /// Distance, rad.
         apart_rad: f64,
-        /// The largest allowed.
         max_rad: f64,
     },
     /// A value that is no number.
     #[error("at {time_secs:.3} s joint {joint} has no finite position, velocity or acceleration")]
     NotFinite {
-        /// When.
         time_secs: f64,
         /// Joint number, 1 to 7.
         joint: usize,
@@ -29,31 +27,23 @@ pub enum Violation {
         "at {time_secs:.3} s the {quantity} of joint {joint} is {found:.4} {unit}, allowed is {min:.4} to {max:.4}"
     )]
     Joint {
-        /// When.
         time_secs: f64,
         /// Position, velocity, acceleration or jerk.
         quantity: &'static str,
         /// Joint number, 1 to 7.
         joint: usize,
-        /// The value.
         found: f64,
-        /// The smallest allowed.
         min: f64,
-        /// The largest allowed.
         max: f64,
-        /// rad and its derivatives.
         unit: &'static str,
     },
     /// The tcp is too fast.
     #[error("at {time_secs:.3} s the {quantity} of the tcp is {found:.3} {unit}, at most {max:.3} are allowed")]
     Cartesian {
-        /// When.
         time_secs: f64,
         /// Velocity, acceleration or jerk, or the same of its turn.
         quantity: &'static str,
-        /// The value.
         found: f64,
-        /// The largest allowed.
         max: f64,
         /// m or rad, and their derivatives.
         unit: &'static str,
@@ -63,17 +53,12 @@ pub enum Violation {
         "at {time_secs:.3} s the {part} is at {axis} = {found_m:.3} m, outside the workspace of {min_m:.3} to {max_m:.3} m"
     )]
     Workspace {
-        /// When.
         time_secs: f64,
-        /// Tcp or flange.
         part: &'static str,
         /// x, y or z of the base frame.
         axis: char,
-        /// The coordinate.
         found_m: f64,
-        /// The smallest allowed.
         min_m: f64,
-        /// The largest allowed.
         max_m: f64,
     },
     /// Hand, wrist or elbow come too near to the table.
@@ -81,21 +66,14 @@ pub enum Violation {
         "at {time_secs:.3} s the {part} is {found_mm:.0} mm above the table, at least {min_mm:.0} mm are asked for"
     )]
     Table {
-        /// When.
         time_secs: f64,
         /// Finger tips, hand, wrist or elbow.
         part: &'static str,
         /// Height above the table, mm; negative below.
         found_mm: f64,
-        /// The least allowed, mm.
         min_mm: f64,
     },
     /// The arm comes too near to itself.
     #[error("at {time_secs:.3} s {collision}")]
-    SelfCollision {
-        /// When.
-        time_secs: f64,
-        /// Which links.
-        collision: SelfCollision,
-    },
+    SelfCollision { time_secs: f64, collision: SelfCollision },
 }

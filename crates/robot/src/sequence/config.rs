@@ -7,9 +7,9 @@ use crate::arm::Load;
 use crate::error::{Result, RobotError};
 use crate::pace::Pace;
 
-/// Middle of the first look on the table where nobody says otherwise, base frame, m.
+/// Middle of the first look on the table unless another is set, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
-/// Height of a wrist camera above the table at the first look where nobody says otherwise, m.
+/// Height of a wrist camera above the table at the first look unless another is set, m.
 pub const LOOK_HEIGHT_M: f64 = 0.58;
 
 /// Where the arm goes to look out for the part.

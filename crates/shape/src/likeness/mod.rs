@@ -1,4 +1,4 @@
-//! Whether photo and picture show the same part, by a small network that sees both, one laid over the other.
+//! The probability that photo and picture show the same part, by a small network whose input is both, aligned.
 //!
 //! ```text
 //! cut-out ────────────────────────┐

@@ -1,4 +1,4 @@
-//! The board that pictures show: told by its file or by its numbers, and by a ruler.
+//! The board that pictures show: from its file or its numbers, and a measured length.
 
 use std::path::{Path, PathBuf};
 

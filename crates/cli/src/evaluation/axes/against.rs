@@ -26,11 +26,9 @@ pub const ALL_WITH_PART: &str = "all with the part";
 /// A model in two runs, on the same pictures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Which parts.
     pub group: PartGroup,
     /// The axis' name, or [`ALL_WITH_PART`].
     pub axis: &'static str,
-    /// The model.
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
@@ -38,7 +36,6 @@ pub struct Comparison {
     pub counts: PairedCounts,
     /// This run's share less the other's, and within what it lies with 95 % confidence.
     pub difference: f64,
-    /// See [`PairedCounts::difference_interval`].
     pub interval: [f64; 2],
     /// Whether the interval leaves zero out.
     pub differs: bool,

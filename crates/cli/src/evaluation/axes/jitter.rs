@@ -1,4 +1,4 @@
-//! A demonstration as a careless hand would have marked it: every mark beside its place.
+//! A demonstration with errors in every mark.
 
 use std::f64::consts::TAU;
 

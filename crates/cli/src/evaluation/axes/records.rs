@@ -1,4 +1,4 @@
-//! What the pictures of an axis leave behind.
+//! Records of the pictures of an axis, as the store keeps them.
 
 use sdg_simulation::scene::Axis;
 use serde::{Deserialize, Serialize};

@@ -15,7 +15,6 @@ pub enum GraspCondition {
     MarkHeight,
     /// Where the camera is in the hand.
     HandEye,
-    /// The pads' friction.
     Friction,
     /// Nothing is wrong, but the hand shakes after lifting.
     Shake,
@@ -61,9 +60,7 @@ const EVERYTHING: &str = "all";
 /// Axes and conditions, each once, in the order in which they are reported.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Selection {
-    /// Of pictures.
     pub axes: Vec<Axis>,
-    /// Of grasps.
     pub conditions: Vec<GraspCondition>,
 }
 

@@ -39,7 +39,6 @@ pub struct Seconds {
     pub teaching: f64,
     /// Of pictures: drawing and detecting.
     pub pictures: f64,
-    /// Of grasp attempts.
     pub grasps: f64,
 }
 
@@ -53,33 +52,26 @@ impl Seconds {
 /// A group of parts: one row for each model, axis and way.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GroupSummary {
-    /// Which parts.
     pub group: PartGroup,
-    /// Their names.
     pub objects: Vec<String>,
     /// Pictures with the part.
     pub axes: Vec<AxisFigures>,
     /// Pictures with a look-alike in its place.
     pub look_alikes: Vec<LookAlikeFigures>,
-    /// Grasps under errors.
     pub grasps: Vec<GraspFigures>,
 }
 
 /// A share and the part it is of.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartShare {
-    /// The part.
     pub object: String,
-    /// Its share.
     pub share: Share,
 }
 
 /// What a model found along an axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisFigures {
-    /// The axis' name.
     pub axis: &'static str,
-    /// The model.
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
@@ -116,7 +108,6 @@ pub struct Third {
 pub struct LookAlikeFigures {
     /// The kind of look-alike, or one of the sums [`Self::SAME_SIZE`] and [`Self::SIZE_ALONE`].
     pub kind: String,
-    /// The model.
     pub model: ModelKind,
     /// With the check or without.
     pub way: Way,
@@ -143,9 +134,7 @@ impl LookAlikeFigures {
 /// What became of a model's grasps under an error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GraspFigures {
-    /// The error.
     pub condition: GraspCondition,
-    /// The model.
     pub model: ModelKind,
     /// Attempts that held the part.
     pub held: Share,

@@ -1,4 +1,4 @@
-//! What the simulated robot knows from the simulator, and a real one would have to measure.
+//! What the simulated robot takes from the simulator, and a real one would have to measure.
 
 /// One thing that is told.
 pub(super) struct Told {

@@ -1,4 +1,4 @@
-//! What there is to do for the axes, and the doing of it.
+//! The units of work of the axes, and how each is done.
 
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
@@ -46,15 +46,12 @@ enum Unit<'a> {
 
 /// Models, parts, axes and errors, and the folder for what becomes of them.
 pub struct AxesEvaluation<'a> {
-    /// The models.
     pub models: &'a [ModelKind],
-    /// The parts.
     pub objects: &'a [ObjectSpec],
     /// Axes of pictures, and errors in grasps.
     pub selection: &'a Selection,
     /// Network, training and augmentation: what the store's settings name.
     pub preset: Preset,
-    /// Teachings and results.
     pub store: &'a Store,
     /// Pictures of each part and axis.
     pub axis_views: u32,

@@ -9,7 +9,6 @@ use serde::Serialize;
 pub enum Way {
     /// With the check against the demonstration.
     WithCheck,
-    /// The network alone.
     NetworkAlone,
 }
 

@@ -1,11 +1,10 @@
-//! What the pictures of a set leave behind.
+//! Records of the pictures of a set, as the store keeps them.
 
 use serde::{Deserialize, Serialize};
 
 /// An accepted detection beside the instance of the part that it lies nearest to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricAnswer {
-    /// Its score.
     pub score: f64,
     /// Place beside the instance, in millimetres; `None` without an instance.
     pub error_mm: Option<f64>,
@@ -37,8 +36,6 @@ pub struct CameraPicture {
 /// What a model said of all pictures of a part and set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraRecord {
-    /// One each.
     pub pictures: Vec<CameraPicture>,
-    /// A worker's seconds.
     pub seconds: f64,
 }

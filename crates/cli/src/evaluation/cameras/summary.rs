@@ -33,11 +33,8 @@ pub struct ErrorFigures {
 /// Results of a model on a set of pictures, of all parts or of some.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SetFigures {
-    /// The model.
     pub model: ModelKind,
-    /// The set.
     pub set: &'static str,
-    /// Which parts.
     pub parts: String,
     /// Instances found, of those in the pictures.
     pub found: Share,

@@ -1,4 +1,4 @@
-//! What there is to do, and the doing of it.
+//! The units of work, and how each is done.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -32,15 +32,11 @@ enum Unit<'a> {
 
 /// Models, parts and sets of pictures, and the folder for what becomes of them.
 pub struct CamerasEvaluation<'a> {
-    /// The models.
     pub models: &'a [ModelKind],
-    /// The parts.
     pub objects: &'a [ObjectSpec],
-    /// The sets.
     pub sets: &'a [PictureSet],
     /// Network, training and augmentation: what the store's settings name.
     pub preset: Preset,
-    /// Teachings and results.
     pub store: &'a Store,
     /// Pictures of each part and set.
     pub views: u32,

@@ -7,11 +7,9 @@ use crate::statistics::Share;
 
 /// A table under its heading.
 pub struct Titled {
-    /// The heading.
     pub title: String,
     /// What is to be seen, in a sentence or two.
     pub lead: String,
-    /// The rows.
     pub table: Table,
 }
 

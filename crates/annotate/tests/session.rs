@@ -1,4 +1,4 @@
-//! A sitting from the first mark to another demonstration, on the real server.
+//! A session from the first mark to another demonstration, on the real server.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod served;
