@@ -8,6 +8,7 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
 //! | S | none | the demonstration looked for in the whole image | likewise |
 
+mod consistency;
 mod keypoints;
 pub(crate) mod mask;
 mod orientation;
@@ -65,7 +66,7 @@ pub(crate) enum Reading {
 pub(crate) struct Proposals {
     /// Best first, those that cannot be read as a pose left out.
     pub(crate) candidates: Vec<PoseCandidate>,
-    /// Every box with its score, beyond the candidates, too.
+    /// Every box with its score, also of those that are no candidates.
     boxes: Vec<(BoundingBox, f64)>,
 }
 
@@ -80,6 +81,7 @@ impl Proposals {
 /// A detection with the model's reading of it, not yet verified.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseCandidate {
+    /// The class's probability, less where the heads contradict each other.
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
     /// Each with the network's score; empty where the model has none.
@@ -180,11 +182,16 @@ impl Network {
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
         let mut proposals = Proposals::default();
         for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= MIN_NETWORK_SCORE) {
-            proposals.boxes.push((detections.boxes[i], detections.scores[i]));
-            if i < MAX_CANDIDATES {
-                proposals.candidates.extend(self.read(image, &detections, i, demonstrations).await?);
-            }
+            let candidate = match i < MAX_CANDIDATES {
+                true => self.read(image, &detections, i, demonstrations).await?,
+                false => None,
+            };
+            let unread = consistency::score(detections.scores[i], 0.0);
+            let score = candidate.as_ref().map_or(unread, |candidate| candidate.network_score);
+            proposals.boxes.push((detections.boxes[i], score));
+            proposals.candidates.extend(candidate);
         }
+        proposals.candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
         Ok(proposals)
     }
 
@@ -211,7 +218,8 @@ impl Network {
                 }
                 _ => demonstration.grasp(&image_from_cutout),
             };
-            let network_score = detections.scores[i];
+            let filled = consistency::filled(demonstration, &image_from_cutout, bbox, image.dimensions());
+            let network_score = consistency::score(detections.scores[i], filled);
             let bbox = *bbox;
             Some(PoseCandidate {
                 network_score,

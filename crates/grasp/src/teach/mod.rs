@@ -324,15 +324,21 @@ pub(crate) fn teach_network(
     // The samples show the part at other sizes than those that may be looked for later.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
-    let other_parts = other_parts::highest_scores(demonstrations, &to_hold_back, &network, options.seed)?;
-    let calibrated = held_back.calibrate(&network, &of_any_size, &other_parts)?;
+    let on_other_parts = other_parts::shown(demonstrations, &to_hold_back, &network, options.seed)?;
+    let calibrated = held_back.calibrate(&network, &of_any_size, &on_other_parts.highest)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });
     }
     let negatives = NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES)?;
     let others = negatives.observe(Some(&network))?;
-    let elsewhere: Vec<f64> = calibrated.elsewhere.iter().copied().chain(others.network_scores()).collect();
+    let elsewhere: Vec<f64> = calibrated
+        .elsewhere
+        .iter()
+        .copied()
+        .chain(others.network_scores())
+        .chain(on_other_parts.best_agreement)
+        .collect();
     let evidence = NetworkEvidence::new(&calibrated.on_part, &elsewhere, &calibrated.network);
     let facts = TeachingFacts {
         seed: options.seed,

@@ -7,7 +7,9 @@ use sdg_part_generator::{Part, PhotoConfig, demonstration};
 
 use crate::error::Result;
 use crate::models::Network;
+use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
+use crate::verification::SearchedImage;
 
 /// Photos as large as the network's input.
 const PHOTO: PhotoConfig = PhotoConfig { width: 320, height: 240, fill: [0.4, 0.6] };
@@ -32,28 +34,40 @@ pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
 /// as with it. Chosen by that reasoning, not measured.
 const NUM_PICTURES: u64 = 24;
 
-/// The network's highest score in each picture of other parts without the part; no pictures where there are no others.
+/// What a network says in pictures of other parts without the part.
+#[derive(Default)]
+pub(super) struct OnOtherParts {
+    /// Its highest score in each.
+    pub(super) highest: Vec<f64>,
+    /// Its score where each agrees best with the part; 0 where it proposes nothing.
+    pub(super) best_agreement: Vec<f64>,
+}
+
+/// Shows a network pictures of other parts; none where there are no others.
 ///
 /// # Errors
 /// As [`Augmenter::new`]; an image that the network refuses.
-pub(super) fn highest_scores(
+pub(super) fn shown(
     demonstrations: &[Demonstration],
     others: &[Demonstration],
     network: &Network,
     seed: u64,
-) -> Result<Vec<f64>> {
+) -> Result<OnOtherParts> {
+    let mut shown = OnOtherParts::default();
     if others.is_empty() {
-        return Ok(Vec::new());
+        return Ok(shown);
     }
     let style = SceneStyle { positive_share: 0.0, other_part_share: 1.0, ..SceneStyle::default() };
     let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
     let augmenter = Augmenter::new(demonstrations, config, seed)?.with_other_parts(others)?;
     let taught = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
-    let highest = |i: u64| {
-        let best = network.proposals(&augmenter.held_out(i).image, &taught)?.candidates.into_iter().next();
-        Ok(best.map_or(0.0, |candidate| candidate.network_score))
-    };
-    (0..NUM_PICTURES).map(highest).collect()
+    for sample in (0..NUM_PICTURES).map(|i| augmenter.held_out(i)) {
+        let proposals = network.proposals(&sample.image, &taught)?;
+        shown.highest.push(proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score));
+        let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, &taught));
+        shown.best_agreement.extend(best_agreement(&sightings).map(|sighting| sighting.network_score));
+    }
+    Ok(shown)
 }
 
 #[cfg(test)]
