@@ -18,7 +18,7 @@ use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeConfig, ShapeTe
 
 use crate::error::Result;
 use crate::sizes::SizeRange;
-use crate::taught::TaughtMarks;
+use crate::taught_marks::TaughtMarks;
 
 /// Largest extent of a part that is worked with, in pixels. Chosen for time: no more than a fraction of a pixel is lost.
 const MAX_EXTENT_PX: f64 = 256.0;

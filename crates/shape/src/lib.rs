@@ -70,7 +70,9 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod capture_range;
 mod comparison;
+mod compass_search;
 mod config;
 mod consensus;
 mod edge_points;
@@ -79,6 +81,7 @@ mod following;
 mod gradient_field;
 mod likeness;
 pub mod parallel;
+mod pixel_cell;
 mod pose;
 mod refinement;
 mod search;

@@ -129,7 +129,7 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::taught::TaughtMarks;
+    use crate::taught_marks::TaughtMarks;
     use image::Rgb;
     use nalgebra::Point2;
     use sdg_geometry::{Angle, GraspLine};

@@ -22,6 +22,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::capture_range::CaptureRange;
 use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
@@ -30,7 +31,6 @@ use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::parallel;
 use crate::pose::Pose;
-use crate::refinement::CaptureRange;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::{Start, sweep};
