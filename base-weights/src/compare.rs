@@ -152,7 +152,7 @@ impl Trial {
         };
         outcome.alarms = alarms(&self.without)?;
         outcome.look_alike_alarms = alarms(&self.look_alikes)?;
-        outcome.error_px = sdg_training::median(&mut errors).map(|error| (error * 100.0).round() / 100.0);
+        outcome.error_px = sdg_geometry::median(errors).map(|error| (error * 100.0).round() / 100.0);
         Ok(outcome)
     }
 
