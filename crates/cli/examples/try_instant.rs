@@ -46,8 +46,9 @@ fn main() -> Result<()> {
     let threshold = default.min_agreement;
     let start = Instant::now();
     // All are wanted, to see how far right and wrong are apart.
-    let search =
-        InstantSearch::new(&demonstration.cutout, &outline, &SearchConfig { scales, min_agreement: 0.0, ..default })?;
+    let mut config = default;
+    (config.scales, config.min_agreement) = (scales, 0.0);
+    let search = InstantSearch::new(&demonstration.cutout, &outline, &config)?;
     println!("taught in {:.1} ms", 1e3 * start.elapsed().as_secs_f64());
 
     let seed: u64 = seed.parse()?;

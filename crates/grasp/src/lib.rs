@@ -109,3 +109,8 @@ pub use taught_marks::TaughtMarks;
 pub use teach::{FineTuning, Preset, Taught, TeachOptions, TeachingEvent, teach};
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
+
+/// The README's example, which runs with the other examples.
+#[cfg(all(doctest, feature = "teach"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

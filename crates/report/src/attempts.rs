@@ -118,8 +118,8 @@ pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64
     let labels = ["seen right".to_owned(), "seen beside it".to_owned(), "not seen".to_owned()];
     let matrix = Matrix::new("What was seen, and where the attempt ended", columns).good_column(steps.len());
     labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
-        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is the \
-         robot's, in the others the eye's."
+        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is \
+         due to the robot, in the others to perception."
     ))
 }
 

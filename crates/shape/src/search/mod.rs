@@ -40,6 +40,7 @@ use crate::template::ShapeTemplate;
 
 /// What is looked for, and what is reported.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SearchConfig {
     /// Scales looked for: 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
     /// known, is faster and mistakes less. The default was chosen by hand.
@@ -66,16 +67,21 @@ impl SearchConfig {
     pub const DEFAULT_MAX_STARTS: usize = 1024;
 }
 
+impl SearchConfig {
+    /// The values of [`Default`], as a constant.
+    pub const DEFAULT: Self = Self {
+        scales: 0.75..=1.3,
+        min_agreement: 0.5,
+        max_matches: 16,
+        num_points: Self::DEFAULT_NUM_POINTS,
+        max_starts: Self::DEFAULT_MAX_STARTS,
+        shape: ShapeConfig::DEFAULT,
+    };
+}
+
 impl Default for SearchConfig {
     fn default() -> Self {
-        Self {
-            scales: 0.75..=1.3,
-            min_agreement: 0.5,
-            max_matches: 16,
-            num_points: Self::DEFAULT_NUM_POINTS,
-            max_starts: Self::DEFAULT_MAX_STARTS,
-            shape: ShapeConfig::default(),
-        }
+        Self::DEFAULT
     }
 }
 
