@@ -160,7 +160,7 @@ impl Trial {
                 None => outcome.wrong += usize::from(best.is_accepted),
             }
         }
-        outcome.error_px = sdg_training::median(&mut errors).map(|error| (error * 100.0).round() / 100.0);
+        outcome.error_px = sdg_geometry::median(errors).map(|error| (error * 100.0).round() / 100.0);
         Ok(outcome)
     }
 

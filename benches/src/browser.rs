@@ -12,12 +12,13 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args as ClapArgs;
 use sdg_detection::ImageTransform;
+use sdg_geometry::median;
 use sdg_webdriver::{Browser, BrowserOptions, serve_folder};
 use serde_json::{Value, json};
 
 use crate::compare::machine::Machine;
 use crate::network::Network;
-use crate::results::{duration, median, rewrite};
+use crate::results::{duration, rewrite};
 
 const PICTURE: &str = "datasets/demonstrations/pendulum/image.png";
 /// What is ours and what is theirs of a download, without weights.
@@ -149,7 +150,7 @@ fn times(measured: &Value, side: &str) -> Result<f64> {
     let times = measured["times"][side].as_array().context("no times")?;
     let times: Vec<f64> = times.iter().filter_map(Value::as_f64).collect();
     ensure!(!times.is_empty(), "{side} was never timed");
-    Ok(median(&times))
+    median(times).context("expected timed frames, found none")
 }
 
 fn markdown(measured: &Value, folder: &Path) -> Result<String> {

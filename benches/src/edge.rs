@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args as ClapArgs;
+use sdg_geometry::median;
 
 use crate::compare::machine::Machine;
-use crate::results::{duration, median, rewrite};
+use crate::results::{duration, rewrite};
 
 const MAX_BYTES: u64 = 25_000_000;
 const MAX_START_SECS: f64 = 0.3;
@@ -104,8 +105,9 @@ fn measure(binary: &Path, model: &Path, photo: &Path) -> Result<Vec<Figure>> {
     shell.arg(limited.get_program()).args(limited.get_args());
     let under_limit = Look::run(shell);
     let row = Look::run(pinned(&core, binary, model, &[photo; FRAMES]))?;
-    let frame = median(&row.frame_seconds);
-    let (start, mb) = (median(&starts), |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6));
+    let frame = median(row.frame_seconds.iter().copied()).unwrap_or(f64::NAN);
+    let (start, mb) =
+        (median(starts.iter().copied()).unwrap_or(f64::NAN), |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6));
     Ok(vec![
         Figure {
             what: "program",

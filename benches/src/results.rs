@@ -39,24 +39,9 @@ pub fn duration(secs: f64) -> String {
     }
 }
 
-/// The middle value, of an even number the mean of the middle two. Panics without values.
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn medians_by_hand() {
-        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&[4.0, 1.0, 2.0, 8.0]), 3.0);
-        assert_eq!(median(&[5.0]), 5.0);
-    }
 
     #[test]
     fn a_file_keeps_what_stands_around_the_marks() {

@@ -8,18 +8,10 @@ use std::path::{Path, PathBuf};
 use sdg_checks::ModuleGraph;
 
 /// Groups of files that may import from each other: the crate's folder, the group's first file, and why.
-const EXCEPTIONS: [(&str, &str, &str); 11] = [
+const EXCEPTIONS: [(&str, &str, &str); 3] = [
     ("crates/grasp", "facts.rs", "the plan of a teaching is part of the model's facts, and reads a model's settings"),
-    ("crates/grasp", "prepared.rs", "a taught part prepares pictures by its own marks"),
     ("crates/grasp", "teach/fine_tuning.rs", "the plan is made where it is carried out"),
     ("crates/orientation", "training/augmented.rs", "the crops to learn from take their size from the configuration"),
-    ("crates/shape", "consensus.rs", "refinement and consensus of several starts call each other"),
-    ("crates/robot", "arm.rs", "an arm's errors, limits and watch name each other's types; to be undone"),
-    ("crates/robot", "franka/hand_worker.rs", "the hand's thread reads the arm's settings; to be undone"),
-    ("crates/robot", "workcell/file.rs", "the workcell's file makes the workcell; to be undone"),
-    ("crates/simulation", "workcell.rs", "the model is made of the workcell's settings; to be undone"),
-    ("crates/cli", "commands/robot/hand.rs", "the verbs of a robot share their arguments; to be undone"),
-    ("crates/fci", "error.rs", "the error names the robot's errors, which are read from bytes; to be undone"),
 ];
 
 fn root() -> PathBuf {

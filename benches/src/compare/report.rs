@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use sdg_geometry::median;
 use serde::Serialize;
 
 use crate::compare::contestant::Contestant;
 use crate::compare::machine::Machine;
 use crate::registry::{Peer, Side, WorkSpec};
-use crate::results::{duration, median, rewrite, write_whole};
+use crate::results::{duration, rewrite, write_whole};
 
 /// One side of a work, measured.
 #[derive(Debug, Clone)]
@@ -37,7 +38,7 @@ impl Measured {
     }
 
     fn median(&self) -> f64 {
-        median(&self.seconds)
+        median(self.seconds.iter().copied()).unwrap_or(f64::NAN)
     }
 }
 

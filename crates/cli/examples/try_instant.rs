@@ -8,8 +8,8 @@ use std::time::Instant;
 use sdg_cli::against_truth::{grasp_error, grasp_pose};
 use sdg_cli::shipped;
 use sdg_cli::trial::{RIGHT_DEGREES, RIGHT_MM};
+use sdg_geometry::median;
 use sdg_grasp::TaughtDemonstration;
-use sdg_report::median;
 use sdg_shape::{InstantSearch, Match, SearchConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
@@ -46,8 +46,9 @@ fn main() -> Result<()> {
     let threshold = default.min_agreement;
     let start = Instant::now();
     // All are wanted, to see how far right and wrong are apart.
-    let search =
-        InstantSearch::new(&demonstration.cutout, &outline, &SearchConfig { scales, min_agreement: 0.0, ..default })?;
+    let mut config = default;
+    (config.scales, config.min_agreement) = (scales, 0.0);
+    let search = InstantSearch::new(&demonstration.cutout, &outline, &config)?;
     println!("taught in {:.1} ms", 1e3 * start.elapsed().as_secs_f64());
 
     let seed: u64 = seed.parse()?;

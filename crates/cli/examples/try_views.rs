@@ -2,8 +2,8 @@
 //! With DIR every picture is listed, and those that went wrong are written there.
 
 use sdg_cli::trial::{Trial, try_views};
+use sdg_geometry::median;
 use sdg_grasp::{Device, GraspModel, Verification};
-use sdg_report::median;
 use sdg_simulation::objects::ObjectSpec;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

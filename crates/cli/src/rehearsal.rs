@@ -8,8 +8,8 @@ use image::RgbImage;
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
-use sdg_report::{AttemptSummary, Step};
-use sdg_robot::{GraspConfig, GraspOutcome, GraspTarget};
+use sdg_report::AttemptSummary;
+use sdg_robot::{GraspOutcome, GraspStep, GraspTarget};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
@@ -19,10 +19,6 @@ use sdg_simulation::{
 use serde::{Deserialize, Serialize};
 
 use crate::against_truth::{grasp_error, grasp_pose};
-
-/// Height of the camera over the table when the shipped demonstrations were photographed, in metres: at the same height
-/// the part has the same size in the picture.
-const DEMONSTRATION_HEIGHT_M: f64 = 0.58;
 
 /// What to rehearse.
 pub struct Rehearsal<'a> {
@@ -80,14 +76,14 @@ impl Rehearsed {
         self.attempts
             .iter()
             .filter(|attempt| !attempt.success)
-            .map(|attempt| Failure { attempt: attempt.number, step: attempt.step.name(), why: attempt.why.clone() })
+            .map(|attempt| Failure { attempt: attempt.number, step: step_name(attempt), why: attempt.why.clone() })
             .collect()
     }
 
     /// Whether the part was not seen in any attempt.
     pub fn found_nothing(&self) -> bool {
         !self.attempts.is_empty()
-            && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == Step::Detect)
+            && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == GraspStep::Detect as usize)
     }
 }
 
@@ -147,15 +143,13 @@ impl Rehearsal<'_> {
         let mut workcell =
             Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
         let mut perception = ModelPerception { rehearsal: self, told: self.told(number), detector: None, last: None };
-        let grasp = GraspConfig { hover_height_m: DEMONSTRATION_HEIGHT_M, ..GraspConfig::default() };
-        let config = AttemptConfig { record, grasp, ..AttemptConfig::default() };
+        let config = AttemptConfig { record, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
             Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
             Err(SimulationError::Perception(why)) => {
                 let duration_secs = started.elapsed().as_secs_f64();
-                let failed =
-                    AttemptSummary { step: Step::Detect, why, duration_secs, ..self.begun(number, base_from_object) };
+                let failed = AttemptSummary { why, duration_secs, ..self.begun(number, base_from_object) };
                 (failed, Looks::default(), Vec::new())
             }
             Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
@@ -173,8 +167,8 @@ impl Rehearsal<'_> {
 
     fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
         let (step, why) = match &report.outcome {
-            GraspOutcome::Held => (Step::Hold, String::new()),
-            GraspOutcome::Failed { step, why } => (Step::from_name(step.name()).unwrap_or(Step::Detect), why.clone()),
+            GraspOutcome::Held => (GraspStep::Hold, String::new()),
+            GraspOutcome::Failed { step, why } => (*step, why.clone()),
         };
         // The last look decides where the hand goes.
         let last_target = report.targets.iter().rev().flatten().next();
@@ -184,7 +178,7 @@ impl Rehearsal<'_> {
             .map(|(base_from_object, target)| grasp_error(self.object, &base_from_object, &target.base_from_tcp));
         AttemptSummary {
             detection_error,
-            step,
+            step: step as usize,
             success: report.outcome.is_held(),
             why,
             duration_secs: report.wall_secs,
@@ -204,12 +198,17 @@ impl Rehearsal<'_> {
             object_mm,
             object_angle_deg,
             detection_error: None,
-            step: Step::Detect,
+            step: GraspStep::Detect as usize,
             success: false,
             why: String::new(),
             duration_secs: 0.0,
         }
     }
+}
+
+/// The name of the step at which an attempt ended.
+pub fn step_name(attempt: &AttemptSummary) -> &'static str {
+    GraspStep::ALL[attempt.step].name()
 }
 
 fn looks_of(report: &AttemptReport) -> Looks {

@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
+use sdg_geometry::median;
 use sdg_grasp::{GraspModel, History};
 use sdg_report::{
-    Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, median,
-    outcome_matrix,
+    Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, outcome_matrix,
 };
+use sdg_robot::GraspStep;
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
@@ -137,13 +138,14 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
 }
 
 fn attempts(page: &RunPage) -> Section {
+    let steps = GraspStep::ALL.map(GraspStep::name);
     Section::new("Attempts")
         .lead(
             "Random poses of the part, of the robot at the start, of light, table and things lying about. Held means: \
              at least 10 cm above the table between both fingers, one second after lifting.",
         )
-        .matrix(outcome_matrix(&page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
-        .table(attempts_table(&page.rehearsed.attempts).caption(
+        .matrix(outcome_matrix(&steps, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
+        .table(attempts_table(&steps, &page.rehearsed.attempts).caption(
             "Where the part lay is in the robot's base frame. Errors are those of the second look, from above the part.",
         ))
 }

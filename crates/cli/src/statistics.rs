@@ -1,4 +1,4 @@
-//! Shares with their uncertainty, and percentiles.
+//! Shares with their uncertainty.
 
 use serde::Serialize;
 
@@ -65,16 +65,6 @@ pub fn wilson_interval(share: Share) -> [f64; 2] {
     [(middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
-/// The value that `percent` of the values do not exceed, in between by a straight line; `None` of nothing.
-pub fn percentile(values: impl IntoIterator<Item = f64>, percent: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)?;
-    let at = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
-    let (below, above) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
-    Some(below + (above - below) * at.fract())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,17 +87,6 @@ mod tests {
             assert!((found_high - high).abs() < TOLERANCE, "{count} of {of}: {found_high}");
         }
         assert_eq!(wilson_interval(Share::default()), [0.0, 1.0]);
-    }
-
-    #[test]
-    fn percentiles_lie_between_neighbours() {
-        let values = [4.0, 1.0, 3.0, 2.0, f64::NAN];
-        assert_eq!(percentile(values, 50.0), Some(2.5));
-        assert_eq!(percentile(values, 0.0), Some(1.0));
-        assert_eq!(percentile(values, 100.0), Some(4.0));
-        // 90 % of the way from the first to the fourth is 2.7 places on.
-        assert!((percentile(values, 90.0).unwrap() - 3.7).abs() < 1e-12);
-        assert_eq!(percentile([], 50.0), None);
     }
 
     #[test]

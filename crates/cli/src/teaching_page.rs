@@ -4,7 +4,9 @@ use anyhow::Result;
 use image::RgbImage;
 use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
 use sdg_geometry::PlanarGrasp;
-use sdg_grasp::{GraspModel, History, Taught, TaughtDemonstration, ValidationRecord, Verification};
+use sdg_grasp::{
+    GraspModel, HIT_DEGREES, HIT_PX, History, Taught, TaughtDemonstration, ValidationRecord, Verification,
+};
 use sdg_report::{
     Axis, Chart, Color, Figure, GallerySize, KeyFigure, Pen, Report, Section, Series, Tone, draw_box,
     draw_demonstration, draw_line,
@@ -183,7 +185,10 @@ pub fn teaching(history: &History) -> Section {
         .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
         .moment(kept, "kept");
     let found = Chart::new("Held-back samples: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
-        .series(Series::new("within 10 mm and 10°", curve(|r| 100.0 * r.validation.hit_rate())).with_markers())
+        .series(
+            Series::new(format!("within {HIT_PX} px and {HIT_DEGREES}°"), curve(|r| 100.0 * r.validation.hit_rate()))
+                .with_markers(),
+        )
         .series(
             Series::new(
                 "false alarms",

@@ -1,11 +1,13 @@
 //! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and who is asked before anything moves.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_geometry::PinholeCamera;
@@ -15,10 +17,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
 use serde_json::Value;
-
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).args(arguments).stdin(Stdio::null()).output().unwrap()
-}
+use support::sdg;
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name)

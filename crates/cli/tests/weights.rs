@@ -1,14 +1,18 @@
 //! `sdg weights` as a user calls it.
 #![allow(clippy::unwrap_used)]
 
+mod support;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::{Value, json};
+use support::sdg;
 
-fn sdg(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sdg")).arg("weights").args(arguments).output().unwrap()
+/// `sdg weights` with these arguments.
+fn sdg_weights(arguments: &[&str]) -> Output {
+    sdg(&[&["weights"], arguments].concat())
 }
 
 fn fixture(name: &str) -> String {
@@ -39,21 +43,22 @@ fn a_detectron2_pickle_becomes_a_file_that_says_where_it_comes_from() {
     let out = folder.path().join("converted.safetensors");
     let config = config(folder.path(), 1);
     let (out, config) = (out.to_str().unwrap(), config.to_str().unwrap());
-    let output = sdg(&["convert", &fixture("detectron2_keypoint.pkl"), out, "--config", config, "--f16", "--json"]);
+    let output =
+        sdg_weights(&["convert", &fixture("detectron2_keypoint.pkl"), out, "--config", config, "--f16", "--json"]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let line = one_json(&output);
     let names = |list: &str| line["report"][list].as_array().unwrap().len();
     assert_eq!((names("applied"), names("missing"), names("mismatched"), names("unused")), (313, 0, 0, 0));
     assert_eq!(line["report"]["naming"], "detectron2");
 
-    let inspected = one_json(&sdg(&["inspect", out, "--json"]));
+    let inspected = one_json(&sdg_weights(&["inspect", out, "--json"]));
     assert_eq!(inspected["tensors"].as_array().unwrap().len(), 313);
     assert_eq!(inspected["metadata"]["source_sha256"], line["written"]["source_sha256"]);
     let network: Value = serde_json::from_str(inspected["metadata"]["network"].as_str().unwrap()).unwrap();
     assert_eq!(network["fpn"]["channels"], 4);
     // A converted file brings its configuration.
     let again = folder.path().join("again.safetensors");
-    assert_eq!(sdg(&["convert", out, again.to_str().unwrap()]).status.code(), Some(0));
+    assert_eq!(sdg_weights(&["convert", out, again.to_str().unwrap()]).status.code(), Some(0));
 }
 
 #[test]
@@ -66,14 +71,14 @@ fn what_does_not_fit_is_listed_and_nothing_is_written() {
     fs::write(&config, wrong.to_string()).unwrap();
     let (out, config) = (out.to_str().unwrap(), config.to_str().unwrap());
     let arguments = ["convert", &fixture("detectron2_keypoint.pkl"), out, "--config", config];
-    let output = sdg(&arguments);
+    let output = sdg_weights(&arguments);
     assert_eq!(output.status.code(), Some(1));
     let (stdout, stderr) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert!(stdout.contains("mismatched  roi_heads.keypoint_head.score_lowres.bias: expected [5], found [12]"));
     assert!(stderr.lines().count() == 1 && stderr.contains("--reinit"), "{stderr}");
     assert!(!Path::new(out).exists());
     let named = [&arguments[..], &["--reinit", "roi_heads.keypoint_head.score_lowres"]].concat();
-    assert_eq!(sdg(&named).status.code(), Some(0));
+    assert_eq!(sdg_weights(&named).status.code(), Some(0));
 }
 
 /// What Detectron2 and torchvision gave themselves.
@@ -87,7 +92,7 @@ fn verification_tells_the_right_image_from_another() {
     let [weights, config, against] = ["weights.safetensors", "config.json", "expected.safetensors"]
         .map(|n| golden(&format!("detectron2/faster/{n}")));
     let verify = |image: &str| {
-        sdg(&["verify", &weights, "--config", &config, "--image", image, "--against", &against, "--json"])
+        sdg_weights(&["verify", &weights, "--config", &config, "--image", image, "--against", &against, "--json"])
     };
     let right = verify(&golden("detectron2/input.png"));
     assert_eq!(right.status.code(), Some(0), "{right:?}");
@@ -109,7 +114,7 @@ fn verification_knows_torchvision_s_numerics_from_detectron2_s() {
     let (weights, against, image) =
         (case("weights.safetensors"), case("expected.safetensors"), golden("detectron2/input.png"));
     let verify = |config: &str| {
-        sdg(&["verify", &weights, "--config", config, "--image", &image, "--against", &against, "--json"])
+        sdg_weights(&["verify", &weights, "--config", config, "--image", &image, "--against", &against, "--json"])
     };
     let config = case("config.json");
     let right = verify(&config);
@@ -150,13 +155,13 @@ fn wrong_input_is_one_line() {
         (["inspect", "/nowhere.pkl", "--json"], 1, "/nowhere.pkl"),
         (["convert", &fixture("arrays_protocol4.pkl"), out.to_str().unwrap()], 1, "expected names as Detectron2"),
     ] {
-        let output = sdg(&arguments);
+        let output = sdg_weights(&arguments);
         let stderr = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(exit), "{stderr}");
         assert!(stderr.lines().count() == 1 && stderr.contains(part), "{stderr}");
     }
     let preset = ["convert", &fixture("detectron2_keypoint.pkl"), out.to_str().unwrap(), "--preset", "yolo"];
-    let output = sdg(&preset);
+    let output = sdg_weights(&preset);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8(output.stderr).unwrap().contains("r50-detectron2"));
     assert!(!out.exists());

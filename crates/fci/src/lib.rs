@@ -39,9 +39,11 @@ mod pose;
 mod robot_error;
 pub mod server;
 pub mod wire;
+mod wire_error;
 
-pub use error::{FciError, Result, WireError};
+pub use error::{FciError, Result};
 pub use limits::{Limits, RateLimits};
 pub use message::read_message;
 pub use pose::{is_rigid, isometry, transform};
 pub use robot_error::{NUM_ERRORS, RobotError, RobotErrors};
+pub use wire_error::WireError;

@@ -2,8 +2,8 @@
 
 use std::io::{self, Read};
 
-use crate::error::WireError;
 use crate::wire::{Header, HeaderKind};
+use crate::wire_error::WireError;
 
 /// Reads the next message; the inner error is a header that cannot be.
 ///

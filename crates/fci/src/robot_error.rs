@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use crate::error::WireError;
 use crate::wire::codec::Codec;
+use crate::wire_error::WireError;
 
 /// Names the errors, in the order of their bits.
 macro_rules! robot_errors {

@@ -1,5 +1,5 @@
 //! The value types that the other crates share: boxes, polygons, masks, keypoints, angles, the pinhole camera
-//! and the planar grasp.
+//! and the planar grasp; and two functions that several crates need, the convex hull and percentiles.
 //!
 //! ```text
 //! annotation ─ BoundingBox, GraspLine, Polygon ─┐
@@ -27,6 +27,7 @@
 mod angle;
 mod bounding_box;
 mod camera;
+mod convex_hull;
 mod error;
 mod keypoint;
 mod mask;
@@ -35,10 +36,12 @@ mod planar_grasp;
 mod planar_similarity;
 mod polygon;
 mod rotational_symmetry;
+mod statistics;
 
 pub use angle::Angle;
 pub use bounding_box::BoundingBox;
 pub use camera::{PinholeCamera, PlanView, PlanViewError, PlumbBob, PosedCamera, Ray, Workspace};
+pub use convex_hull::convex_hull;
 pub use error::GeometryError;
 pub use keypoint::{GraspLine, Keypoint, Visibility};
 pub use mask::{Mask, RunLengthMask};
@@ -48,6 +51,7 @@ pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;
 pub use rotational_symmetry::RotationalSymmetry;
+pub use statistics::{median, percentile};
 
 /// The README's example, which runs with the other examples.
 #[cfg(doctest)]

@@ -6,12 +6,13 @@
 
 use std::ops::RangeInclusive;
 
-use sdg_shape::{SearchConfig, ShapeConfig};
+use sdg_shape::SearchConfig;
 
 use crate::error::{GraspError, Result};
 
 /// How a demonstration is compared with an image, searched for in it, and accepted or refused.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct CheckConfig {
     /// What the search over a whole image looks for, and, in its `shape`, how demonstration and image are compared anywhere.
     /// Its scales are the size tolerance.
@@ -36,13 +37,12 @@ impl CheckConfig {
     ///
     /// The search's least agreement was chosen by hand: right poses agree by more, but for one of a hundred.
     pub const DEFAULT: Self = Self {
-        search: SearchConfig {
-            scales: Self::DEFAULT_SIZE_TOLERANCE,
-            min_agreement: 0.2,
-            max_matches: Self::DEFAULT_MAX_DETECTIONS,
-            num_points: SearchConfig::DEFAULT_NUM_POINTS,
-            max_starts: SearchConfig::DEFAULT_MAX_STARTS,
-            shape: ShapeConfig::DEFAULT,
+        search: {
+            let mut search = SearchConfig::DEFAULT;
+            search.scales = Self::DEFAULT_SIZE_TOLERANCE;
+            search.min_agreement = 0.2;
+            search.max_matches = Self::DEFAULT_MAX_DETECTIONS;
+            search
         },
         score: ScoreConfig::DEFAULT,
     };
@@ -95,6 +95,7 @@ pub struct Term {
 /// hand; the ranges so that no term rejects alone. The network's weight was fitted on models C of ten generated parts: only its
 /// silence counts, because a network proposes look-alikes as well as the part.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ScoreConfig {
     /// Whether pictures show lengths: then the size is that of the demonstration, and otherwise that of the surest detection in
     /// the picture.

@@ -73,7 +73,7 @@ fn is_without_symmetry(symmetry: &RotationalSymmetry) -> bool {
 /// How good a model was found to be on held-back samples.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValidationFacts {
-    /// Share of the parts found within 10 mm and 10°, in `[0, 1]`, network alone.
+    /// Share of the parts found within 9.2 demonstration pixels (`sdg_training::HIT_PX`) and 10°, in `[0, 1]`, network alone.
     #[serde(rename = "validation_hit_rate")]
     pub hit_rate: f64,
     /// Median error in pixels of the demonstration, after verification.

@@ -74,6 +74,7 @@ mod safetensors_file;
 mod sighting;
 mod sizes;
 mod taught;
+mod taught_marks;
 #[cfg(feature = "teach")]
 mod teach;
 mod tracking;
@@ -101,9 +102,15 @@ pub use record::{DetectionRecord, GraspRecord};
 pub use sdg_demonstration::{ImageLimits, NUM_KEYPOINTS, decode_image};
 pub use sdg_detection::keep_freed_memory;
 #[cfg(feature = "teach")]
-pub use sdg_training::{Ending, History, LossValues, StepRecord, Validation, ValidationRecord};
-pub use taught::{TaughtDemonstration, TaughtMarks};
+pub use sdg_training::{Ending, HIT_DEGREES, HIT_PX, History, LossValues, StepRecord, Validation, ValidationRecord};
+pub use taught::TaughtDemonstration;
+pub use taught_marks::TaughtMarks;
 #[cfg(feature = "teach")]
 pub use teach::{FineTuning, Preset, Start, Taught, TeachOptions, TeachingEvent, teach};
 pub use tracking::{PartDetector, PartSearch, SearchOutcome, TrackState, TrackedPart, Tracker, TrackerConfig};
 pub use verdict::Contributions;
+
+/// The README's example, which runs with the other examples.
+#[cfg(all(doctest, feature = "teach"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

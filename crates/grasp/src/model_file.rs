@@ -34,7 +34,8 @@ use crate::models::mask::MaskMatcher;
 use crate::models::{self, Network, Reading};
 use crate::network_evidence::NetworkEvidence;
 use crate::safetensors_file::{self, TensorBytes};
-use crate::taught::{TaughtDemonstration, TaughtMarks};
+use crate::taught::TaughtDemonstration;
+use crate::taught_marks::TaughtMarks;
 
 /// The version written here. Any change that an older reader would misread raises it.
 pub const FORMAT_VERSION: u32 = 2;

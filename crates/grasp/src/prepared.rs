@@ -14,11 +14,11 @@ use image::RgbImage;
 use image::imageops::{self, FilterType};
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeConfig, ShapeTemplate};
+use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeTemplate};
 
 use crate::error::Result;
 use crate::sizes::SizeRange;
-use crate::taught::TaughtMarks;
+use crate::taught_marks::TaughtMarks;
 
 /// Largest extent of a part that is worked with, in pixels. Chosen for time: no more than a fraction of a pixel is lost.
 const MAX_EXTENT_PX: f64 = 256.0;
@@ -99,7 +99,8 @@ impl Prepared {
         let reach = SURROUNDINGS * grasp.length().max(MIN_LINE_SHARE * diagonal);
         let surroundings = circle(grasp.center(), reach);
         // No outline is special there.
-        let config = ShapeConfig { outline_weight: 1.0, ..config.shape.clone() };
+        let mut config = config.shape.clone();
+        config.outline_weight = 1.0;
         let about_marks = ShapeTemplate::new(cutout, &surroundings, &config).ok();
         Ok(Self { search, about_marks, max_shift: MAX_MARKS_SHIFT * diagonal })
     }
@@ -166,7 +167,8 @@ impl PreparedSizes {
         if let Some(kept) = locked().iter().find(|kept| kept.key == key) {
             return Ok(kept.prepared.clone());
         }
-        let config = SearchConfig { scales: key.scales.clone(), ..config.clone() };
+        let mut config = config.clone();
+        config.scales = key.scales.clone();
         let made = Arc::new(Prepared::new(cutout, marks, working.cutout_scale, &config)?);
         let mut kept = locked();
         if kept.len() == MAX_KEPT {

@@ -4,43 +4,17 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use serde::{Deserialize, Serialize};
-
 use std::sync::Arc;
 
 use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
 use crate::prepared::{Prepared, PreparedSizes, WorkingSize};
 use crate::sizes::SizeRange;
+use crate::taught_marks::TaughtMarks;
 use crate::{GraspError, NUM_KEYPOINTS};
 
 /// Pixels kept around the part, so that gradients at the outline have both their sides. Chosen by hand, not measured.
 const MARGIN_PX: f64 = 16.0;
-
-/// The marks, in pixels of the kept cut-out.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TaughtMarks {
-    /// The object's name.
-    pub label: String,
-    /// The box around the part.
-    pub bbox: BoundingBox,
-    /// The grasp.
-    pub grasp: GraspLine,
-    /// The outline, if it was drawn.
-    pub outline: Option<Polygon>,
-    /// The part's width between the jaws: as marked, or measured across the outline.
-    pub width_px: f64,
-    /// Width and height of the photo that the cut-out is from; files of older versions do not tell.
-    #[serde(default)]
-    pub photo_size: Option<[u32; 2]>,
-}
-
-impl TaughtMarks {
-    /// The outline; the box where none was drawn.
-    pub fn region(&self) -> Polygon {
-        self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
-    }
-}
 
 /// The cut-out, its marks, and what is laid over images.
 #[derive(Debug, Clone)]

@@ -9,6 +9,7 @@ use crate::joints::{JointVector, ready_pose};
 /// The cost to be minimised is `seed_weight · |q - seed|² + posture_weight · |q - posture|² +
 /// limit_weight · Σ max(0, 1 - margin / comfortable_margin_rad)²`, angles in rad.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct IkOptions {
     /// Weight of the distance to the seed configuration: short motions.
     pub seed_weight: f64,

@@ -17,6 +17,7 @@ use crate::panda::{Jacobian, Panda, pose_error};
 
 /// How a straight path is followed.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LineOptions {
     /// Distance between waypoints in `s`, m.
     pub step_m: f64,

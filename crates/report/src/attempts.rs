@@ -1,48 +1,9 @@
 //! Grasp attempts as a table and in numbers.
 
+use sdg_geometry::median;
+
 use crate::chart::Matrix;
 use crate::table::{Cell, Column, Table, Tone};
-
-/// The steps of an attempt, in their order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Step {
-    /// Finding the part from the look-out pose.
-    Detect,
-    /// Moving over the part and finding it again.
-    Hover,
-    /// Going down to it.
-    Approach,
-    /// Closing the fingers.
-    Close,
-    /// Lifting.
-    Lift,
-    /// Holding for a second.
-    Hold,
-}
-
-impl Step {
-    /// All steps in their order.
-    pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
-
-    /// The name used in tables and in JSON.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Detect => "detect",
-            Self::Hover => "hover",
-            Self::Approach => "approach",
-            Self::Close => "close",
-            Self::Lift => "lift",
-            Self::Hold => "hold",
-        }
-    }
-
-    /// The step of a name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|step| step.name() == name)
-    }
-}
 
 /// How far a detection was from the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,8 +25,8 @@ pub struct AttemptSummary {
     pub object_angle_deg: f64,
     /// The detection's error, where there was a detection.
     pub detection_error: Option<DetectionError>,
-    /// The step at which it ended: [`Step::Hold`] when all went well.
-    pub step: Step,
+    /// The step at which it ended, counted from 0: the last one when all went well.
+    pub step: usize,
     /// Whether the part was held at the end.
     pub success: bool,
     /// Why it failed; empty on success.
@@ -74,11 +35,11 @@ pub struct AttemptSummary {
     pub duration_secs: f64,
 }
 
-/// The table of attempts, with medians below.
+/// The table of attempts, with medians below; `steps` names the steps of an attempt in their order.
 ///
 /// Outcome and step come before the numbers, so that a phone shows them without scrolling.
 #[must_use]
-pub fn attempts_table(attempts: &[AttemptSummary]) -> Table {
+pub fn attempts_table(steps: &[&str], attempts: &[AttemptSummary]) -> Table {
     let mut table = Table::new(vec![
         Column::number("#"),
         Column::text("outcome"),
@@ -104,9 +65,9 @@ pub fn attempts_table(attempts: &[AttemptSummary]) -> Table {
                 note: (!why.is_empty()).then(|| why.to_owned()),
             },
             Cell::Progress {
-                done: if attempt.success { Step::ALL.len() } else { attempt.step as usize },
-                total: Step::ALL.len(),
-                label: attempt.step.name().to_owned(),
+                done: if attempt.success { steps.len() } else { attempt.step },
+                total: steps.len(),
+                label: steps[attempt.step].to_owned(),
             },
             Cell::number(attempt.object_mm[0], 0),
             Cell::number(attempt.object_mm[1], 0),
@@ -138,37 +99,28 @@ pub fn attempts_table(attempts: &[AttemptSummary]) -> Table {
 }
 
 /// What was seen against what came of it: rows say how far the last detection was from the truth, columns at which step
-/// the attempt ended.
+/// (of `steps`) the attempt ended.
 ///
 /// `right_mm` and `right_deg` are the largest errors of a detection that counts as right.
 #[must_use]
-pub fn outcome_matrix(attempts: &[AttemptSummary], right_mm: f64, right_deg: f64) -> Matrix {
+pub fn outcome_matrix(steps: &[&str], attempts: &[AttemptSummary], right_mm: f64, right_deg: f64) -> Matrix {
     let seen = |attempt: &AttemptSummary| match attempt.detection_error {
         Some(error) if error.distance_mm <= right_mm && error.angle_deg <= right_deg => 0,
         Some(_) => 1,
         None => 2,
     };
-    let mut counts = vec![[0usize; Step::ALL.len() + 1]; 3];
+    let mut counts = vec![vec![0usize; steps.len() + 1]; 3];
     for attempt in attempts {
-        let ended = if attempt.success { Step::ALL.len() } else { attempt.step as usize };
+        let ended = if attempt.success { steps.len() } else { attempt.step };
         counts[seen(attempt)][ended] += 1;
     }
-    let columns = Step::ALL.map(Step::name).into_iter().chain(["held"]);
+    let columns = steps.iter().copied().chain(["held"]);
     let labels = ["seen right".to_owned(), "seen beside it".to_owned(), "not seen".to_owned()];
-    let matrix = Matrix::new("What was seen, and where the attempt ended", columns).good_column(Step::ALL.len());
+    let matrix = Matrix::new("What was seen, and where the attempt ended", columns).good_column(steps.len());
     labels.into_iter().zip(counts).fold(matrix, |matrix, (label, counts)| matrix.row(label, counts)).caption(format!(
-        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is the \
-         robot's, in the others the eye's."
+        "Right: within {right_mm:.0} mm and {right_deg:.0}° of the truth when last seen. A failure in the first row is \
+         due to the robot, in the others to perception."
     ))
-}
-
-/// The median of the finite values; the mean of the middle two when they are even in number.
-#[must_use]
-pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let (upper, lower) = (sorted.len() / 2, sorted.len().checked_sub(1)? / 2);
-    Some(sorted[lower] / 2.0 + sorted[upper] / 2.0)
 }
 
 #[cfg(test)]
@@ -176,13 +128,14 @@ mod tests {
     use super::*;
     use crate::html_checker::assert_well_formed;
 
-    fn attempt(number: usize, step: Step, success: bool, why: &str) -> AttemptSummary {
+    const STEPS: [&str; 6] = ["detect", "hover", "approach", "close", "lift", "hold"];
+
+    fn attempt(number: usize, step: usize, success: bool, why: &str) -> AttemptSummary {
         AttemptSummary {
             number,
             object_mm: [512.0, -34.0],
             object_angle_deg: 127.0,
-            detection_error: (step > Step::Detect)
-                .then_some(DetectionError { distance_mm: number as f64, angle_deg: 0.5 }),
+            detection_error: (step > 0).then_some(DetectionError { distance_mm: number as f64, angle_deg: 0.5 }),
             step,
             success,
             why: why.to_owned(),
@@ -191,25 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn medians_of_odd_even_and_none() {
-        assert_eq!(median([3.0, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median([4.0, 1.0, f64::NAN, 2.0, 3.0]), Some(2.5));
-        assert_eq!(median([]), None);
-    }
-
-    #[test]
     fn outcomes_are_counted_by_what_was_seen() {
         let beside = AttemptSummary {
             detection_error: Some(DetectionError { distance_mm: 30.0, angle_deg: 0.5 }),
-            ..attempt(4, Step::Close, false, "closed on nothing")
+            ..attempt(4, 3, false, "closed on nothing")
         };
         let html = outcome_matrix(
-            &[
-                attempt(1, Step::Hold, true, ""),
-                attempt(2, Step::Lift, false, "slipped"),
-                attempt(3, Step::Detect, false, "nothing found"),
-                beside,
-            ],
+            &STEPS,
+            &[attempt(1, 5, true, ""), attempt(2, 4, false, "slipped"), attempt(3, 0, false, "nothing found"), beside],
             10.0,
             10.0,
         )
@@ -220,11 +162,10 @@ mod tests {
 
     #[test]
     fn the_table_tells_what_happened() {
-        let html = attempts_table(&[
-            attempt(1, Step::Hold, true, ""),
-            attempt(2, Step::Lift, false, "slipped <out>"),
-            attempt(3, Step::Detect, false, "nothing found"),
-        ])
+        let html = attempts_table(
+            &STEPS,
+            &[attempt(1, 5, true, ""), attempt(2, 4, false, "slipped <out>"), attempt(3, 0, false, "nothing found")],
+        )
         .to_html();
         assert_well_formed(&html);
         assert!(html.contains("1 of 3 held") && html.contains("slipped &lt;out&gt;"));
@@ -235,11 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lead_back_to_steps() {
-        for step in Step::ALL {
-            assert_eq!(Step::from_name(step.name()), Some(step));
-        }
-        assert_eq!(Step::from_name("dance"), None);
-        assert_well_formed(&attempts_table(&[]).to_html());
+    fn a_table_of_nothing_is_well_formed() {
+        assert_well_formed(&attempts_table(&STEPS, &[]).to_html());
     }
 }

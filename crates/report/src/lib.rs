@@ -46,11 +46,12 @@ mod html;
 #[cfg(test)]
 mod html_checker;
 mod page;
+mod section;
 mod table;
 
 pub use animation::{Animation, AnimationOptions, AnimationRecorder};
 pub use atomic_file::write_atomically;
-pub use attempts::{AttemptSummary, DetectionError, Step, attempts_table, median, outcome_matrix};
+pub use attempts::{AttemptSummary, DetectionError, attempts_table, outcome_matrix};
 pub use chart::{Axis, Chart, Matrix, Scale, Series, ShareChart};
 pub use draw::{
     Color, DetectionMark, Pen, Verdict, contact_sheet, draw_box, draw_demonstration, draw_detection, draw_grasp_jaws,
@@ -59,5 +60,6 @@ pub use draw::{
 pub use error::ReportError;
 pub use figure::Figure;
 pub use html::{escape, format_number};
-pub use page::{GallerySize, KeyFigure, Report, Section};
+pub use page::{KeyFigure, Report};
+pub use section::{GallerySize, Section};
 pub use table::{Cell, Column, Table, Tone};

@@ -26,6 +26,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod arm;
+mod arm_state;
 mod error;
 mod franka;
 mod pace;
@@ -38,8 +39,9 @@ mod sequence;
 mod watch;
 pub mod workcell;
 
-pub use arm::{
-    Arm, ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
+pub use arm::Arm;
+pub use arm_state::{
+    ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
     MotionEnd, PERIOD_SECS,
 };
 pub use error::{Result, RobotError};

@@ -52,6 +52,9 @@ pub enum GraspStep {
 }
 
 impl GraspStep {
+    /// All steps in their order.
+    pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
+
     /// The name in messages and in JSON.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,6 +1,7 @@
 //! An arm that does not move: what a sequence would do, before it is done.
 
-use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
+use crate::arm::Arm;
+use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
 use crate::error::Result;
 use crate::safety::CheckedMotion;
 use crate::watch::Watch;

@@ -6,7 +6,7 @@
 
 use sdg_kinematics::JointVector;
 
-use crate::arm::PERIOD_SECS;
+use crate::arm_state::PERIOD_SECS;
 use crate::safety::CheckedMotion;
 
 /// How long a controlled stop takes, in seconds.

@@ -2,7 +2,8 @@
 
 use sdg_kinematics::{CartesianLimits, JointLimits, JointPath, JointVector, NUM_JOINTS, Panda, Trajectory};
 
-use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
+use crate::arm::Arm;
+use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
 use crate::safety::{SafetyLimits, Violation};
 use crate::watch::{StopReason, Watch};

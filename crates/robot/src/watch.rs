@@ -5,7 +5,7 @@ use std::fmt;
 
 use sdg_kinematics::{JointVector, NUM_JOINTS, VELOCITY_MAX_RAD_S};
 
-use crate::arm::{ArmMode, ArmState};
+use crate::arm_state::{ArmMode, ArmState};
 
 /// Why a motion was ended before its end.
 #[derive(Debug, Clone, PartialEq)]

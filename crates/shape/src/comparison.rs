@@ -19,6 +19,7 @@ use image::RgbImage;
 use nalgebra::Vector2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 
+use crate::compass_search::CompassSearch;
 use crate::config::{AgreementConfig, RefinementConfig};
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
@@ -180,29 +181,16 @@ impl Comparison<'_> {
 
     /// Compass search for the best agreement of edges and surface together about `from`; the pose and its agreement.
     fn climbed(&self, from: PlanarSimilarity, scales: &RangeInclusive<f64>) -> (PlanarSimilarity, f64) {
-        let (mut best, mut agreement) = (from, self.agreement(&from).both());
-        let (mut step_px, mut num_evaluations) = (STEPS_PX.0, 0);
-        while step_px > STEPS_PX.1 && num_evaluations < MAX_EVALUATIONS {
-            let mut is_better = false;
-            for direction in 0..4 {
-                for sign in [1.0, -1.0] {
-                    let next = self.stepped(&best, direction, sign * step_px);
-                    if !scales.contains(&next.scale) {
-                        continue;
-                    }
-                    num_evaluations += 1;
-                    let seen = self.agreement(&next).both();
-                    if seen > agreement + MIN_GAIN {
-                        (best, agreement, is_better) = (next, seen, true);
-                        break;
-                    }
-                }
-            }
-            if !is_better {
-                step_px *= 0.5;
-            }
-        }
-        (best, agreement)
+        let search = CompassSearch {
+            steps: STEPS_PX,
+            min_gain: MIN_GAIN,
+            max_rounds: usize::MAX,
+            max_evaluations: MAX_EVALUATIONS,
+        };
+        let neighbour = |pose: &PlanarSimilarity, coordinate: usize, step_px: f64| {
+            Some(self.stepped(pose, coordinate, step_px)).filter(|next| scales.contains(&next.scale))
+        };
+        search.climb(from, neighbour, |pose| self.agreement(pose).both())
     }
 
     /// Moved along x or y, turned or scaled, so that edges move by about `step_px` pixels of the image.

@@ -12,6 +12,7 @@ use crate::error::ShapeError;
 
 /// How a template is made, how far it is moved, and how it is compared with an image.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ShapeConfig {
     /// Most edge points kept at each pyramid level. Chosen by hand, not measured: more cost time.
     pub max_points: usize,
@@ -79,6 +80,7 @@ impl ScaleRange {
 
 /// Which gradients count as edges.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct GradientConfig {
     /// Gradient below which a direction is not trusted even in a noiseless image, in grey levels per level pixel. A step of
     /// 5 grey levels has about this gradient after smoothing. Chosen by that reasoning, not measured.
@@ -101,6 +103,7 @@ impl Default for GradientConfig {
 
 /// How colours inside the outline are compared; see [`crate::Surface`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SurfaceConfig {
     /// Cells of equal size that the outline's area would fill. Chosen by hand together with `cells_share`; other numbers
     /// were not recorded.
@@ -129,6 +132,7 @@ impl Default for SurfaceConfig {
 /// How edge directions are compared both ways; see [`crate::Structure`]. Chosen by hand, not measured apart: with them
 /// the score's loss on held-out generated parts fell from 372 to 274 (docs/decisions/007-score.md).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct StructureConfig {
     /// Points of the grid over the part.
     pub num_points: f64,
@@ -153,6 +157,7 @@ impl Default for StructureConfig {
 
 /// How edges and surface become one number.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct AgreementConfig {
     /// Extent of the part at which its edges are compared, in level pixels. Coarser than the finest level, so that a pixel
     /// of parallax or of lens distortion does not count as another shape. Chosen by that reasoning; no measurement is
@@ -180,6 +185,7 @@ impl Default for AgreementConfig {
 /// All of them were fitted on the simulator's pictures: with them 0 instead of 25 of 960 poses ended beside the part, and 7
 /// instead of 60 more than 3 px off.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct RefinementConfig {
     /// A pose that agrees so well is left where the edges put it.
     pub sure_agreement: f64,

@@ -11,9 +11,9 @@
 
 use nalgebra::{Matrix4, Vector4};
 
+use crate::capture_range::{CaptureRange, step_units};
 use crate::edge_points::parabola_peak;
 use crate::pose::Pose;
-use crate::refinement::{CaptureRange, step_units};
 use crate::template::{MatchedLevel, TemplateLevel};
 
 /// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,

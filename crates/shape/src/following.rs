@@ -9,10 +9,10 @@
 
 use sdg_geometry::PlanarSimilarity;
 
+use crate::capture_range::CaptureRange;
 use crate::consensus::{Starts, snap_from};
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
-use crate::refinement::CaptureRange;
 use crate::template::ShapeTemplate;
 
 /// How far from its start a pose may be moved.

@@ -52,7 +52,8 @@
 //!     })
 //! };
 //! let outline = Polygon::from_box(&BoundingBox { x1: 50.0, y1: 50.0, x2: 130.0, y2: 90.0 });
-//! let config = ShapeConfig { capture_shift: 0.04, ..ShapeConfig::default() };
+//! let mut config = ShapeConfig::default();
+//! config.capture_shift = 0.04;
 //! let template = ShapeTemplate::new(&plate_at(50), &outline, &config)?;
 //!
 //! let field = GradientField::new(&plate_at(55));
@@ -70,7 +71,9 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod capture_range;
 mod comparison;
+mod compass_search;
 mod config;
 mod consensus;
 mod edge_points;
@@ -79,6 +82,7 @@ mod following;
 mod gradient_field;
 mod likeness;
 pub mod parallel;
+mod pixel_cell;
 mod pose;
 mod refinement;
 mod search;
@@ -99,3 +103,8 @@ pub use search::{InstantSearch, Match, SearchConfig};
 pub use structure::{Structure, StructureAgreement};
 pub use surface::Surface;
 pub use template::ShapeTemplate;
+
+/// The README's example, which runs with the other examples.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

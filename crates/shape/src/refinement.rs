@@ -12,6 +12,8 @@
 
 use sdg_geometry::PlanarSimilarity;
 
+use crate::capture_range::{CaptureRange, step_units};
+use crate::compass_search::CompassSearch;
 use crate::consensus::{Snapped, snap};
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;
@@ -25,10 +27,9 @@ const GRID_STEP: f64 = 1.5;
 /// Agreement given up for a start at the far end of the capture range: ties go to the prediction. Chosen by
 /// hand, not measured.
 const DISTANCE_PENALTY: f64 = 0.03;
-/// Steps of the climb in level pixels of edge movement: first and last. Chosen by hand, not measured.
-const CLIMB_STEPS: (f64, f64) = (0.5, 0.1);
-/// A bound for climbs that creep. Chosen by hand, not measured.
-const MAX_CLIMB_ROUNDS: usize = 24;
+/// The climb: steps in level pixels of edge movement, and a bound for climbs of many small steps. Chosen by hand, not measured.
+const CLIMB: CompassSearch =
+    CompassSearch { steps: (0.5, 0.1), min_gain: 1e-6, max_rounds: 24, max_evaluations: usize::MAX };
 
 /// A pose after refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -145,90 +146,16 @@ impl ShapeTemplate {
     }
 }
 
-/// Where a refinement may go: a box about the initial pose.
-pub(crate) struct CaptureRange {
-    start: Pose,
-    /// Largest change of x (px), y (px), angle (rad), ln scale.
-    pub(crate) limits: [f64; 4],
-}
-
-impl CaptureRange {
-    fn new(template: &ShapeTemplate, field: &GradientField, start: Pose) -> Self {
-        let config = &template.config;
-        let shift = config.capture_shift * field.width() as f64;
-        Self { start, limits: [shift, shift, config.capture_angle_rad, config.scale.max_log()] }
-    }
-
-    /// A box about `start` that reaches `limits` (px, px, rad, ln scale) to either side.
-    pub(crate) fn around(start: Pose, limits: [f64; 4]) -> Self {
-        Self { start, limits }
-    }
-
-    fn pose_at_cell(&self, cell: [i32; 4], counts: [i32; 4]) -> Pose {
-        let step = [0, 1, 2, 3].map(|k| self.limits[k] * f64::from(cell[k]) / f64::from(counts[k].max(1)));
-        self.start.moved(step)
-    }
-
-    fn difference(&self, pose: &Pose) -> [f64; 4] {
-        [
-            pose.center.x - self.start.center.x,
-            pose.center.y - self.start.center.y,
-            pose.angle_rad - self.start.angle_rad,
-            pose.log_scale - self.start.log_scale,
-        ]
-    }
-
-    /// Mean squared share of the limits that the pose uses, in `[0, 1]`.
-    fn distance(&self, pose: &Pose) -> f64 {
-        let difference = self.difference(pose);
-        (0..4).filter(|&k| self.limits[k] > 0.0).map(|k| (difference[k] / self.limits[k]).powi(2)).sum::<f64>() / 4.0
-    }
-
-    pub(crate) fn clamped(&self, pose: &Pose) -> Pose {
-        let difference = self.difference(pose);
-        self.start.moved([0, 1, 2, 3].map(|k| difference[k].clamp(-self.limits[k], self.limits[k])))
-    }
-}
-
-/// Changes of (x, y, angle, ln scale) that each move the edges by about one pixel of the image level.
-pub(crate) fn step_units(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose) -> [f64; 4] {
-    let pixel = matched.image_pixel_size;
-    let turn = pixel / (level.radius_px * pose.log_scale.exp()).max(1.0);
-    [pixel, pixel, turn, turn]
-}
-
-/// Compass search: one coordinate at a time, halving the step when no neighbour is better.
+/// Compass search for the best alignment at a level, less a penalty for the distance from the start.
 fn climb(level: &TemplateLevel, matched: &MatchedLevel<'_>, range: &CaptureRange, from: Pose) -> Pose {
     let units = step_units(level, matched, &from);
     let evaluate = |pose: &Pose| {
         matched.mean_alignment(level, pose, LevelSampling::Bilinear) - DISTANCE_PENALTY * range.distance(pose)
     };
-    let mut pose = from;
-    let mut best = evaluate(&pose);
-    let mut step = CLIMB_STEPS.0;
-    for _ in 0..MAX_CLIMB_ROUNDS {
-        let mut improved = false;
-        for k in 0..4 {
-            if range.limits[k] == 0.0 {
-                continue;
-            }
-            for sign in [1.0, -1.0] {
-                let mut change = [0.0; 4];
-                change[k] = sign * step * units[k];
-                let next = range.clamped(&pose.moved(change));
-                let score = evaluate(&next);
-                if score > best + 1e-6 {
-                    (best, pose, improved) = (score, next, true);
-                    break;
-                }
-            }
-        }
-        if !improved {
-            step *= 0.5;
-            if step < CLIMB_STEPS.1 {
-                break;
-            }
-        }
-    }
-    pose
+    let neighbour = |pose: &Pose, coordinate: usize, step: f64| {
+        let mut change = [0.0; 4];
+        change[coordinate] = step * units[coordinate];
+        (range.limits[coordinate] > 0.0).then(|| range.clamped(&pose.moved(change)))
+    };
+    CLIMB.climb(from, neighbour, evaluate).0
 }

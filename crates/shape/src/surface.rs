@@ -22,6 +22,7 @@ use nalgebra::{Point2, Vector3};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::config::SurfaceConfig;
+use crate::pixel_cell::PixelCell;
 
 /// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
 /// before there were cells.
@@ -236,28 +237,9 @@ fn weighted_median(mut values: Vec<(f64, usize)>) -> f64 {
     middle.map_or(0.0, |(value, _)| *value)
 }
 
-/// The colour at a point between pixel centres, by bilinear interpolation; `None` outside the image.
+/// The colour at a point, by bilinear interpolation; `None` outside the image.
 fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f64; 3]> {
-    let (x, y) = (point.x - 0.5, point.y - 0.5);
-    let (left, top) = (x.floor(), y.floor());
-    if !(left >= 0.0 && top >= 0.0 && left + 1.0 < f64::from(image.width()) && top + 1.0 < f64::from(image.height())) {
-        return None;
-    }
-    let (along, down) = (x - left, y - top);
-    let pixel = |dx: u32, dy: u32| image.get_pixel(left as u32 + dx, top as u32 + dy).0;
-    let corners = [
-        (pixel(0, 0), (1.0 - along) * (1.0 - down)),
-        (pixel(1, 0), along * (1.0 - down)),
-        (pixel(0, 1), (1.0 - along) * down),
-        (pixel(1, 1), along * down),
-    ];
-    let mut color = [0.0; 3];
-    for (pixel, weight) in corners {
-        for channel in 0..3 {
-            color[channel] += weight * f64::from(pixel[channel]);
-        }
-    }
-    Some(color)
+    PixelCell::at(image, point).map(|cell| cell.color_f64())
 }
 
 #[cfg(test)]

@@ -94,7 +94,8 @@ fn bad_outlines_and_configurations_are_refused() {
     assert!(matches!(ShapeTemplate::new(&image, &hole, &default), Err(ShapeError::OutlineDegenerate { .. })));
     let outside = Polygon::from_box(&BoundingBox { x1: 300.0, y1: 0.0, x2: 400.0, y2: 90.0 });
     assert!(matches!(ShapeTemplate::new(&image, &outside, &default), Err(ShapeError::OutlineTooSmall { .. })));
-    let far = ShapeConfig { capture_shift: 0.5, ..default };
+    let mut far = default;
+    far.capture_shift = 0.5;
     let refused = ShapeTemplate::new(&image, &outline, &far);
     assert!(matches!(refused, Err(ShapeError::InvalidConfig { name: "capture_shift", .. })));
 }
@@ -102,7 +103,8 @@ fn bad_outlines_and_configurations_are_refused() {
 #[test]
 fn a_fixed_scale_stays() {
     let (image, outline) = square();
-    let config = ShapeConfig { scale: ScaleRange::Fixed, ..ShapeConfig::default() };
+    let mut config = ShapeConfig::default();
+    config.scale = ScaleRange::Fixed;
     let template = ShapeTemplate::new(&image, &outline, &config).expect("a square has edges");
     let initial =
         PlanarSimilarity::about(Point2::new(100.0, 100.0), Point2::new(102.0, 99.0), Angle::from_degrees(3.0), 1.04);

@@ -8,11 +8,18 @@ use proptest::test_runner::RngSeed;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
-use sdg_shape::{InstantSearch, SearchConfig, ShapeConfig, ShapeError};
+use sdg_shape::{InstantSearch, SearchConfig, ShapeError};
 
 /// Errors allowed on another table under another light, as for refinement from a near start.
 const TOLERANCE_PX: f64 = 2.0;
 const TOLERANCE_DEG: f64 = 1.5;
+
+/// The default with a change.
+fn with(change: impl FnOnce(&mut SearchConfig)) -> SearchConfig {
+    let mut config = SearchConfig::default();
+    change(&mut config);
+    config
+}
 
 struct Taught {
     search: InstantSearch,
@@ -177,7 +184,7 @@ fn a_tiny_part_is_found_and_a_smaller_one_refused() {
 
 #[test]
 fn only_the_configured_scales_are_found() {
-    let narrow = taught(0, &SearchConfig { scales: 0.97..=1.03, ..SearchConfig::default() });
+    let narrow = taught(0, &with(|config| config.scales = 0.97..=1.03));
     let picture = |scale: f64| {
         let mut scene = scenes::Scene::plain(8);
         scene.place(&narrow.part, scenes::pose(300.0, 240.0, 100.0, scale));
@@ -190,7 +197,7 @@ fn only_the_configured_scales_are_found() {
 #[test]
 fn a_part_is_found_with_half_and_with_twice_the_points() {
     for num_points in [32, 64, 128, 1024] {
-        let taught = taught(0, &SearchConfig { num_points, ..SearchConfig::default() });
+        let taught = taught(0, &with(|config| config.num_points = num_points));
         let mut scene = scenes::Scene::plain(8);
         let pose = scenes::pose(300.0, 240.0, 100.0, 1.0);
         scene.place(&taught.part, pose);
@@ -207,13 +214,11 @@ fn bad_configurations_are_refused() {
         Err(ShapeError::InvalidConfig { name, .. }) => name,
         other => panic!("{other:?}"),
     };
-    let default = SearchConfig::default;
-    assert_eq!(refused(SearchConfig { scales: 0.1..=1.0, ..default() }), "scales");
-    assert_eq!(refused(SearchConfig { scales: 1.2..=0.9, ..default() }), "scales");
-    assert_eq!(refused(SearchConfig { scales: f64::NAN..=1.0, ..default() }), "scales");
-    assert_eq!(refused(SearchConfig { min_agreement: 1.5, ..default() }), "min_agreement");
-    assert_eq!(refused(SearchConfig { num_points: 7, ..default() }), "num_points");
-    assert_eq!(refused(SearchConfig { num_points: 1025, ..default() }), "num_points");
-    let shape = ShapeConfig { max_points: 3, ..ShapeConfig::default() };
-    assert_eq!(refused(SearchConfig { shape, ..default() }), "max_points");
+    assert_eq!(refused(with(|config| config.scales = 0.1..=1.0)), "scales");
+    assert_eq!(refused(with(|config| config.scales = 1.2..=0.9)), "scales");
+    assert_eq!(refused(with(|config| config.scales = f64::NAN..=1.0)), "scales");
+    assert_eq!(refused(with(|config| config.min_agreement = 1.5)), "min_agreement");
+    assert_eq!(refused(with(|config| config.num_points = 7)), "num_points");
+    assert_eq!(refused(with(|config| config.num_points = 1025)), "num_points");
+    assert_eq!(refused(with(|config| config.shape.max_points = 3)), "max_points");
 }

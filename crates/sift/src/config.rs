@@ -4,6 +4,7 @@ use crate::SiftError;
 
 /// Settings of [`Sift`](crate::Sift). The defaults are Lowe's, where he names them.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SiftConfig {
     /// Whether the scale space begins at twice the image's size, which finds the smallest blobs: about four times
     /// the keypoints for four times the work.

@@ -13,6 +13,7 @@ use crate::{SiftError, SiftKeypoint};
 
 /// Settings of the search for a similarity.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RansacConfig {
     /// Seed of the draws.
     pub seed: u64,

@@ -11,6 +11,7 @@ use crate::{Features, Plane, Sift, SiftError, match_features};
 
 /// Settings of [`RotationEstimator`].
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RotationConfig {
     /// Largest ratio of a match; see [`match_features`].
     pub ratio: f32,

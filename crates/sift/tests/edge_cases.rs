@@ -7,6 +7,13 @@ mod support;
 use sdg_geometry::Mask;
 use sdg_sift::{Features, Plane, Sift, SiftConfig, SiftError, match_features};
 
+/// The default with a change.
+fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
+    let mut config = SiftConfig::default();
+    change(&mut config);
+    config
+}
+
 fn describe(image: &Plane) -> Features {
     Sift::default().detect_and_describe(image, None).unwrap()
 }
@@ -93,7 +100,7 @@ fn a_mask_keeps_what_lies_inside() {
 #[test]
 fn the_strongest_are_kept() {
     let image = noise(120, 90);
-    let sift = Sift::new(SiftConfig { max_features: Some(25), ..SiftConfig::default() }).unwrap();
+    let sift = Sift::new(with(|config| config.max_features = Some(25))).unwrap();
     let few = sift.detect_and_describe(&image, None).unwrap();
     assert_eq!(few.len(), 25);
     let weakest = few.keypoints.iter().map(|k| k.contrast).fold(f64::MAX, f64::min);
@@ -104,13 +111,13 @@ fn the_strongest_are_kept() {
 #[test]
 fn settings_out_of_range_are_named() {
     let error = |config: SiftConfig| Sift::new(config).err().unwrap().to_string();
-    assert_eq!(error(SiftConfig { intervals: 0, ..SiftConfig::default() }), "expected intervals from 1 to 16, found 0");
+    assert_eq!(error(with(|config| config.intervals = 0)), "expected intervals from 1 to 16, found 0");
     assert_eq!(
-        error(SiftConfig { contrast_threshold: f64::NAN, ..SiftConfig::default() }),
+        error(with(|config| config.contrast_threshold = f64::NAN)),
         "expected contrast_threshold at least 0, found NaN"
     );
     assert!(matches!(
-        Sift::new(SiftConfig { edge_ratio: 0.5, ..SiftConfig::default() }),
+        Sift::new(with(|config| config.edge_ratio = 0.5)),
         Err(SiftError::BadSetting { name: "edge_ratio", .. })
     ));
 }

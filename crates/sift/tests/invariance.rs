@@ -9,6 +9,13 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_sift::{Features, Plane, Sift, SiftConfig, match_features};
 use support::{PARTS, picture, relit, warped};
 
+/// The default with a change.
+fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
+    let mut config = SiftConfig::default();
+    change(&mut config);
+    config
+}
+
 fn describe(image: &Plane) -> Features {
     Sift::new(SiftConfig::default()).unwrap().detect_and_describe(image, None).unwrap()
 }
@@ -71,7 +78,10 @@ fn a_quarter_turn_turns_directions_and_keeps_descriptors() {
     let image = Plane::from_rgb(&image::imageops::crop_imm(&picture("rod_end"), 90, 80, width, height).to_image());
     // Pixel by pixel, so nothing is resampled: (x, y) goes to (height - y, x).
     let turned = Plane::from_fn(height, width, |x, y| image.row((height - 1 - x) as usize)[y as usize]);
-    let config = SiftConfig { double_first_octave: false, contrast_threshold: 0.02, ..SiftConfig::default() };
+    let config = with(|config| {
+        config.double_first_octave = false;
+        config.contrast_threshold = 0.02;
+    });
     let sift = Sift::new(config).unwrap();
     let (before, after) =
         (sift.detect_and_describe(&image, None).unwrap(), sift.detect_and_describe(&turned, None).unwrap());

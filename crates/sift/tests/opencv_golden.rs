@@ -6,6 +6,13 @@ mod support;
 
 use sdg_sift::{DescriptorNormalization, Plane, Sift, SiftConfig};
 
+/// The default with a change.
+fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
+    let mut config = SiftConfig::default();
+    change(&mut config);
+    config
+}
+
 const LEFT: u32 = 240;
 const TOP: u32 = 150;
 const WIDTH: u32 = 170;
@@ -40,7 +47,7 @@ fn cosine_with_opencv(ours: &[f32], theirs: &[f32]) -> f32 {
 fn keypoints_and_descriptors_are_those_of_opencv() {
     let picture =
         Plane::from_rgb(&image::imageops::crop_imm(&support::picture("pendulum"), LEFT, TOP, WIDTH, HEIGHT).to_image());
-    let config = SiftConfig { normalization: DescriptorNormalization::Clipped, ..SiftConfig::default() };
+    let config = with(|config| config.normalization = DescriptorNormalization::Clipped);
     let features = Sift::new(config).unwrap().detect_and_describe(&picture, None).unwrap();
     let golden = golden();
     assert!(golden.len() > 30, "{} golden keypoints", golden.len());

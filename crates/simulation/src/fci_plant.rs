@@ -13,8 +13,7 @@ use crate::gripper::Gripper;
 use crate::model::Model;
 use crate::panda::{FINGER_TRAVEL_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
 use crate::self_distance::LinkCapsules;
-use crate::workcell::WorkcellConfig;
-use crate::workcell_model::build_model;
+use crate::workcell::{WorkcellConfig, build_model};
 
 /// The generalised positions of a plant, for others to look at while a server owns it; see [`PandaPlant::positions`].
 #[derive(Debug, Clone, Default)]

@@ -52,7 +52,6 @@ mod self_distance;
 mod shake;
 pub mod table_camera;
 mod workcell;
-mod workcell_model;
 
 pub use attempt::{AttemptConfig, AttemptReport};
 pub use attempt_errors::{ArmFault, ArmFaultKind, AttemptErrors, Shake};
@@ -71,5 +70,4 @@ pub use panda::{
 pub use perception::Perception;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{Workcell, WorkcellConfig};
-pub use workcell_model::CameraPlace;
+pub use workcell::{CameraPlace, Workcell, WorkcellConfig};

@@ -180,6 +180,14 @@ mod tests {
         (Data::new(model).unwrap(), ids)
     }
 
+    /// `fci` sees no other crate and the MJCF no constant: all three say how far the hand opens.
+    #[test]
+    fn the_hand_opens_as_far_everywhere() {
+        assert_eq!(sdg_fci::server::HAND_MAX_WIDTH_M, kinematics::HAND_OPENING_MAX_M);
+        let range = format!("axis=\"0 1 0\" limited=\"true\" range=\"0 {FINGER_TRAVEL_M}\"");
+        assert!(include_str!("../assets/panda.xml").contains(&range), "{range}");
+    }
+
     #[test]
     fn mujoco_and_kinematics_agree_everywhere() {
         let (mut data, ids) = arm();

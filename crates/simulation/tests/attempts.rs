@@ -8,7 +8,7 @@ use std::error::Error;
 use std::fs;
 
 use nalgebra::{Isometry3, Translation3};
-use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, GraspTarget, camera_looking_down};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, GraspTarget, LOOK_HEIGHT_M, camera_looking_down};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
@@ -89,7 +89,7 @@ fn a_bar_of_known_pose_is_lifted() {
         assert_eq!((report.views.len(), report.targets.len()), (2, 2));
         // At the second look the camera stands over the part.
         let camera = report.views[1].camera.world_from_camera.translation;
-        assert!((camera.x - x).hypot(camera.y - y) < 0.003 && (camera.z - 0.50).abs() < 0.003, "{camera}");
+        assert!((camera.x - x).hypot(camera.y - y) < 0.003 && (camera.z - LOOK_HEIGHT_M).abs() < 0.003, "{camera}");
     }
 }
 

@@ -42,4 +42,4 @@ pub use pace::Pace;
 pub use progress::{Ending, History, LossValues, StepRecord, TrainingEvent, ValidationRecord};
 pub use schedule::OneCycle;
 pub use trainer::{Trained, train};
-pub use validation::{HIT_DEGREES, HIT_PX, Outcome, Validation, median};
+pub use validation::{HIT_DEGREES, HIT_PX, Outcome, Validation};

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use nalgebra::Point2;
+use sdg_geometry::{Polygon, convex_hull};
 
 use super::bundle::Bundle;
 
@@ -118,27 +119,9 @@ pub(super) fn advice(bundle: &Bundle<'_>, used: &[usize]) -> Vec<Advice> {
     advice
 }
 
-/// The area of the convex hull, by Andrew's monotone chain.
-fn hull_area(mut points: Vec<Point2<f64>>) -> f64 {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let turns_right = |a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>| (b - a).perp(&(c - a)) <= 0.0;
-    let half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for point in points {
-            while let [.., a, b] = &chain[..]
-                && turns_right(a, b, &point)
-            {
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop();
-        chain
-    };
-    let mut hull = half(&mut points.iter().copied());
-    hull.extend(half(&mut points.iter().rev().copied()));
-    let next = |k: usize| hull[(k + 1) % hull.len()].coords;
-    0.5 * hull.iter().enumerate().map(|(k, point)| point.coords.perp(&next(k))).sum::<f64>()
+/// The area of the convex hull.
+fn hull_area(points: Vec<Point2<f64>>) -> f64 {
+    Polygon { vertices: convex_hull(points) }.area()
 }
 
 #[cfg(test)]

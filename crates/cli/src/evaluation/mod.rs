@@ -32,9 +32,10 @@ mod summary;
 mod tables;
 mod teaching;
 mod units;
+mod work;
 
 pub use crate::progress::EvaluationProgress;
-pub use crate::statistics::{Share, percentile, wilson_interval};
+pub use crate::statistics::{Share, wilson_interval};
 pub use cell::{Cell, Marks};
 pub use groups::PartGroup;
 pub use page::page;

@@ -1,9 +1,7 @@
 //! The evaluation as a page.
 
 use anyhow::Result;
-use sdg_report::{
-    Axis, Chart, Figure, GallerySize, KeyFigure, Matrix, Report, Section, Series, ShareChart, Step, Tone,
-};
+use sdg_report::{Axis, Chart, Figure, GallerySize, KeyFigure, Matrix, Report, Section, Series, ShareChart, Tone};
 
 use super::cell::Cell;
 use super::groups::PartGroup;
@@ -95,23 +93,18 @@ fn plots(summary: &Summary, section: Section) -> Section {
 }
 
 fn outcomes(title: &str) -> Matrix {
-    let columns = steps().chain(["held"]);
-    Matrix::new(title, columns).good_column(steps().count())
-}
-
-/// Everything at which an attempt can end.
-fn steps() -> impl Iterator<Item = &'static str> {
-    [AttemptRecord::TEACH].into_iter().chain(Step::ALL.map(Step::name)).chain([AttemptRecord::SIMULATION])
+    let columns = AttemptRecord::steps().chain(["held"]);
+    Matrix::new(title, columns).good_column(AttemptRecord::steps().count())
 }
 
 /// How many attempts ended at each step, and how many held.
 fn counts<'a>(figures: impl IntoIterator<Item = &'a Figures>) -> Vec<usize> {
-    let mut counts = vec![0; steps().count() + 1];
+    let mut counts = vec![0; AttemptRecord::steps().count() + 1];
     for figures in figures {
-        for (count, step) in counts.iter_mut().zip(steps()) {
+        for (count, step) in counts.iter_mut().zip(AttemptRecord::steps()) {
             *count += figures.failures_by_step.get(step).copied().unwrap_or(0);
         }
-        counts[steps().count()] += figures.held.count;
+        counts[AttemptRecord::steps().count()] += figures.held.count;
     }
     counts
 }

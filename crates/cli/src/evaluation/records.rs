@@ -2,9 +2,10 @@
 
 use sdg_grasp::TeachingFacts;
 use sdg_report::DetectionError;
+use sdg_robot::GraspStep;
 use serde::{Deserialize, Serialize};
 
-use crate::rehearsal::{Looks, RehearsedAttempt};
+use crate::rehearsal::{Looks, RehearsedAttempt, step_name};
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// Steps that one value of a teaching's loss stands for.
@@ -58,12 +59,17 @@ impl AttemptRecord {
     /// Where an attempt ends for which there is no model.
     pub const TEACH: &str = "teach";
 
+    /// Everything at which an attempt can end, in order.
+    pub fn steps() -> impl Iterator<Item = &'static str> {
+        [Self::TEACH].into_iter().chain(GraspStep::ALL.map(GraspStep::name)).chain([Self::SIMULATION])
+    }
+
     /// As the rehearsal tells it.
     pub fn new(RehearsedAttempt { attempt, looks, .. }: &RehearsedAttempt) -> Self {
         Self {
             attempt: attempt.number,
             success: attempt.success,
-            step: attempt.step.name().to_owned(),
+            step: step_name(attempt).to_owned(),
             why: attempt.why.clone(),
             error_mm: attempt.detection_error.map(|e| e.distance_mm),
             error_deg: attempt.detection_error.map(|e| e.angle_deg),

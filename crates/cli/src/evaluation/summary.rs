@@ -12,7 +12,8 @@ use super::records::{AttemptRecord, DetectionRecord, TeachingRecord};
 use super::settings::Settings;
 use super::store::Store;
 use super::units::Evaluation;
-use crate::statistics::{Share, percentile, wilson_interval};
+use crate::statistics::{Share, wilson_interval};
+use sdg_geometry::percentile;
 
 /// All there is to report of a group of parts. What has not been done yet is missing from the sums, and `remaining` says how
 /// much that is, of all groups.

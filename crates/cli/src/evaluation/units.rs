@@ -1,31 +1,16 @@
-//! The units of work, and how each is done.
+//! The units of work of the protocol: which there are and what each waits for. `work.rs` does them.
 
-use std::ops::ControlFlow;
-use std::time::Instant;
-
-use anyhow::{Context, Result};
+use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{TestView, test_views};
 
-use super::attempting::go_on;
-use super::caught::{NO_MODEL, caught};
-use super::cell::{Cell, Marks, attempts_of};
-use super::looking::{observe_picture, part_seed, picture_seed, scene_without};
-use super::records::{LookRecord, SpeedRecord};
-use super::schedule::{Task, run_all};
+use super::cell::{Cell, Marks};
+use super::schedule::Task;
 use super::store::Store;
-use super::teaching::Teaching;
-use crate::progress::EvaluationProgress;
-use crate::rehearsal::{Rehearsal, RehearsalErrors};
-use crate::trial::try_view;
-
-/// Pictures on which speed is measured, for each part.
-const SPEED_VIEWS: usize = 3;
 
 /// What is kept or lost as a whole.
 #[derive(Debug, Clone, Copy)]
-enum Unit<'a> {
+pub(super) enum Unit<'a> {
     /// A network is taught on a part.
     Teach(Cell<'a>),
     /// All models look at a part's pictures: each picture is drawn once.
@@ -48,36 +33,6 @@ pub struct Evaluation<'a> {
 }
 
 impl Evaluation<'_> {
-    /// Does what is not in the store yet; breaks when `is_interrupted` says so, with everything kept that has ended.
-    ///
-    /// # Errors
-    /// Files that cannot be read or written, and errors of the simulator itself. A teaching that fails is a result.
-    pub fn run(
-        &self,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-        progress: &EvaluationProgress,
-    ) -> Result<ControlFlow<()>> {
-        let tasks = self.tasks()?;
-        let without_speed = self.without_speed()?;
-        progress.expect(tasks.len() + without_speed.len());
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let work = |unit: &Unit| {
-            if is_interrupted() {
-                return Ok(ControlFlow::Break(()));
-            }
-            caught(|| self.work(*unit, is_interrupted, progress)).with_context(|| unit.to_string())
-        };
-        run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)?;
-        for object in without_speed {
-            if is_interrupted() {
-                break;
-            }
-            self.measure_speed(object, cores)?;
-            progress.unit_done(&format!("time {}: done", object.name));
-        }
-        Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
-    }
-
     /// How many units are not in the store yet.
     pub fn remaining(&self) -> Result<usize> {
         Ok(self.tasks()?.len() + self.without_speed()?.len())
@@ -89,13 +44,13 @@ impl Evaluation<'_> {
         std::iter::once(Verification::ByShape).chain(alone.then_some(Verification::Off))
     }
 
-    fn cells<'s>(&'s self, object: &'s ObjectSpec) -> impl Iterator<Item = Cell<'s>> {
+    pub(super) fn cells<'s>(&'s self, object: &'s ObjectSpec) -> impl Iterator<Item = Cell<'s>> {
         self.models.iter().map(|&model| Cell { model, object: &object.name })
     }
 
     /// What is not in the store yet, part by part, so that an interrupted evaluation has whole parts to show. Attempts
     /// without the check come last of all.
-    fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
+    pub(super) fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
         let (store, mut tasks, mut last) = (self.store, Vec::<Task<Unit>>::new(), Vec::new());
         for object in self.objects {
             let mut teachings: Vec<(ModelKind, usize)> = Vec::new();
@@ -140,7 +95,7 @@ impl Evaluation<'_> {
         Ok(!cell.is_without_model(Marks::Shipped, self.store)?)
     }
 
-    fn without_speed(&self) -> Result<Vec<&ObjectSpec>> {
+    pub(super) fn without_speed(&self) -> Result<Vec<&ObjectSpec>> {
         let mut without = Vec::new();
         for object in self.objects {
             for cell in self.cells(object) {
@@ -151,125 +106,6 @@ impl Evaluation<'_> {
             }
         }
         Ok(without)
-    }
-
-    fn work(
-        &self,
-        unit: Unit,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-        progress: &EvaluationProgress,
-    ) -> Result<ControlFlow<()>> {
-        let started = Instant::now();
-        let summary = match unit {
-            Unit::Teach(cell) => {
-                let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
-                teaching.teach(cell, Marks::Shipped, is_interrupted)?
-            }
-            Unit::Look(object) => self.look(object, is_interrupted)?,
-            Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted)?,
-        };
-        let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
-        progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
-        Ok(ControlFlow::Continue(()))
-    }
-
-    /// Shows every model of a part that has not seen them the same pictures.
-    fn look(&self, object: &ObjectSpec, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
-        let settings = self.store.settings();
-        let mut looks = Vec::new();
-        for cell in self.cells(object) {
-            if cell.look(self.store)?.is_none()
-                && let Some(model) = cell.read_model_at_fixed_height(self.store)?
-            {
-                looks.push((cell, model, LookRecord::default(), None));
-            }
-        }
-        for number in 0..u64::from(settings.views) {
-            let seed = picture_seed(settings.seed, object, number);
-            let seen = test_views(object, true, 1, seed).next().context("a picture")??;
-            if is_interrupted() {
-                return Ok(None);
-            }
-            for (_, model, record, drawn) in &mut looks {
-                let (picture_record, trial) = observe_picture(model, object, &seen, seed, None)?;
-                record.present.push(picture_record);
-                drawn.get_or_insert(trial.drawn);
-            }
-        }
-        for number in 0..u64::from(settings.scenes) {
-            let seed = picture_seed(settings.seed, object, number);
-            let (seen, other_part) = scene_without(object, number, seed)?;
-            if is_interrupted() {
-                return Ok(None);
-            }
-            for (_, model, record, _) in &mut looks {
-                record.absent.push(observe_picture(model, object, &seen, seed, other_part)?.0);
-            }
-        }
-        let mut summary = Vec::new();
-        for (cell, _, record, drawn) in looks {
-            if let Some(drawn) = drawn {
-                let mut png = std::io::Cursor::new(Vec::new());
-                drawn.write_to(&mut png, image::ImageFormat::Png)?;
-                self.store.write_bytes(&cell.picture_file(), &png.into_inner())?;
-            }
-            self.store.write(&cell.file("look"), &record)?;
-            let right = record.present.iter().filter(|p| p.verified.is_right()).count();
-            let false_alarms = record.absent.iter().filter(|p| p.verified.is_accepted()).count();
-            summary.push(format!("{} right on {right}, {false_alarms} false alarms", cell.model));
-        }
-        Ok(Some(if summary.is_empty() { NO_MODEL.to_owned() } else { summary.join("; ") }))
-    }
-
-    /// Goes on with a cell's attempts.
-    fn attempt(
-        &self,
-        cell: Cell,
-        object: &ObjectSpec,
-        verification: Verification,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-    ) -> Result<Option<String>> {
-        let settings = self.store.settings();
-        let Some(model) = cell.read_model_at_fixed_height(self.store)? else { return Ok(Some(NO_MODEL.to_owned())) };
-        let seed = part_seed(settings.seed, object);
-        let rehearsal = Rehearsal {
-            model: &model,
-            object,
-            attempts: settings.attempts,
-            seed,
-            verification,
-            errors: RehearsalErrors::default(),
-            camera: None,
-        };
-        let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
-        Ok(attempts.map(|attempts| {
-            let held = attempts.iter().filter(|attempt| attempt.success).count();
-            format!("held in {held} of {}", attempts.len())
-        }))
-    }
-
-    /// Times detections with nothing of ours beside them, on all cores.
-    fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
-        let seed = picture_seed(self.store.settings().seed, object, 0);
-        let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
-        for cell in self.cells(object) {
-            if cell.speed(self.store)?.is_some() {
-                continue;
-            }
-            let Some(model) = cell.read_model(Marks::Shipped, self.store)? else { continue };
-            let timed = |verification: Verification| -> Result<Vec<f64>> {
-                // The first one packs weights and fills caches.
-                model.detect(&pictures[0].view.image, verification)?;
-                pictures.iter().map(|seen| Ok(try_view(&model, object, seen, verification)?.seconds)).collect()
-            };
-            let record = SpeedRecord {
-                cores,
-                verified_secs: timed(Verification::ByShape)?,
-                alone_secs: if cell.model.has_network() { timed(Verification::Off)? } else { Vec::new() },
-            };
-            self.store.write(&cell.file("speed"), &record)?;
-        }
-        Ok(())
     }
 }
 
@@ -287,7 +123,7 @@ impl std::fmt::Display for Unit<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::{AttemptRecord, AttemptsRecord, Settings, TeachingRecord};
+    use crate::evaluation::{AttemptRecord, AttemptsRecord, LookRecord, Settings, TeachingRecord};
 
     fn settings() -> Settings {
         Settings {

@@ -3,13 +3,13 @@
 //! Distances are pixels of the picture, angles degrees; a detection's place is the middle of its grasp.
 
 use nalgebra::Point2;
-use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry};
+use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry, percentile};
 use sdg_grasp::{GraspDetection, TaughtDemonstration};
 use serde::Serialize;
 
 use super::folder::{Instance, LabelledPicture};
 use crate::picture_detector::PictureDetector;
-use crate::statistics::{Share, percentile};
+use crate::statistics::Share;
 
 /// A hit lies at most so far from the instance's marks, in diagonals of the instance.
 const MAX_DISTANCE_DIAGONALS: f64 = 0.04;

@@ -8,9 +8,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use crate::error::{FciError, Result, WireError};
+use crate::error::{FciError, Result};
 use crate::message::read_message;
 use crate::wire::{Header, HeaderKind};
+use crate::wire_error::WireError;
 
 /// The sending half, which any thread may use.
 #[derive(Debug, Clone)]

@@ -3,8 +3,9 @@
 use super::plant::Plant;
 use crate::wire::{HandCommand, HandRequest, HandState, HandStatus};
 
-/// Franka's hand: largest width, speed and continuous force.
-const MAX_WIDTH_M: f64 = 0.08;
+/// Largest width of Franka's hand, m.
+pub const HAND_MAX_WIDTH_M: f64 = 0.08;
+/// Its largest speed and continuous force.
 const MAX_SPEED_M_S: f64 = 0.1;
 const MAX_FORCE_N: f64 = 70.0;
 /// Force of motions that grasp nothing.
@@ -92,12 +93,12 @@ impl HandCore {
                 plant.move_hand(PRESSING_WIDTH_M, HOMING_SPEED_M_S, MOVING_FORCE_N);
                 Some(Task::HomingClose)
             }
-            HandRequest::Move { width, speed } if (0.0..=MAX_WIDTH_M).contains(&width) && is_speed(speed) => {
+            HandRequest::Move { width, speed } if (0.0..=HAND_MAX_WIDTH_M).contains(&width) && is_speed(speed) => {
                 plant.move_hand(width, speed.min(MAX_SPEED_M_S), MOVING_FORCE_N);
                 Some(Task::Move { width })
             }
             HandRequest::Grasp { width, epsilon_inner, epsilon_outer, speed, force }
-                if (0.0..=MAX_WIDTH_M).contains(&width)
+                if (0.0..=HAND_MAX_WIDTH_M).contains(&width)
                     && is_speed(speed)
                     && (0.0..=2.0 * MAX_FORCE_N).contains(&force)
                     && epsilon_inner >= 0.0
@@ -149,11 +150,11 @@ impl HandCore {
             }
             _ if !is_standing => return,
             Task::HomingClose => {
-                plant.move_hand(MAX_WIDTH_M, HOMING_SPEED_M_S, MOVING_FORCE_N);
+                plant.move_hand(HAND_MAX_WIDTH_M, HOMING_SPEED_M_S, MOVING_FORCE_N);
                 self.running = Some(Running { task: Task::HomingOpen, num_standing: 0, ..running });
                 return;
             }
-            Task::HomingOpen if is_reached(MAX_WIDTH_M) => HandStatus::Success,
+            Task::HomingOpen if is_reached(HAND_MAX_WIDTH_M) => HandStatus::Success,
             Task::HomingOpen => HandStatus::Fail,
             Task::Move { .. } => HandStatus::Unsuccessful,
             Task::Grasp { range: (narrowest, widest) } if narrowest < width && width < widest => {
@@ -171,7 +172,7 @@ impl HandCore {
         HandState {
             message_id: self.time_ms,
             width: plant.hand_width().0,
-            max_width: MAX_WIDTH_M,
+            max_width: HAND_MAX_WIDTH_M,
             is_grasped: self.grasped.is_some(),
             temperature: TEMPERATURE,
         }

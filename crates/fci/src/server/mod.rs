@@ -22,7 +22,7 @@ mod statistics;
 mod torque;
 
 pub use config::{Pace, ServerConfig};
-pub use hand::{HandCore, HandOutgoing};
+pub use hand::{HAND_MAX_WIDTH_M, HandCore, HandOutgoing};
 pub use plant::{Jacobian, JointVector, Observation, Plant};
 pub use reference::PERIOD_SECS;
 pub use robot::{Outgoing, RobotCore};

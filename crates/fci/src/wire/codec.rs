@@ -2,7 +2,7 @@
 //!
 //! A message names its fields once, in a function generic over [`Codec`]; an [`Encoder`] writes them, a [`Decoder`] fills them.
 
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// How a message keeps its real numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

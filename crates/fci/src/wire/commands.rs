@@ -1,7 +1,7 @@
 //! The commands of the robot and their numbers.
 
 use super::version::Version;
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// Which command; the numbers depend on the version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::codec::{Codec, Decoder, Encoder, Real};
 use super::header::{Header, HeaderKind};
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// The hand's version.
 pub const HAND_VERSION: u16 = 3;

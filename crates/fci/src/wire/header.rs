@@ -1,7 +1,7 @@
 //! What stands before every message over TCP.
 
 use super::codec::{Codec, Decoder, Encoder, Real};
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// Size of the robot's header.
 pub const HEADER_SIZE: usize = 12;

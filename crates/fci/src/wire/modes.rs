@@ -1,6 +1,6 @@
 //! What the robot is doing, as a state tells it and a Move asks for it.
 
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// An enum of bytes, and its names for messages.
 macro_rules! byte_enum {

@@ -6,7 +6,7 @@ use super::header::{Header, HeaderKind};
 use super::modes::{ControllerMode, MotionGeneratorMode};
 use super::state::{IDENTITY, Transform};
 use super::version::Version;
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// How far a motion may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,7 +3,7 @@
 use super::codec::{Codec, Decoder, Encoder, Real};
 use super::state::{IDENTITY, Transform};
 use super::version::Version;
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// Size of a command in version 5.
 pub const COMMAND_SIZE_V5: usize = 370;

@@ -3,8 +3,8 @@
 use super::codec::{Codec, Decoder, Encoder};
 use super::modes::{ControllerMode, MotionGeneratorMode, RobotMode};
 use super::version::Version;
-use crate::error::WireError;
 use crate::robot_error::RobotErrors;
+use crate::wire_error::WireError;
 
 /// Size of a state in version 5.
 pub const STATE_SIZE_V5: usize = 2373;

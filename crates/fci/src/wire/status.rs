@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::commands::Command;
 use super::version::Version;
-use crate::error::WireError;
+use crate::wire_error::WireError;
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

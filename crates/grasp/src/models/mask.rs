@@ -18,7 +18,9 @@ const MARGIN_PX: f64 = 24.0;
 /// The mask of a pipe, read off 28 cells a side, overlaps the pipe's outline by a third when it lies right on it. Whether
 /// it is the part, the demonstration says. Chosen on fuel lines, a shipped part; the number of pictures is not recorded.
 fn rotation() -> RotationConfig {
-    RotationConfig { min_overlap: 0.3, ..RotationConfig::default() }
+    let mut config = RotationConfig::default();
+    config.min_overlap = 0.3;
+    config
 }
 
 /// The demonstrations as the mask's content is compared with them.
@@ -129,7 +131,7 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::taught::TaughtMarks;
+    use crate::taught_marks::TaughtMarks;
     use image::Rgb;
     use nalgebra::Point2;
     use sdg_geometry::{Angle, GraspLine};

@@ -26,7 +26,7 @@ pub(super) fn fill_box(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::taught::TaughtMarks;
+    use crate::taught_marks::TaughtMarks;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_geometry::{GraspLine, Polygon};

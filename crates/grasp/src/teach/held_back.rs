@@ -1,8 +1,8 @@
 //! Held-back samples: a network's hit rate, errors and score threshold.
 
 use sdg_demonstration::{Sample, SampleObject};
-use sdg_geometry::{Keypoint, PlanarGrasp};
-use sdg_training::{Outcome, median};
+use sdg_geometry::{Keypoint, PlanarGrasp, median};
+use sdg_training::Outcome;
 
 use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
@@ -105,8 +105,8 @@ impl HeldBack<'_> {
             network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG).unwrap_or(Calibration::NEUTRAL),
             on_part,
             elsewhere,
-            error_px: median(&mut errors_px).unwrap_or(f64::INFINITY),
-            error_degrees: median(&mut errors_degrees).unwrap_or(f64::INFINITY),
+            error_px: median(errors_px).unwrap_or(f64::INFINITY),
+            error_degrees: median(errors_degrees).unwrap_or(f64::INFINITY),
         })
     }
 

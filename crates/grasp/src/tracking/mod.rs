@@ -69,6 +69,7 @@ impl TrackedPart {
 
 /// When parts are searched for, lost and forgotten.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct TrackerConfig {
     /// Time from the start of one search to that of the next while all known parts are followed; as soon as one is lost, or none is
     /// known, searches follow each other. Chosen by hand: a new part is found within this and the time of a search.

@@ -1,6 +1,6 @@
 //! How far angles are off.
 
-use sdg_training::median;
+use sdg_geometry::median;
 
 use super::augmented::LabelledCrop;
 use crate::error::Result;
@@ -47,7 +47,7 @@ impl AngleErrors {
 
     /// Median in degrees; infinite without crops.
     pub fn median_degrees(&self) -> f64 {
-        median(&mut self.sorted.clone()).unwrap_or(f64::INFINITY)
+        median(self.sorted.iter().copied()).unwrap_or(f64::INFINITY)
     }
 
     /// The error that `share` of the crops stay below, in degrees; infinite without crops.

@@ -3,9 +3,11 @@
 use image::RgbImage;
 use nalgebra::Point2;
 
-use super::font::{CAP_HEIGHT, DESCENT, text_polylines, text_width};
-use super::layer::{Layer, stroke};
-use super::{Color, Pen};
+use tiny_skia::FillRule;
+
+use super::Color;
+use super::font::{DESCENT, text_path, text_width};
+use super::paint::{fill, inside_of};
 
 /// Draws a tag with one line of text; `height_px` is the height of its capitals.
 ///
@@ -15,26 +17,22 @@ pub fn draw_label(image: &mut RgbImage, at: Point2<f64>, text: &str, color: Colo
     if !(at.x.is_finite() && at.y.is_finite() && height_px.is_finite() && height_px > 0.0) || text.is_empty() {
         return;
     }
-    let unit = height_px / CAP_HEIGHT;
     let padding = (0.45 * height_px).max(2.0);
-    let tag_width = text_width(text) * unit + 2.0 * padding;
-    let tag_height = (CAP_HEIGHT + 0.4 * DESCENT) * unit + 2.0 * padding;
+    let tag_width = text_width(text, height_px) + 2.0 * padding;
+    let tag_height = (1.0 + 0.4 * DESCENT) * height_px + 2.0 * padding;
     let left = at.x.min(f64::from(image.width()) - tag_width).max(0.0);
     let top = (at.y - tag_height).min(f64::from(image.height()) - tag_height).max(0.0);
 
     let p = Point2::new;
     let (right, bottom) = (left + tag_width, top + tag_height);
     let corners = [p(left, top), p(right, top), p(right, bottom), p(left, bottom)];
-    if let Some(mut layer) = Layer::around(image, corners, 0.0) {
-        layer.add_convex(&corners);
-        layer.paint(image, color, 1.0);
+    if let Some(tag) = inside_of(image, &corners) {
+        fill(image, tag, FillRule::Winding, color, 1.0);
     }
     let ink = if color.lightness() > 0.45 { Color([16, 18, 22]) } else { Color([255, 255, 255]) };
-    let polylines: Vec<Vec<Point2<f64>>> = text_polylines(text)
-        .into_iter()
-        .map(|line| line.into_iter().map(|q| p(left + padding + q.x * unit, top + padding + q.y * unit)).collect())
-        .collect();
-    stroke(image, &polylines, &Pen::new(ink).width((0.15 * height_px).max(1.1)).without_halo());
+    if let Some(letters) = text_path(text, left + padding, top + padding + height_px, height_px) {
+        fill(image, letters, FillRule::Winding, ink, 1.0);
+    }
 }
 
 #[cfg(test)]

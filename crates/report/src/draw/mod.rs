@@ -7,8 +7,8 @@
 mod contact_sheet;
 mod font;
 mod label;
-mod layer;
 mod marks;
+mod paint;
 mod shapes;
 
 pub use contact_sheet::contact_sheet;

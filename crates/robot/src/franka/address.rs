@@ -3,6 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
+use sdg_fci::FciError;
+
+use crate::error::RobotError;
+
 /// Ports of arm and hand unless another is set.
 const ROBOT_PORT: u16 = 1337;
 
@@ -15,6 +19,13 @@ pub struct RobotAddress {
     pub port: u16,
     /// TCP port of the hand.
     pub hand_port: u16,
+}
+
+impl RobotAddress {
+    /// The connection to a device at this address, such as `robot` or `hand`, is lost.
+    pub(super) fn lost(&self, device: &str, error: &FciError) -> RobotError {
+        RobotError::Lost { peer: format!("the {device} at {self}"), why: error.to_string() }
+    }
 }
 
 impl FromStr for RobotAddress {

@@ -4,8 +4,8 @@ use std::thread::JoinHandle;
 
 use sdg_fci::client::{Hand, HandStopHandle};
 
-use super::{RobotAddress, lost};
-use crate::arm::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH_M};
+use super::address::RobotAddress;
+use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH_M};
 use crate::error::{Result, RobotError};
 
 /// A hand that stands still, or moves in a thread.
@@ -52,7 +52,7 @@ impl HandWorker {
 
     pub(super) fn state(&mut self, address: &RobotAddress) -> Result<HandState> {
         self.finish()?;
-        let state = self.hand.as_mut().ok_or_else(gone)?.read_state().map_err(|error| lost("hand", address, &error))?;
+        let state = self.hand.as_mut().ok_or_else(gone)?.read_state().map_err(|error| address.lost("hand", &error))?;
         Ok(HandState { opening_m: state.width, is_grasping: state.is_grasped, force_n: None })
     }
 

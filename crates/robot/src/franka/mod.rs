@@ -18,7 +18,8 @@ use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
 use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status};
 use sdg_kinematics::JointVector;
 
-use crate::arm::{Arm, ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
+use crate::arm::Arm;
+use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
 use crate::playback::Playback;
 use crate::safety::CheckedMotion;
@@ -60,9 +61,9 @@ impl FrankaArm {
             check_real_time()?;
         }
         let config = RobotConfig { port: address.port, timeout: TIMEOUT, ..RobotConfig::default() };
-        let robot = Robot::connect(&address.host, &config).map_err(|error| lost("robot", address, &error))?;
+        let robot = Robot::connect(&address.host, &config).map_err(|error| address.lost("robot", &error))?;
         let config = HandConfig { port: address.hand_port, timeout: TIMEOUT };
-        let hand = Hand::connect(&address.host, &config).map_err(|error| lost("hand", address, &error))?;
+        let hand = Hand::connect(&address.host, &config).map_err(|error| address.lost("hand", &error))?;
         let hand = HandWorker::new(hand);
         Ok(Self { robot, hand, address: address.clone(), scheduling, sensitivity: None })
     }
@@ -83,7 +84,7 @@ impl FrankaArm {
                 100.0 * success_rate
             )),
             FciError::Closed { .. } | FciError::Timeout { .. } | FciError::Socket { .. } | FciError::Wire { .. } => {
-                lost("robot", &self.address, &error)
+                self.address.lost("robot", &error)
             }
             other => RobotError::Device(Box::new(other)),
         }
@@ -226,8 +227,4 @@ fn arm_state(state: &RobotState) -> ArmState {
             RobotMode::UserStopped | RobotMode::Other => ArmMode::UserStopped,
         },
     }
-}
-
-fn lost(what: &str, address: &RobotAddress, error: &FciError) -> RobotError {
-    RobotError::Lost { peer: format!("the {what} at {address}"), why: error.to_string() }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Vector3, Vector6};
 use sdg_kinematics::{ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Panda, Trajectory};
 
-use crate::arm::PERIOD_SECS;
+use crate::arm_state::PERIOD_SECS;
 use crate::safety::capsules::LinkCapsules;
 use crate::safety::violation::Violation;
 

@@ -3,13 +3,14 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
 
-use crate::arm::Load;
+use crate::arm_state::Load;
 use crate::error::{Result, RobotError};
 use crate::pace::Pace;
 
 /// Middle of the first look on the table unless another is set, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
-/// Height of a wrist camera above the table at the first look unless another is set, m.
+/// Height of a wrist camera above the table at every look unless another is set, m: that of the shipped demonstrations, so that
+/// a part has the same size in all pictures.
 pub const LOOK_HEIGHT_M: f64 = 0.58;
 
 /// Where the arm goes to look out for the part.
@@ -45,7 +46,7 @@ pub enum CameraMount {
 pub struct GraspConfig {
     /// Where the arm looks out from, one after the other, until the part is found. The first must be within reach.
     pub look_outs: Vec<LookOut>,
-    /// Height of the wrist camera above the table at the second look, m: best that of the demonstration.
+    /// Height of the wrist camera above the table at the second look, m: best that of the demonstration's photo.
     pub hover_height_m: f64,
     /// Force of each finger when closed, N.
     pub grasp_force_n: f64,
@@ -75,7 +76,7 @@ impl Default for GraspConfig {
         });
         Self {
             look_outs: look_outs.to_vec(),
-            hover_height_m: 0.50,
+            hover_height_m: LOOK_HEIGHT_M,
             grasp_force_n: 40.0,
             opening_margin_m: 0.045,
             lift_m: 0.45,

@@ -4,7 +4,8 @@ use sdg_kinematics::LineOptions;
 
 use super::reach::above;
 use super::{Sequence, Steps, Stop, fails_at};
-use crate::arm::{Arm, HandCommand, HandState, MIN_HELD_WIDTH_M};
+use crate::arm::Arm;
+use crate::arm_state::{HandCommand, HandState, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
 use crate::perception::{GraspStep, GraspTarget};
 

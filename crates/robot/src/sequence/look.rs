@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, JointVector, with_fingers_exchanged};
 
 use super::{FREE_CLEARANCE_M, SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down, fails_at};
-use crate::arm::{Arm, ContactSensitivity};
+use crate::arm::Arm;
+use crate::arm_state::ContactSensitivity;
 use crate::perception::{GraspStep, GraspTarget};
 
 /// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.

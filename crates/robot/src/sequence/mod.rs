@@ -16,7 +16,8 @@ use std::time::Instant;
 
 use sdg_kinematics::Trajectory;
 
-use crate::arm::{Arm, HandState};
+use crate::arm::Arm;
+use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;

@@ -4,7 +4,8 @@ use nalgebra::{Isometry3, Translation3};
 use sdg_kinematics::{Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, LineOptions};
 
 use super::{Sequence, Steps, Stop, fails_at};
-use crate::arm::{Arm, ContactSensitivity, HandCommand};
+use crate::arm::Arm;
+use crate::arm_state::{ContactSensitivity, HandCommand};
 use crate::perception::{GraspStep, GraspTarget};
 
 /// Least distance of the finger tips to the table when closing, m.

@@ -5,7 +5,8 @@ use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{Mounting, RobotModel, Workcell, WorkcellError};
+use super::error::WorkcellError;
+use super::{Mounting, RobotModel, Workcell};
 use crate::franka::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
@@ -140,7 +141,17 @@ impl Source<'_> {
     }
 }
 
-pub(super) fn read(text: &str) -> Result<Workcell, WorkcellError> {
+impl Workcell {
+    /// Reads a workcell's file.
+    ///
+    /// # Errors
+    /// [`WorkcellError`] with the line, what was expected and what was found.
+    pub fn from_toml(text: &str) -> Result<Self, WorkcellError> {
+        read(text)
+    }
+}
+
+fn read(text: &str) -> Result<Workcell, WorkcellError> {
     let source = Source(text);
     let file: File = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);

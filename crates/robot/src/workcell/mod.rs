@@ -98,14 +98,6 @@ pub struct Workcell {
 }
 
 impl Workcell {
-    /// Reads a workcell's file.
-    ///
-    /// # Errors
-    /// [`WorkcellError`] with the line, what was expected and what was found.
-    pub fn from_toml(text: &str) -> Result<Self, WorkcellError> {
-        file::read(text)
-    }
-
     /// What every motion in this workcell keeps to.
     pub fn safety_limits(&self) -> SafetyLimits {
         SafetyLimits {
@@ -118,9 +110,10 @@ impl Workcell {
 
     /// The sequence in this workcell, at the pace of rehearsals; the part hangs at the tcp.
     pub fn grasp_config(&self) -> GraspConfig {
-        let load = self
-            .part_mass_kg
-            .map(|mass_kg| crate::arm::Load { mass_kg, center_in_flange_m: [0.0, 0.0, sdg_kinematics::TCP_OFFSET_M] });
+        let load = self.part_mass_kg.map(|mass_kg| crate::arm_state::Load {
+            mass_kg,
+            center_in_flange_m: [0.0, 0.0, sdg_kinematics::TCP_OFFSET_M],
+        });
         GraspConfig {
             look_outs: self.look_outs.clone(),
             grasp_force_n: self.grasp_force_n,

@@ -4,6 +4,8 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::pixel_cell::PixelCell;
+
 /// Rows and columns of what the network sees.
 pub const SIDE: usize = 64;
 /// Values of a pixel: the photo's colour, the picture's, whether it lies in the outline, whether it lies in the picture.
@@ -125,22 +127,9 @@ fn exposed(color: &Option<[f32; 3]>, gain: f32) -> [f32; 3] {
     color.map_or([0.0; 3], |color| color.map(|value| ((value + DARK) * gain).min(MAX)))
 }
 
-/// The colour at a point between pixel centres, by bilinear interpolation; `None` outside the image.
+/// The colour at a point, by bilinear interpolation; `None` outside the image.
 fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f32; 3]> {
-    let (x, y) = (point.x - 0.5, point.y - 0.5);
-    let (left, top) = (x.floor(), y.floor());
-    let [width, height] = [image.width(), image.height()];
-    if !(left >= 0.0 && top >= 0.0 && left + 1.0 < f64::from(width) && top + 1.0 < f64::from(height)) {
-        return None;
-    }
-    let (along, below) = ((x - left) as f32, (y - top) as f32);
-    let at = 3 * (top as usize * width as usize + left as usize);
-    let raw = image.as_raw();
-    let (upper, lower) = (&raw[at..][..6], &raw[at + 3 * width as usize..][..6]);
-    Some(std::array::from_fn(|c| {
-        let row = |row: &[u8]| (1.0 - along) * f32::from(row[c]) + along * f32::from(row[c + 3]);
-        (1.0 - below) * row(upper) + below * row(lower)
-    }))
+    PixelCell::at(image, point).map(|cell| cell.color_f32())
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
+use crate::capture_range::CaptureRange;
 use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
@@ -30,7 +31,6 @@ use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::parallel;
 use crate::pose::Pose;
-use crate::refinement::CaptureRange;
 use crate::search::bank::Bank;
 use crate::search::responses::{PITCH, Responses};
 use crate::search::sweep::{Start, sweep};
@@ -40,6 +40,7 @@ use crate::template::ShapeTemplate;
 
 /// What is looked for, and what is reported.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SearchConfig {
     /// Scales looked for: 1 is the demonstration's own size. A narrow range around 1, where the camera's height is
     /// known, is faster and mistakes less. The default was chosen by hand.
@@ -66,16 +67,21 @@ impl SearchConfig {
     pub const DEFAULT_MAX_STARTS: usize = 1024;
 }
 
+impl SearchConfig {
+    /// The values of [`Default`], as a constant.
+    pub const DEFAULT: Self = Self {
+        scales: 0.75..=1.3,
+        min_agreement: 0.5,
+        max_matches: 16,
+        num_points: Self::DEFAULT_NUM_POINTS,
+        max_starts: Self::DEFAULT_MAX_STARTS,
+        shape: ShapeConfig::DEFAULT,
+    };
+}
+
 impl Default for SearchConfig {
     fn default() -> Self {
-        Self {
-            scales: 0.75..=1.3,
-            min_agreement: 0.5,
-            max_matches: 16,
-            num_points: Self::DEFAULT_NUM_POINTS,
-            max_starts: Self::DEFAULT_MAX_STARTS,
-            shape: ShapeConfig::default(),
-        }
+        Self::DEFAULT
     }
 }
 

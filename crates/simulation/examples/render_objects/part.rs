@@ -203,5 +203,5 @@ fn round(value: f64) -> f64 {
 /// The convex hull of a part seen from above, counter-clockwise.
 fn hull(part: &Part) -> Vec<Point2<f64>> {
     let points = part.pieces.iter().flat_map(|piece| piece.mesh.vertices.iter().map(|vertex| vertex.position.xy()));
-    sdg_simulation::scene::footprint::convex_hull(points)
+    sdg_geometry::convex_hull(points)
 }

@@ -6,7 +6,7 @@
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_geometry::RotationalSymmetry;
+use sdg_geometry::{RotationalSymmetry, convex_hull};
 
 use super::ObjectSpec;
 use super::features::{Bounds, Pieces};
@@ -15,7 +15,6 @@ use super::look_alike::rounded;
 use super::mjcf_tags::{Tag, map_tags};
 use super::shape::{VisualMesh, triangles};
 use crate::error::Result;
-use crate::scene::footprint::convex_hull;
 
 /// How far a feature moves, as a share of the part's box diagonal.
 const MOVES: std::ops::Range<f64> = 0.05..0.10;

@@ -5,8 +5,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use sdg_geometry::convex_hull;
 
-use super::footprint::{convex_hull, placed};
+use super::footprint::placed;
 use super::fragment::{MjcfFragment, pose_attributes};
 use super::mesh::TriangleMesh;
 use super::solids::{

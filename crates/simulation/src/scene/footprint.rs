@@ -2,31 +2,6 @@
 
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// The convex hull of points, counter-clockwise, without points on its edges (Andrew's monotone chain).
-pub fn convex_hull(points: impl IntoIterator<Item = Point2<f64>>) -> Vec<Point2<f64>> {
-    let mut points: Vec<Point2<f64>> = points.into_iter().collect();
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let turns_left = |a: Point2<f64>, b: Point2<f64>, c: Point2<f64>| (b - a).perp(&(c - a)) > 1e-12;
-    let half = |points: &mut dyn Iterator<Item = Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for point in points {
-            while chain.len() >= 2 && !turns_left(chain[chain.len() - 2], chain[chain.len() - 1], point) {
-                chain.pop();
-            }
-            chain.push(point);
-        }
-        chain.pop();
-        chain
-    };
-    let mut hull = half(&mut points.iter().copied());
-    hull.extend(half(&mut points.iter().rev().copied()));
-    hull
-}
-
 /// Moves an outline to its place on the table.
 pub fn placed(outline: &[Point2<f64>], table_from_outline: &Isometry2<f64>) -> Vec<Point2<f64>> {
     outline.iter().map(|point| table_from_outline * point).collect()
@@ -58,17 +33,13 @@ pub fn separation(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use sdg_geometry::convex_hull;
 
     fn square(x: f64, y: f64) -> Vec<Point2<f64>> {
         convex_hull(
             [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.5, 0.5), (0.5, 0.0)]
                 .map(|(u, v)| Point2::new(x + u, y + v)),
         )
-    }
-
-    #[test]
-    fn hull_keeps_the_corners_only() {
-        assert_eq!(square(0.0, 0.0), [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| Point2::new(x, y)));
     }
 
     #[test]

@@ -21,8 +21,7 @@ use crate::lens::Frustum;
 use crate::objects::{LookAlikeKind, ObjectSpec};
 use crate::panda::PandaIds;
 use crate::render::{RenderConfig, Renderer};
-use crate::workcell::WorkcellConfig;
-use crate::workcell_model::build_model;
+use crate::workcell::{WorkcellConfig, build_model};
 
 /// A camera model and where it may hang.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,6 +3,8 @@
 use std::ops::Range;
 use std::str::FromStr;
 
+use sdg_robot::LOOK_HEIGHT_M;
+
 use crate::error::{Result, SimulationError};
 use crate::objects::{LookAlikeKind, ObjectSpec};
 
@@ -56,7 +58,7 @@ impl TableCameraConfig {
             hidden_secs: None,
             covered_secs: None,
             noise: 2.0,
-            height_m: 0.58,
+            height_m: LOOK_HEIGHT_M,
             tilt_rad: 0.0,
         }
     }

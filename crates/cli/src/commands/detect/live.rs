@@ -150,7 +150,8 @@ impl Finder {
         let tracker = match args.every_frame || args.no_verify {
             true => None,
             false => {
-                let config = TrackerConfig { max_parts: args.max as usize, ..TrackerConfig::DEFAULT };
+                let mut config = TrackerConfig::DEFAULT;
+                config.max_parts = args.max as usize;
                 Some(LiveTracker::new(detector.to_part_detector(), config, SearchTime::AsItTakes)?)
             }
         };

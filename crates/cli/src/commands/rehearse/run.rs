@@ -14,7 +14,7 @@ use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
-use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed};
+use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, step_name};
 use crate::run_page::{self, RunPage};
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
@@ -62,7 +62,7 @@ pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) ->
     let outcome = if attempt.success {
         "grasped and held".to_owned()
     } else {
-        format!("failed at {}: {}", attempt.step.name(), attempt.why)
+        format!("failed at {}: {}", step_name(attempt), attempt.why)
     };
     eprintln!("attempt {} of {of}: {outcome}{error} ({:.1} s)", attempt.number, attempt.duration_secs);
     if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

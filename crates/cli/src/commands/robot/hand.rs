@@ -5,7 +5,7 @@ use clap::Args;
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load, Watch};
 
-use super::ArmArgs;
+use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 
 /// Speed of the fingers against each other, m/s.

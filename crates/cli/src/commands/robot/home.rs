@@ -7,7 +7,7 @@ use clap::Args;
 use sdg_kinematics::ready_pose;
 use sdg_robot::{DEFAULT_SPEED, FrankaArm, Robot};
 
-use super::ArmArgs;
+use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::robots::{self, Consent, confirm, write_states};

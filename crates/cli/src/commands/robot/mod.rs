@@ -1,17 +1,18 @@
 //! `sdg robot`: a real arm by hand. Each verb's arguments stand beside what it does.
 
+mod arm_args;
 mod hand;
 mod home;
 mod state;
 
-use std::path::PathBuf;
-
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use sdg_robot::{Arm, FrankaArm, RobotAddress, Scheduling};
+use sdg_robot::Arm;
 
-use crate::exit::{Outcome, Usage};
-use crate::robots::{self, Consent, RobotChoice, confirm};
+use arm_args::ArmArgs;
+
+use crate::exit::Outcome;
+use crate::robots::{Consent, confirm};
 
 /// The verbs of `sdg robot`.
 #[derive(Debug, Subcommand)]
@@ -26,41 +27,6 @@ pub enum RobotCommand {
     Open(hand::OpenArgs),
     /// Closes the hand on what is between its fingers
     Close(hand::CloseArgs),
-}
-
-/// Which arm.
-#[derive(Debug, Args)]
-pub struct ArmArgs {
-    /// HOST or HOST:PORT; without it, the address in the workcell's file
-    #[arg(long, value_name = "ADDRESS")]
-    pub robot: Option<RobotChoice>,
-    /// The workcell's file
-    #[arg(long, value_name = "FILE")]
-    pub workcell: Option<PathBuf>,
-}
-
-impl ArmArgs {
-    fn address(&self) -> Result<RobotAddress> {
-        let of_workcell = match &self.workcell {
-            Some(path) => robots::read_workcell(path)?.0.address,
-            None => None,
-        };
-        match RobotChoice::named(self.robot.as_ref(), of_workcell.as_deref())? {
-            RobotChoice::Network(address) => Ok(address),
-            RobotChoice::Sim => Err(Usage(
-                "--robot: expected the address of an arm; a simulated one lives only as long as sdg grasp, or as sdg \
-                 simulate --fci, whose address is 127.0.0.1"
-                    .to_owned(),
-            )
-            .into()),
-        }
-    }
-
-    /// Connects; what is asked of the arm without a control loop needs no real time.
-    fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
-        let address = self.address()?;
-        Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))
-    }
 }
 
 /// `sdg robot recover`

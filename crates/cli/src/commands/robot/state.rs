@@ -7,7 +7,7 @@ use sdg_kinematics::Panda;
 use sdg_robot::Arm;
 use serde_json::{Value, json};
 
-use super::ArmArgs;
+use super::arm_args::ArmArgs;
 use crate::exit::Outcome;
 
 /// `sdg robot state`

@@ -24,6 +24,7 @@ mod tables;
 mod told;
 mod units;
 mod way;
+mod work;
 
 pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
 pub use jitter::{MARKS_JITTER_PX, with_jittered_marks};
@@ -37,6 +38,7 @@ pub use summary::{
     AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
 };
 pub use tables::{markdown, tables};
-pub(super) use units::draw;
-pub use units::{AxesEvaluation, GRASPING_MODELS, RunEnd};
+pub use units::{AxesEvaluation, GRASPING_MODELS};
 pub use way::Way;
+pub use work::RunEnd;
+pub(super) use work::draw;

@@ -15,7 +15,8 @@ use super::way::Way;
 use crate::evaluation::cell::{Cell, Marks};
 use crate::evaluation::groups::PartGroup;
 use crate::evaluation::records::{AttemptRecord, TeachingRecord};
-use crate::statistics::{Share, percentile, wilson_interval};
+use crate::statistics::{Share, wilson_interval};
+use sdg_geometry::percentile;
 
 /// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
 #[derive(Debug, Clone, PartialEq, Serialize)]

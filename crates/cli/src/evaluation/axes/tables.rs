@@ -1,7 +1,7 @@
 //! What was measured along each axis and under each error, as tables: the paper's parts, and apart from them the others.
 
 use sdg_grasp::ModelKind;
-use sdg_report::{Cell, Column, Step, Table, Tone};
+use sdg_report::{Cell, Column, Table, Tone};
 
 use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, lowest};
 use super::told::told_from_truth;
@@ -267,10 +267,7 @@ fn grasps(group: &GroupSummary) -> (String, String, Table) {
 }
 
 fn failures(group: &GroupSummary) -> (String, String, Table) {
-    let steps: Vec<&str> = std::iter::once(AttemptRecord::TEACH)
-        .chain(Step::ALL.map(Step::name))
-        .chain([AttemptRecord::SIMULATION])
-        .collect();
+    let steps: Vec<&str> = AttemptRecord::steps().collect();
     let mut columns = vec![Column::text("error"), Column::text("model"), Column::text("failed")];
     columns.extend(steps.iter().map(|step| Column::number(*step)));
     let mut table = Table::new(columns);

@@ -8,7 +8,8 @@ use super::records::{CameraPicture, MetricAnswer};
 use super::sets::PictureSet;
 use super::units::CamerasEvaluation;
 use crate::evaluation::cell::Cell;
-use crate::statistics::{Share, percentile};
+use crate::statistics::Share;
+use sdg_geometry::percentile;
 
 /// Parts whose marks lie higher over the table than this show walls to a camera beside them, in metres.
 pub(super) const HIGH_M: f64 = 0.010;

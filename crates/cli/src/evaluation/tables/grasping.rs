@@ -1,6 +1,6 @@
 //! Attempts: how many held, and where the others ended.
 
-use sdg_report::{Cell, Column, Step, Table, Tone};
+use sdg_report::{Cell, Column, Table, Tone};
 
 use super::titled::{Titled, number, share, ways};
 use crate::evaluation::paper;
@@ -82,10 +82,7 @@ pub(super) fn by_part(summary: &Summary) -> Titled {
 
 /// Where attempts ended that failed.
 pub(super) fn failures(summary: &Summary) -> Titled {
-    let steps: Vec<&str> = std::iter::once(AttemptRecord::TEACH)
-        .chain(Step::ALL.map(Step::name))
-        .chain([AttemptRecord::SIMULATION])
-        .collect();
+    let steps: Vec<&str> = AttemptRecord::steps().collect();
     let mut columns = vec![Column::text("model"), Column::text("failed")];
     columns.extend(steps.iter().map(|step| Column::number(*step)));
     let mut table = Table::new(columns);

@@ -1,13 +1,14 @@
-//! The robot at its table: one scene, its state, its cameras, and motion through time.
+//! The robot at its table: one scene, its state, and motion through time.
 
-use image::RgbImage;
+mod config;
+mod model;
+mod pictures;
+
 use nalgebra::Isometry3;
-use sdg_geometry::{PinholeCamera, PosedCamera};
-use sdg_kinematics::{IkOptions, Panda, ready_pose};
+use sdg_kinematics::{Panda, ready_pose};
 use sdg_robot::{HandCommand, PERIOD_SECS};
 
-use crate::attempt_errors::AttemptErrors;
-use crate::camera::{CameraView, posed_camera};
+use crate::camera::posed_camera;
 use crate::controller::{ArmController, ArmReference};
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
@@ -16,38 +17,12 @@ use crate::gripper::Gripper;
 use crate::lens::Frustum;
 use crate::model::{Body, Camera, Id, Joint};
 use crate::panda::PandaIds;
-use crate::record::{RecordConfig, Recorder};
-use crate::render::{RenderConfig, Renderer, Segmentation};
-use crate::scene::SceneVariation;
-use crate::workcell_model::{CAMERA_IN_BASE, CameraPlace, build_model};
+use crate::record::Recorder;
+use crate::render::Renderer;
 
-/// What a workcell is made of.
-#[derive(Debug, Clone)]
-pub struct WorkcellConfig {
-    /// Part, light, table and distractors.
-    pub scene: SceneVariation,
-    /// How the wrist camera's pictures are drawn.
-    pub wrist_render: RenderConfig,
-    /// What is wrong in attempts.
-    pub errors: AttemptErrors,
-    /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
-    pub wrist_camera: Option<PinholeCamera>,
-    /// Where the camera is, if not in its usual place on the hand.
-    pub camera_place: Option<CameraPlace>,
-}
-
-impl WorkcellConfig {
-    /// A scene with the wrist camera's usual pictures, without errors.
-    pub fn new(scene: SceneVariation) -> Self {
-        Self {
-            scene,
-            wrist_render: RenderConfig::default(),
-            errors: AttemptErrors::default(),
-            wrist_camera: None,
-            camera_place: None,
-        }
-    }
-}
+pub use config::{CameraPlace, WorkcellConfig};
+use model::CAMERA_IN_BASE;
+pub(crate) use model::build_model;
 
 /// The part to grasp, as MuJoCo knows it.
 #[derive(Debug, Clone, Copy)]
@@ -231,94 +206,6 @@ impl Workcell {
     /// The tool centre point's pose for the wrist camera to be at a pose (optical frame).
     pub fn base_from_tcp_for_camera(&self, base_from_camera: &Isometry3<f64>) -> Isometry3<f64> {
         base_from_camera * self.tcp_from_camera.inverse()
-    }
-
-    /// What the wrist camera sees now.
-    ///
-    /// # Errors
-    /// As [`Renderer::image`].
-    pub fn wrist_view(&mut self) -> Result<CameraView> {
-        // A step leaves positions one period behind the joints.
-        self.data.forward()?;
-        let drawn = CameraView::capture(&mut self.wrist_renderer, &mut self.data, self.camera)?;
-        match self.config.wrist_camera {
-            None => Ok(drawn),
-            Some(intrinsics) => Ok(CameraView {
-                image: Frustum::around(&intrinsics)?.resample(&drawn.image, &intrinsics),
-                camera: PosedCamera { intrinsics, ..drawn.camera },
-            }),
-        }
-    }
-
-    /// Which geom each pixel of the wrist camera's picture shows now.
-    ///
-    /// # Errors
-    /// As [`Renderer::segmentation`].
-    pub fn wrist_segmentation(&mut self) -> Result<Segmentation> {
-        self.wrist_renderer.segmentation(&mut self.data, self.camera)
-    }
-
-    /// Puts the arm, without moving through time, where its wrist camera is at a pose, and takes a
-    /// picture: for demonstrations and test images.
-    ///
-    /// # Errors
-    /// [`SimulationError::Configuration`] for a pose that the arm cannot reach.
-    pub fn view_from(&mut self, base_from_camera: &Isometry3<f64>) -> Result<CameraView> {
-        self.reach_camera_pose(base_from_camera)?;
-        self.wrist_view()
-    }
-
-    /// As [`Workcell::view_from`], without the picture.
-    pub(crate) fn reach_camera_pose(&mut self, base_from_camera: &Isometry3<f64>) -> Result<()> {
-        let base_from_tcp = self.base_from_tcp_for_camera(base_from_camera);
-        let solution = self.panda.inverse(&base_from_tcp, &ready_pose(), &IkOptions::default()).map_err(|error| {
-            SimulationError::Configuration {
-                field: "base_from_camera",
-                expected: "a pose within the arm's reach".into(),
-                found: error.to_string(),
-            }
-        })?;
-        self.panda_ids.set_position(&mut self.data, &solution.q);
-        self.reference = ArmReference::at_rest(solution.q);
-        self.data.forward()
-    }
-
-    /// A picture of the whole workcell from outside with the arm somewhere else, fingers at an opening (m): for plans.
-    ///
-    /// # Errors
-    /// As [`Workcell::scene_image`].
-    pub fn scene_image_at(
-        &mut self,
-        renderer: &mut Renderer,
-        q: &sdg_kinematics::JointVector,
-        opening_m: f64,
-    ) -> Result<RgbImage> {
-        self.panda_ids.set_position(&mut self.data, q);
-        self.panda_ids.set_finger_position_m(&mut self.data, 0.5 * opening_m);
-        self.data.forward()?;
-        renderer.image(&mut self.data, self.scene_camera)
-    }
-
-    /// A picture of the whole workcell from outside.
-    ///
-    /// # Errors
-    /// As [`Renderer::new`] and [`Renderer::image`].
-    pub fn scene_image(&mut self, config: RenderConfig) -> Result<RgbImage> {
-        Renderer::new(self.data.model(), config)?.image(&mut self.data, self.scene_camera)
-    }
-
-    /// Takes pictures from outside from now on, while time passes.
-    ///
-    /// # Errors
-    /// As [`Renderer::new`].
-    pub fn start_recording(&mut self, config: &RecordConfig) -> Result<()> {
-        self.recorder = Some(Recorder::new(self.data.model(), self.scene_camera, config)?);
-        Ok(())
-    }
-
-    /// Ends the recording and hands out its pictures.
-    pub fn stop_recording(&mut self) -> Vec<RgbImage> {
-        self.recorder.take().map(Recorder::into_frames).unwrap_or_default()
     }
 
     /// Lets one control period pass, the arm following the reference.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use sdg_kinematics::HAND_TURN_RAD;
 
 use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_field_of_view_rad};
@@ -11,19 +11,11 @@ use crate::lens::Frustum;
 use crate::model::Model;
 use crate::panda::{PANDA_FILE, changed_panda_asset};
 use crate::scene::pose_attributes;
-use crate::workcell::WorkcellConfig;
+
+use super::config::{CameraPlace, WorkcellConfig};
 
 /// Name of a camera beside the robot.
 pub(crate) const CAMERA_IN_BASE: &str = "beside";
-
-/// Where a workcell's camera is (optical frame), m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraPlace {
-    /// On the robot's flange.
-    OnFlange(Isometry3<f64>),
-    /// Beside the robot, in its base frame.
-    InBase(Isometry3<f64>),
-}
 
 /// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
@@ -47,7 +39,7 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
                 format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
         }
     }
-    let xml = include_str!("../assets/workcell.xml")
+    let xml = include_str!("../../assets/workcell.xml")
         .replace("PANDA_FILE", PANDA_FILE)
         .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
     let mut assets = fragment.files;

@@ -1,0 +1,45 @@
+//! The arguments that name an arm, which all verbs of `sdg robot` take.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
+
+use crate::exit::Usage;
+use crate::robots::{self, RobotChoice};
+
+/// Which arm.
+#[derive(Debug, Args)]
+pub struct ArmArgs {
+    /// HOST or HOST:PORT; without it, the address in the workcell's file
+    #[arg(long, value_name = "ADDRESS")]
+    pub robot: Option<RobotChoice>,
+    /// The workcell's file
+    #[arg(long, value_name = "FILE")]
+    pub workcell: Option<PathBuf>,
+}
+
+impl ArmArgs {
+    pub(super) fn address(&self) -> Result<RobotAddress> {
+        let of_workcell = match &self.workcell {
+            Some(path) => robots::read_workcell(path)?.0.address,
+            None => None,
+        };
+        match RobotChoice::named(self.robot.as_ref(), of_workcell.as_deref())? {
+            RobotChoice::Network(address) => Ok(address),
+            RobotChoice::Sim => Err(Usage(
+                "--robot: expected the address of an arm; a simulated one lives only as long as sdg grasp, or as sdg \
+                 simulate --fci, whose address is 127.0.0.1"
+                    .to_owned(),
+            )
+            .into()),
+        }
+    }
+
+    /// Connects; what is asked of the arm without a control loop needs no real time.
+    pub(super) fn connect(&self) -> Result<(FrankaArm, RobotAddress)> {
+        let address = self.address()?;
+        Ok((FrankaArm::connect(&address, Scheduling::Ordinary)?, address))
+    }
+}

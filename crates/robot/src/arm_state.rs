@@ -1,0 +1,124 @@
+//! What an arm and its hand tell of themselves, and what they are asked: plain values.
+
+use sdg_kinematics::JointVector;
+
+/// Time between two commands of an arm that is driven cycle by cycle, in seconds: 1 kHz.
+pub const PERIOD_SECS: f64 = 1e-3;
+
+/// What the arm's controller does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ArmMode {
+    /// It holds its place and takes commands.
+    Idle,
+    /// It follows a motion.
+    Moving,
+    /// A person moves it by hand.
+    Guiding,
+    /// It stopped by itself, after a contact or a command that it could not follow, and waits to be recovered.
+    Reflex,
+    /// The stop button is pressed, or the brakes are closed.
+    UserStopped,
+    /// It recovers from an error.
+    Recovering,
+}
+
+impl ArmMode {
+    /// The name in messages and in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::Moving => "moving",
+            Self::Guiding => "guiding",
+            Self::Reflex => "reflex",
+            Self::UserStopped => "user stopped",
+            Self::Recovering => "recovering",
+        }
+    }
+}
+
+/// What the arm says of itself at one instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArmState {
+    /// The arm's own clock, in seconds.
+    pub time_secs: f64,
+    /// Measured joint positions, rad.
+    pub q: JointVector,
+    /// Measured joint velocities, rad/s.
+    pub dq: JointVector,
+    /// Commanded joint positions, rad: the controller's reference.
+    pub q_commanded: JointVector,
+    /// Estimated torques that come from outside, Nm; zeros where the arm does not estimate them.
+    pub tau_external_nm: JointVector,
+    /// What the controller does.
+    pub mode: ArmMode,
+}
+
+/// What the hand says of itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandState {
+    /// Distance between the fingers, m.
+    pub opening_m: f64,
+    /// Whether the hand presses on something with the force that it was told, at a width that it was told to expect.
+    pub is_grasping: bool,
+    /// Force of each finger, N, where the hand tells it.
+    pub force_n: Option<f64>,
+}
+
+/// What a hand is asked to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum HandCommand {
+    /// Move to an opening.
+    Move {
+        /// Distance between the fingers, m.
+        opening_m: f64,
+        /// Speed at which that distance changes, m/s.
+        speed_m_s: f64,
+    },
+    /// Close until something resists.
+    Grasp {
+        /// The part's width between the fingers, m. Wider or thinner than [`GRASP_TOLERANCE_M`] is no grasp.
+        width_m: f64,
+        /// Speed at which the opening changes, m/s.
+        speed_m_s: f64,
+        /// Force of each finger, N.
+        force_n: f64,
+    },
+}
+
+/// How much thinner (first) or wider (second) a part may be than the hand was told, m. A width read from a picture is right to
+/// a few millimetres, and a round part is met beside its thickest place; what the fingers must not do is close on nothing.
+pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
+/// Fingers that are nearer together than this hold nothing, m.
+pub const MIN_HELD_WIDTH_M: f64 = 0.001;
+
+/// What the hand carries, for the controller's gravity compensation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Load {
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Centre of mass in the flange's frame, m.
+    pub center_in_flange_m: [f64; 3],
+}
+
+impl Load {
+    /// Nothing.
+    pub const NONE: Self = Self { mass_kg: 0.0, center_in_flange_m: [0.0; 3] };
+}
+
+/// At which contact the arm stops by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ContactSensitivity {
+    /// In free motion, where nothing may touch the arm: low thresholds.
+    Free,
+    /// Near and with the part, where the table and the part push back.
+    Contact,
+}
+
+/// How a motion ended that did not fail.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MotionEnd {
+    /// The arm is where the motion ends.
+    Arrived,
+    /// Something held the arm up; what touched it, in words.
+    Blocked(String),
+}

@@ -1,0 +1,57 @@
+//! Where a refinement may go, and the units in which it moves.
+
+use crate::gradient_field::GradientField;
+use crate::pose::Pose;
+use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
+
+/// Where a refinement may go: a box about the initial pose.
+pub(crate) struct CaptureRange {
+    pub(crate) start: Pose,
+    /// Largest change of x (px), y (px), angle (rad), ln scale.
+    pub(crate) limits: [f64; 4],
+}
+
+impl CaptureRange {
+    pub(crate) fn new(template: &ShapeTemplate, field: &GradientField, start: Pose) -> Self {
+        let config = &template.config;
+        let shift = config.capture_shift * field.width() as f64;
+        Self { start, limits: [shift, shift, config.capture_angle_rad, config.scale.max_log()] }
+    }
+
+    /// A box about `start` that reaches `limits` (px, px, rad, ln scale) to either side.
+    pub(crate) fn around(start: Pose, limits: [f64; 4]) -> Self {
+        Self { start, limits }
+    }
+
+    pub(crate) fn pose_at_cell(&self, cell: [i32; 4], counts: [i32; 4]) -> Pose {
+        let step = [0, 1, 2, 3].map(|k| self.limits[k] * f64::from(cell[k]) / f64::from(counts[k].max(1)));
+        self.start.moved(step)
+    }
+
+    fn difference(&self, pose: &Pose) -> [f64; 4] {
+        [
+            pose.center.x - self.start.center.x,
+            pose.center.y - self.start.center.y,
+            pose.angle_rad - self.start.angle_rad,
+            pose.log_scale - self.start.log_scale,
+        ]
+    }
+
+    /// Mean squared share of the limits that the pose uses, in `[0, 1]`.
+    pub(crate) fn distance(&self, pose: &Pose) -> f64 {
+        let difference = self.difference(pose);
+        (0..4).filter(|&k| self.limits[k] > 0.0).map(|k| (difference[k] / self.limits[k]).powi(2)).sum::<f64>() / 4.0
+    }
+
+    pub(crate) fn clamped(&self, pose: &Pose) -> Pose {
+        let difference = self.difference(pose);
+        self.start.moved([0, 1, 2, 3].map(|k| difference[k].clamp(-self.limits[k], self.limits[k])))
+    }
+}
+
+/// Changes of (x, y, angle, ln scale) that each move the edges by about one pixel of the image level.
+pub(crate) fn step_units(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose) -> [f64; 4] {
+    let pixel = matched.image_pixel_size;
+    let turn = pixel / (level.radius_px * pose.log_scale.exp()).max(1.0);
+    [pixel, pixel, turn, turn]
+}

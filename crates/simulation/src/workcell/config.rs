@@ -1,0 +1,45 @@
+//! What a workcell is made of.
+
+use nalgebra::Isometry3;
+use sdg_geometry::PinholeCamera;
+
+use crate::attempt_errors::AttemptErrors;
+use crate::render::RenderConfig;
+use crate::scene::SceneVariation;
+
+/// What a workcell is made of.
+#[derive(Debug, Clone)]
+pub struct WorkcellConfig {
+    /// Part, light, table and distractors.
+    pub scene: SceneVariation,
+    /// How the wrist camera's pictures are drawn.
+    pub wrist_render: RenderConfig,
+    /// What is wrong in attempts.
+    pub errors: AttemptErrors,
+    /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
+    pub wrist_camera: Option<PinholeCamera>,
+    /// Where the camera is, if not in the MJCF's place on the hand.
+    pub camera_place: Option<CameraPlace>,
+}
+
+impl WorkcellConfig {
+    /// A scene with the wrist camera's default pictures, without errors.
+    pub fn new(scene: SceneVariation) -> Self {
+        Self {
+            scene,
+            wrist_render: RenderConfig::default(),
+            errors: AttemptErrors::default(),
+            wrist_camera: None,
+            camera_place: None,
+        }
+    }
+}
+
+/// Where a workcell's camera is (optical frame), m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraPlace {
+    /// On the robot's flange.
+    OnFlange(Isometry3<f64>),
+    /// Beside the robot, in its base frame.
+    InBase(Isometry3<f64>),
+}
