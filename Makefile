@@ -82,9 +82,12 @@ BASE_WEIGHTS := target/base-weights
 base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on where it was stopped)
 	$(CARGO) build $(PROFILE) --locked --workspace --bin sdg-base-weights --features sdg-base-weights/$(DEVICE)
 	mkdir -p $(BASE_WEIGHTS)
-	target/release/sdg-base-weights pretrain --checkpoint $(BASE_WEIGHTS)/run.safetensors --device $(DEVICE)
-	target/release/sdg-base-weights export --checkpoint $(BASE_WEIGHTS)/run.safetensors \
-		--out $(BASE_WEIGHTS)/edge.safetensors --commit $$(git rev-parse --short HEAD)
+	target/release/sdg-base-weights pretrain --checkpoint $(BASE_WEIGHTS)/detector.safetensors --device $(DEVICE)
+	target/release/sdg-base-weights pretrain --network orientation --steps 3000 \
+		--checkpoint $(BASE_WEIGHTS)/orientation.safetensors --device $(DEVICE)
+	target/release/sdg-base-weights export --detector $(BASE_WEIGHTS)/detector.safetensors \
+		--orientation $(BASE_WEIGHTS)/orientation.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \
+		--commit $$(git rev-parse --short HEAD)
 
 bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
 	benches/peers/install.sh target/bench/venv

@@ -234,3 +234,140 @@ impl Descriptors {
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ResizeRule;
+    use crate::presets::edge;
+    use crate::roi_heads::heatmap::encode;
+    use crate::state_dict;
+    use burn::tensor::Device;
+    use image::{Rgb, RgbImage};
+    use sdg_geometry::BoundingBox;
+
+    const NUM_KEYPOINTS: usize = 3;
+
+    /// The edge preset, narrow and for small pictures.
+    fn detector() -> GeneralizedRcnn {
+        let mut config = edge(NUM_KEYPOINTS);
+        config.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 96 };
+        (config.backbone.stem_channels, config.backbone.res2_channels) = (8, 8);
+        config.backbone.num_blocks = [1, 1, 1, 1];
+        config.fpn.channels = 8;
+        config.roi_heads.box_head.fc_channels = 16;
+        if let Some(head) = &mut config.roi_heads.keypoint_head {
+            head.conv_channels = vec![12];
+        }
+        config.init(&Device::flex(), 4).unwrap()
+    }
+
+    fn imprint() -> Imprint {
+        let mut init = Initializer::new(&Device::flex(), 6);
+        let mut vector = |count| init.param([count], Distribution::Normal { std: 0.3 });
+        let class = ClassImprint {
+            mean: vector(16),
+            common: vector(16),
+            scale: vector(1),
+            norm_scale: vector(1),
+            bias: vector(1),
+        };
+        Imprint { class, keypoint: KeypointImprint { mean: vector(12), scale: vector(1) } }
+    }
+
+    /// Pictures of a bright patch, and one without.
+    fn views() -> (Vec<RgbImage>, Vec<Target>) {
+        let patch = |x0: u32, y0: u32| {
+            RgbImage::from_fn(96, 96, |x, y| {
+                let inside = (x0..x0 + 40).contains(&x) && (y0..y0 + 24).contains(&y);
+                Rgb([if inside { 150 + (x - x0) as u8 * 2 } else { 30 }, 60, if inside { 90 + y as u8 } else { 50 }])
+            })
+        };
+        let target = |x0: f64, y0: f64| Target {
+            boxes: vec![BoundingBox { x1: x0, y1: y0, x2: x0 + 40.0, y2: y0 + 24.0 }],
+            labels: vec![0],
+            keypoints: vec![
+                (0..NUM_KEYPOINTS).map(|k| Keypoint::visible([x0 + 8.0 + 11.0 * k as f64, y0 + 13.0].into())).collect(),
+            ],
+            masks: Vec::new(),
+        };
+        let none = Target { boxes: vec![], labels: vec![], keypoints: vec![], masks: vec![] };
+        (vec![patch(10, 20), RgbImage::new(96, 96), patch(44, 50)], vec![target(10.0, 20.0), none, target(44.0, 50.0)])
+    }
+
+    #[test]
+    fn the_layers_are_the_imprints_of_the_mean_view() {
+        let (detector, imprint) = (detector(), imprint());
+        let (pictures, targets) = views();
+        let images: Vec<TransformedImage> =
+            pictures.iter().map(|picture| detector.image_transform().apply(picture).unwrap()).collect();
+        let layers = imprint.last_layers(&detector, &images, &targets).unwrap();
+        let (imprinted, report) = state_dict::import(detector.clone(), &layers);
+        assert!(report.mismatched.is_empty() && report.unused.is_empty(), "{report:?}");
+
+        // The scores of the first view are those of the formula.
+        let padded = pad_batch(&images, 32);
+        let data = TensorData::new(padded.pixels, padded.dims);
+        let features = detector.backbone.forward(Tensor::from_data(data, &Device::flex()));
+        let rois = [(0, [10.0, 20.0, 50.0, 44.0]), (2, [44.0, 50.0, 84.0, 74.0])]
+            .map(|(image_idx, corners)| Roi { image_idx, corners });
+        let hidden = detector.roi_heads.box_head.forward(&features, &rois);
+        let scores = values(imprinted.roi_heads.box_predictor.cls_score.forward(hidden.clone()));
+        let (weights, biases) = imprint.class.classifier(hidden.clone().mean_dim(0));
+        let expected = values(hidden.matmul(weights.transpose()) + biases.unsqueeze());
+        for row in 0..2 {
+            assert!((scores[2 * row] - expected[row]).abs() < 1e-4, "{scores:?} {expected:?}");
+            assert_eq!(scores[2 * row + 1], 0.0);
+        }
+
+        // What the keypoint's kernel adds is the descriptor's product with the map, doubled: away from the border, where
+        // the transposed convolution sees zeros, as the interpolation has it.
+        let [head, own_head] = [&detector, &imprinted].map(|d| d.roi_heads.keypoint_head.as_ref().unwrap());
+        let maps = head.hidden(&features, &rois);
+        let added = own_head.score_lowres.forward(maps.clone()) - head.score_lowres.forward(maps.clone());
+        let flat: Tensor<3> = maps.reshape([2, 12, 14 * 14]);
+        let mut descriptors = vec![0f32; NUM_KEYPOINTS * 12];
+        let cells = values(flat.clone());
+        for (row, (roi, target)) in rois.iter().zip([&targets[0], &targets[2]]).enumerate() {
+            for (k, keypoint) in target.keypoints[0].iter().enumerate() {
+                for (cell, weight) in reading_weights(keypoint, &roi.corners, 14).unwrap() {
+                    for channel in 0..12 {
+                        descriptors[k * 12 + channel] += 0.5 * weight * cells[(row * 12 + channel) * 196 + cell];
+                    }
+                }
+            }
+        }
+        let descriptors = Tensor::<2>::from_data(TensorData::new(descriptors, [NUM_KEYPOINTS, 12]), &Device::flex());
+        let products = imprint.keypoint.weights(descriptors).unsqueeze::<3>().repeat_dim(0, 2).matmul(flat);
+        let doubled = crate::layers::upsample_bilinear_2x(products.reshape([2, NUM_KEYPOINTS, 14, 14]));
+        let (added, doubled) = (values(added), values(doubled));
+        for (idx, (one, other)) in added.iter().zip(&doubled).enumerate() {
+            let (y, x) = (idx / 28 % 28, idx % 28);
+            if (1..27).contains(&x) && (1..27).contains(&y) {
+                assert!((one - other).abs() < 1e-3 * (1.0 + other.abs()), "{idx}: {one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_view_there_are_no_layers() {
+        let detector = detector();
+        let (pictures, targets) = views();
+        let images = [detector.image_transform().apply(&pictures[1]).unwrap()];
+        assert!(imprint().last_layers(&detector, &images, &targets[1..2]).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_square_is_read_where_the_keypoint_lies() {
+        let corners = [10.0, 20.0, 24.0, 34.0];
+        let read = |x: f64, y: f64| reading_weights(&Keypoint::visible([x, y].into()), &corners, 14);
+        // The middle of a cell is that cell, between two cells both count.
+        assert_eq!(read(13.5, 20.5).unwrap()[0], (3, 1.0));
+        let [left, right, ..] = read(14.0, 20.5).unwrap();
+        assert_eq!((left, right), ((3, 0.5), (4, 0.5)));
+        let sum: f32 = read(23.9, 33.9).unwrap().iter().map(|(_, weight)| weight).sum();
+        assert!((sum - 1.0).abs() < 1e-6);
+        assert!(read(9.0, 25.0).is_none());
+        assert!(encode(&Keypoint::visible([9.0, 25.0].into()), &corners, 56).is_none());
+    }
+}

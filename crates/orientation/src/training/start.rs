@@ -77,3 +77,70 @@ impl OrientationStart {
         ]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::OrientationConfig;
+    use image::Rgb;
+    use sdg_geometry::Angle;
+
+    fn config() -> OrientationConfig {
+        OrientationConfig {
+            input_px: 32,
+            stage_channels: vec![8, 16],
+            stage_convs: vec![1, 1],
+            hidden: 32,
+            ..OrientationConfig::edge()
+        }
+    }
+
+    /// A bar from red to green at an angle.
+    fn crop(degrees: f64) -> LabelledCrop {
+        let angle = Angle::from_degrees(degrees);
+        let crop = RgbImage::from_fn(32, 32, |x, y| {
+            let (x, y) = (f64::from(x) - 15.5, f64::from(y) - 15.5);
+            let (sin, cos) = angle.radians().sin_cos();
+            let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+            Rgb(match (along.abs() < 13.0 && across.abs() < 4.0, along < 0.0) {
+                (true, true) => [230, 20, 20],
+                (true, false) => [20, 230, 20],
+                _ => [40, 40, 40],
+            })
+        });
+        LabelledCrop { crop, angle }
+    }
+
+    fn start() -> OrientationStart {
+        let mut parameters = state_dict::export(&config().init(&burn::tensor::Device::flex(), 3).unwrap());
+        parameters.retain(|name, _| !name.starts_with("classes."));
+        let mut init = Initializer::new(&burn::tensor::Device::flex(), 5);
+        OrientationStart { parameters, imprint: state_dict::export(&ClassImprint::init(32, &mut init)) }
+    }
+
+    #[test]
+    fn classes_of_crops_read_the_angle_before_anything_is_taught() {
+        // Even features that nobody taught differ from turn to turn.
+        let crops: Vec<LabelledCrop> = (0..240).map(|i| crop(1.5 * f64::from(i))).collect();
+        let fresh = config().init(&burn::tensor::Device::flex(), 9).unwrap();
+        let untaught = fresh.predict(&crops[10].crop).unwrap();
+        let network = start().apply(fresh, &crops).unwrap();
+        for degrees in [3.0, 50.0, 161.0, -100.0] {
+            let read = network.predict(&crop(degrees).crop).unwrap().angle;
+            let error = read.distance(Angle::from_degrees(degrees)).to_degrees();
+            assert!(error < 15.0, "{degrees}: {read:?}, untaught {untaught:?}");
+        }
+    }
+
+    #[test]
+    fn parameters_of_another_network_are_refused_by_name() {
+        let mut other = start();
+        other.parameters.remove("hidden.bias");
+        let fresh = config().init(&burn::tensor::Device::flex(), 9).unwrap();
+        let error = other.apply(fresh.clone(), &[crop(0.0)]).unwrap_err().to_string();
+        assert!(error.contains("hidden.bias"), "{error}");
+        let mut other = start();
+        other.imprint.clear();
+        assert!(other.apply(fresh, &[crop(0.0)]).unwrap_err().to_string().contains("imprint"));
+    }
+}
