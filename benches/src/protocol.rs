@@ -1,4 +1,4 @@
-//! The conversation between `compare` and those who work, a JSON object a line.
+//! The protocol between `compare` and its workers, a JSON object a line.
 //!
 //! ```text
 //! worker: {"ready": {"seconds": s, "facts": {…}, "gflop": g, "version": "…"}}   after one run that does not count

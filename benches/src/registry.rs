@@ -1,4 +1,4 @@
-//! Every work that is compared, with whom, and how much faster we mean to be.
+//! Every work that is compared, its peers, and the ratio aimed at.
 
 use crate::network::Network;
 

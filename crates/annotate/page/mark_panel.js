@@ -116,9 +116,9 @@ function fix(remedy) {
 
 function renderAdvice({ advice }) {
   const list = by("remarks");
-  const text = JSON.stringify(advice.remarks);
-  if (list.dataset.shown !== text) {
-    list.dataset.shown = text;
+  const remarks = JSON.stringify(advice.remarks);
+  if (list.dataset.shown !== remarks) {
+    list.dataset.shown = remarks;
     list.replaceChildren(...advice.remarks.map((remark) => {
       const item = document.createElement("li");
       item.dataset.code = remark.code;

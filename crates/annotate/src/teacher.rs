@@ -145,7 +145,7 @@ pub struct TaughtSummary {
 /// One grasp that a model found, in pixels of the image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FoundGrasp {
-    /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
+    /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
     /// Whether the part is there.
     pub is_accepted: bool,

@@ -85,7 +85,7 @@ impl TeachingPage<'_> {
             figures.push(figure.caption(format!("{there}; score {best:.2}")));
         }
         Ok(Section::new("Tried")
-            .lead("Samples that it was not taught on, with what the finished model says of them; 0.5 is the place to decide.")
+            .lead("Samples that it was not taught on, with what the finished model says of them; at least 0.5 is accepted.")
             .gallery(GallerySize::Medium, figures))
     }
 

@@ -51,7 +51,7 @@ pub enum Verification {
 /// One grasp found in an image; places in pixels of the image as given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspDetection {
-    /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
+    /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
     /// The network's own score, in `[0, 1]`; zero for what no network has seen (model S, what only the search found).
     pub network_score: f64,

@@ -8,7 +8,7 @@ use crate::{Contributions, TurnSource};
 /// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DetectionRecord {
-    /// Calibrated, in `[0, 1]`: 0.5 is the place to decide.
+    /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
     /// The network's own, in `[0, 1]`.
     pub network_score: f64,

@@ -1,4 +1,4 @@
-//! Random numbers by address: every part, photo and sample has a generator of its own.
+//! Random numbers by index: every part, photo and sample has a generator of its own.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;

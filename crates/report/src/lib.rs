@@ -1,4 +1,4 @@
-//! What a run has to show: pictures with marks on them, curves, tables and animations on one self-contained page.
+//! Reports of runs: pictures with marks on them, curves, tables and animations on one self-contained page.
 //!
 //! ```text
 //! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐

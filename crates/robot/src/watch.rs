@@ -1,4 +1,4 @@
-//! What is looked at in every state of a moving arm, and the states of the last second.
+//! The checks of every state of a moving arm, and the states of the last second.
 
 use std::collections::VecDeque;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! A perception that knows where the part is, to tell what the robot alone can do.
+//! Perception that gives the part's true pose, to measure the robot without a model.
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use sdg_robot::GraspTarget;

@@ -1,4 +1,4 @@
-//! How far a run is, in [0, 1], when steps, a time budget and an early stop all have a say.
+//! How far a run is, in [0, 1], from its steps, time budget and early stop.
 
 use crate::progress::Ending;
 

@@ -1,4 +1,4 @@
-//! How well a detector does on samples it was not trained on, in the units that a gripper cares about.
+//! How well a detector does on samples it was not trained on, in pixels of the demonstration and degrees.
 //!
 //! A pixel error says little when the training image is half the photo's size, so errors are given in pixels **of the
 //! demonstration**: there, millimetres a pixel are a constant of the camera's height.

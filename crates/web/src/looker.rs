@@ -1,4 +1,4 @@
-//! A model that looks at images: bytes in, JSON out.
+//! A model that detects in images: bytes in, JSON out.
 
 use image::RgbImage;
 use sdg_grasp::{

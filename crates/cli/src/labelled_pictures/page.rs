@@ -167,7 +167,7 @@ fn min_score_chart(evaluated: &Evaluated) -> Chart {
         }
     }
     chart.caption(
-        "To the left more is found and more is wrong. Scores are calibrated so that 0.5 is the place to decide.",
+        "To the left more is found and more is wrong. Scores are calibrated so that 0.5 separates right from wrong.",
     )
 }
 

@@ -1,4 +1,4 @@
-//! What a robot measures, held against its limits.
+//! A robot's measurements compared with its limits.
 
 use super::frames::shifted;
 use super::plant::{Observation, Plant};

@@ -1,4 +1,4 @@
-//! Boxes as a detector gives them: a little off.
+//! Boxes with errors like those of a detector.
 
 use rand::Rng;
 use sdg_geometry::BoundingBox;

@@ -1,4 +1,4 @@
-//! What lies where in a picture, under which light, before which camera.
+//! The composition of a picture: bodies, light and camera.
 
 use std::sync::Arc;
 

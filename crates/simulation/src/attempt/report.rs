@@ -1,4 +1,4 @@
-//! What came of a grasp attempt.
+//! The outcome of a grasp attempt.
 
 use image::RgbImage;
 use nalgebra::Isometry3;
