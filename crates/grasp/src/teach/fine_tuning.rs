@@ -2,10 +2,13 @@
 
 use sdg_demonstration::AugmentationStyle;
 use sdg_detection::config::Freeze;
-use sdg_training::TrainingConfig;
+use sdg_training::{EarlyStop, TrainingConfig, ValidationConfig};
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
+
+/// Steps unless the network is good before.
+const STEPS: usize = 120;
 
 /// What differs from the preset's teaching.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -23,10 +26,21 @@ pub struct FineTuning {
 }
 
 impl FineTuning {
-    /// The preset's own teaching, among two dozen other parts.
+    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts.
     pub fn new(seed: u64) -> Self {
         Self {
-            training: TrainingConfig::edge(seed),
+            training: TrainingConfig {
+                steps: STEPS,
+                validation: ValidationConfig { every: 40, first: 80, samples: 48 },
+                early_stop: Some(EarlyStop {
+                    hit_rate: 0.9,
+                    median_error_px: 3.0,
+                    median_error_degrees: 2.0,
+                    false_alarm_rate: 0.1,
+                    cool_down: 20,
+                }),
+                ..TrainingConfig::edge(seed)
+            },
             freeze: Freeze::Nothing,
             num_other_parts: 24,
             positive_share: 0.75,
