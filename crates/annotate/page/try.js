@@ -130,9 +130,9 @@ function card(detection, i, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : scene();
-  const text = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
-  if (found.dataset.shown === text) return;
-  found.dataset.shown = text;
+  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
+  if (found.dataset.shown === wanted) return;
+  found.dataset.shown = wanted;
   found.replaceChildren();
   if (!shown || !isTaught()) return;
   if (shown.failed) return found.append(text("p", shown.failed, "error"));
