@@ -79,7 +79,9 @@ fn teach(binary: &Path, photo: &Path, out: &Path) -> Result<f64> {
     let demo = format!("{}:{}", photo.display(), photo.with_file_name("annotation.json").display());
     let begun = Instant::now();
     let output = Command::new(binary)
-        .args(["teach", "--seed", "1", "--steps", STEPS, "--demo", &demo, "--out"])
+        // This build carries none.
+        .args(["teach", "--base-weights", "crates/grasp/weights/edge.safetensors"])
+        .args(["--seed", "1", "--steps", STEPS, "--demo", &demo, "--out"])
         .arg(out)
         .output()
         .with_context(|| binary.display().to_string())?;

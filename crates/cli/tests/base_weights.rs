@@ -229,7 +229,7 @@ fn weights_that_cannot_be_a_start_are_refused_before_teaching() {
         (
             &["--preset", "r50-torchvision"][..],
             2,
-            "--base-weights: the preset r50-torchvision fine-tunes imported weights",
+            "--base-weights: the preset r50-torchvision starts from weights, and this build carries none for it",
         ),
         (&["--reinit", "roi_heads"], 2, "--base-weights"),
         (&["--base-weights", "/nowhere.pth"], 1, "/nowhere.pth"),

@@ -9,7 +9,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, Start, Taught, TeachOptions, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, Preset, Start, Taught, TeachOptions, teach};
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -91,6 +91,9 @@ fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     }
 }
 
+/// Where the sources have the base weights that this build may lack.
+const SHIPPED_FILE: &str = "crates/grasp/weights/edge.safetensors";
+
 /// What `--base-weights` says for a start from nothing.
 const NO_BASE_WEIGHTS: &str = "none";
 
@@ -127,6 +130,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let taught = teach(&demonstrations, &options, &mut |event| progress.show(event));
     progress.finish();
     let taught = taught.map_err(|error| match error {
+        GraspError::NeedsBaseWeights { preset } if preset == Preset::Edge.name() => {
+            Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
+        }
         GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
         error => anyhow::Error::from(error),
     })?;
