@@ -18,6 +18,7 @@ pub(crate) struct PixelCell<'a> {
 
 impl<'a> PixelCell<'a> {
     /// `None` where the point does not lie between four pixel centres.
+    #[inline]
     pub(crate) fn at(image: &'a RgbImage, point: &Point2<f64>) -> Option<Self> {
         let (x, y) = (point.x - 0.5, point.y - 0.5);
         let (left, top) = (x.floor(), y.floor());
@@ -32,6 +33,7 @@ impl<'a> PixelCell<'a> {
     }
 
     /// The colour in single precision.
+    #[inline]
     pub(crate) fn color_f32(&self) -> [f32; 3] {
         let (along, below) = (self.along as f32, self.below as f32);
         std::array::from_fn(|c| {
@@ -41,6 +43,7 @@ impl<'a> PixelCell<'a> {
     }
 
     /// The colour in double precision.
+    #[inline]
     pub(crate) fn color_f64(&self) -> [f64; 3] {
         let (along, down) = (self.along, self.below);
         let weights = [(1.0 - along) * (1.0 - down), along * (1.0 - down), (1.0 - along) * down, along * down];
