@@ -4,10 +4,11 @@ use anyhow::Result;
 use burn::tensor::{Device, Tensor};
 use rayon::prelude::*;
 use sdg_detection::RcnnConfig;
+use sdg_training::step_seed;
 
 use crate::network::PretrainNetwork;
 use crate::pictures::Pictures;
-use crate::run::{Settings, Task, step_seed};
+use crate::run::{Settings, Task};
 
 /// The detector of a configuration, see [`crate::network`].
 pub struct DetectorTask {
@@ -45,7 +46,7 @@ impl Task for DetectorTask {
             .map(|i| self.pictures.picture(&group, i))
             .collect::<Result<_>>()?;
         let (images, targets): (Vec<_>, Vec<_>) = batch.into_iter().unzip();
-        let losses = network.losses(&images, &targets, step_seed(settings, step));
+        let losses = network.losses(&images, &targets, step_seed(settings.seed, step));
         let always = [
             ("rpn_cls", losses.rpn_cls),
             ("rpn_loc", losses.rpn_loc),

@@ -23,9 +23,10 @@ use sdg_grasp::NUM_KEYPOINTS;
 use sdg_orientation::training::{BoxJitter, LabelledCrop, OrientationTraining};
 use sdg_orientation::{OrientationCnn, OrientationConfig, crop_batch};
 use sdg_part_generator::Instance;
+use sdg_training::step_seed;
 
 use crate::pictures::{MIN_VISIBLE_SHARE, Pictures};
-use crate::run::{Settings, Task, step_seed};
+use crate::run::{Settings, Task};
 
 /// Crops of the one view, and parts and other views of each that a step compares with it.
 const NUM_TURNS: usize = 24;
@@ -81,7 +82,7 @@ impl OrientationTask {
             .map(|i| self.pictures.mixed_sample(&group, i))
             .collect();
         let compared = |(place, part): (usize, &usize)| {
-            let seed = step_seed(settings, step).wrapping_add(place as u64);
+            let seed = step_seed(settings.seed, step).wrapping_add(place as u64);
             let mut rng = Pcg64Mcg::seed_from_u64(seed);
             let mut views: Vec<(&RgbImage, SampleObject)> = pictures
                 .iter()

@@ -155,8 +155,3 @@ impl<T: Task> Run<T> {
         Ok(values)
     }
 }
-
-/// A seed of its own for every step, far from those of its neighbours.
-pub(crate) fn step_seed(settings: &Settings, step: usize) -> u64 {
-    settings.seed.wrapping_add((step as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
-}

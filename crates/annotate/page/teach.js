@@ -7,11 +7,11 @@ import { toast } from "./toast.js";
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
-  ["C", "Keypoints", "The best all-round. Some two minutes on two cores."],
+  ["C", "Keypoints", "The best all-round. Half a minute on two cores."],
   ["S", "Shape", "No network: searches for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
-  ["A", "Crop", "A box, and the part’s turn from the crop in it. Some three minutes."],
-  ["B", "Box", "As C, but the gripper goes to the middle of the box. Some two minutes."],
-  ["D", "Mask", "Texture or outline of what a mask shows. Some three minutes; needs the outline."],
+  ["A", "Crop", "A box, and the part’s turn from the crop in it. About a minute."],
+  ["B", "Box", "As C, but the gripper goes to the middle of the box. Half a minute."],
+  ["D", "Mask", "Texture or outline of what a mask shows. About a minute; needs the outline."],
 ];
 
 for (const [letter, name, says] of MODELS) {

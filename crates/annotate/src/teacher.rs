@@ -15,7 +15,7 @@ const MAX_STEPS: usize = 1_000_000;
 
 /// Teaches grasp models.
 pub trait GraspTeacher: Send + Sync + 'static {
-    /// Teaches a model; minutes for one with a network. `observe` is called with the progress and may end the teaching, which
+    /// Teaches a model; half a minute and more for one with a network. `observe` is called with the progress and may end the teaching, which
     /// then keeps what there is.
     ///
     /// # Errors

@@ -43,7 +43,7 @@ impl BaseWeights {
         !self.imprint.is_empty()
     }
 
-    /// The detector with last layers made from views of the part, where the weights can make them.
+    /// The detector with last layers made from views of the part; for weights of [`Self::is_ours`].
     ///
     /// # Errors
     /// Targets that do not fit the images; [`GraspError::BaseWeights`] where the imprint is another network's.
@@ -53,9 +53,6 @@ impl BaseWeights {
         images: &[TransformedImage],
         targets: &[Target],
     ) -> Result<GeneralizedRcnn> {
-        if !self.is_ours() {
-            return Ok(detector);
-        }
         let heads = &detector.config().roi_heads;
         let channels = heads.keypoint_head.as_ref().and_then(|head| head.conv_channels.last().copied()).unwrap_or(1);
         let mut init = Initializer::blank(&Device::flex());

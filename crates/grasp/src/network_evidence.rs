@@ -1,7 +1,7 @@
 //! Log-odds of a place from a network's proposal, or from having none.
 //!
-//! A network taught for two minutes gives detections on other things, and that it misses every third part makes no
-//! proposal weak evidence.
+//! A network taught for half a minute gives detections on other things, and that it misses parts makes no proposal weak
+//! evidence.
 //! How much, teaching counts on samples that it was not trained on:
 //!
 //! ```text

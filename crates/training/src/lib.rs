@@ -41,5 +41,5 @@ pub use error::TrainingError;
 pub use pace::Pace;
 pub use progress::{Ending, History, LossValues, StepRecord, TrainingEvent, ValidationRecord};
 pub use schedule::OneCycle;
-pub use trainer::{Trained, train};
+pub use trainer::{Trained, step_seed, train};
 pub use validation::{HIT_DEGREES, HIT_PX, Outcome, Validation};

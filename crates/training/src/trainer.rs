@@ -161,6 +161,6 @@ impl Run<'_> {
 }
 
 /// A seed of its own for every step, far from those of its neighbours.
-fn step_seed(seed: u64, step: usize) -> u64 {
+pub fn step_seed(seed: u64, step: usize) -> u64 {
     seed.wrapping_add((step as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
