@@ -4,12 +4,44 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context, Result, bail};
 use burn::tensor::Device;
+use sdg_comparison::ComparisonConfig;
 use sdg_detection::state_dict::{self, StateDict};
 use sdg_grasp::BaseWeightsFile;
 
 use crate::checkpoint::Checkpoint;
 use crate::network::pretrain_config;
 use crate::run::Settings;
+
+/// A file with a comparison network added, or another in place of the one it has.
+///
+/// # Errors
+/// A checkpoint of another network.
+pub fn with_comparison(
+    mut file: BaseWeightsFile,
+    comparison: &Checkpoint<Settings>,
+    commit: &str,
+) -> Result<BaseWeightsFile> {
+    let wanted = state_dict::export(&ComparisonConfig::edge().init_blank(&Device::flex())?);
+    let same_shapes = wanted
+        .iter()
+        .all(|(name, blank)| comparison.parameters.get(name).is_some_and(|found| found.shape == blank.shape));
+    if !same_shapes || wanted.len() != comparison.parameters.len() {
+        bail!("expected a checkpoint of the comparison network of preset edge, found one of another");
+    }
+    file.parameters.retain(|name, _| !name.starts_with("comparison."));
+    take(&comparison.parameters, "", "comparison.", &mut file.parameters)?;
+    // It is the orientation CNN's, and not trained.
+    file.parameters.retain(|name, _| !name.starts_with("comparison.trunk."));
+    file.origin.insert("comparison".into(), format!("{}, commit {commit}", told(comparison)));
+    Ok(file)
+}
+
+/// How a network was made.
+fn told(
+    Checkpoint { settings: Settings { seed, num_parts, batch_size, .. }, step, .. }: &Checkpoint<Settings>,
+) -> String {
+    format!("seed {seed}, {step} steps, {num_parts} parts, {} pictures", step * batch_size)
+}
 
 /// The file of a detector's checkpoint and, for model A, of an orientation CNN's.
 ///
@@ -47,13 +79,9 @@ pub fn export(
         ("licence".to_owned(), "MIT OR Apache-2.0".to_owned()),
     ]);
     for (network, checkpoint) in [("detector", Some(detector)), ("orientation", orientation)] {
-        let Some(Checkpoint { settings: Settings { seed, num_parts, batch_size, .. }, step, .. }) = checkpoint else {
-            continue;
-        };
-        origin.insert(
-            network.to_owned(),
-            format!("seed {seed}, {step} steps, {num_parts} parts, {} pictures", step * batch_size),
-        );
+        if let Some(checkpoint) = checkpoint {
+            origin.insert(network.to_owned(), told(checkpoint));
+        }
     }
     Ok(BaseWeightsFile { preset: "edge".into(), reinitialized, parameters, origin })
 }

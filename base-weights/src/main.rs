@@ -8,13 +8,15 @@ use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
 use sdg_base_weights::compare::Comparison;
+use sdg_base_weights::comparison::ComparisonTask;
 use sdg_base_weights::detector::DetectorTask;
-use sdg_base_weights::export::export;
+use sdg_base_weights::export::{export, with_comparison};
 use sdg_base_weights::network::pretrain_config;
 use sdg_base_weights::orientation::OrientationTask;
 use sdg_base_weights::outcome::{Outcome, outcomes};
 use sdg_base_weights::run::{Run, Settings, Task};
 use sdg_base_weights::table::table;
+use sdg_comparison::ComparisonConfig;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
 use sdg_orientation::OrientationConfig;
 use serde_json::Value;
@@ -31,7 +33,7 @@ struct Arguments {
 enum Command {
     /// Pretrains, or goes on where a run was stopped.
     Pretrain {
-        /// detector, or the orientation CNN of model A.
+        /// The detector, the orientation CNN of model A, or the comparison network.
         #[arg(long, value_enum, default_value_t = Pretrained::Detector)]
         network: Pretrained,
         /// Decides parts, pictures and every random choice.
@@ -43,17 +45,27 @@ enum Command {
         /// Steps of the whole run.
         #[arg(long, default_value_t = 8000)]
         steps: usize,
+        /// Base weights with an orientation CNN, for the comparison network.
+        #[arg(long)]
+        trunk: Option<PathBuf>,
         #[command(flatten)]
         pace: PaceArguments,
     },
     /// Writes what teaching starts from, in half precision.
     Export {
         /// A checkpoint of a detector.
+        #[arg(long, required_unless_present = "base", conflicts_with = "base")]
+        detector: Option<PathBuf>,
+        /// Weights to take all other networks from.
         #[arg(long)]
-        detector: PathBuf,
+        base: Option<PathBuf>,
         /// A checkpoint of an orientation CNN; none for weights that model A cannot start from.
         #[arg(long)]
+        #[arg(conflicts_with = "base")]
         orientation: Option<PathBuf>,
+        /// A checkpoint of a comparison network; none for weights whose models do not compare.
+        #[arg(long)]
+        comparison: Option<PathBuf>,
         /// The file to write.
         #[arg(long)]
         out: PathBuf,
@@ -103,6 +115,7 @@ enum Command {
 enum Pretrained {
     Detector,
     Orientation,
+    Comparison,
 }
 
 /// How a run is kept, and how long it goes on.
@@ -127,19 +140,36 @@ const TOLD_EVERY: usize = 50;
 
 fn main() -> Result<()> {
     match Arguments::parse().command {
-        Command::Pretrain { network, seed, parts, steps, pace } => {
+        Command::Pretrain { network, seed, parts, steps, trunk, pace } => {
             let settings = Settings::new(seed, parts, steps);
             match network {
                 Pretrained::Detector => pretrain(DetectorTask::new(&settings, pretrain_config())?, settings, &pace),
                 Pretrained::Orientation => {
                     pretrain(OrientationTask::new(&settings, OrientationConfig::edge())?, settings, &pace)
                 }
+                Pretrained::Comparison => {
+                    let settings = Settings { batch_size: ComparisonTask::BATCH_SIZE, ..settings };
+                    let path = trunk.context("--trunk says whose first stages the comparison network has")?;
+                    let orientation = BaseWeightsFile::from_bytes(&std::fs::read(&path)?)?.parameters;
+                    let orientation = orientation
+                        .into_iter()
+                        .filter_map(|(name, values)| Some((name.strip_prefix("orientation.")?.to_owned(), values)))
+                        .collect();
+                    let task = ComparisonTask::new(&settings, ComparisonConfig::edge(), orientation)?;
+                    pretrain(task, settings, &pace)
+                }
             }
         }
-        Command::Export { detector, orientation, out, commit } => {
-            let detector = Checkpoint::read(&detector)?;
-            let orientation = orientation.map(|path| Checkpoint::read(&path)).transpose()?;
-            let bytes = export(&detector, orientation.as_ref(), &commit)?.to_bytes();
+        Command::Export { detector, base, orientation, comparison, out, commit } => {
+            let read = |path: Option<PathBuf>| path.map(|path| Checkpoint::read(&path)).transpose();
+            let mut file = match (read(detector)?, base) {
+                (Some(detector), _) => export(&detector, read(orientation)?.as_ref(), &commit)?,
+                (None, base) => read_file(&base.context("--detector or --base")?)?,
+            };
+            if let Some(comparison) = read(comparison)? {
+                file = with_comparison(file, &comparison, &commit)?;
+            }
+            let bytes = file.to_bytes();
             write_whole(&out, &bytes)?;
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
@@ -222,6 +252,11 @@ fn read_weights(path: &Path) -> Result<BaseWeights> {
         &network,
         sha256(&bytes),
     )?)
+}
+
+fn read_file(path: &Path) -> Result<BaseWeightsFile> {
+    let named = || path.display().to_string();
+    BaseWeightsFile::from_bytes(&std::fs::read(path).with_context(named)?).with_context(named)
 }
 
 fn sha256(bytes: &[u8]) -> String {

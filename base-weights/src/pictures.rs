@@ -8,7 +8,9 @@ use sdg_demonstration::NUM_KEYPOINTS;
 use sdg_detection::ResizedTarget;
 use sdg_detection::{ImageTransform, ObjectMask, RcnnConfig, TransformedImage};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, Polygon, RotationalSymmetry, Visibility};
-use sdg_part_generator::{LookAlike, MixedInstance, MixedSample, Part, PhotoConfig, SceneConfig, Scenes};
+use sdg_part_generator::{
+    DemonstrationPhoto, LookAlike, MixedInstance, MixedSample, Part, PhotoConfig, SceneConfig, Scenes,
+};
 
 /// Every so many parts, one is a look-alike of the part before it: what tells the two apart must be learnt.
 const LOOK_ALIKE_EVERY: usize = 2;
@@ -76,6 +78,16 @@ impl Pictures {
         group
     }
 
+    /// How many parts there are.
+    pub fn num_parts(&self) -> usize {
+        self.is_symmetric.len()
+    }
+
+    /// The photo that a part is demonstrated by.
+    pub fn photo(&self, part_idx: usize) -> &DemonstrationPhoto {
+        self.scenes.photo(part_idx)
+    }
+
     /// Picture `index` of a group of parts, with the truth.
     pub fn mixed_sample(&self, group: &[usize], index: u64) -> MixedSample {
         self.scenes.mixed_sample_of(group, index)
@@ -125,6 +137,12 @@ pub fn draw_parts(num_parts: usize, seed: u64) -> Vec<Part> {
         parts.push(look_alike.unwrap_or_else(|| Part::generate(first.wrapping_add(i as u64))));
     }
     parts
+}
+
+/// The part that one of [`draw_parts`] was made to look like, or that was made to look like it; another part where none
+/// could be made.
+pub fn look_alike_of(part_idx: usize) -> usize {
+    part_idx ^ 1
 }
 
 /// The keypoints on the grasp line, start to end, in pixels of the network's input; unlabelled outside the box.

@@ -88,6 +88,7 @@ pub fn read(
         parameters,
         reinitialized,
         imprint: StateDict::new(),
+        comparison: StateDict::new(),
         orientation: None,
     })
 }

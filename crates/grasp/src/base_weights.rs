@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use burn::module::Module;
 use burn::tensor::Device;
+use sdg_comparison::{ComparisonConfig, ComparisonNetwork};
 use sdg_detection::config::NormKind;
 use sdg_detection::imprint::Imprint;
 use sdg_detection::initialization::Initializer;
@@ -28,6 +29,8 @@ pub struct BaseWeights {
     pub reinitialized: BTreeSet<String>,
     /// What makes last layers of a part's own views; empty for weights without.
     pub imprint: StateDict,
+    /// The comparison network, which is not taught; empty for weights without.
+    pub comparison: StateDict,
     /// What model A's orientation CNN starts from; `None` for weights without.
     pub orientation: Option<OrientationStart>,
 }
@@ -41,6 +44,21 @@ impl BaseWeights {
     /// Whether they are of our own pretraining, which makes last layers of a part's views.
     pub(crate) fn is_ours(&self) -> bool {
         !self.imprint.is_empty()
+    }
+
+    /// The network that compares places of pictures with the demonstration; `None` for weights without.
+    ///
+    /// # Errors
+    /// [`GraspError::BaseWeights`] where the values are another network's.
+    pub(crate) fn comparison(&self, device: &Device) -> Result<Option<ComparisonNetwork>> {
+        if self.comparison.is_empty() {
+            return Ok(None);
+        }
+        let (network, report) = state_dict::import(ComparisonConfig::edge().init_blank(device)?, &self.comparison);
+        match first_misfit(&report) {
+            None => Ok(Some(network)),
+            Some(found) => Err(GraspError::BaseWeights { fitting: report.applied.len(), found }),
+        }
     }
 
     /// The detector with last layers made from views of the part; for weights of [`Self::is_ours`].
@@ -153,6 +171,7 @@ mod tests {
             parameters,
             reinitialized: BTreeSet::new(),
             imprint: StateDict::new(),
+            comparison: StateDict::new(),
             orientation: None,
         }
     }

@@ -143,6 +143,9 @@ pub enum GraspError {
     /// The orientation CNN refused its input or did not learn.
     #[error(transparent)]
     Orientation(#[from] sdg_orientation::OrientationError),
+    /// From the comparison network.
+    #[error(transparent)]
+    Comparison(#[from] sdg_comparison::ComparisonError),
     /// A demonstration that shows neither texture nor an outline, or a mask of another size than its image.
     #[error(transparent)]
     Sift(#[from] sdg_sift::SiftError),

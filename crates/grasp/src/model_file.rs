@@ -5,10 +5,12 @@
 //!            teaching       seed, samples, steps, seconds, validation figures, base weights' hash   (JSON)
 //!            network        the detector's configuration; none in model S                           (JSON)
 //!            orientation    the orientation CNN's configuration; in model A alone                   (JSON)
+//!            comparison     the comparison network's configuration, where there is one        (JSON)
 //!            calibration    of the network's score; how much other things resemble the part         (JSON)
 //!            demonstrations marks of each, in pixels of its cut-out                                 (JSON)
 //! tensors    network.NAME              f16
 //!            orientation.NAME          f16
+//!            comparison.NAME           f16
 //!            demonstrations.I.cutout   u8, a PNG file
 //! ```
 
@@ -18,6 +20,7 @@ use std::io::Cursor;
 use burn::tensor::Device;
 use image::ImageFormat;
 use safetensors::{Dtype, SafeTensors};
+use sdg_comparison::ComparisonConfig;
 use sdg_demonstration::{ImageLimits, decode_image};
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
@@ -38,8 +41,9 @@ use crate::taught::TaughtDemonstration;
 use crate::taught_marks::TaughtMarks;
 
 /// The version written here. Any change that an older reader would misread raises it.
-pub const FORMAT_VERSION: u32 = 2;
-/// The oldest version that is read. Version 1 had a threshold of the agreement instead of one score from all evidence.
+pub const FORMAT_VERSION: u32 = 3;
+/// The oldest version that is read. Version 1 had a threshold of the agreement instead of one score from all evidence,
+/// version 2 no comparison network.
 const OLDEST_VERSION: u32 = 1;
 
 /// More demonstrations than anybody takes; bounds the work on a forged file.
@@ -104,10 +108,13 @@ impl GraspModel {
                 tensors.insert(format!("{module}.{name}"), (weight.shape, TensorBytes::halves(&weight.values)));
             }
         };
-        if let Some(Network { detector, reading }) = &self.network {
+        if let Some(Network { detector, reading, comparison }) = &self.network {
             put_weights("network", state_dict::export(detector));
             if let Reading::BoxAndCrop(orientation) = reading {
                 put_weights("orientation", orientation.state_dict());
+            }
+            if let Some(comparison) = comparison {
+                put_weights("comparison", state_dict::export(comparison));
             }
         }
         for (i, demonstration) in self.demonstrations.iter().enumerate() {
@@ -133,11 +140,14 @@ impl GraspModel {
         put("angle_reference_deg", first.grasp.angle().degrees().to_string());
         put("grasp_offset_px", to_json(&[offset.x, offset.y]));
         put("teaching", to_json(&self.facts));
-        if let Some(Network { detector, reading }) = &self.network {
+        if let Some(Network { detector, reading, comparison }) = &self.network {
             put("input_size", to_json(&detector.config().input.resize));
             put("network", to_json(detector.config()));
             if let Reading::BoxAndCrop(orientation) = reading {
                 put("orientation", to_json(orientation.config()));
+            }
+            if let Some(comparison) = comparison {
+                put("comparison", to_json(comparison.config()));
             }
         }
         put("calibration", to_json(&self.calibrations));
@@ -216,7 +226,16 @@ fn read_network(
     models::check_heads(kind, &config)?;
     let (detector, report) = state_dict::import(config.init_blank(device)?, &weights(file, "network")?);
     check_complete(&report, "network")?;
-    Ok(Some(Network { detector, reading }))
+    let comparison = match metadata.0.contains_key("comparison") {
+        true => {
+            let config: ComparisonConfig = metadata.json("comparison")?;
+            let (comparison, report) = state_dict::import(config.init_blank(device)?, &weights(file, "comparison")?);
+            check_complete(&report, "comparison network")?;
+            Some(comparison)
+        }
+        false => None,
+    };
+    Ok(Some(Network { detector, reading, comparison }))
 }
 
 /// The weights whose names start with a module's.
@@ -374,6 +393,7 @@ mod tests {
                 ModelKind::D => Reading::Mask(MaskMatcher::new(&demonstrations).unwrap()),
                 _ => Reading::Keypoints,
             },
+            comparison: Some(ComparisonConfig::edge().init(&Device::flex(), 3).unwrap()),
         });
         GraspModel {
             preset: "edge".to_owned(),
@@ -432,9 +452,12 @@ mod tests {
     #[test]
     fn other_versions_are_told_apart_from_damage() {
         let bytes = untaught(ModelKind::C).to_bytes().unwrap();
-        let newer = with_metadata(&bytes, r#""format_version":"2""#, r#""format_version":"7""#);
+        let newer = with_metadata(&bytes, r#""format_version":"3""#, r#""format_version":"7""#);
         let refused = GraspModel::from_bytes(&newer, &Device::flex()).unwrap_err();
-        assert!(matches!(&refused, GraspError::OtherVersion { expected: 2, found } if found == "7"), "{refused}");
+        assert!(
+            matches!(&refused, GraspError::OtherVersion { expected: FORMAT_VERSION, found } if found == "7"),
+            "{refused}"
+        );
     }
 
     #[test]
@@ -448,7 +471,7 @@ mod tests {
             r#"{"network":{"threshold":0.5,"slope":4.0},"agreement":{"threshold":0.56,"slope":25.0}}"#,
         )
         .unwrap();
-        let bytes = with_metadata(&old.to_bytes().unwrap(), r#""format_version":"2""#, r#""format_version":"1""#);
+        let bytes = with_metadata(&old.to_bytes().unwrap(), r#""format_version":"3""#, r#""format_version":"1""#);
         let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
         assert!((read.calibrations.resemblance() - 0.36).abs() < 1e-12);
         assert_eq!(read.size_tolerance(), CheckConfig::DEFAULT_SIZE_TOLERANCE);

@@ -2,9 +2,10 @@
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
+use sdg_comparison::Reference;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
@@ -24,6 +25,7 @@ pub struct TaughtDemonstration {
     /// The marks on it.
     pub marks: TaughtMarks,
     prepared: PreparedSizes,
+    reference: OnceLock<Reference>,
     check: CheckConfig,
 }
 
@@ -78,7 +80,7 @@ impl TaughtDemonstration {
 
     pub(crate) fn with_config(cutout: RgbImage, marks: TaughtMarks, check: CheckConfig) -> Result<Self, GraspError> {
         check.check()?;
-        let made = Self { cutout, marks, prepared: PreparedSizes::default(), check };
+        let made = Self { cutout, marks, prepared: PreparedSizes::default(), reference: OnceLock::new(), check };
         // What is wrong with a demonstration should come out here, not at the first picture.
         let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
         made.prepared(own_size)?;
@@ -94,6 +96,11 @@ impl TaughtDemonstration {
         let working = WorkingSize::new(bounds.width().max(bounds.height()), range.middle());
         let prepared = self.prepared.get(&self.cutout, &self.marks, &working, range, &self.check.search)?;
         Ok((working, prepared))
+    }
+
+    /// What the comparison network of a model compares pictures with, in views of `input_px` pixels a side.
+    pub(crate) fn reference(&self, input_px: u32) -> &Reference {
+        self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), input_px))
     }
 
     /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration

@@ -44,7 +44,8 @@ pub struct ConvNormRelu {
 }
 
 impl ConvNormRelu {
-    fn init(shape: [usize; 4], stride: usize, num_groups: usize, init: &mut Initializer) -> Self {
+    /// Draws the parameters of `shape`, `[C_out, C_in, k, k]`.
+    pub fn init(shape: [usize; 4], stride: usize, num_groups: usize, init: &mut Initializer) -> Self {
         let [channels, in_channels, kernel, _] = shape;
         let norm = GroupNorm {
             weight: init.param([channels], Distribution::Constant(1.0)),

@@ -8,6 +8,7 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
 //! | S | none | the demonstration looked for in the whole image | likewise |
 
+mod comparison;
 mod consistency;
 mod keypoints;
 pub(crate) mod mask;
@@ -20,6 +21,7 @@ use burn::tensor::Device;
 use burn::tensor::read_sync;
 use image::RgbImage;
 use nalgebra::Point2;
+use sdg_comparison::ComparisonNetwork;
 #[cfg(any(feature = "teach", test))]
 use sdg_detection::presets::RcnnKind;
 #[cfg(feature = "teach")]
@@ -46,6 +48,8 @@ const MIN_NETWORK_SCORE: f64 = 0.05;
 pub(crate) struct Network {
     pub(crate) detector: GeneralizedRcnn,
     pub(crate) reading: Reading,
+    /// Compares what lies under a pose with the demonstration; none where teaching started from weights without it.
+    pub(crate) comparison: Option<ComparisonNetwork>,
 }
 
 /// How a detection becomes a pose of the demonstration.
@@ -81,8 +85,11 @@ impl Proposals {
 /// A detection with the model's reading of it, not yet verified.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseCandidate {
-    /// The class's probability, less where the heads contradict each other.
+    /// The class's probability; of proposals, less where the heads contradict each other and where the place does not look
+    /// like the demonstration.
     pub(crate) network_score: f64,
+    /// How much of the box the demonstration fills.
+    filled: f64,
     pub(crate) bbox: BoundingBox,
     /// Each with the network's score; empty where the model has none.
     pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
@@ -148,7 +155,7 @@ impl Network {
             Reading::BoxAndCrop(orientation) => Reading::BoxAndCrop(Box::new(round(*orientation))),
             other => other,
         };
-        Self { detector: round(self.detector), reading }
+        Self { detector: round(self.detector), reading, comparison: self.comparison.map(round) }
     }
 
     pub(crate) fn moved_to(self, device: &Device) -> Self {
@@ -156,7 +163,8 @@ impl Network {
             Reading::BoxAndCrop(orientation) => Reading::BoxAndCrop(Box::new(orientation.to_device(device))),
             other => other,
         };
-        Self { detector: self.detector.to_device(device), reading }
+        let comparison = self.comparison.map(|network| network.to_device(device));
+        Self { detector: self.detector.to_device(device), reading, comparison }
     }
 
     /// What the network proposes, best first. Detections that make no sense to the model (keypoints on one place, a
@@ -180,16 +188,26 @@ impl Network {
     ) -> Result<Proposals> {
         let transformed = self.detector.image_transform().apply(image)?;
         let detections = self.detector.detect_async(&[transformed]).await.pop().unwrap_or_default();
+        let proposed = (0..detections.scores.len()).filter(|&i| detections.scores[i] >= MIN_NETWORK_SCORE);
+        let mut read = Vec::new();
+        for i in proposed.clone().take(MAX_CANDIDATES) {
+            read.extend(self.read(image, &detections, i, demonstrations).await?);
+        }
+        let compared = match &self.comparison {
+            Some(network) => {
+                let poses = read.iter().map(|one| (&demonstrations[one.demonstration_idx], one.image_from_cutout));
+                comparison::compared(network, image, poses).await
+            }
+            None => Vec::new(),
+        };
         let mut proposals = Proposals::default();
-        for i in (0..detections.scores.len()).filter(|&i| detections.scores[i] >= MIN_NETWORK_SCORE) {
-            let candidate = match i < MAX_CANDIDATES {
-                true => self.read(image, &detections, i, demonstrations).await?,
-                false => None,
-            };
-            let unread = consistency::score(detections.scores[i], 0.0);
-            let score = candidate.as_ref().map_or(unread, |candidate| candidate.network_score);
-            proposals.boxes.push((detections.boxes[i], score));
-            proposals.candidates.extend(candidate);
+        let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
+        proposals.boxes.extend(proposed.map(unread));
+        for (place, mut candidate) in read.into_iter().enumerate() {
+            let (class, log_odds) = (candidate.network_score, compared.get(place).map(|reading| reading.log_odds));
+            candidate.network_score = consistency::score(class, candidate.filled, log_odds);
+            proposals.boxes.push((candidate.bbox, candidate.network_score));
+            proposals.candidates.push(candidate);
         }
         proposals.candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
         Ok(proposals)
@@ -219,11 +237,10 @@ impl Network {
                 _ => demonstration.grasp(&image_from_cutout),
             };
             let filled = consistency::filled(demonstration, &image_from_cutout, bbox, image.dimensions());
-            let network_score = consistency::score(detections.scores[i], filled);
-            let bbox = *bbox;
             Some(PoseCandidate {
-                network_score,
-                bbox,
+                network_score: detections.scores[i],
+                filled,
+                bbox: *bbox,
                 keypoints,
                 grasp,
                 demonstration_idx,

@@ -269,6 +269,10 @@ pub(crate) fn teach_network(
     let taught = taught(demonstrations, options)?;
     // First, because what is wrong with base weights should not come out after minutes.
     let detector = options.initial_detector(&plan.network)?;
+    let comparison = match options.start.weights() {
+        Some(base_weights) => base_weights.comparison(&options.device)?,
+        None => None,
+    };
     let mut orientation_facts = None;
     let reading = match (options.kind, &plan.orientation) {
         (ModelKind::A, Some(orientation_plan)) => {
@@ -312,7 +316,8 @@ pub(crate) fn teach_network(
         &training,
         source,
         &mut |detector: &GeneralizedRcnn| {
-            let network = Network { detector: detector.clone(), reading: reading.clone() };
+            let (reading, comparison) = (reading.clone(), comparison.clone());
+            let network = Network { detector: detector.clone(), reading, comparison };
             held_back.examine(&network, &taught).map_err(|error| TrainingError::Examination(error.into()))
         },
         &mut |event| observe(&TeachingEvent::from(*event)),
@@ -320,7 +325,7 @@ pub(crate) fn teach_network(
     let own = own_config(options.kind, &plan.network).init(&options.device, options.seed)?;
     let detector = state_dict::import(own, &state_dict::export(&detector)).0;
     // Calibrated and handed out is what a file will give back.
-    let network = Network { detector, reading }.rounded();
+    let network = Network { detector, reading, comparison }.rounded();
     // The samples show the part at other sizes than those that may be looked for later.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;

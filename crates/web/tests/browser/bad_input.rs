@@ -26,7 +26,7 @@ fn wrong_files_are_told_apart() {
     let newer = made.path("newer.sdg");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let mut bytes = std::fs::read(&model).unwrap();
-    let version = br#""format_version":"2""#;
+    let version = br#""format_version":"3""#;
     let at = bytes.windows(version.len()).position(|window| window == version).unwrap() + version.len() - 2;
     bytes[at] = b'9';
     assert!(text(&bytes).contains(r#""format_version":"9""#));

@@ -1,0 +1,290 @@
+//! The comparison network's task: a demonstration and a place of a picture, the same part in the same pose or not.
+//!
+//! ```text
+//! picture ─ every visible part ─┬─ its own demonstration, or another picture of it, in a pose nearly right  same
+//!                               ├─ the same in a wrong pose                                                 not
+//!                               ├─ its look-alike's demonstration where the look-alike would lie            not
+//!                               └─ another part's demonstration, fitted to its box                          not
+//! ```
+
+use anyhow::Result;
+use burn::tensor::{Device, Int, Tensor, TensorData, activation};
+use image::RgbImage;
+use nalgebra::{Point2, Vector2};
+use rand::seq::IndexedRandom;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+use sdg_comparison::{ComparisonConfig, ComparisonNetwork, Reference, View, batch};
+use sdg_detection::state_dict::{self, StateDict};
+use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
+use sdg_part_generator::{Instance, MixedSample};
+use sdg_training::step_seed;
+
+use crate::network::pretrain_config;
+use crate::pictures::{Pictures, look_alike_of};
+use crate::run::{Settings, Task};
+
+/// Share of a part that must be seen to ask whether it is the part.
+const MIN_VISIBLE_SHARE: f64 = 0.6;
+/// Only what is seen as a whole can stand for the demonstration.
+const WHOLE_SHARE: f64 = 0.97;
+/// Pairs where another picture of the part stands for the demonstration, and where its box for its outline.
+const OTHER_PICTURE_PROBABILITY: f64 = 0.35;
+const BOX_PROBABILITY: f64 = 0.1;
+
+/// How far a pose that counts as right may be off: shift in sides of the outline's box, turn, factor of size.
+const MAX_SHIFT: f64 = 0.1;
+const MAX_TURN_DEGREES: f64 = 12.0;
+const MAX_SIZE: f64 = 0.12;
+/// What counts as wrong is off by at least this much.
+const MIN_WRONG_SHIFT: f64 = 0.25;
+const MIN_WRONG_TURN_DEGREES: f64 = 30.0;
+const MIN_WRONG_SIZE: f64 = 0.35;
+
+/// Turns that another part's demonstration is tried in.
+const NUM_TURNS: usize = 12;
+
+/// Weight of the offset's loss against that of the log-odds.
+const OFFSET_WEIGHT: f64 = 0.3;
+
+/// The comparison network of preset `edge`.
+pub struct ComparisonTask {
+    config: ComparisonConfig,
+    pictures: Pictures,
+    /// The parameters of an orientation CNN, whose first stages look at each side.
+    trunk: StateDict,
+}
+
+/// A question and its answer.
+struct Pair {
+    view: View,
+    /// The offset's outputs where it shows the part.
+    same: Option<[f64; 4]>,
+}
+
+impl ComparisonTask {
+    /// Pictures a step: about ninety questions.
+    pub const BATCH_SIZE: usize = 3;
+
+    /// Prepares the pictures of a run.
+    ///
+    /// # Errors
+    /// Settings that the generator refuses.
+    pub fn new(settings: &Settings, config: ComparisonConfig, orientation: StateDict) -> Result<Self> {
+        let pictures = Pictures::new(settings.num_parts, &pretrain_config(), settings.seed)?;
+        Ok(Self { config, pictures, trunk: orientation })
+    }
+
+    fn pairs(&self, settings: &Settings, step: usize) -> Vec<Pair> {
+        let group = self.pictures.group(step);
+        let first = (step * settings.batch_size) as u64;
+        let pictures: Vec<MixedSample> = (first..first + settings.batch_size as u64)
+            .into_par_iter()
+            .map(|i| self.pictures.mixed_sample(&group, i))
+            .collect();
+        let of_picture = |(number, picture): (usize, &MixedSample)| {
+            let seed = step_seed(settings.seed, step).wrapping_add(number as u64);
+            let mut asked = Asked { task: self, pictures: &pictures, rng: Pcg64Mcg::seed_from_u64(seed) };
+            let visible = picture.instances.iter().filter(|mixed| mixed.instance.visible_share >= MIN_VISIBLE_SHARE);
+            visible.flat_map(|mixed| asked.about(&picture.image, mixed.part_idx, &mixed.instance, &group)).collect()
+        };
+        let pairs: Vec<Vec<Pair>> = pictures.par_iter().enumerate().map(of_picture).collect();
+        pairs.into_iter().flatten().collect()
+    }
+}
+
+/// What stands for the demonstration, and the way from it to the part as the photo shows it.
+struct Shown {
+    reference: Reference,
+    photo_from_shown: PlanarSimilarity,
+    length: f64,
+    center: Point2<f64>,
+    outline: Polygon,
+}
+
+struct Asked<'a> {
+    task: &'a ComparisonTask,
+    pictures: &'a [MixedSample],
+    rng: Pcg64Mcg,
+}
+
+impl Asked<'_> {
+    fn about(&mut self, image: &RgbImage, part_idx: usize, instance: &Instance, group: &[usize]) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        let Some(shown) = self.shown(part_idx, Some(image)) else { return pairs };
+        let truth = instance.image_from_demonstration.compose(&shown.photo_from_shown);
+        let has_turn = self.task.pictures.has_turn(part_idx);
+        let mut ask = |shown: &Shown, pose: &PlanarSimilarity, truth: Option<&PlanarSimilarity>| {
+            pairs.push(Pair {
+                view: shown.reference.view(image, pose),
+                same: truth.map(|truth| {
+                    let mut outputs = shown.reference.offset(pose, truth).outputs();
+                    // Which of the turns that look alike was meant cannot be told.
+                    if !has_turn {
+                        outputs[2] = f64::NAN;
+                    }
+                    outputs
+                }),
+            });
+        };
+        let near = self.near(&shown, &truth, 1.0);
+        ask(&shown, &near, Some(&truth));
+        let near = self.near(&shown, &truth, 0.5);
+        ask(&shown, &near, Some(&truth));
+        let wrong = self.wrong(&shown, &truth, has_turn);
+        ask(&shown, &wrong, None);
+
+        let photo_from_part = |idx: usize| self.task.pictures.photo(idx).photo_from_part;
+        let image_from_part = instance.image_from_demonstration.compose(&photo_from_part(part_idx));
+        let look_alike = Some(look_alike_of(part_idx)).filter(|idx| *idx < self.task.pictures.num_parts());
+        let of_group = group.choose(&mut self.rng).copied().filter(|idx| *idx != part_idx);
+        for other_idx in look_alike.into_iter().chain(of_group) {
+            let Some(other) = self.shown(other_idx, None) else { continue };
+            let nominal = image_from_part.compose(&photo_from_part(other_idx).inverse());
+            let is_look_alike = Some(other_idx) == look_alike && self.rng.random_bool(0.7);
+            let pose = match is_look_alike {
+                true => nominal.compose(&other.photo_from_shown),
+                false => self.fitted(&other, &nominal, instance),
+            };
+            let pose = self.near(&other, &pose, 0.5);
+            ask(&other, &pose, None);
+        }
+        pairs
+    }
+
+    /// The part's photo, or now and then another picture of it.
+    fn shown(&mut self, part_idx: usize, but_not: Option<&RgbImage>) -> Option<Shown> {
+        let photo = &self.task.pictures.photo(part_idx).demonstration;
+        let mut image = &photo.image;
+        let mut outline = photo.annotation.outline.clone()?;
+        let mut photo_from_shown = PlanarSimilarity::IDENTITY;
+        if self.rng.random_bool(OTHER_PICTURE_PROBABILITY) {
+            let in_pictures =
+                self.pictures.iter().filter(|picture| but_not.is_none_or(|b| !std::ptr::eq(b, &picture.image)));
+            let views: Vec<_> = in_pictures
+                .flat_map(|picture| picture.instances.iter().map(move |mixed| (&picture.image, mixed)))
+                .filter(|(_, mixed)| mixed.part_idx == part_idx && mixed.instance.visible_share >= WHOLE_SHARE)
+                .filter_map(|(image, mixed)| Some((image, &mixed.instance, mixed.instance.outline()?)))
+                .collect();
+            if let Some((other, instance, other_outline)) = views.choose(&mut self.rng) {
+                image = other;
+                outline = other_outline.clone();
+                photo_from_shown = instance.image_from_demonstration.inverse();
+            }
+        }
+        let bounds = outline.bounds();
+        if bounds.width() < 4.0 || bounds.height() < 4.0 {
+            return None;
+        }
+        if self.rng.random_bool(BOX_PROBABILITY) {
+            outline = Polygon::from_box(&bounds);
+        }
+        Some(Shown {
+            reference: Reference::new(image, &outline, self.task.config.input_px),
+            photo_from_shown,
+            length: bounds.width().max(bounds.height()),
+            center: bounds.center(),
+            outline,
+        })
+    }
+
+    fn within(&mut self, most: f64) -> f64 {
+        most * (2.0 * self.rng.random::<f64>() - 1.0)
+    }
+
+    /// A pose that is off by no more than a share of what counts as right.
+    fn near(&mut self, shown: &Shown, pose: &PlanarSimilarity, share: f64) -> PlanarSimilarity {
+        let reach = share * MAX_SHIFT * shown.length;
+        let shift = Vector2::new(self.within(reach), self.within(reach));
+        let turn = Angle::from_degrees(self.within(share * MAX_TURN_DEGREES));
+        let scale = self.within(share * MAX_SIZE).exp();
+        pose.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, turn, scale))
+    }
+
+    /// A pose that is off by too much in one respect.
+    fn wrong(&mut self, shown: &Shown, pose: &PlanarSimilarity, has_turn: bool) -> PlanarSimilarity {
+        let near = self.near(shown, pose, 1.0);
+        let (mut shift, mut turn, mut scale) = (Vector2::zeros(), 0.0, 1.0);
+        match self.rng.random_range(0..5) {
+            0 | 1 if has_turn => turn = self.rng.random_range(MIN_WRONG_TURN_DEGREES..360.0 - MIN_WRONG_TURN_DEGREES),
+            2 if has_turn => turn = 180.0,
+            3 => {
+                let log = self.rng.random_range(MIN_WRONG_SIZE..2.0 * MIN_WRONG_SIZE);
+                scale = if self.rng.random_bool(0.5) { log.exp() } else { (-log).exp() };
+            }
+            _ => {
+                let direction = Angle::from_degrees(self.rng.random_range(0.0..360.0)).radians();
+                let reach = shown.length * self.rng.random_range(MIN_WRONG_SHIFT..2.0);
+                shift = reach * Vector2::new(direction.cos(), direction.sin());
+            }
+        }
+        near.compose(&PlanarSimilarity::about(shown.center, shown.center + shift, Angle::from_degrees(turn), scale))
+    }
+
+    /// Another part's demonstration as a network would lay it over this one: in the turn in which it fills the box best, or
+    /// in any.
+    fn fitted(&mut self, other: &Shown, nominal: &PlanarSimilarity, instance: &Instance) -> PlanarSimilarity {
+        let first: f64 = self.rng.random_range(0.0..360.0);
+        let count = if self.rng.random_bool(0.7) { NUM_TURNS } else { 1 };
+        let laid = (0..count).map(|k| {
+            let turn = Angle::from_degrees(first + 360.0 * k as f64 / NUM_TURNS as f64);
+            let turned = PlanarSimilarity::about(other.center, other.center, turn, 1.0);
+            let bounds = other.outline.transformed(&turned).bounds();
+            let usual = nominal.scale * other.photo_from_shown.scale;
+            let scale = (instance.bbox.area() / bounds.area()).sqrt().clamp(usual / 1.35, usual * 1.35);
+            let target = instance.bbox.center();
+            let pose = PlanarSimilarity::about(bounds.center(), target, Angle::ZERO, scale).compose(&turned);
+            (other.outline.transformed(&pose).bounds().iou(&instance.bbox), pose)
+        });
+        laid.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(*nominal, |(_, pose)| pose)
+    }
+}
+
+impl Task for ComparisonTask {
+    type Network = ComparisonNetwork;
+
+    fn network(&self, settings: &Settings, device: &Device) -> Result<ComparisonNetwork> {
+        let network = self.config.init(device, settings.seed)?;
+        // The names of the stages that both networks have.
+        let trunk: StateDict = self
+            .trunk
+            .iter()
+            .filter_map(|(name, values)| Some((format!("trunk.{}", name.strip_prefix("stages.")?), values.clone())))
+            .collect();
+        Ok(state_dict::import(network, &trunk).0)
+    }
+
+    fn losses(
+        &self,
+        network: &ComparisonNetwork,
+        settings: &Settings,
+        step: usize,
+    ) -> Result<Vec<(&'static str, Tensor<1>)>> {
+        let device = network.device();
+        let pairs = self.pairs(settings, step);
+        let n = pairs.len();
+        if n == 0 {
+            return Ok(vec![("same", Tensor::zeros([1], &device)), ("offset", Tensor::zeros([1], &device))]);
+        }
+        let (views, same): (Vec<View>, Vec<_>) = pairs.into_iter().map(|pair| (pair.view, pair.same)).unzip();
+        let outputs = network.forward(batch(&views, &device));
+        let signs: Vec<f32> = same.iter().map(|same| if same.is_some() { 1.0 } else { -1.0 }).collect();
+        let signs = Tensor::<2>::from_data(TensorData::new(signs, [n, 1]), &device);
+        let answer = activation::log_sigmoid(outputs.clone().narrow(1, 0, 1) * signs).mean().neg();
+
+        let shown: Vec<usize> = (0..n).filter(|i| same[*i].is_some()).collect();
+        let values: Vec<f32> = same.into_iter().flatten().flatten().map(|value| value as f32).collect();
+        let is_known: Vec<f32> = values.iter().map(|value| if value.is_nan() { 0.0 } else { 1.0 }).collect();
+        let values: Vec<f32> = values.into_iter().map(|value| if value.is_nan() { 0.0 } else { value }).collect();
+        let tensor = |values: Vec<f32>| Tensor::<2>::from_data(TensorData::new(values, [shown.len(), 4]), &device);
+        let indices: Vec<i64> = shown.iter().map(|i| *i as i64).collect();
+        let indices = Tensor::<1, Int>::from_data(TensorData::new(indices, [shown.len()]), &device);
+        let offsets = outputs.narrow(1, 1, 4).select(0, indices);
+        // Huber's loss, of unit 0.3.
+        let error = ((offsets - tensor(values)) * tensor(is_known)).abs();
+        let small = error.clone().clamp_max(0.3);
+        let offset = (small.clone() * (error - small * 0.5)).mean() / 0.3;
+        Ok(vec![("same", answer), ("offset", offset * OFFSET_WEIGHT)])
+    }
+}

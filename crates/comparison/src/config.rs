@@ -1,0 +1,140 @@
+//! The network's shape, as plain data that a model file can carry.
+
+use burn::tensor::Device;
+use sdg_detection::initialization::Initializer;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::network::ComparisonNetwork;
+
+/// A setting that no network can be built with.
+#[derive(Debug, Error)]
+#[error("comparison network: {field} must be {expected}, found {found}")]
+pub struct ComparisonError {
+    field: &'static str,
+    expected: &'static str,
+    found: String,
+}
+
+/// The network. Every stage halves its map with its first convolution.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ComparisonConfig {
+    /// S: side of a view, in pixels.
+    pub input_px: u32,
+    /// Channels of the stages that look at the demonstration and the picture each alone.
+    pub trunk_channels: Vec<usize>,
+    /// Convolutions of each of them, the halving one included.
+    pub trunk_convs: Vec<usize>,
+    /// Cells along each axis by which the demonstration's map is moved over the picture's.
+    pub reach: usize,
+    /// Channels of each stage that looks at what differs.
+    pub stage_channels: Vec<usize>,
+    /// Convolutions of each stage, the halving one included; as many as there are stages.
+    pub stage_convs: Vec<usize>,
+    /// Groups of the group norms; divides every stage's channels.
+    pub norm_groups: usize,
+    /// Width of the hidden fully connected layer.
+    pub hidden: usize,
+}
+
+impl ComparisonConfig {
+    /// 64 × 64 pixels, half a million parameters.
+    pub fn edge() -> Self {
+        Self {
+            input_px: 64,
+            trunk_channels: vec![24, 48],
+            trunk_convs: vec![1, 2],
+            reach: 2,
+            stage_channels: vec![96, 128],
+            stage_convs: vec![2, 2],
+            norm_groups: 8,
+            hidden: 64,
+        }
+    }
+
+    /// Side of the trunk's map.
+    pub fn trunk_map_px(&self) -> usize {
+        self.input_px as usize >> self.trunk_channels.len()
+    }
+
+    /// Side of the last map.
+    pub fn last_map_px(&self) -> usize {
+        self.trunk_map_px() >> self.stage_channels.len()
+    }
+
+    /// Builds the network with parameters drawn from a seed. For training the device must carry autodiff.
+    ///
+    /// # Errors
+    /// A setting that is out of its range.
+    pub fn init(&self, device: &Device, seed: u64) -> Result<ComparisonNetwork, ComparisonError> {
+        self.check()?;
+        Ok(ComparisonNetwork::init(self, &mut Initializer::new(device, seed)))
+    }
+
+    /// Builds the network without drawing its parameters, for who sets all of them next.
+    ///
+    /// # Errors
+    /// As [`Self::init`].
+    pub fn init_blank(&self, device: &Device) -> Result<ComparisonNetwork, ComparisonError> {
+        self.check()?;
+        Ok(ComparisonNetwork::init(self, &mut Initializer::blank(device)))
+    }
+
+    fn check(&self) -> Result<(), ComparisonError> {
+        let check = |holds: bool, field, expected, found: String| match holds {
+            true => Ok(()),
+            false => Err(ComparisonError { field, expected, found }),
+        };
+        let channels: Vec<usize> = self.trunk_channels.iter().chain(&self.stage_channels).copied().collect();
+        for (field, stages) in [("trunk_channels", &self.trunk_channels), ("stage_channels", &self.stage_channels)] {
+            check((1..=3).contains(&stages.len()), field, "1 to 3 stages", stages.len().to_string())?;
+        }
+        check(self.reach <= 4, "reach", "0 to 4 cells", self.reach.to_string())?;
+        check(
+            (16..=256).contains(&self.input_px) && self.input_px.is_multiple_of(1 << channels.len()),
+            "input_px",
+            "16 to 256, and halved by every stage without a remainder",
+            self.input_px.to_string(),
+        )?;
+        let fits = |c: &usize| (1..=1024).contains(c) && c.is_multiple_of(self.norm_groups);
+        check(
+            self.norm_groups > 0 && channels.iter().all(fits),
+            "norm_groups",
+            "a divisor of every stage's channels, which are 1 to 1024",
+            format!("{} for {channels:?}", self.norm_groups),
+        )?;
+        for (field, convs, stages) in [
+            ("trunk_convs", &self.trunk_convs, &self.trunk_channels),
+            ("stage_convs", &self.stage_convs, &self.stage_channels),
+        ] {
+            let fits = convs.len() == stages.len() && convs.iter().all(|count| (1..=8).contains(count));
+            check(fits, field, "1 to 8 convolutions for each stage", format!("{convs:?}"))?;
+        }
+        check((1..=4096).contains(&self.hidden), "hidden", "1 to 4096", self.hidden.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_without_sense_are_named_and_the_preset_survives_serialisation() {
+        let edge = ComparisonConfig::edge();
+        let written = serde_json::to_string(&edge).unwrap();
+        assert_eq!(serde_json::from_str::<ComparisonConfig>(&written).unwrap(), edge);
+        assert_eq!(edge.last_map_px(), 4);
+        let message = |change: fn(&mut ComparisonConfig)| {
+            let mut config = ComparisonConfig::edge();
+            change(&mut config);
+            config.init_blank(&Device::flex()).unwrap_err().to_string()
+        };
+        let odd = message(|c| c.input_px = 72);
+        assert!(odd.contains("input_px must be 16 to 256") && odd.ends_with("found 72"), "{odd}");
+        assert!(message(|c| c.norm_groups = 7).contains("norm_groups"));
+        assert!(message(|c| c.norm_groups = 0).contains("norm_groups"));
+        assert!(message(|c| c.stage_channels.clear()).contains("stage_channels must be 1 to 3 stages"));
+        assert!(message(|c| c.stage_convs = vec![2, 0]).contains("stage_convs must be 1 to 8"));
+        assert!(message(|c| c.hidden = 0).contains("hidden"));
+    }
+}

@@ -1,0 +1,46 @@
+//! The comparison network: does a place of a picture show the part of a demonstration, in the pose that a model read there?
+//!
+//! ```text
+//! demonstration, outline ─ upright, S×S ───────────────┐
+//!                                                      ├─ 16 channels ─ convolutions ─ log-odds, offset of the pose
+//! picture, pose ─ turned upright by the pose, S×S ─────┘
+//! ```
+//!
+//! Both are cut by the pose, so that the same place of the part is the same pixel of both: what is left to tell is whether
+//! they look alike. That is the same question for every part, so nothing in the network belongs to one part; it is learnt
+//! once, on generated parts and their look-alikes, and teaching adds nothing but the demonstration.
+//!
+//! **Frame of a view.** A square about the middle of the outline's box, in the demonstration's direction, x right, y down.
+//!
+//! Left out: finding the part and its pose (crates `detection`, `grasp`), pretraining (`base-weights`), files.
+//!
+//! # Source
+//! Both as channels of one input: the 2-channel network of Zagoruyko and Komodakis, Learning to Compare Image Patches via
+//! Convolutional Neural Networks (2015). Log-odds of a pose, from a picture and a view of the object under it: Labbé and
+//! others, MegaPose (2022).
+//!
+//! # Example
+//! ```
+//! use burn::tensor::{Device, read_sync};
+//! use image::RgbImage;
+//! use sdg_comparison::{ComparisonConfig, Reference};
+//! use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
+//!
+//! let network = ComparisonConfig::edge().init(&Device::flex(), 7)?;
+//! let outline = Polygon::from_box(&BoundingBox::new(20.0, 20.0, 100.0, 60.0)?);
+//! let reference = Reference::new(&RgbImage::new(120, 80), &outline, network.config().input_px);
+//! let view = reference.view(&RgbImage::new(640, 480), &PlanarSimilarity::IDENTITY);
+//! let readings = read_sync(network.compare(&[view]));
+//! assert!(readings[0].log_odds.is_finite());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod config;
+mod network;
+mod view;
+
+pub use config::{ComparisonConfig, ComparisonError};
+pub use network::{ComparisonNetwork, Reading};
+pub use view::{CHANNELS, Offset, Reference, View, batch};

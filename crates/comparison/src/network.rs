@@ -1,0 +1,149 @@
+//! The network: views in, log-odds and offsets out.
+
+use burn::module::Module;
+use burn::tensor::ops::PadMode;
+use burn::tensor::{Device, Tensor, activation};
+use sdg_detection::initialization::{Distribution, Initializer};
+use sdg_detection::layers::Linear;
+use sdg_orientation::{ConvNormRelu, Stage};
+
+use crate::config::ComparisonConfig;
+use crate::view::{DIFFERENCES, Offset, View, batch};
+
+/// Side of the first convolution's kernel.
+const FIRST_KERNEL: usize = 5;
+/// Added to the square of a cell's length, so that a cell without features has a direction of zero.
+const LEAST_SQUARE: f64 = 1e-4;
+/// The log-odds, and the offset's four values.
+const NUM_OUTPUTS: usize = 5;
+
+/// The comparison network.
+#[derive(Module, Debug)]
+pub struct ComparisonNetwork {
+    /// From a square of the demonstration or of the picture to its map. Never trained here: it is another network's.
+    pub trunk: Vec<Stage>,
+    /// From what differs to the last map.
+    pub stages: Vec<Stage>,
+    /// From the flat last map.
+    pub hidden: Linear,
+    /// To the log-odds and the offset.
+    pub outputs: Linear,
+    #[module(skip)]
+    config: ComparisonConfig,
+}
+
+/// What the network says of a view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// That it shows the part in the pose that it was made by.
+    pub log_odds: f64,
+    /// By how much the pose is off, where it shows the part.
+    pub offset: Offset,
+}
+
+impl ComparisonNetwork {
+    pub(crate) fn init(config: &ComparisonConfig, init: &mut Initializer) -> Self {
+        let groups = config.norm_groups;
+        let trunk = stages(3, FIRST_KERNEL, &config.trunk_channels, &config.trunk_convs, groups, init);
+        let of_trunk = config.trunk_channels.last().copied().unwrap_or(3);
+        let compared = (2 * config.reach + 1).pow(2) + 2 * of_trunk + DIFFERENCES;
+        let head = stages(compared, 3, &config.stage_channels, &config.stage_convs, groups, init);
+        let flat = config.stage_channels.last().copied().unwrap_or(compared) * config.last_map_px().pow(2);
+        let hidden = Linear::init(flat, config.hidden, Distribution::he_normal(flat), init);
+        // Small first outputs: undecided, and no offset.
+        let outputs = Linear::init(config.hidden, NUM_OUTPUTS, Distribution::Normal { std: 0.01 }, init);
+        let trunk = trunk.into_iter().map(Module::no_grad).collect();
+        Self { trunk, stages: head, hidden, outputs, config: config.clone() }
+    }
+
+    /// The configuration that the network was built from.
+    pub fn config(&self) -> &ComparisonConfig {
+        &self.config
+    }
+
+    /// The device that the parameters are on.
+    pub fn device(&self) -> Device {
+        self.outputs.weight.val().device()
+    }
+
+    /// The raw outputs for views of a [`batch`].
+    ///
+    /// # Shapes
+    /// - `views`: `[N, CHANNELS, S, S]`
+    /// - output: `[N, 5]`: log-odds, then shift x, shift y, turn, logarithm of size over their units
+    pub fn forward(&self, views: Tensor<4>) -> Tensor<2> {
+        let [n, _, side, _] = views.dims();
+        let map = |first: usize| through(&self.trunk, views.clone().narrow(1, first, 3));
+        let [demonstration, picture] = [map(0), map(3)];
+        let cells = self.config.trunk_map_px();
+        let differences = views.clone().narrow(1, 6, DIFFERENCES);
+        let px = side / cells;
+        let averaged = differences.reshape([n, DIFFERENCES, cells, px, cells, px]).mean_dim(5).mean_dim(3);
+        let differences: Tensor<4> = averaged.reshape([n, DIFFERENCES, cells, cells]);
+        let inside = differences.clone().narrow(1, DIFFERENCES - 1, 1);
+        let correlated = self.correlation(&demonstration, &picture) * inside.clone();
+        let differing = (demonstration.clone() - picture).abs() * inside;
+        let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
+        let map = through(&self.stages, compared);
+        let flat: Tensor<2> = map.reshape([n as i64, -1]);
+        self.outputs.forward(activation::relu(self.hidden.forward(flat)))
+    }
+
+    /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
+    fn correlation(&self, demonstration: &Tensor<4>, picture: &Tensor<4>) -> Tensor<4> {
+        let unit = |map: &Tensor<4>| map.clone() / (map.clone().square().sum_dim(1) + LEAST_SQUARE).sqrt();
+        let reach = self.config.reach;
+        let [_, _, height, width] = picture.dims();
+        let one = unit(demonstration);
+        let other = unit(picture).pad((reach, reach, reach, reach), PadMode::Constant(0.0));
+        let shifted = (0..=2 * reach).flat_map(|dy| (0..=2 * reach).map(move |dx| (dy, dx)));
+        let products = shifted
+            .map(|(dy, dx)| (one.clone() * other.clone().narrow(2, dy, height).narrow(3, dx, width)).sum_dim(1))
+            .collect();
+        Tensor::cat(products, 1)
+    }
+
+    /// What the network says of each view.
+    pub async fn compare(&self, views: &[View]) -> Vec<Reading> {
+        if views.is_empty() {
+            return Vec::new();
+        }
+        let outputs = self.forward(batch(views, &self.device()));
+        let read = outputs.into_data_async().await.expect("what the device computes can be read");
+        let values: Vec<f64> = read.iter::<f32>().map(f64::from).collect();
+        let reading = |row: &[f64]| {
+            let offset = Offset::from_outputs([row[1], row[2], row[3], row[4]]);
+            Reading { log_odds: row[0], offset }
+        };
+        values.chunks_exact(NUM_OUTPUTS).map(reading).collect()
+    }
+}
+
+/// Stages that halve their maps each; the first convolution's kernel has a side of its own.
+fn stages(
+    mut in_channels: usize,
+    first_kernel: usize,
+    channels: &[usize],
+    convs: &[usize],
+    num_groups: usize,
+    init: &mut Initializer,
+) -> Vec<Stage> {
+    let mut made = Vec::with_capacity(channels.len());
+    for (stage, (&channels, &num_convs)) in channels.iter().zip(convs).enumerate() {
+        let convs = (0..num_convs)
+            .map(|conv| {
+                let kernel = if stage == 0 && conv == 0 { first_kernel } else { 3 };
+                let stride = if conv == 0 { 2 } else { 1 };
+                let shape = [channels, in_channels, kernel, kernel];
+                in_channels = channels;
+                ConvNormRelu::init(shape, stride, num_groups, init)
+            })
+            .collect();
+        made.push(Stage { convs });
+    }
+    made
+}
+
+fn through(stages: &[Stage], x: Tensor<4>) -> Tensor<4> {
+    stages.iter().flat_map(|stage| &stage.convs).fold(x, |x, conv| conv.forward(x))
+}
