@@ -67,7 +67,7 @@ test-torch: setup ## Tests a whole network against torchvision, losses and gradi
 	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked -p sdg-detection --test golden -- --ignored
 
 # The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
-PACKAGED = geometry kinematics sift shape grasp kernels detection demonstration training orientation part-generator
+PACKAGED = geometry kinematics sift shape grasp kernels detection demonstration training orientation comparison part-generator
 
 package: ## Packages the libraries that other programs can use, into target/package
 	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
@@ -86,7 +86,12 @@ base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on 
 	target/release/sdg-base-weights pretrain --network orientation --steps 3000 \
 		--checkpoint $(BASE_WEIGHTS)/orientation.safetensors --device $(DEVICE)
 	target/release/sdg-base-weights export --detector $(BASE_WEIGHTS)/detector.safetensors \
-		--orientation $(BASE_WEIGHTS)/orientation.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \
+		--orientation $(BASE_WEIGHTS)/orientation.safetensors --out $(BASE_WEIGHTS)/networks.safetensors \
+		--commit $$(git rev-parse --short HEAD)
+	target/release/sdg-base-weights pretrain --network comparison --steps 3000 --trunk $(BASE_WEIGHTS)/networks.safetensors \
+		--checkpoint $(BASE_WEIGHTS)/comparison.safetensors --device $(DEVICE)
+	target/release/sdg-base-weights export --base $(BASE_WEIGHTS)/networks.safetensors \
+		--comparison $(BASE_WEIGHTS)/comparison.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \
 		--commit $$(git rev-parse --short HEAD)
 
 bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)

@@ -288,3 +288,36 @@ impl Task for ComparisonTask {
         Ok(vec![("same", answer), ("offset", offset * OFFSET_WEIGHT)])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_comparison::CHANNELS;
+    use sdg_detection::state_dict::StateDict;
+
+    #[test]
+    fn pairs_are_drawn_by_their_step_and_the_same_part_differs_less() {
+        let settings = Settings { batch_size: ComparisonTask::BATCH_SIZE, ..Settings::new(3, 16, 100) };
+        let config = ComparisonConfig::edge();
+        let task = ComparisonTask::new(&settings, config.clone(), StateDict::new()).unwrap();
+        // The mean of what differs in normalised colour on the part.
+        let pixels = config.input_px.pow(2) as usize;
+        let difference = |pair: &Pair| {
+            let of = |channels: std::ops::Range<usize>| {
+                pair.view.values()[channels.start * pixels..channels.end * pixels].iter().sum::<f32>()
+            };
+            of(CHANNELS - 4..CHANNELS - 1) / of(CHANNELS - 1..CHANNELS)
+        };
+        let mut means = [Vec::new(), Vec::new()];
+        for step in 0..4 {
+            let pairs = task.pairs(&settings, step);
+            let again = task.pairs(&settings, step);
+            assert_eq!(pairs.len(), again.len());
+            assert!(pairs.iter().zip(&again).all(|(one, other)| one.view == other.view));
+            pairs.iter().for_each(|pair| means[usize::from(pair.same.is_some())].push(f64::from(difference(pair))));
+        }
+        let [not, same] = means.map(|values| (values.len(), sdg_geometry::median(values).unwrap()));
+        assert!(same.0 > 40 && not.0 > same.0, "{same:?} {not:?}");
+        assert!(same.1 < 0.8 * not.1, "{same:?} {not:?}");
+    }
+}

@@ -1,10 +1,12 @@
 //! A run that was stopped goes on as if nothing had happened.
 #![allow(clippy::unwrap_used)]
 
+use sdg_base_weights::comparison::ComparisonTask;
 use sdg_base_weights::detector::DetectorTask;
 use sdg_base_weights::network::pretrain_config;
 use sdg_base_weights::orientation::OrientationTask;
 use sdg_base_weights::run::{Run, Settings, Task};
+use sdg_comparison::ComparisonConfig;
 use sdg_detection::RcnnConfig;
 use sdg_detection::config::ResizeRule;
 use sdg_grasp::Device;
@@ -83,6 +85,30 @@ fn fifty_steps_of_the_orientation_cnn_are_the_same_bits_whether_stopped_or_not()
     let task = || OrientationTask::new(&settings(), config.clone()).unwrap();
     let losses = stopped_and_not(task, &settings());
     assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
+}
+
+#[test]
+fn fifty_steps_of_the_comparison_network_are_the_same_bits_whether_stopped_or_not_and_leave_its_trunk() {
+    let orientation =
+        OrientationConfig { stage_channels: vec![8, 16], stage_convs: vec![1, 1], ..OrientationConfig::edge() };
+    let orientation = orientation.init(&Device::flex(), 4).unwrap().state_dict();
+    let config = ComparisonConfig {
+        trunk_channels: vec![8, 16],
+        trunk_convs: vec![1, 1],
+        stage_channels: vec![16],
+        stage_convs: vec![1],
+        hidden: 16,
+        ..ComparisonConfig::edge()
+    };
+    let settings = Settings { batch_size: 1, ..settings() };
+    let task = || ComparisonTask::new(&settings, config.clone(), orientation.clone()).unwrap();
+    let losses = stopped_and_not(task, &settings);
+    assert!(mean(&losses[STEPS - 10..]) < mean(&losses[..10]), "{losses:?}");
+
+    let mut run = Run::start(task(), settings.clone(), &Device::flex()).unwrap();
+    advance(&mut run, 2);
+    let taught = run.checkpoint().parameters;
+    assert_eq!(taught["trunk.1.convs.0.weight"], orientation["stages.1.convs.0.weight"]);
 }
 
 #[test]

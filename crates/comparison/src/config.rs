@@ -38,7 +38,7 @@ pub struct ComparisonConfig {
 }
 
 impl ComparisonConfig {
-    /// 64 × 64 pixels, half a million parameters.
+    /// 64 × 64 pixels, 0.6 million parameters; the trunk is the first stages of preset `edge`'s orientation CNN.
     pub fn edge() -> Self {
         Self {
             input_px: 64,

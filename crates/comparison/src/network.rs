@@ -147,3 +147,62 @@ fn stages(
 fn through(stages: &[Stage], x: Tensor<4>) -> Tensor<4> {
     stages.iter().flat_map(|stage| &stage.convs).fold(x, |x, conv| conv.forward(x))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Reference;
+    use burn::tensor::read_sync;
+    use image::{Rgb, RgbImage};
+    use sdg_detection::state_dict;
+    use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
+
+    fn view(reference: &Reference, tx: f64) -> View {
+        let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));
+        reference.view(&image, &PlanarSimilarity { tx, ..PlanarSimilarity::IDENTITY })
+    }
+
+    fn reference(network: &ComparisonNetwork) -> Reference {
+        let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));
+        let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 30.0, x2: 100.0, y2: 50.0 });
+        Reference::new(&image, &outline, network.config().input_px)
+    }
+
+    #[test]
+    fn a_batch_is_read_as_each_of_its_views_alone() {
+        let network = ComparisonConfig::edge().init(&Device::flex(), 5).unwrap();
+        let reference = reference(&network);
+        let views = [view(&reference, 0.0), view(&reference, 25.0)];
+        let together = read_sync(network.compare(&views));
+        assert_ne!(together[0].log_odds, together[1].log_odds);
+        for (view, reading) in views.into_iter().zip(&together) {
+            let alone = read_sync(network.compare(&[view]))[0];
+            assert!((alone.log_odds - reading.log_odds).abs() < 1e-4, "{alone:?} {reading:?}");
+        }
+        assert_eq!(read_sync(network.compare(&[])), []);
+    }
+
+    #[test]
+    fn correlation_is_one_where_the_maps_are_the_same_and_finds_a_shift() {
+        let network = ComparisonConfig::edge().init(&Device::flex(), 5).unwrap();
+        let map = Tensor::<4>::random([1, 48, 16, 16], burn::tensor::Distribution::Normal(0.0, 1.0), &Device::flex());
+        // What the picture shows one cell to the right.
+        let moved = Tensor::cat(vec![map.clone().narrow(3, 15, 1), map.clone().narrow(3, 0, 15)], 3);
+        let strongest = |other: &Tensor<4>| {
+            let values = network.correlation(&map, other).into_data().try_to_vec_as::<f32>().unwrap();
+            let at = |shift: usize| values[shift * 256 + 8 * 16 + 8];
+            (0..25).max_by(|a, b| at(*a).total_cmp(&at(*b))).map(|shift| (shift, at(shift))).unwrap()
+        };
+        let (shift, value) = strongest(&map);
+        assert!(shift == 12 && (value - 1.0).abs() < 1e-3, "{shift} {value}");
+        let (shift, value) = strongest(&moved);
+        assert!(shift == 13 && (value - 1.0).abs() < 1e-3, "{shift} {value}");
+    }
+
+    #[test]
+    fn the_preset_has_about_six_hundred_thousand_parameters() {
+        let network = ComparisonConfig::edge().init_blank(&Device::flex()).unwrap();
+        let count: usize = state_dict::export(&network).values().map(|tensor| tensor.values.len()).sum();
+        assert!((500_000..650_000).contains(&count), "{count}");
+    }
+}

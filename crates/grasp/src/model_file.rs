@@ -479,6 +479,17 @@ mod tests {
     }
 
     #[test]
+    fn a_file_of_version_2_is_read_without_a_comparison_network() {
+        let mut older = untaught(ModelKind::C);
+        older.network.as_mut().unwrap().comparison = None;
+        let today = older.to_bytes().unwrap();
+        let bytes = with_metadata(&today, r#""format_version":"3""#, r#""format_version":"2""#);
+        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
+        assert!(read.network.as_ref().unwrap().comparison.is_none());
+        assert_eq!(read.to_bytes().unwrap(), today);
+    }
+
+    #[test]
     fn a_file_cut_anywhere_is_an_error() {
         let bytes = untaught(ModelKind::C).to_bytes().unwrap();
         for length in [0, 1, 7, 8, 100, 5_000, bytes.len() / 2, bytes.len() - 1] {

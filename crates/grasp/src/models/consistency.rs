@@ -1,4 +1,5 @@
-//! A network's score: the probability of the class, less where its heads contradict each other.
+//! A network's score: the probability of the class, less where its heads contradict each other, and less where the place does
+//! not look like the demonstration.
 //!
 //! Box, keypoints, mask and turn of a detection each say where the part lies. On the part they agree; on another thing the
 //! box fits that thing, and where the other heads put the demonstration, it fills little of the box or has an impossible size.
@@ -74,7 +75,10 @@ mod tests {
         let large = at(300.0, 2.0);
         let too_large = filled(&taught, &large, &around(&large), picture);
         assert!(too_large < 0.5 && score(0.9, too_large, None) < 0.6, "{too_large}");
+        // What does not look like the demonstration scores lower, what does higher.
+        let scores = [-3.0, 0.0, 3.0].map(|log_odds| score(0.7, whole, Some(log_odds)));
+        assert!(scores[0] < 0.05 && scores[1] == score(0.7, whole, None) && scores[2] > 0.95, "{scores:?}");
         // What fills nothing and what is certain stay numbers.
-        assert!(score(1.0, 0.0, None) > 0.0 && score(1.0, 1.0, None) < 1.0);
+        assert!(score(1.0, 0.0, None) > 0.0 && score(1.0, 1.0, None) < 1.0 && score(0.0, 1.0, None) > 0.0);
     }
 }
