@@ -27,6 +27,13 @@ const MASK_SAMPLES: u32 = 2;
 #[derive(Debug, Clone, PartialEq)]
 pub struct View(Vec<f32>);
 
+impl View {
+    /// `[CHANNELS, S, S]`.
+    pub fn values(&self) -> &[f32] {
+        &self.0
+    }
+}
+
 /// How far a pose is off, in the frame of the view that it was made by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offset {
