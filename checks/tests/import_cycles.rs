@@ -8,10 +8,9 @@ use std::path::{Path, PathBuf};
 use sdg_checks::ModuleGraph;
 
 /// Groups of files that may import from each other: the crate's folder, the group's first file, and why.
-const EXCEPTIONS: [(&str, &str, &str); 3] = [
+const EXCEPTIONS: [(&str, &str, &str); 2] = [
     ("crates/grasp", "facts.rs", "the plan of a teaching is part of the model's facts, and reads a model's settings"),
     ("crates/grasp", "teach/fine_tuning.rs", "the plan is made where it is carried out"),
-    ("crates/orientation", "training/augmented.rs", "the crops to learn from take their size from the configuration"),
 ];
 
 fn root() -> PathBuf {

@@ -7,8 +7,8 @@ use sdg_detection::presets::RcnnKind;
 use sdg_detection::{RcnnConfig, presets};
 use sdg_geometry::RotationalSymmetry;
 use sdg_orientation::OrientationConfig;
-use sdg_orientation::training::OrientationTraining;
 use sdg_training::TrainingConfig;
+use sdg_training::orientation::OrientationTraining;
 
 use super::{FineTuning, TeachOptions, paper, r50};
 use crate::NUM_KEYPOINTS;
