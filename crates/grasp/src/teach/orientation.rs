@@ -7,9 +7,9 @@ use sdg_orientation::OrientationCnn;
 use sdg_training::Ending;
 use sdg_training::orientation::{self, OrientationEvent};
 
-use super::TeachOptions;
 use super::event::TeachingEvent;
-use super::plan::OrientationPlan;
+use super::options::TeachOptions;
+use super::preset::OrientationPlan;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::OrientationFacts;
