@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
+use sdg_base_weights::checkpoint::Checkpoint;
 use sdg_base_weights::compare::Comparison;
 use sdg_base_weights::detector::DetectorTask;
 use sdg_base_weights::export::export;
@@ -17,6 +17,7 @@ use sdg_base_weights::run::{Run, Settings, Task};
 use sdg_base_weights::table::table;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
 use sdg_orientation::OrientationConfig;
+use sdg_report::write_atomically;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -140,7 +141,7 @@ fn main() -> Result<()> {
             let detector = Checkpoint::read(&detector)?;
             let orientation = orientation.map(|path| Checkpoint::read(&path)).transpose()?;
             let bytes = export(&detector, orientation.as_ref(), &commit)?.to_bytes();
-            write_whole(&out, &bytes)?;
+            write_atomically(&out, &bytes)?;
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
         }

@@ -11,9 +11,9 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::demonstration_view;
 
 use super::axes::{MARKS_JITTER_PX, with_jittered_marks};
-use super::caught::caught;
 use super::cell::{Cell, Marks};
 use super::looking::part_seed;
+use super::one_unit::caught;
 use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::exit::one_line;
