@@ -17,6 +17,7 @@ use crate::plan::Lengths;
 
 /// How to teach.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct TeachOptions {
     /// Which model.
     pub kind: ModelKind,
