@@ -1,13 +1,13 @@
 //! What a stopped run goes on from: all parameters and moments in full precision, and the settings of the run.
 
 use std::collections::HashMap;
-use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::state_dict::{StateDict, WeightTensor};
+use sdg_report::write_atomically;
 use sdg_training::AdamWState;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -51,7 +51,7 @@ impl<S: Serialize + DeserializeOwned> Checkpoint<S> {
             ("optimizer_step".to_owned(), self.optimizer.step.to_string()),
         ]);
         let bytes = safetensors::serialize(views, Some(metadata)).with_context(named)?;
-        write_whole(path, &bytes)
+        Ok(write_atomically(path, &bytes)?)
     }
 
     /// Reads a file.
@@ -83,18 +83,4 @@ impl<S: Serialize + DeserializeOwned> Checkpoint<S> {
         }
         Ok(Self { settings, step, parameters, optimizer })
     }
-}
-
-/// Writes a file under a temporary name, syncs it, and gives it its name.
-///
-/// # Errors
-/// A folder that cannot be written.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let named = || format!("{}: cannot write", path.display());
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(named)?;
-    file.write_all(bytes).with_context(named)?;
-    file.as_file().sync_all().with_context(named)?;
-    file.persist(path).with_context(named)?;
-    Ok(())
 }

@@ -256,14 +256,12 @@ impl Comparison<'_> {
             }
             let trial = Trial::new(part)?;
             for steps in missing {
-                let options = TeachOptions {
-                    kind: ModelKind::C,
-                    symmetry: trial.part.symmetry(),
-                    start: self.weights.clone().map_or(Start::Nothing, Start::Weights),
-                    steps: Some(steps),
-                    fine_tuning: self.fine_tuning.clone(),
-                    ..TeachOptions::new(self.seed)
-                };
+                let mut options = TeachOptions::new(self.seed);
+                options.kind = ModelKind::C;
+                options.symmetry = trial.part.symmetry();
+                options.start = self.weights.clone().map_or(Start::Nothing, Start::Weights);
+                options.steps = Some(steps);
+                options.fine_tuning = self.fine_tuning.clone();
                 let outcome = trial.run(self.name, part, &options)?;
                 observe(&outcome);
                 writeln!(out, "{}", serde_json::to_string(&outcome)?).with_context(named)?;

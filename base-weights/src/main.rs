@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use sdg_base_weights::checkpoint::{Checkpoint, write_whole};
+use sdg_base_weights::checkpoint::Checkpoint;
 use sdg_base_weights::compare::Comparison;
 use sdg_base_weights::comparison::ComparisonTask;
 use sdg_base_weights::detector::DetectorTask;
@@ -19,6 +19,7 @@ use sdg_base_weights::table::table;
 use sdg_comparison::ComparisonConfig;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
 use sdg_orientation::OrientationConfig;
+use sdg_report::write_atomically;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
@@ -170,7 +171,7 @@ fn main() -> Result<()> {
                 file = with_comparison(file, &comparison, &commit)?;
             }
             let bytes = file.to_bytes();
-            write_whole(&out, &bytes)?;
+            write_atomically(&out, &bytes)?;
             println!("{}: {} bytes, SHA-256 {}", out.display(), bytes.len(), sha256(&bytes));
             Ok(())
         }

@@ -20,9 +20,9 @@ use sdg_detection::imprint::ClassImprint;
 use sdg_detection::initialization::Initializer;
 use sdg_geometry::Angle;
 use sdg_grasp::NUM_KEYPOINTS;
-use sdg_orientation::training::{BoxJitter, LabelledCrop, OrientationTraining};
 use sdg_orientation::{OrientationCnn, OrientationConfig, crop_batch};
 use sdg_part_generator::Instance;
+use sdg_training::orientation::{BoxJitter, LabelledCrop, OrientationTraining};
 use sdg_training::step_seed;
 
 use crate::pictures::{MIN_VISIBLE_SHARE, Pictures};

@@ -23,7 +23,9 @@ fn the_file_is_whole_small_and_says_how_it_was_made() {
     }
     assert!(file.origin["detector"].contains("seed") && file.origin["detector"].contains("steps"), "{:?}", file.origin);
     for kind in [ModelKind::A, ModelKind::B, ModelKind::C, ModelKind::D] {
-        let network = TeachOptions { kind, ..TeachOptions::new(1) }.taught_network().unwrap();
+        let mut options = TeachOptions::new(1);
+        options.kind = kind;
+        let network = options.taught_network().unwrap();
         let weights = file.for_network(Preset::Edge.name(), &network, sha256.clone()).unwrap();
         assert!(!weights.imprint.is_empty() && weights.orientation.is_some(), "{kind}");
         // Teaching draws nothing anew but the class scores, which it makes of the part's views.

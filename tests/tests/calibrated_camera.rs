@@ -34,7 +34,9 @@ fn taught(part: &ObjectSpec) -> GraspModel {
     let marks = part.marks_in_base(&shown.truth.base_from_object);
     let (photo, camera) = (shipped::demonstration(&part.name).unwrap(), over_table(shown.view.camera));
     let (seen, lengths) = seen_from_above(&[photo], &camera, marks[0].z, shown.truth.tcp.z).unwrap();
-    let options = TeachOptions { kind: ModelKind::S, lengths: Some(lengths), ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.kind = ModelKind::S;
+    options.lengths = Some(lengths);
     let model = teach(&seen, &options, &mut |_| ControlFlow::Continue(())).unwrap().model;
     // What is used from here on is what a file gives back.
     GraspModel::from_bytes(&model.to_bytes().unwrap(), &Device::flex()).unwrap()

@@ -26,7 +26,9 @@ const MIN_RIGHT_SHARE: f64 = 0.95;
 const MAX_DROPPED: usize = 1;
 
 fn model_without_network(object: &ObjectSpec) -> GraspModel {
-    let options = TeachOptions { kind: ModelKind::S, symmetry: object.symmetry, ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.kind = ModelKind::S;
+    options.symmetry = object.symmetry;
     let demonstration = shipped::demonstration(&object.name).unwrap();
     let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
     // What is used from here on is what a file gives back.

@@ -51,7 +51,8 @@ fn the_network_learns() {
     let without_part =
         scenes(&part, SceneConfig { absent_share: 1.0, others: [1, 4], ..SceneConfig::only(Condition::Nominal) });
     let demonstration = with_part.photo(0).demonstration.clone();
-    let options = TeachOptions { symmetry: part.symmetry(), ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.symmetry = part.symmetry();
     let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
     let model = taught.model;
     let hits = (0..NUM_PICTURES).filter(|&i| is_hit(&model, &part, &with_part.sample(i))).count();

@@ -18,7 +18,8 @@ fn the_pendulum_is_taught_found_and_grasped() {
     let object = ObjectSpec::by_name("pendulum").unwrap();
     let demonstration = shipped::demonstration("pendulum").unwrap();
     // The camera hovers as high as it was for the photo: what has another size is another part.
-    let options = TeachOptions { size_tolerance: CheckConfig::FIXED_HEIGHT_TOLERANCE, ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
     let taught = teach(&[demonstration], &options, &mut |_| ControlFlow::Continue(())).unwrap();
     let seconds = taught.model.facts().seconds;
     println!("taught in {seconds:.0} s: {:?}", taught.model.facts().validation);

@@ -56,7 +56,9 @@ fn tracked(address: &str, detector: impl FnOnce(&TableCamera, &ObjectSpec) -> Pa
 
 /// Without a calibrated camera.
 fn by_picture(_: &TableCamera, part: &ObjectSpec) -> PartDetector {
-    let options = TeachOptions { kind: ModelKind::S, symmetry: part.symmetry, ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.kind = ModelKind::S;
+    options.symmetry = part.symmetry;
     taught(shipped::demonstration(&part.name).unwrap(), &options).into()
 }
 
@@ -69,7 +71,10 @@ fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> PartDetector {
     let photo_camera = over_table(shown.view.camera);
     let (seen, lengths) = seen_from_above(&[photo], &photo_camera, mark_height_m, shown.truth.tcp.z).unwrap();
     let lengths = Some(lengths);
-    let options = TeachOptions { kind: ModelKind::S, symmetry: part.symmetry, lengths, ..TeachOptions::new(1) };
+    let mut options = TeachOptions::new(1);
+    options.kind = ModelKind::S;
+    options.symmetry = part.symmetry;
+    options.lengths = lengths;
     let model = taught(seen.into_iter().next().unwrap(), &options);
     PlanDetector::new(model, &over_table(camera.posed_camera())).unwrap().into()
 }

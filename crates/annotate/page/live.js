@@ -144,9 +144,9 @@ export async function keepPicture() {
   if (state.tab !== "try" || !isLive() || live.number === null) return;
   const { number, detections, seconds } = live;
   try {
-    const scene = await api.keepFrame(number);
-    state.scenes.push({ ...scene, detections, seconds });
-    toast(`Kept as ${scene.name}`);
+    const trial = await api.keepFrame(number);
+    state.trialPictures.push({ ...trial, detections, seconds });
+    toast(`Kept as ${trial.name}`);
   } catch (error) {
     toast(error.message);
   }

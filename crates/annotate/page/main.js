@@ -51,7 +51,7 @@ try {
     label: session.label,
     modelPath: session.model_path,
     images: session.images.map(adopt),
-    scenes: session.scenes.map((scene) => ({ ...scene, detections: null })),
+    trialPictures: session.trial_pictures.map((trial) => ({ ...trial, detections: null })),
     teaching,
     camera: session.camera,
   });

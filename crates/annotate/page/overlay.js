@@ -1,7 +1,7 @@
 // Marks as they are drawn over the photo. Elements are kept from frame to frame, so that a handle in focus stays so.
 
 import { add, boundsOf, boxPolygon, direction, gripperOf, quarter, sub, times } from "./geometry.js";
-import { image, isLive, isMarking, marks, scene, state } from "./store.js";
+import { image, isLive, isMarking, marks, state, trialPicture } from "./store.js";
 import { toScreen } from "./view.js";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -172,7 +172,7 @@ export function renderOverlay() {
   if (state.tab === "try") {
     // What was found in an old picture is not there now.
     const inLive = state.live.isUsable ? state.live.detections : null;
-    const detections = isLive() ? inLive : scene()?.detections;
+    const detections = isLive() ? inLive : trialPicture()?.detections;
     const shown = detections?.filter((d) => d.is_accepted || state.showRefused) ?? [];
     // Worst first, so that the best is on top.
     shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => drawDetection(d, i));

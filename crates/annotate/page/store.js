@@ -7,8 +7,8 @@ export const state = {
   images: [],
   current: 0,
   /** Pictures to try, each with its `detections` once looked at. */
-  scenes: [],
-  scene: 0,
+  trialPictures: [],
+  trial: 0,
   tab: "mark",
   tool: "select",
   /** Which mark is being corrected: box, grasp, outline; and which of the outline's points. */
@@ -47,7 +47,7 @@ export function changed() {
 
 export const image = () => state.images[state.current];
 export const marks = () => image().marks;
-export const scene = () => state.scenes[state.scene];
+export const trialPicture = () => state.trialPictures[state.trial];
 export const size = () => [image().width, image().height];
 
 /** Whether the stage shows the camera: for the first photo, for a further one, or to try the model. */

@@ -2,7 +2,7 @@
 
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
-import { changed, image, isLive, marks, scene, state } from "./store.js";
+import { changed, image, isLive, marks, state, trialPicture } from "./store.js";
 import { show } from "./view.js";
 
 const strip = document.getElementById("strip");
@@ -17,9 +17,9 @@ export function openImage(index) {
 }
 
 /** Opens another picture to try. */
-export function openScene(index) {
-  if (index < 0 || index >= state.scenes.length) return;
-  Object.assign(state, { scene: index, tryingLive: false });
+export function openTrialPicture(index) {
+  if (index < 0 || index >= state.trialPictures.length) return;
+  Object.assign(state, { trial: index, tryingLive: false });
   showCurrent();
 }
 
@@ -27,9 +27,9 @@ export function openScene(index) {
 function onStage() {
   if (isLive()) return state.live.url && [state.live.url, state.live.size, `Live picture of ${state.camera}`];
   const trying = state.tab === "try";
-  const shown = trying ? scene() : image();
+  const shown = trying ? trialPicture() : image();
   if (!shown) return null;
-  return [trying ? api.sceneUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`];
+  return [trying ? api.trialPictureUrl(shown.id) : api.imageUrl(shown.id), [shown.width, shown.height], `Photo ${shown.name}`];
 }
 
 /** Shows what the present step is about. */
@@ -56,21 +56,21 @@ function words(entry, trying) {
 
 export function renderStrip() {
   const trying = state.tab === "try";
-  const entries = trying ? state.scenes : state.images;
+  const entries = trying ? state.trialPictures : state.images;
   strip.setAttribute("aria-label", trying ? "Pictures to try" : "Photos of the part");
   strip.hidden = state.tab === "samples" ? state.images.length < 2 : trying || isLive() ? !entries.length : entries.length < 2;
-  const current = trying ? state.scene : state.current;
+  const current = trying ? state.trial : state.current;
   while (strip.children.length > entries.length) strip.lastChild.remove();
   entries.forEach((entry, i) => {
     let item = strip.children[i];
     if (!item) {
       item = document.createElement("li");
       item.innerHTML = '<button><img alt="" loading="lazy"><span></span><span></span></button>';
-      item.firstChild.addEventListener("click", () => (state.tab === "try" ? openScene(i) : openImage(i)));
+      item.firstChild.addEventListener("click", () => (state.tab === "try" ? openTrialPicture(i) : openImage(i)));
       strip.append(item);
     }
     const [picture, name, word] = item.firstChild.children;
-    const url = trying ? api.sceneUrl(entry.id) : api.imageUrl(entry.id);
+    const url = trying ? api.trialPictureUrl(entry.id) : api.imageUrl(entry.id);
     if (picture.getAttribute("src") !== url) picture.src = url;
     name.textContent = entry.name;
     word.textContent = words(entry, trying);
@@ -79,5 +79,5 @@ export function renderStrip() {
 }
 
 /** For the title of the window. */
-export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? scene() : image())?.name) ?? "";
+export const shownName = () => (isLive() ? "Live" : (state.tab === "try" ? trialPicture() : image())?.name) ?? "";
 export const isMarked = () => Boolean(image() && (marks().box || marks().outline) && marks().grasp);

@@ -36,7 +36,7 @@ for (const button of document.querySelectorAll("[data-next]")) {
 }
 
 export function renderTabs() {
-  const done = { mark: isMarked(), samples: false, teach: state.hasModel, try: state.images.length > 0 && state.scenes.some((s) => s.became !== null) };
+  const done = { mark: isMarked(), samples: false, teach: state.hasModel, try: state.images.length > 0 && state.trialPictures.some((s) => s.became !== null) };
   for (const name of NAMES) {
     const open = name === state.tab;
     tab(name).setAttribute("aria-selected", String(open));

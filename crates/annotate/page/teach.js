@@ -66,7 +66,7 @@ export async function watch() {
   }
   if (state.teaching.status === "done") {
     // What another model found is old news.
-    for (const scene of [...state.scenes, state.live]) scene.detections = null;
+    for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
     changed();
   }
 }

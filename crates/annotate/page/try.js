@@ -3,8 +3,8 @@
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
 import { poseText } from "./live.js";
-import { openImage, openScene } from "./strip.js";
-import { changed, isLive, scene, state } from "./store.js";
+import { openImage, openTrialPicture } from "./strip.js";
+import { changed, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 
@@ -46,17 +46,17 @@ async function addPictures(files) {
     problem.textContent = "There was no PNG or JPEG picture among them.";
     return;
   }
-  const first = state.scenes.length;
+  const first = state.trialPictures.length;
   for (const file of pictures) {
     try {
-      state.scenes.push({ ...(await api.addScene(file)), detections: null });
+      state.trialPictures.push({ ...(await api.addTrialPicture(file)), detections: null });
       changed();
     } catch (error) {
       problem.hidden = false;
       problem.textContent = `${file.name}: ${error.message}`;
     }
   }
-  if (state.scenes.length > first) openScene(first);
+  if (state.trialPictures.length > first) openTrialPicture(first);
 }
 
 /** Looks at every picture that was not looked at yet, the shown one first. */
@@ -66,7 +66,7 @@ async function lookAtAll() {
   looking = true;
   for (;;) {
     const waiting = (s) => s && !s.detections && !s.failed;
-    const next = waiting(scene()) ? scene() : state.scenes.find(waiting);
+    const next = waiting(trialPicture()) ? trialPicture() : state.trialPictures.find(waiting);
     if (!next || state.tab !== "try") break;
     next.detecting = true;
     changed();
@@ -83,7 +83,7 @@ async function lookAtAll() {
 }
 
 async function accept(marks, { correct }) {
-  const target = scene();
+  const target = trialPicture();
   try {
     const view = await api.accept(target.id, marks);
     state.images.push(adopt(view));
@@ -129,7 +129,7 @@ function card(detection, i, shown) {
 
 function renderFound() {
   const found = by("found");
-  const shown = isLive() ? null : scene();
+  const shown = isLive() ? null : trialPicture();
   const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
   if (found.dataset.shown === wanted) return;
   found.dataset.shown = wanted;
@@ -167,7 +167,7 @@ export function renderTry() {
   if (state.tab !== "try") return;
   by("try-intro").textContent = !isTaught()
     ? "Nothing is taught yet. Teach a model first; pictures can be added already."
-    : state.scenes.length
+    : state.trialPictures.length
       ? "Each picture is looked at as it comes in. Score 0.5 decides."
       : "Add pictures that were taken as the first one was, with the part lying in other ways.";
   renderFound();

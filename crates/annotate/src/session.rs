@@ -22,7 +22,7 @@ use crate::teaching::{News, Teaching};
 use crate::views::{ImageView, Saved, SessionView, TrialPictureView};
 
 /// Pictures to try that one session keeps.
-const MAX_SCENES: usize = 500;
+const MAX_TRIAL_PICTURES: usize = 500;
 /// The longest name of an object.
 const MAX_LABEL_CHARS: usize = 80;
 
@@ -32,7 +32,7 @@ pub struct SessionOptions {
     /// Pictures of one object, each with the file of its marks if that has another name than the picture's.
     pub images: Vec<(PathBuf, Option<PathBuf>)>,
     /// Pictures, or folders of pictures, to try a taught model on.
-    pub scenes: Vec<PathBuf>,
+    pub trial_pictures: Vec<PathBuf>,
     /// Where a taught model is written; without it, beside the first picture under the object's name.
     pub model_path: Option<PathBuf>,
     /// A camera to take pictures with; with one, `images` may be empty.
@@ -73,24 +73,24 @@ impl Session {
             label = label.or(opened.label);
             images.push(MarkedPicture { picture, marks: opened.marks, file: opened.path, note: opened.note, saved });
         }
-        let mut scenes = Vec::new();
-        for path in &options.scenes {
+        let mut trial_pictures = Vec::new();
+        for path in &options.trial_pictures {
             let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
             for path in paths {
                 let taken = images.iter().any(|image| image.picture.path == path);
                 if !taken {
-                    scenes.push(TrialPicture { picture: Picture::open(&path)?, uploaded: false, became: None });
+                    trial_pictures.push(TrialPicture { picture: Picture::open(&path)?, uploaded: false, became: None });
                 }
             }
         }
-        if scenes.len() > MAX_SCENES {
-            return Err(Error::TooManyPictures { most: MAX_SCENES });
+        if trial_pictures.len() > MAX_TRIAL_PICTURES {
+            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
         }
         let uploads = tempfile::Builder::new()
             .prefix("sdg-annotate-")
             .tempdir()
             .map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?;
-        let state = State { label: label.unwrap_or_else(|| "part".to_owned()), images, scenes };
+        let state = State { label: label.unwrap_or_else(|| "part".to_owned()), images, trial_pictures };
         Ok(Self {
             teacher,
             teaching: Arc::default(),
@@ -113,7 +113,7 @@ impl Session {
         SessionView {
             label: state.label.clone(),
             images: (0..state.images.len()).map(|id| state.image_view(id)).collect(),
-            scenes: (0..state.scenes.len()).map(|id| state.scene_view(id)).collect(),
+            trial_pictures: (0..state.trial_pictures.len()).map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
             camera: self.live.as_ref().map(|desk| desk.options.address.clone()),
         }
@@ -183,18 +183,18 @@ impl Session {
     ///
     /// # Errors
     /// No such picture.
-    pub(crate) fn scene(&self, id: usize) -> Result<TrialPicture> {
-        Ok(self.state().scene(id)?.clone())
+    pub(crate) fn trial_picture(&self, id: usize) -> Result<TrialPicture> {
+        Ok(self.state().trial_picture(id)?.clone())
     }
 
     /// Takes a picture that came from the page; it is kept in a folder of this session.
     ///
     /// # Errors
     /// Bytes that are no picture, more pictures than a session keeps.
-    pub fn add_scene(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
-        let count = self.state().scenes.len();
-        if count >= MAX_SCENES {
-            return Err(Error::TooManyPictures { most: MAX_SCENES });
+    pub fn add_trial_picture(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
+        let count = self.state().trial_pictures.len();
+        if count >= MAX_TRIAL_PICTURES {
+            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
         }
         // The name is for people; the file's own is ours.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
@@ -214,13 +214,13 @@ impl Session {
             source: error.error,
         })?;
         let mut state = self.state();
-        state.scenes.push(TrialPicture {
+        state.trial_pictures.push(TrialPicture {
             picture: Picture { path: kept, name: shown, ..picture },
             uploaded: true,
             became: None,
         });
-        let id = state.scenes.len() - 1;
-        Ok(state.scene_view(id))
+        let id = state.trial_pictures.len() - 1;
+        Ok(state.trial_picture_view(id))
     }
 
     /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
@@ -228,14 +228,14 @@ impl Session {
     ///
     /// # Errors
     /// No such picture, one that is a demonstration already, a file that cannot be written.
-    pub fn accept(&self, scene_id: usize, marks: Marks) -> Result<ImageView> {
+    pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
-        let scene = state.scene(scene_id)?.clone();
-        if scene.became.is_some() {
+        let trial = state.trial_picture(trial_id)?.clone();
+        if trial.became.is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
-        let mut picture = scene.picture;
-        if scene.uploaded {
+        let mut picture = trial.picture;
+        if trial.uploaded {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
@@ -244,7 +244,7 @@ impl Session {
             picture.path = target;
         }
         let id = state.add_image(picture, marks)?;
-        state.scenes[scene_id].became = Some(id);
+        state.trial_pictures[trial_id].became = Some(id);
         state.save(id);
         Ok(state.image_view(id))
     }
@@ -288,7 +288,7 @@ impl Session {
     /// No camera, a frame that is not kept any more, more pictures than a session keeps.
     pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
         let bytes = png(&*self.live_desk()?.frame(number)?)?;
-        self.add_scene(&format!("live-{number}.png"), &bytes)
+        self.add_trial_picture(&format!("live-{number}.png"), &bytes)
     }
 
     /// One picture with its marks, as teaching takes it.

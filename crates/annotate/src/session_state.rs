@@ -16,7 +16,7 @@ use crate::views::{ImageView, Saved, TrialPictureView};
 pub struct State {
     pub label: String,
     pub images: Vec<MarkedPicture>,
-    pub scenes: Vec<TrialPicture>,
+    pub trial_pictures: Vec<TrialPicture>,
 }
 
 /// A picture of the object and what is marked on it.
@@ -43,8 +43,8 @@ impl State {
         self.images.get(id).ok_or(Error::NoSuchPicture { id, count: self.images.len() })
     }
 
-    pub fn scene(&self, id: usize) -> Result<&TrialPicture> {
-        self.scenes.get(id).ok_or(Error::NoSuchPicture { id, count: self.scenes.len() })
+    pub fn trial_picture(&self, id: usize) -> Result<&TrialPicture> {
+        self.trial_pictures.get(id).ok_or(Error::NoSuchPicture { id, count: self.trial_pictures.len() })
     }
 
     /// Adds a picture with marks that are not saved yet, and says its number.
@@ -72,8 +72,8 @@ impl State {
         ImageView { id, name, width, height, marks: marks.clone(), saved: saved.clone(), advice, note: note.clone() }
     }
 
-    pub fn scene_view(&self, id: usize) -> TrialPictureView {
-        let TrialPicture { picture, became, .. } = &self.scenes[id];
+    pub fn trial_picture_view(&self, id: usize) -> TrialPictureView {
+        let TrialPicture { picture, became, .. } = &self.trial_pictures[id];
         let Picture { name, size: [width, height], .. } = picture.clone();
         TrialPictureView { id, name, width, height, became: *became }
     }

@@ -67,7 +67,7 @@ pub struct SessionView {
     /// The pictures of it.
     pub images: Vec<ImageView>,
     /// Pictures to try.
-    pub scenes: Vec<TrialPictureView>,
+    pub trial_pictures: Vec<TrialPictureView>,
     /// Where a taught model is written.
     pub model_path: String,
     /// The camera's address, if there is one.

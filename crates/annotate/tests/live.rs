@@ -127,9 +127,9 @@ fn the_model_is_tried_on_a_frame_which_can_be_kept() {
 
     let kept = post(&served, "/api/live/0/keep").json();
     assert_eq!((&kept["id"], &kept["name"]), (&json!(0), &json!("live-0.png")));
-    let bytes = served.ask("GET", "/api/scenes/0/picture", b"").body;
+    let bytes = served.ask("GET", "/api/trial-pictures/0/picture", b"").body;
     assert_eq!(image::load_from_memory(&bytes).unwrap().into_rgb8(), photo());
-    let accepted = served.ask("POST", "/api/scenes/0/accept", marks.to_string().as_bytes()).json();
+    let accepted = served.ask("POST", "/api/trial-pictures/0/accept", marks.to_string().as_bytes()).json();
     assert_eq!(accepted["name"], "live-0.png");
     assert!(served.folder.path().join("live-0.json").exists());
 }

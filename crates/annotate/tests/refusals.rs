@@ -29,7 +29,7 @@ fn wrong_and_missing_tokens_are_refused_everywhere() {
         ("GET", "/api/images/0/picture"),
         ("PUT", "/api/images/0/marks"),
         ("POST", "/api/teaching"),
-        ("POST", "/api/scenes?name=a.png"),
+        ("POST", "/api/trial-pictures?name=a.png"),
         ("GET", "/api/live"),
         ("POST", "/api/live/0/photo"),
         ("GET", "/nowhere"),
@@ -75,7 +75,7 @@ fn no_path_leads_to_other_files() {
         "/api/images/1/picture",
         "/api/images/-1/picture",
         "/api/images/18446744073709551616/picture",
-        "/api/scenes/0/picture",
+        "/api/trial-pictures/0/picture",
         "/page//etc/passwd",
     ] {
         let answer = served.ask("GET", path, b"");
@@ -87,9 +87,10 @@ fn no_path_leads_to_other_files() {
 #[test]
 fn a_picture_s_name_cannot_choose_where_it_is_written() {
     let served = Served::start();
-    let scene = served.ask("POST", "/api/scenes?name=..%2f..%2f..%2ftmp%2fevil%00.png", &served::photo_png()).json();
-    assert_eq!(scene["name"], "evil\0.png");
-    let view = served.ask("POST", "/api/scenes/0/accept", b"{\"box\": [40, 40, 140, 60]}").json();
+    let trial =
+        served.ask("POST", "/api/trial-pictures?name=..%2f..%2f..%2ftmp%2fevil%00.png", &served::photo_png()).json();
+    assert_eq!(trial["name"], "evil\0.png");
+    let view = served.ask("POST", "/api/trial-pictures/0/accept", b"{\"box\": [40, 40, 140, 60]}").json();
     assert_eq!(view["name"], "evil_.png");
     assert!(served.folder.path().join("evil_.png").exists() && served.folder.path().join("evil_.json").exists());
 }
@@ -103,16 +104,16 @@ fn oversized_bodies_are_refused() {
         ("POST", "/api/images/0/outline"),
         ("PUT", "/api/label"),
         ("POST", "/api/teaching"),
-        ("POST", "/api/scenes/0/accept"),
+        ("POST", "/api/trial-pictures/0/accept"),
     ] {
         assert_eq!(served.ask(method, path, &large).status, 413, "{path}");
     }
     let picture = vec![0; (64 << 20) + 1];
-    assert_eq!(served.ask("POST", "/api/scenes?name=a.png", &picture).status, 413);
+    assert_eq!(served.ask("POST", "/api/trial-pictures?name=a.png", &picture).status, 413);
     // Pictures may be larger than marks: what follows the end of a PNG does not count.
     let mut photo = served::photo_png();
     photo.resize(3 << 20, 0);
-    assert_eq!(served.ask("POST", "/api/scenes?name=a.png", &photo).status, 200);
+    assert_eq!(served.ask("POST", "/api/trial-pictures?name=a.png", &photo).status, 200);
 }
 
 #[test]
@@ -131,7 +132,7 @@ fn requests_without_sense_are_told_in_one_line() {
     refused("PUT", "/api/images/0/marks", b"{\"bux\": 1}", &["bux"]);
     refused("PUT", "/api/images/7/marks", b"{}", &["numbered below 1", "7"]);
     refused("PUT", "/api/label", b"{\"label\": \"  \"}", &["name", "letters"]);
-    refused("POST", "/api/scenes?name=a.png", b"GIF89a....", &["a.png", "PNG or JPEG"]);
+    refused("POST", "/api/trial-pictures?name=a.png", b"GIF89a....", &["a.png", "PNG or JPEG"]);
     refused("POST", "/api/teaching", b"{\"model\": \"Z\"}", &["teaching", "unknown variant"]);
     refused("POST", "/api/teaching", b"{\"model\": \"C\"}", &["photo.png", "a box and a grasp"]);
     refused("POST", "/api/teaching", b"{\"model\": \"C\", \"steps\": 0}", &["steps", "1 to 1000000"]);

@@ -104,24 +104,24 @@ fn a_teaching_tells_its_news_and_ends_when_asked() {
 fn a_taught_model_is_tried_and_what_it_found_becomes_a_demonstration() {
     let served = Served::start();
     put_marks(&served, &marks());
-    assert_eq!(served.ask("POST", "/api/scenes?name=table.png", &served::photo_png()).json()["id"], 0);
-    assert_eq!(served.ask("POST", "/api/scenes/0/detect", b"").status, 409, "nothing is taught yet");
+    assert_eq!(served.ask("POST", "/api/trial-pictures?name=table.png", &served::photo_png()).json()["id"], 0);
+    assert_eq!(served.ask("POST", "/api/trial-pictures/0/detect", b"").status, 409, "nothing is taught yet");
     served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
     let news = wait_for(&served, &["done", "failed"]);
     assert_eq!(news["status"], "done", "{news}");
     assert_eq!(std::fs::read(served.folder.path().join("part.sdg")).unwrap(), b"a model");
 
-    let found = served.ask("POST", "/api/scenes/0/detect", b"").json();
+    let found = served.ask("POST", "/api/trial-pictures/0/detect", b"").json();
     let detection = &found["detections"][0];
     assert_eq!((&detection["is_accepted"], &detection["marks"]["grasp"]), (&json!(true), &marks()["grasp"]));
     let body = detection["marks"].to_string();
-    let view = served.ask("POST", "/api/scenes/0/accept", body.as_bytes()).json();
+    let view = served.ask("POST", "/api/trial-pictures/0/accept", body.as_bytes()).json();
     assert_eq!(
         (&view["id"], &view["name"], &view["saved"]["state"]),
         (&json!(1), &json!("table.png"), &json!("written"))
     );
     let read = Annotation::read(&std::fs::read(served.folder.path().join("table.json")).unwrap(), &FACTS).unwrap();
     assert!(read[0].grasp.is_some() && read[0].outline.is_some());
-    assert_eq!(served.ask("POST", "/api/scenes/0/accept", body.as_bytes()).status, 409, "once is enough");
+    assert_eq!(served.ask("POST", "/api/trial-pictures/0/accept", body.as_bytes()).status, 409, "once is enough");
     assert_eq!(served.ask("GET", "/api/images/1/picture", b"").body, served::photo_png());
 }

@@ -50,7 +50,9 @@ fn main() -> Result<()> {
     let model = match model_file {
         [file, ..] => GraspModel::from_bytes(&std::fs::read(file)?, &Device::flex())?,
         [] => {
-            let options = TeachOptions { kind: ModelKind::S, symmetry: part.symmetry, ..TeachOptions::new(1) };
+            let mut options = TeachOptions::new(1);
+            options.kind = ModelKind::S;
+            options.symmetry = part.symmetry;
             teach(&[shipped::demonstration(&part.name)?], &options, &mut |_| ControlFlow::Continue(()))?.model
         }
     };

@@ -17,11 +17,11 @@ use rand_pcg::Pcg64Mcg;
 use sdg_cli::shipped;
 use sdg_geometry::{Angle, BoundingBox};
 use sdg_grasp::Device;
-use sdg_orientation::training::{AngleErrors, BoxJitter, LabelledCrop, OrientationTraining, teach};
 use sdg_orientation::{Labels, OrientationConfig, crop_for};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{GraspTruth, SceneVariation, VariationConfig, base_from_look_camera};
 use sdg_simulation::{Body, CameraView, Workcell, WorkcellConfig};
+use sdg_training::orientation::{AngleErrors, BoxJitter, LabelledCrop, OrientationTraining, teach};
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 

@@ -30,18 +30,16 @@ impl GraspTeacher for PageTeacher {
         request: &TeachRequest,
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
-        let options = TeachOptions {
-            kind: request.model,
-            preset: self.preset,
-            symmetry: match request.symmetry {
-                0 => RotationalSymmetry::Full,
-                1 => RotationalSymmetry::None,
-                count => RotationalSymmetry::Fold(count),
-            },
-            time_budget: request.time_budget(),
-            steps: request.steps,
-            ..TeachOptions::new(request.seed)
+        let mut options = TeachOptions::new(request.seed);
+        options.kind = request.model;
+        options.preset = self.preset;
+        options.symmetry = match request.symmetry {
+            0 => RotationalSymmetry::Full,
+            1 => RotationalSymmetry::None,
+            count => RotationalSymmetry::Fold(count),
         };
+        options.time_budget = request.time_budget();
+        options.steps = request.steps;
         let mut taught_with = |demonstrations: &[Demonstration], options: &TeachOptions| {
             teach(demonstrations, options, &mut |event| observe(step(event)))
         };
@@ -49,7 +47,7 @@ impl GraspTeacher for PageTeacher {
             None => PictureDetector::AnyCamera(Box::new(taught_with(demonstrations, &options)?.model)),
             Some((camera, [mark, grasp])) => {
                 let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
-                let options = TeachOptions { lengths: Some(lengths), ..options };
+                options.lengths = Some(lengths);
                 PictureDetector::calibrated(taught_with(&seen, &options)?.model, camera.clone())?
             }
         };

@@ -51,7 +51,7 @@ pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;
 pub use rotational_symmetry::RotationalSymmetry;
-pub use statistics::{median, percentile};
+pub use statistics::{median, percentile, upper_median};
 
 /// The README's example, which runs with the other examples.
 #[cfg(doctest)]

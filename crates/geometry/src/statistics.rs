@@ -14,6 +14,12 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(0.5 * sorted[lower] + 0.5 * sorted[upper])
 }
 
+/// The median of the finite values; of an even number the upper one of the middle two, of none `None`.
+pub fn upper_median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let sorted = sorted(values);
+    sorted.get(sorted.len() / 2).copied()
+}
+
 /// The value that `percent` of the finite values do not exceed, between two of them by linear interpolation; of none `None`.
 pub fn percentile(values: impl IntoIterator<Item = f64>, percent: f64) -> Option<f64> {
     let sorted = sorted(values);
@@ -34,6 +40,13 @@ mod tests {
         assert_eq!(median([4.0, 1.0, f64::NAN, 2.0, 3.0]), Some(2.5));
         assert_eq!(median([5.0]), Some(5.0));
         assert_eq!(median([]), None);
+    }
+
+    #[test]
+    fn an_upper_median_is_one_of_the_values() {
+        assert_eq!(upper_median([3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(upper_median([4.0, 1.0, f64::NAN, 2.0, 8.0]), Some(4.0));
+        assert_eq!(upper_median([]), None);
     }
 
     #[test]

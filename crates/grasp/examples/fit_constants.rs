@@ -78,7 +78,9 @@ fn main() -> Result<()> {
     let num_parts = parts.len() + held_out.len();
     eprintln!("{num_parts} parts, {num_pictures} pictures, {:.0} s", start.elapsed().as_secs_f64());
 
-    let options = FitOptions { seed: arguments.seed, only: arguments.only };
+    let mut options = FitOptions::default();
+    options.seed = arguments.seed;
+    options.only = arguments.only;
     let report = fit(&parts, &held_out, &options, &mut |event| {
         let seconds = start.elapsed().as_secs_f64();
         match event {

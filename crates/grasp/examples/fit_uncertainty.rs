@@ -74,12 +74,10 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
             let demonstration = marked_on_surface(shown, 0.5 * surface_m, surface_m)?;
             let (seen, lengths) =
                 seen_from_above(&[demonstration], &over_table(shown.camera), surface_m, 0.5 * surface_m)?;
-            let options = TeachOptions {
-                kind: ModelKind::S,
-                symmetry: part.symmetry(),
-                lengths: Some(lengths),
-                ..TeachOptions::new(1)
-            };
+            let mut options = TeachOptions::new(1);
+            options.kind = ModelKind::S;
+            options.symmetry = part.symmetry();
+            options.lengths = Some(lengths);
             let model = teach(&seen, &options, &mut |_| ControlFlow::Continue(()))?.model;
             detector = Some(PlanDetector::new(model, &over_table(shown.camera))?);
         }

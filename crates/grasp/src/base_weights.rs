@@ -11,7 +11,7 @@ use sdg_detection::initialization::Initializer;
 use sdg_detection::state_dict::{self, ImportReport, StateDict, WeightTensor};
 use sdg_detection::{GeneralizedRcnn, Target, TransformedImage};
 
-use sdg_orientation::training::OrientationStart;
+use sdg_training::orientation::OrientationStart;
 
 use crate::error::{GraspError, Result};
 

@@ -18,7 +18,7 @@ use safetensors::{Dtype, SafeTensors};
 use sdg_comparison::ComparisonConfig;
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_orientation::training::OrientationStart;
+use sdg_training::orientation::OrientationStart;
 
 use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};

@@ -21,6 +21,7 @@ pub const TORQUE_MAX_NM: [f64; NUM_JOINTS] = [87.0, 87.0, 87.0, 87.0, 12.0, 12.0
 
 /// Limits of every joint.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct JointLimits {
     /// Smallest positions, rad.
     pub position_min: JointVector,
@@ -99,6 +100,7 @@ impl Default for JointLimits {
 
 /// Limits of the tcp's motion along a Cartesian path.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct CartesianLimits {
     /// Largest speed, m/s.
     pub velocity_m_s: f64,

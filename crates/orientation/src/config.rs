@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::angle_classes::AngleClasses;
-use crate::error::{OrientationError, Result};
+use crate::error::{Result, check_setting};
 
 /// The network and its reading.
 ///
@@ -87,55 +87,53 @@ impl OrientationConfig {
     /// Checks that the network can be built and read.
     ///
     /// # Errors
-    /// [`OrientationError::Config`] names the first setting that is not usable.
+    /// [`OrientationError::Config`](crate::OrientationError::Config) names the first setting that is not usable.
     pub fn validate(&self) -> Result<()> {
         let num_stages = self.stage_channels.len();
-        check((1..=6).contains(&num_stages), "stage_channels", "1 to 6 stages", num_stages)?;
+        check_setting((1..=6).contains(&num_stages), "stage_channels", "1 to 6 stages", num_stages)?;
         let halvings = 1u32 << num_stages;
-        check(
+        check_setting(
             self.input_px.is_multiple_of(halvings) && (16..=1024).contains(&self.input_px),
             "input_px",
             &format!("16 to 1024 and a multiple of {halvings}, so that every stage halves exactly"),
             self.input_px,
         )?;
-        check(
+        check_setting(
             self.stage_convs.len() == num_stages && self.stage_convs.iter().all(|count| (1..=8).contains(count)),
             "stage_convs",
             &format!("1 to 8 convolutions for each of {num_stages} stages"),
             format!("{:?}", self.stage_convs),
         )?;
-        check(self.stem_kernel % 2 == 1 && self.stem_kernel <= 11, "stem_kernel", "odd, 1 to 11", self.stem_kernel)?;
+        check_setting(
+            self.stem_kernel % 2 == 1 && self.stem_kernel <= 11,
+            "stem_kernel",
+            "odd, 1 to 11",
+            self.stem_kernel,
+        )?;
         let channels = &self.stage_channels;
-        check(
+        check_setting(
             self.norm_groups > 0 && channels.iter().all(|c| *c > 0 && c.is_multiple_of(self.norm_groups)),
             "norm_groups",
             &format!("a number that divides the stages' channels {channels:?}"),
             self.norm_groups,
         )?;
-        check((1..=8192).contains(&self.hidden), "hidden", "1 to 8192", self.hidden)?;
+        check_setting((1..=8192).contains(&self.hidden), "hidden", "1 to 8192", self.hidden)?;
         let AngleClasses { num_classes, symmetry } = self.classes;
-        check((4..=3600).contains(&num_classes), "classes.num_classes", "4 to 3600", num_classes)?;
-        check((1..=72).contains(&symmetry), "classes.symmetry", "1 to 72 equal turns", symmetry)?;
-        check(
+        check_setting((4..=3600).contains(&num_classes), "classes.num_classes", "4 to 3600", num_classes)?;
+        check_setting((1..=72).contains(&symmetry), "classes.symmetry", "1 to 72 equal turns", symmetry)?;
+        check_setting(
             !self.readout.quarter_turns || num_classes.is_multiple_of(4),
             "classes.num_classes",
             "a multiple of four, for a reading in quarter turns",
             num_classes,
         )?;
-        check(
+        check_setting(
             self.readout.window_classes < num_classes / 4,
             "readout.window_classes",
             &format!("below a quarter of {num_classes} classes"),
             self.readout.window_classes,
         )
     }
-}
-
-pub(crate) fn check(holds: bool, field: &'static str, expected: &str, found: impl ToString) -> Result<()> {
-    if holds {
-        return Ok(());
-    }
-    Err(OrientationError::Config { field, expected: expected.to_owned(), found: found.to_string() })
 }
 
 #[cfg(test)]

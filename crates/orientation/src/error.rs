@@ -19,27 +19,18 @@ pub enum OrientationError {
     /// A crop of another size than the network's input.
     #[error("the orientation CNN reads crops of {expected}x{expected} pixels, found {width}x{height}")]
     CropSize { expected: u32, width: u32, height: u32 },
-    /// A demonstration that cannot be taught.
-    #[cfg(feature = "training")]
-    #[error(transparent)]
-    Demonstration(#[from] sdg_demonstration::Error),
-    /// Parameters to start from that are another network's.
-    #[cfg(feature = "training")]
-    #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
-    Start {
-        /// The first parameter that does not fit.
-        name: String,
-    },
-    /// A loss that is NaN or infinite.
-    #[cfg(feature = "training")]
-    #[error("the orientation loss became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
-    Diverged {
-        step: usize,
-        loss: f64,
-        /// The learning rate of that step.
-        learning_rate: f64,
-    },
 }
 
 /// Result of the fallible functions of this crate.
 pub type Result<T> = std::result::Result<T, OrientationError>;
+
+/// Refuses a setting of the network, or of its teaching, that does not hold.
+///
+/// # Errors
+/// [`OrientationError::Config`].
+pub fn check_setting(holds: bool, field: &'static str, expected: &str, found: impl ToString) -> Result<()> {
+    if holds {
+        return Ok(());
+    }
+    Err(OrientationError::Config { field, expected: expected.to_owned(), found: found.to_string() })
+}

@@ -9,14 +9,8 @@
 //! The angle is the direction of the marked grasp line, `atan2(dy, dx)` in pixels with y down, so that several
 //! demonstrations of one part agree on it however the part lay in each photo.
 //!
-//! With the feature `training`, [`training`] makes crops from a demonstration and teaches the network in seconds.
-//!
-//! Left out: finding the box (crate `detection`), parts that look the same at every angle (there is nothing to learn),
-//! files and clocks (but for the feature `training`, which measures its own time).
-//!
-//! # Measured
-//!
-//! See [`training`] for how well and how fast the network learns, with the commands.
+//! Left out: finding the box (crate `detection`), teaching (crate `training`), parts that look the same at every angle
+//! (there is nothing to learn), files and clocks.
 //!
 //! # Example
 //! ```
@@ -42,12 +36,10 @@ mod config;
 mod crop;
 mod error;
 mod network;
-#[cfg(feature = "training")]
-pub mod training;
 
 pub use angle_classes::{AngleClasses, AngleReading, Labels};
 pub use config::{OrientationConfig, Readout};
 pub use crop::{CropWindow, OUTSIDE, crop_for};
-pub use error::{OrientationError, Result};
+pub use error::{OrientationError, Result, check_setting};
 pub use network::{ConvNormRelu, GroupNorm, OrientationCnn, Stage, crop_batch};
 pub use sdg_detection::state_dict::{ImportReport, StateDict, WeightTensor};

@@ -89,7 +89,7 @@ pub struct OrientationCnn {
 impl OrientationConfig {
     /// Builds the network with parameters drawn from a seed.
     ///
-    /// For training the device must carry autodiff (`device.autodiff()`, feature `training`).
+    /// For training the device must carry autodiff (`device.autodiff()`; crate `training` has the feature).
     ///
     /// # Errors
     /// Where [`OrientationConfig::validate`] finds one.

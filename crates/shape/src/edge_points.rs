@@ -2,7 +2,7 @@
 //! chosen so that together they hold the part in every direction.
 
 use nalgebra::{Matrix4, Point2, Vector2, Vector4};
-use sdg_geometry::Polygon;
+use sdg_geometry::{Polygon, upper_median};
 
 use crate::gradient_field::GradientLevel;
 
@@ -59,9 +59,7 @@ pub(crate) fn select_edge_points(
     let mut candidates = find_candidates(level, pixel_size, selection);
     candidates.sort_by(|a, b| b.strength.total_cmp(&a.strength));
     let spread = spread_out(&candidates, selection.max_points, pixel_size);
-    let mut strengths: Vec<f64> = spread.iter().map(|&i| candidates[i].strength).collect();
-    strengths.sort_by(f64::total_cmp);
-    let median = strengths.get(strengths.len() / 2).copied().unwrap_or(1.0);
+    let median = upper_median(spread.iter().map(|&i| candidates[i].strength)).unwrap_or(1.0);
 
     let mut points: Vec<EdgePoint> = Vec::with_capacity(spread.len());
     for idx in spread {

@@ -1,4 +1,4 @@
-//! Why a training run ended without a detector.
+//! Why a training run ended without a network.
 
 /// What went wrong.
 #[derive(Debug, thiserror::Error)]
@@ -9,8 +9,10 @@ pub enum TrainingError {
     #[error("{setting}: expected {expected}, found {found}")]
     BadSetting { setting: &'static str, expected: &'static str, found: String },
     /// A loss that is NaN or infinite.
-    #[error("the loss became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
+    #[error("the {name} became {loss} at step {step}; a lower learning rate than {learning_rate:e} may help")]
     Diverged {
+        /// Which loss, such as "orientation loss".
+        name: &'static str,
         step: usize,
         loss: f64,
         /// The learning rate of that step.
@@ -22,6 +24,18 @@ pub enum TrainingError {
     /// The held-back samples could not be looked at.
     #[error("the held-back samples cannot be examined: {0}")]
     Examination(Box<dyn std::error::Error + Send + Sync>),
+    /// A demonstration that cannot be taught.
+    #[error(transparent)]
+    Demonstration(#[from] sdg_demonstration::Error),
+    /// Parameters to start the orientation CNN from that are another network's.
+    #[error("weights to start the orientation CNN from: expected those of this network, found another {name}")]
+    Start {
+        /// The first parameter that does not fit.
+        name: String,
+    },
+    /// A setting of the orientation CNN or of its teaching, or a crop that it refused.
+    #[error(transparent)]
+    Orientation(#[from] sdg_orientation::OrientationError),
     /// The network refused a batch.
     #[error(transparent)]
     Detection(#[from] sdg_detection::DetectionError),

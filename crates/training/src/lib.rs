@@ -1,10 +1,12 @@
-//! From a demonstration's samples to a trained detector.
+//! From a demonstration's samples to a trained network: the detector, and model A's orientation CNN ([`orientation`]).
 //!
 //! ```text
 //! Augmenter ─ sample i ─ ImageTransform ─ batch (prepared on another thread) ─ losses ─ gradients ─ AdamW
 //!                                                                                 │
 //! held-back samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
+//!
+//! Both are taught by one loop (run.rs), which asks what differs of a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: which samples, in which order, every random choice of the losses. Only a time
 //! budget that cuts a run short makes it depend on the machine.
@@ -24,22 +26,21 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod adamw;
-mod batch;
-mod config;
+mod detector;
 mod error;
 mod optimizer;
+pub mod orientation;
 mod pace;
-mod progress;
+mod prefetch;
+mod run;
 mod schedule;
-mod trainer;
-mod validation;
 
 pub use adamw::{AdamW, AdamWState};
-pub use batch::{SampleSource, first_windows};
-pub use config::{EarlyStop, Optimizer, TrainingConfig, ValidationConfig, WindowPhase};
+pub use detector::{
+    EarlyStop, HIT_DEGREES, HIT_PX, History, LossValues, Outcome, SampleSource, StepRecord, Trained, TrainingConfig,
+    TrainingEvent, Validation, ValidationConfig, ValidationRecord, WindowPhase, first_windows, step_seed, train,
+};
 pub use error::TrainingError;
-pub use pace::Pace;
-pub use progress::{Ending, History, LossValues, StepRecord, TrainingEvent, ValidationRecord};
+pub use optimizer::Optimizer;
+pub use pace::Ending;
 pub use schedule::OneCycle;
-pub use trainer::{Trained, step_seed, train};
-pub use validation::{HIT_DEGREES, HIT_PX, Outcome, Validation};

@@ -1,10 +1,23 @@
 //! How far a run is, in [0, 1], from its steps, time budget and early stop.
 
-use crate::progress::Ending;
+use serde::{Deserialize, Serialize};
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Ending {
+    /// All steps were done.
+    Completed,
+    /// A validation was good enough.
+    EarlyStop,
+    /// The time budget was used up.
+    TimeBudget,
+    /// The observer asked to stop.
+    Interrupted,
+}
 
 /// Progress of a run; drives the learning rate and the end.
 #[derive(Debug, Clone, Copy)]
-pub struct Pace {
+pub(crate) struct Pace {
     steps: usize,
     budget_secs: Option<f64>,
     /// Step and progress at which a validation was good enough, and the steps left from there.
@@ -13,12 +26,12 @@ pub struct Pace {
 
 impl Pace {
     /// A run of `steps`, within `budget_secs` if given.
-    pub fn new(steps: usize, budget_secs: Option<f64>) -> Self {
+    pub(crate) fn new(steps: usize, budget_secs: Option<f64>) -> Self {
         Self { steps, budget_secs, cool_down: None }
     }
 
     /// Progress before `step`, `elapsed_secs` after the start.
-    pub fn progress(&self, step: usize, elapsed_secs: f64) -> f64 {
+    pub(crate) fn progress(&self, step: usize, elapsed_secs: f64) -> f64 {
         let by_steps = match self.cool_down {
             Some((from, reached, length)) => reached + (1.0 - reached) * (step - from) as f64 / length.max(1) as f64,
             None => step as f64 / self.steps as f64,
@@ -28,19 +41,19 @@ impl Pace {
     }
 
     /// Ends the run `length` steps after `step`, unless it would end earlier anyway.
-    pub fn start_cool_down(&mut self, step: usize, elapsed_secs: f64, length: usize) {
+    pub(crate) fn start_cool_down(&mut self, step: usize, elapsed_secs: f64, length: usize) {
         if self.cool_down.is_none() && step + length < self.steps {
             self.cool_down = Some((step, self.progress(step, elapsed_secs), length));
         }
     }
 
     /// Steps that the run will have, as known now.
-    pub fn planned_steps(&self) -> usize {
+    pub(crate) fn planned_steps(&self) -> usize {
         self.cool_down.map_or(self.steps, |(from, _, length)| from + length)
     }
 
     /// Why the run is over before `step`, or `None` while it is not.
-    pub fn ending(&self, step: usize, elapsed_secs: f64) -> Option<Ending> {
+    pub(crate) fn ending(&self, step: usize, elapsed_secs: f64) -> Option<Ending> {
         if step >= self.planned_steps() {
             return Some(if self.cool_down.is_some() { Ending::EarlyStop } else { Ending::Completed });
         }

@@ -10,10 +10,10 @@
 //! | `POST /api/images/{id}/outline` | proposes an outline from a box; null where nothing stands out |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | news of the teaching; starts it; ends it with what there is |
-//! | `POST /api/scenes?name=` | takes a picture to try |
-//! | `GET /api/scenes/{id}/picture` | that picture |
-//! | `POST /api/scenes/{id}/detect` | grasps in it |
-//! | `POST /api/scenes/{id}/accept` | makes it a demonstration with the marks given |
+//! | `POST /api/trial-pictures?name=` | takes a picture to try |
+//! | `GET /api/trial-pictures/{id}/picture` | that picture |
+//! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
+//! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
 //! | `GET /api/live` | the number of the camera's newest frame, and what is wrong with the camera |
 //! | `GET /api/live/{number}/picture` | that frame, as JPEG |
 //! | `POST /api/live/{number}/detect` | grasps in it |
@@ -24,7 +24,7 @@ mod answers;
 mod detections;
 mod images;
 mod live;
-mod scenes;
+mod trial_pictures;
 
 use serde::Deserialize;
 
@@ -43,7 +43,7 @@ const MAX_JSON_BYTES: usize = 1 << 20;
 
 /// How long the body of a request to `path` may be.
 pub fn max_body_bytes(path: &str) -> usize {
-    if path == "/api/scenes" { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
+    if path == "/api/trial-pictures" { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
 }
 
 /// Answers a request that the guard has let pass.
@@ -68,13 +68,13 @@ pub fn answer(session: &Session, request: &Request) -> Response {
             session.stop_teaching();
             json_of(Ok(session.teaching_news()))
         }
-        ("POST", ["api", "scenes"]) => json_of(scenes::add(session, request)),
+        ("POST", ["api", "trial-pictures"]) => json_of(trial_pictures::add(session, request)),
         (method, ["api", "live", rest @ ..]) => live::answer(session, method, rest).unwrap_or_else(no_such_address),
-        (method, ["api", kind @ ("images" | "scenes"), id, rest @ ..]) => {
+        (method, ["api", kind @ ("images" | "trial-pictures"), id, rest @ ..]) => {
             let Ok(id) = id.parse::<usize>() else { return no_such_address() };
             let answered = match *kind {
                 "images" => images::answer(session, request, method, id, rest),
-                _ => scenes::answer(session, request, method, id, rest),
+                _ => trial_pictures::answer(session, request, method, id, rest),
             };
             answered.unwrap_or_else(no_such_address)
         }

@@ -13,7 +13,7 @@ mod bundle;
 mod coverage;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
-use sdg_geometry::{PinholeCamera, PlumbBob};
+use sdg_geometry::{PinholeCamera, PlumbBob, upper_median};
 
 use self::bundle::Bundle;
 pub use self::coverage::Advice;
@@ -175,9 +175,7 @@ pub(crate) fn focal_length(homographies: &[Matrix3<f64>], cx: f64, cy: f64) -> O
 
 /// The picture that disagrees most with the others, if one does.
 fn disagreeing(rms: &[f64]) -> Option<usize> {
-    let mut sorted = rms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted[sorted.len() / 2];
+    let median = upper_median(rms.iter().copied())?;
     let worst = (0..rms.len()).max_by(|a, b| rms[*a].total_cmp(&rms[*b]))?;
     (rms[worst] > MAX_RMS_PX && rms[worst] > MAX_RMS_RATIO * median).then_some(worst)
 }

@@ -99,16 +99,14 @@ const NO_BASE_WEIGHTS: &str = "none";
 
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
-    let mut options = TeachOptions {
-        kind: parse("--model", &args.model)?,
-        preset: parse("--preset", &args.preset)?,
-        symmetry: args.symmetry,
-        size_tolerance: args.size_tolerance.range(),
-        time_budget: args.time_budget.map(Duration::from_secs_f64),
-        steps: args.steps.map(|steps| steps as usize),
-        device: devices::open(&args.compute)?,
-        ..TeachOptions::new(args.seed)
-    };
+    let mut options = TeachOptions::new(args.seed);
+    options.kind = parse("--model", &args.model)?;
+    options.preset = parse("--preset", &args.preset)?;
+    options.symmetry = args.symmetry;
+    options.size_tolerance = args.size_tolerance.range();
+    options.time_budget = args.time_budget.map(Duration::from_secs_f64);
+    options.steps = args.steps.map(|steps| steps as usize);
+    options.device = devices::open(&args.compute)?;
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
     if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;

@@ -18,10 +18,10 @@
 mod attempting;
 pub mod axes;
 pub mod cameras;
-mod caught;
 mod cell;
 mod groups;
 mod looking;
+mod one_unit;
 mod page;
 mod paper;
 mod records;

@@ -11,9 +11,9 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::demonstration_view;
 
 use super::axes::{MARKS_JITTER_PX, with_jittered_marks};
-use super::caught::caught;
 use super::cell::{Cell, Marks};
 use super::looking::part_seed;
+use super::one_unit::caught;
 use super::records::{LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use crate::exit::one_line;
@@ -53,14 +53,12 @@ impl Teaching<'_> {
                 (demonstration, Some(lengths))
             }
         };
-        let options = TeachOptions {
-            kind: cell.network().model,
-            preset: self.preset,
-            symmetry: object.symmetry,
-            steps: settings.steps.map(|steps| steps as usize),
-            lengths,
-            ..TeachOptions::new(settings.seed)
-        };
+        let mut options = TeachOptions::new(settings.seed);
+        options.kind = cell.network().model;
+        options.preset = self.preset;
+        options.symmetry = object.symmetry;
+        options.steps = settings.steps.map(|steps| steps as usize);
+        options.lengths = lengths;
         // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
         let mut interrupted = false;
         let mut observe = |_: &TeachingEvent| {

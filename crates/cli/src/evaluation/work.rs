@@ -1,7 +1,6 @@
 //! How the units of work of the protocol are done.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use anyhow::{Context, Result};
 use sdg_grasp::Verification;
@@ -9,9 +8,9 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
 use super::attempting::go_on;
-use super::caught::{NO_MODEL, caught};
 use super::cell::{Cell, Marks, attempts_of};
 use super::looking::{observe_picture, part_seed, picture_seed, scene_without};
+use super::one_unit::{NO_MODEL, do_unit};
 use super::records::{LookRecord, SpeedRecord};
 use super::schedule::run_all;
 use super::teaching::Teaching;
@@ -38,10 +37,8 @@ impl Evaluation<'_> {
         progress.expect(tasks.len() + without_speed.len());
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let work = |unit: &Unit| {
-            if is_interrupted() {
-                return Ok(ControlFlow::Break(()));
-            }
-            caught(|| self.work(*unit, is_interrupted, progress)).with_context(|| unit.to_string())
+            do_unit(unit, is_interrupted, progress, || self.work(*unit, is_interrupted))
+                .with_context(|| unit.to_string())
         };
         run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)?;
         for object in without_speed {
@@ -54,24 +51,15 @@ impl Evaluation<'_> {
         Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
-    fn work(
-        &self,
-        unit: Unit,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-        progress: &EvaluationProgress,
-    ) -> Result<ControlFlow<()>> {
-        let started = Instant::now();
-        let summary = match unit {
+    fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        match unit {
             Unit::Teach(cell) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
-                teaching.teach(cell, Marks::Shipped, is_interrupted)?
+                teaching.teach(cell, Marks::Shipped, is_interrupted)
             }
-            Unit::Look(object) => self.look(object, is_interrupted)?,
-            Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted)?,
-        };
-        let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
-        progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
-        Ok(ControlFlow::Continue(()))
+            Unit::Look(object) => self.look(object, is_interrupted),
+            Unit::Attempts(cell, object, way) => self.attempt(cell, object, way, is_interrupted),
+        }
     }
 
     /// Shows every model of a part that has not seen them the same pictures.

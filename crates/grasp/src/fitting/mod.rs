@@ -43,6 +43,7 @@ pub use self::report::{ConstantReport, FitReport, ScoreReport, Trial};
 
 /// What is fitted.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct FitOptions {
     /// Decides the negatives that are composed for each part.
     pub seed: u64,

@@ -7,6 +7,7 @@
 //! Legend: `x` the values of a pose's terms, kept in their ranges; `w` the weights, the bias last; `y` 1 for right.
 
 use nalgebra::{SMatrix, SVector};
+use sdg_geometry::upper_median;
 use sdg_shape::Evidence;
 
 use super::loss::COST_OF_WRONG;
@@ -177,9 +178,7 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
     let examples = examples(parts, config);
     let median = |k: usize, right: Option<bool>| {
         let of_kind = examples.iter().filter(|example| right.is_none_or(|right| example.is_right == right));
-        let mut values: Vec<f64> = of_kind.map(|example| example.x[k]).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
+        upper_median(of_kind.map(|example| example.x[k])).unwrap_or(0.0)
     };
     let weights = weights_of(config);
     let mut made = *config;

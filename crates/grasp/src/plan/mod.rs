@@ -9,54 +9,21 @@
 //! camera serves any other.
 
 mod demonstration;
+mod lengths;
 mod picture;
 mod uncertainty;
 
 use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
-use serde::{Deserialize, Serialize};
 
 pub use self::demonstration::seen_from_above;
+pub use self::lengths::Lengths;
 pub(crate) use self::picture::PixelRect;
 use self::picture::PlanMap;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::error::{GraspError, Result};
 use crate::model::{GraspDetection, GraspModel, Verification};
-
-/// What a model that was taught with a camera knows of lengths.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Lengths {
-    /// Pixels of the demonstrations for a metre.
-    pub pixels_per_m: f64,
-    /// Height of the marks' plane over the table, in metres.
-    pub mark_height_m: f64,
-    /// Height over the table at which the gripper closes, in metres.
-    pub grasp_height_m: f64,
-    /// From where the first photo showed the part: see [`slant`]. 0 in models of before.
-    #[serde(default)]
-    pub slant: [f64; 2],
-}
-
-impl Lengths {
-    /// # Errors
-    /// [`GraspError::Damaged`] for what no camera and no part has.
-    pub(crate) fn check(&self) -> Result<()> {
-        let Self { pixels_per_m, mark_height_m, grasp_height_m, slant } = *self;
-        let is_height = |height: f64| (0.0..MAX_HEIGHT_M).contains(&height);
-        if (1.0..MAX_PIXELS_PER_M).contains(&pixels_per_m)
-            && is_height(mark_height_m)
-            && is_height(grasp_height_m)
-            && slant.iter().all(|share| share.is_finite())
-        {
-            return Ok(());
-        }
-        Err(GraspError::Damaged {
-            expected: format!("1 to {MAX_PIXELS_PER_M} pixels a metre and heights of 0 to {MAX_HEIGHT_M} m"),
-            found: format!("{self:?}"),
-        })
-    }
-}
 
 /// A table and a camera over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,9 +69,6 @@ pub struct PlanDetection {
     pub pose: PlanarPose,
 }
 
-/// A micrometre for a pixel, and a part as high as a person. Chosen by hand.
-const MAX_PIXELS_PER_M: f64 = 1e6;
-const MAX_HEIGHT_M: f64 = 2.0;
 /// More pixels than a search is quick in. Chosen by hand.
 const MAX_PLAN_PIXELS: u64 = 6_000_000;
 

@@ -3,8 +3,9 @@
 //!
 //! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
 
+use burn::tensor::Device;
+use sdg_detection::golden::{record, verify};
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
-use sdg_detection::verification::{record, verify};
 
 use super::tests::{demonstration, small_plan, taught};
 use super::*;

@@ -1,11 +1,8 @@
 //! How a part is taught from base weights of our own: what differs from teaching from nothing.
 
-use sdg_demonstration::AugmentationStyle;
 use sdg_detection::config::Freeze;
 use sdg_training::{EarlyStop, TrainingConfig, ValidationConfig};
 use serde::{Deserialize, Serialize};
-
-use super::Plan;
 
 /// Steps unless the network is good before.
 const STEPS: usize = 120;
@@ -46,17 +43,5 @@ impl FineTuning {
             positive_share: 0.75,
             hard_negative_share: 0.0,
         }
-    }
-
-    /// The preset's plan, changed.
-    pub(super) fn adapt(&self, mut plan: Plan) -> Plan {
-        plan.training = self.training.clone();
-        plan.network.backbone.freeze = self.freeze;
-        plan.network.roi_heads.hard_negative_share = self.hard_negative_share;
-        plan.num_other_parts = self.num_other_parts;
-        if let AugmentationStyle::Scenes(style) = &mut plan.samples.style {
-            style.positive_share = self.positive_share;
-        }
-        plan
     }
 }

@@ -9,133 +9,54 @@
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
 //! ```
 
+mod detector_plan;
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
 mod event;
 mod fine_tuning;
 mod held_back;
 pub(crate) mod negatives;
+mod options;
 mod orientation;
 mod other_parts;
 mod paper;
 mod plan;
+mod preset;
 mod r50;
 mod start;
 pub(crate) mod symmetry;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use std::ops::{ControlFlow, RangeInclusive};
-use std::time::{Duration, Instant};
+use std::ops::ControlFlow;
+use std::time::Instant;
 
-use burn::tensor::Device;
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
-use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
-use sdg_geometry::{GraspLine, RotationalSymmetry};
+use sdg_detection::{GeneralizedRcnn, state_dict};
+use sdg_geometry::GraspLine;
 use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
 use crate::calibration::Calibration;
-use crate::check_config::CheckConfig;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
 use crate::model_file::Calibrations;
 use crate::models::mask::MaskMatcher;
-use crate::models::{self, Network, Reading};
+use crate::models::{Network, Reading};
 use crate::network_evidence::NetworkEvidence;
-use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
 pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
 use negatives::NegativeScenes;
+pub use options::TeachOptions;
 pub(crate) use plan::Plan;
-pub use plan::Preset;
+use plan::ReadingPlan;
+pub use preset::Preset;
 pub use start::Start;
 use symmetry::HiddenTurns;
-
-/// How to teach.
-#[derive(Debug, Clone)]
-pub struct TeachOptions {
-    /// Which model.
-    pub kind: ModelKind,
-    /// Which network and training; without effect on model S, which has neither.
-    pub preset: Preset,
-    /// Decides every random choice.
-    pub seed: u64,
-    /// Wall-clock time for the training.
-    pub time_budget: Option<Duration>,
-    /// Steps of the detector other than the preset's, with the orientation CNN's in proportion; for tests and trials.
-    pub steps: Option<usize>,
-    /// How to teach; `None` for the preset's way from nothing, and for [`FineTuning::new`] from base weights of our own.
-    pub fine_tuning: Option<FineTuning>,
-    /// Turns of the part that look the same: they are neither taught nor held against the model.
-    pub symmetry: RotationalSymmetry,
-    /// Sizes over the nominal one at which the part is looked for.
-    pub size_tolerance: RangeInclusive<f64>,
-    /// What [`crate::seen_from_above`] says where the demonstrations come from there.
-    pub lengths: Option<Lengths>,
-    /// What the networks start from.
-    pub start: Start,
-    /// Where to compute; without gradients.
-    pub device: Device,
-}
-
-impl TeachOptions {
-    /// Model C with the default preset on the default device.
-    pub fn new(seed: u64) -> Self {
-        Self {
-            kind: ModelKind::C,
-            preset: Preset::default(),
-            seed,
-            time_budget: None,
-            steps: None,
-            fine_tuning: None,
-            symmetry: RotationalSymmetry::None,
-            size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
-            lengths: None,
-            start: Start::default(),
-            device: Device::flex(),
-        }
-    }
-
-    /// The detector that is taught, which weights to start from must fit; `None` for model S, which has none.
-    pub fn network(&self) -> Option<RcnnConfig> {
-        models::rcnn_kind(self.kind).map(|rcnn| self.preset.network(rcnn, true))
-    }
-
-    /// The detector while it is taught, which may have more heads than the model: what base weights of ours are read for.
-    pub fn taught_network(&self) -> Option<RcnnConfig> {
-        models::rcnn_kind(self.kind).map(|rcnn| self.preset.plan(rcnn, self).network)
-    }
-
-    /// The detector as teaching starts. Heads that the model itself has not start from nothing.
-    fn initial_detector(&self, config: &RcnnConfig) -> Result<GeneralizedRcnn> {
-        let device = self.device.clone().autodiff();
-        let detector = config.init(&device, self.seed)?;
-        match &self.start {
-            Start::Weights(base_weights) => {
-                // Weights of ours have every head that is taught, imported ones those of the model alone.
-                let start =
-                    if base_weights.has_keypoint_head() { config.clone() } else { own_config(self.kind, config) };
-                let own = base_weights.apply(start.init(&device, self.seed)?)?;
-                Ok(state_dict::import(detector, &state_dict::export(&own)).0)
-            }
-            Start::Shipped | Start::Nothing => Ok(detector),
-        }
-    }
-}
-
-/// The detector that the model itself has, out of the one that is taught.
-fn own_config(kind: ModelKind, taught: &RcnnConfig) -> RcnnConfig {
-    let mut own = taught.clone();
-    if !kind.has_keypoints() {
-        own.roi_heads.keypoint_head = None;
-    }
-    own
-}
 
 /// A model and the run that made it.
 #[derive(Debug, Clone)]
@@ -158,10 +79,11 @@ pub fn teach(
 ) -> Result<Taught> {
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
-    let Some(rcnn) = models::rcnn_kind(options.kind) else { return instant(demonstrations, options, start) };
-    let options = &options.with_start()?;
-    let plan = options.preset.plan(rcnn, options);
-    teach_network(demonstrations, &plan, options, observe, start)
+    let options = options.with_start_read()?;
+    match Plan::new(&options) {
+        Some(plan) => teach_network(demonstrations, &plan, &options, observe, start),
+        None => instant(demonstrations, &options, start),
+    }
 }
 
 /// Smallest extent of a part in its photo: with less, whatever has two edges looks like it. Chosen by hand, not measured.
@@ -265,25 +187,23 @@ pub(crate) fn teach_network(
     observe: &mut dyn FnMut(&TeachingEvent) -> ControlFlow<()>,
     start: Instant,
 ) -> Result<Taught> {
-    let plan = options.steps.map_or_else(|| plan.clone(), |steps| plan.clone().with_steps(steps));
     let taught = taught(demonstrations, options)?;
     // First, because what is wrong with base weights should not come out after minutes.
-    let detector = options.initial_detector(&plan.network)?;
+    let detector = plan.detector.initial(options.start.weights(), &options.device, options.seed)?;
     let comparison = match options.start.weights() {
         Some(base_weights) => base_weights.comparison(&options.device)?,
         None => None,
     };
     let mut orientation_facts = None;
-    let reading = match (options.kind, &plan.orientation) {
-        (ModelKind::A, Some(orientation_plan)) => {
+    let reading = match &plan.reading {
+        ReadingPlan::BoxAndCrop(orientation_plan) => {
             let (network, facts) = orientation::teach(demonstrations, orientation_plan, options, observe)?;
             orientation_facts = Some(facts);
             Reading::BoxAndCrop(Box::new(network))
         }
-        (ModelKind::B, _) => Reading::BoxAndKeypoints,
-        (ModelKind::C, _) => Reading::Keypoints,
-        (ModelKind::D, _) => Reading::Mask(MaskMatcher::new(&taught)?),
-        (kind, _) => unreachable!("model {kind} comes here with all that it needs"),
+        ReadingPlan::BoxAndKeypoints => Reading::BoxAndKeypoints,
+        ReadingPlan::Keypoints => Reading::Keypoints,
+        ReadingPlan::Mask => Reading::Mask(MaskMatcher::new(&taught)?),
     };
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
@@ -299,14 +219,14 @@ pub(crate) fn teach_network(
     training.time_budget = options.time_budget.map(|budget| budget.saturating_sub(start.elapsed()));
 
     let recurring = |i: u64| plan.distinct_samples.map_or(i, |distinct| i % distinct);
-    let windows = augmenter.windows(plan.network.input.size_divisibility as u32);
+    let windows = augmenter.windows(plan.detector.network.input.size_divisibility as u32);
     let source = SampleSource {
         frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
         windows: &|i| turns.canonical(windows.sample(recurring(i))),
     };
     let detector = match options.start.weights() {
         Some(base_weights) if base_weights.is_ours() => {
-            let (images, targets) = first_windows(NUM_VIEWS, &plan.network.input, &source)?;
+            let (images, targets) = first_windows(NUM_VIEWS, &plan.detector.network.input, &source)?;
             base_weights.imprint(detector, &images, &targets)?
         }
         _ => detector,
@@ -322,7 +242,8 @@ pub(crate) fn teach_network(
         },
         &mut |event| observe(&TeachingEvent::from(*event)),
     )?;
-    let own = own_config(options.kind, &plan.network).init(&options.device, options.seed)?;
+    // Without the head that only teaching has.
+    let own = plan.detector.network.init(&options.device, options.seed)?;
     let detector = state_dict::import(own, &state_dict::export(&detector)).0;
     // Calibrated and handed out is what a file will give back.
     let network = Network { detector, reading, comparison }.rounded();

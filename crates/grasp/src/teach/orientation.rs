@@ -4,12 +4,12 @@ use std::ops::ControlFlow;
 
 use sdg_demonstration::Demonstration;
 use sdg_orientation::OrientationCnn;
-use sdg_orientation::training::{self, OrientationEvent};
 use sdg_training::Ending;
+use sdg_training::orientation::{self, OrientationEvent};
 
-use super::TeachOptions;
 use super::event::TeachingEvent;
-use super::plan::OrientationPlan;
+use super::options::TeachOptions;
+use super::preset::OrientationPlan;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::OrientationFacts;
@@ -28,12 +28,19 @@ pub(super) fn teach(
     training.time_budget = options.time_budget.map(|budget| budget.mul_f64(TIME_SHARE));
     let start = options.start.weights().and_then(|weights| weights.orientation.as_ref());
     let taught =
-        training::teach(demonstrations, &plan.network, start, &training, &options.device, &mut |event| match *event {
-            OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {
-                observe(&TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs })
-            }
-            _ => ControlFlow::Continue(()),
-        })?;
+        orientation::teach(
+            demonstrations,
+            &plan.network,
+            start,
+            &training,
+            &options.device,
+            &mut |event| match *event {
+                OrientationEvent::Step { step, planned_steps, loss, elapsed_secs } => {
+                    observe(&TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs })
+                }
+                _ => ControlFlow::Continue(()),
+            },
+        )?;
     if taught.ending == Ending::Interrupted {
         return Err(GraspError::StoppedTooEarly);
     }

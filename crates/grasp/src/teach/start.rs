@@ -1,6 +1,8 @@
 //! What teaching starts from.
 
-use super::{Preset, TeachOptions};
+use sdg_detection::RcnnConfig;
+
+use super::preset::Preset;
 use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
 
@@ -13,7 +15,8 @@ pub enum Start {
     Shipped,
     /// From random values.
     Nothing,
-    /// Other weights, for the detector that [`TeachOptions::network`] or [`TeachOptions::taught_network`] gives.
+    /// Other weights, for the detector that [`TeachOptions::network`](super::TeachOptions::network) or
+    /// [`TeachOptions::taught_network`](super::TeachOptions::taught_network) gives.
     Weights(BaseWeights),
 }
 
@@ -25,36 +28,31 @@ impl Start {
             Self::Shipped | Self::Nothing => None,
         }
     }
-}
 
-impl TeachOptions {
-    /// The same with the shipped weights read, where these options ask for them.
+    /// The same with the shipped weights read, where they are asked for and the preset starts from them.
     ///
     /// # Errors
     /// [`GraspError::NeedsBaseWeights`] where the preset starts from weights and this build carries none.
-    pub(super) fn with_start(&self) -> Result<Self> {
-        let start = match (&self.start, self.preset) {
-            (Start::Shipped, Preset::Edge) => Start::Weights(self.shipped_weights()?),
-            (Start::Shipped | Start::Nothing, preset) if preset.needs_base_weights() => {
-                return Err(GraspError::NeedsBaseWeights { preset: preset.name() });
+    pub(super) fn read(&self, preset: Preset, taught_network: &RcnnConfig) -> Result<Self> {
+        match (self, preset) {
+            (Self::Shipped, Preset::Edge) => shipped_weights(preset, taught_network).map(Self::Weights),
+            (Self::Shipped | Self::Nothing, preset) if preset.needs_base_weights() => {
+                Err(GraspError::NeedsBaseWeights { preset: preset.name() })
             }
-            (Start::Shipped, _) => Start::Nothing,
-            (start, _) => start.clone(),
-        };
-        Ok(Self { start, ..self.clone() })
+            (Self::Shipped, _) => Ok(Self::Nothing),
+            (start, _) => Ok(start.clone()),
+        }
     }
+}
 
-    /// The shipped weights for what these options teach.
-    #[cfg(feature = "base-weights")]
-    fn shipped_weights(&self) -> Result<BaseWeights> {
-        use crate::base_weights_file::{BaseWeightsFile, SHIPPED, SHIPPED_SHA256};
-        let needs = GraspError::NeedsBaseWeights { preset: self.preset.name() };
-        let network = self.taught_network().ok_or(needs)?;
-        BaseWeightsFile::from_bytes(SHIPPED)?.for_network(self.preset.name(), &network, SHIPPED_SHA256.to_owned())
-    }
+/// The shipped weights for a network.
+#[cfg(feature = "base-weights")]
+fn shipped_weights(preset: Preset, taught_network: &RcnnConfig) -> Result<BaseWeights> {
+    use crate::base_weights_file::{BaseWeightsFile, SHIPPED, SHIPPED_SHA256};
+    BaseWeightsFile::from_bytes(SHIPPED)?.for_network(preset.name(), taught_network, SHIPPED_SHA256.to_owned())
+}
 
-    #[cfg(not(feature = "base-weights"))]
-    fn shipped_weights(&self) -> Result<BaseWeights> {
-        Err(GraspError::NeedsBaseWeights { preset: self.preset.name() })
-    }
+#[cfg(not(feature = "base-weights"))]
+fn shipped_weights(preset: Preset, _taught_network: &RcnnConfig) -> Result<BaseWeights> {
+    Err(GraspError::NeedsBaseWeights { preset: preset.name() })
 }

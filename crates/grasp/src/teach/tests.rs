@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use burn::tensor::Device;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_demonstration::Annotation;
@@ -10,7 +11,8 @@ use sdg_detection::config::{NormKind, RcnnConfig, ResizeRule};
 use sdg_geometry::{GraspLine, Polygon};
 use sdg_training::ValidationConfig;
 
-use super::plan::OrientationPlan;
+use super::plan::ReadingPlan;
+use super::preset::OrientationPlan;
 use super::*;
 use crate::model::Verification;
 
@@ -33,6 +35,9 @@ pub(crate) fn demonstration() -> Demonstration {
     Demonstration { image, annotation }
 }
 
+/// Channels of the keypoint head's convolutions.
+const SMALL_KEYPOINT_CONVS: [usize; 2] = [16; 2];
+
 /// The network's structure with few channels and pixels.
 fn shrink(network: &mut RcnnConfig) {
     network.input.resize = ResizeRule::FitWithin { width_px: 96, height_px: 72 };
@@ -45,7 +50,7 @@ fn shrink(network: &mut RcnnConfig) {
     heads.sampler.batch_size_per_image = 32;
     heads.box_head.fc_channels = 32;
     if let Some(head) = &mut heads.keypoint_head {
-        head.conv_channels = vec![16; 2];
+        head.conv_channels = SMALL_KEYPOINT_CONVS.to_vec();
     }
     if let Some(head) = &mut heads.mask_head {
         (head.conv_channels, head.deconv_channels) = (vec![16; 2], 16);
@@ -53,18 +58,21 @@ fn shrink(network: &mut RcnnConfig) {
 }
 
 fn whole_plan(options: &TeachOptions) -> Plan {
-    options.preset.plan(models::rcnn_kind(options.kind).unwrap(), options)
+    Plan::new(options).unwrap()
 }
 
 /// A preset's plan, small enough for a test; any network is kept.
 pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     let mut plan = whole_plan(options);
-    shrink(&mut plan.network);
+    shrink(&mut plan.detector.network);
+    if let Some(head) = &mut plan.detector.auxiliary_keypoints {
+        head.conv_channels = SMALL_KEYPOINT_CONVS.to_vec();
+    }
     plan.min_hit_rate = 0.0;
     plan.samples = plan.samples.with_output_size(96, 72);
     plan.training.steps = STEPS;
     plan.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
-    if let Some(OrientationPlan { network, training }) = &mut plan.orientation {
+    if let ReadingPlan::BoxAndCrop(OrientationPlan { network, training }) = &mut plan.reading {
         network.input_px = 32;
         (network.stage_channels, network.stage_convs, network.hidden) = (vec![8, 16], vec![1, 1], 16);
         (training.steps, training.validation_crops) = (STEPS, 4);
@@ -132,8 +140,8 @@ fn the_papers_protocol_teaches_every_network_model() {
 #[test]
 fn the_paper_freezes_what_was_imported_and_nothing_else() {
     let frozen = |has_base_weights| {
-        let network = Preset::Paper.network(models::rcnn_kind(ModelKind::C).unwrap(), has_base_weights);
-        network.backbone.freeze != sdg_detection::config::Freeze::Nothing
+        let detector = Preset::Paper.detector(ModelKind::C, has_base_weights).unwrap();
+        detector.network.backbone.freeze != sdg_detection::config::Freeze::Nothing
     };
     assert!(frozen(true) && !frozen(false));
 }

@@ -49,15 +49,10 @@ impl Workcell {
     /// What every motion in the workcell keeps to: Franka's limits over the table, but for the hand's turning, since joint motions
     /// go at the pace of rehearsals.
     pub fn safety_limits() -> SafetyLimits {
-        SafetyLimits {
-            cartesian: CartesianLimits {
-                angular_velocity_rad_s: REHEARSED_ANGULAR_VELOCITY_RAD_S,
-                angular_acceleration_rad_s2: REHEARSED_ANGULAR_ACCELERATION_RAD_S2,
-                ..CartesianLimits::franka()
-            },
-            fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M,
-            ..SafetyLimits::default()
-        }
+        let mut cartesian = CartesianLimits::franka();
+        cartesian.angular_velocity_rad_s = REHEARSED_ANGULAR_VELOCITY_RAD_S;
+        cartesian.angular_acceleration_rad_s2 = REHEARSED_ANGULAR_ACCELERATION_RAD_S2;
+        SafetyLimits { cartesian, fingertip_beyond_tcp_m: FINGERTIP_BEYOND_TCP_M, ..SafetyLimits::default() }
     }
 
     /// Where the wrist camera is.

@@ -29,7 +29,7 @@ pub struct AnnotateArgs {
     pub from: Option<Address>,
     /// A picture, or a folder of pictures, to try the taught model on; repeat for several. The page takes more
     #[arg(long = "try", value_name = "PATH")]
-    pub scenes: Vec<PathBuf>,
+    pub trial_pictures: Vec<PathBuf>,
     /// Where a model taught on the page is written; without it, beside the first photo under the part's name
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

@@ -35,7 +35,8 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;
-    let options = SessionOptions { images, scenes: args.scenes.clone(), model_path: args.out.clone(), live };
+    let options =
+        SessionOptions { images, trial_pictures: args.trial_pictures.clone(), model_path: args.out.clone(), live };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;
     let url = server.url();

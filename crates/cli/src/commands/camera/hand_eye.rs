@@ -10,6 +10,7 @@ use sdg_calibration::{
     Board, CalibratedCamera, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose, calibrate_hand_eye, find_board,
     read_robot_poses,
 };
+use sdg_geometry::upper_median;
 use sdg_report::write_atomically;
 use serde_json::{Value, json};
 
@@ -142,9 +143,7 @@ fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose]
         Mount::Hand => ("flange", "base"),
         Mount::Base => ("base", "flange"),
     };
-    let mut rms = found.pictures_rms_px.clone();
-    rms.sort_by(f64::total_cmp);
-    let median = rms[rms.len() / 2];
+    let median = upper_median(found.pictures_rms_px.iter().copied()).context("no picture was used")?;
     let widest = |k: usize| found.spread.iter().map(|spread| spread[k]).fold(0.0, f64::max);
     let (spread_mm, spread_deg) = (1000.0 * widest(0), widest(1).to_degrees());
     if args.json {

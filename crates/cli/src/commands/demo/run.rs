@@ -31,13 +31,11 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
 
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());
-    let options = TeachOptions {
-        // The workcell's camera hovers as high as it was for the photo.
-        size_tolerance: CheckConfig::FIXED_HEIGHT_TOLERANCE,
-        time_budget: args.time_budget.map(Duration::from_secs_f64),
-        symmetry: object.symmetry,
-        ..TeachOptions::new(args.seed)
-    };
+    let mut options = TeachOptions::new(args.seed);
+    // The workcell's camera hovers as high as it was for the photo.
+    options.size_tolerance = CheckConfig::FIXED_HEIGHT_TOLERANCE;
+    options.time_budget = args.time_budget.map(Duration::from_secs_f64);
+    options.symmetry = object.symmetry;
     let mut progress = TeachingProgress::new(interrupt.clone());
     let taught = teach(std::slice::from_ref(&demonstration), &options, &mut |event| progress.show(event));
     progress.finish();

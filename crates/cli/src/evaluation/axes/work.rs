@@ -17,9 +17,9 @@ use super::selection::GraspCondition;
 use super::units::{AxesEvaluation, Unit, axis_file, grasps_file, marks_of};
 use crate::evaluation::EvaluationProgress;
 use crate::evaluation::attempting::go_on;
-use crate::evaluation::caught::{NO_MODEL, caught};
 use crate::evaluation::cell::{Cell, Marks, attempts_of};
 use crate::evaluation::looking::part_seed;
+use crate::evaluation::one_unit::{NO_MODEL, do_unit};
 use crate::evaluation::schedule::run_all;
 use crate::evaluation::teaching::Teaching;
 use crate::exit::one_line;
@@ -49,10 +49,7 @@ impl AxesEvaluation<'_> {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let failures = Mutex::new(Vec::new());
         let work = |unit: &Unit| {
-            if is_interrupted() {
-                return Ok(ControlFlow::Break(()));
-            }
-            caught(|| self.work(*unit, is_interrupted, progress)).or_else(|error| {
+            do_unit(unit, is_interrupted, progress, || self.work(*unit, is_interrupted)).or_else(|error| {
                 let failure = format!("{unit}: {}", one_line(&error));
                 progress.unit_done(&format!("failed: {failure}"));
                 failures.lock().unwrap_or_else(PoisonError::into_inner).push(failure);
@@ -64,24 +61,15 @@ impl AxesEvaluation<'_> {
         Ok(RunEnd { remaining: self.remaining()?, failures })
     }
 
-    fn work(
-        &self,
-        unit: Unit,
-        is_interrupted: &(dyn Fn() -> bool + Sync),
-        progress: &EvaluationProgress,
-    ) -> Result<ControlFlow<()>> {
-        let started = Instant::now();
-        let summary = match unit {
+    fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        match unit {
             Unit::Teach(cell, marks) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
-                teaching.teach(cell, marks, is_interrupted)?
+                teaching.teach(cell, marks, is_interrupted)
             }
-            Unit::Pictures(object, axis) => self.detect_in_pictures(object, axis, is_interrupted)?,
-            Unit::Grasps(cell, object, condition) => self.grasp(cell, object, condition, is_interrupted)?,
-        };
-        let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
-        progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
-        Ok(ControlFlow::Continue(()))
+            Unit::Pictures(object, axis) => self.detect_in_pictures(object, axis, is_interrupted),
+            Unit::Grasps(cell, object, condition) => self.grasp(cell, object, condition, is_interrupted),
+        }
     }
 
     /// A cell's model as it is measured.

@@ -1,6 +1,5 @@
 //! The units of work, and how each is done.
 
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -14,8 +13,8 @@ use super::sets::{PictureSet, Shown};
 use crate::against_truth::grasp_error;
 use crate::evaluation::EvaluationProgress;
 use crate::evaluation::axes::match_one_to_one;
-use crate::evaluation::caught::{NO_MODEL, caught};
 use crate::evaluation::cell::{Cell, Marks};
+use crate::evaluation::one_unit::{NO_MODEL, do_unit};
 use crate::evaluation::schedule::{Task, run_all};
 use crate::evaluation::settings::TeachingSettings;
 use crate::evaluation::store::Store;
@@ -63,16 +62,7 @@ impl CamerasEvaluation<'_> {
         let tasks = self.tasks()?;
         progress.expect(tasks.len());
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let work = |unit: &Unit| {
-            if is_interrupted() {
-                return Ok(ControlFlow::Break(()));
-            }
-            let started = Instant::now();
-            let summary = caught(|| self.work(*unit, is_interrupted))?;
-            let Some(summary) = summary else { return Ok(ControlFlow::Break(())) };
-            progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
-            Ok(ControlFlow::Continue(()))
-        };
+        let work = |unit: &Unit| do_unit(unit, is_interrupted, progress, || self.work(*unit, is_interrupted));
         run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)
     }
 

@@ -54,20 +54,26 @@ fn the_tcp_has_limits_of_its_own() {
     let planned = CartesianLimits::franka().scaled(0.2, 0.1, 0.05).unwrap();
     let limits = |cartesian| SafetyLimits { cartesian, ..SafetyLimits::default() };
     // The path is a straight line between waypoints only: differences of 1 ms see its third derivative jump.
-    let roomy = CartesianLimits { jerk_m_s3: 6500.0, ..planned };
+    let mut roomy = planned;
+    roomy.jerk_m_s3 = 6500.0;
     limits(roomy).check(trajectory.clone()).unwrap();
-    for (expected, cartesian) in [
-        ("velocity", CartesianLimits { velocity_m_s: 0.1, ..roomy }),
-        ("acceleration", CartesianLimits { acceleration_m_s2: 0.5, ..roomy }),
-        ("jerk", CartesianLimits { jerk_m_s3: 10.0, ..roomy }),
-    ] {
+    type Lower = fn(&mut CartesianLimits);
+    let lowered: [(&str, Lower); 3] = [
+        ("velocity", |limits| limits.velocity_m_s = 0.1),
+        ("acceleration", |limits| limits.acceleration_m_s2 = 0.5),
+        ("jerk", |limits| limits.jerk_m_s3 = 10.0),
+    ];
+    for (expected, lower) in lowered {
+        let mut cartesian = roomy;
+        lower(&mut cartesian);
         match limits(cartesian).check(trajectory.clone()).unwrap_err() {
             Violation::Cartesian { quantity, .. } => assert_eq!(quantity, expected),
             other => panic!("{expected}: {other}"),
         }
     }
     let turning = point_to_point([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5], [0.9, 0.5, 0.2]);
-    let slow = CartesianLimits { angular_velocity_rad_s: 0.5, ..CartesianLimits::franka() };
+    let mut slow = CartesianLimits::franka();
+    slow.angular_velocity_rad_s = 0.5;
     let found = limits(slow).check(turning).unwrap_err().to_string();
     assert!(found.contains("the angular velocity of the tcp is 0.5") && found.contains("rad/s"), "{found}");
 }

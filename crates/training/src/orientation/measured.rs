@@ -1,10 +1,9 @@
 //! How far angles are off.
 
 use sdg_geometry::median;
+use sdg_orientation::{OrientationCnn, OrientationError};
 
-use super::augmented::LabelledCrop;
-use crate::error::Result;
-use crate::network::OrientationCnn;
+use super::labelled_crop::LabelledCrop;
 
 /// An angle farther from the truth than this spoils the grasp.
 pub const HIT_DEGREES: f64 = 10.0;
@@ -26,12 +25,15 @@ impl AngleErrors {
     ///
     /// # Errors
     /// A crop of another size than the network's input.
-    pub fn measure<'a>(network: &OrientationCnn, crops: impl IntoIterator<Item = &'a LabelledCrop>) -> Result<Self> {
+    pub fn measure<'a>(
+        network: &OrientationCnn,
+        crops: impl IntoIterator<Item = &'a LabelledCrop>,
+    ) -> Result<Self, OrientationError> {
         let classes = network.config().classes;
-        let error = |crop: &LabelledCrop| -> Result<f64> {
+        let error = |crop: &LabelledCrop| -> Result<f64, OrientationError> {
             Ok(classes.distance(network.predict(&crop.crop)?.angle, crop.angle).to_degrees())
         };
-        Ok(Self::new(crops.into_iter().map(error).collect::<Result<_>>()?))
+        Ok(Self::new(crops.into_iter().map(error).collect::<Result<_, _>>()?))
     }
 
     /// How many crops.

@@ -9,11 +9,10 @@ use image::RgbImage;
 use sdg_detection::imprint::ClassImprint;
 use sdg_detection::initialization::Initializer;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_orientation::{Labels, OrientationCnn, crop_batch};
 
-use super::augmented::LabelledCrop;
-use crate::angle_classes::Labels;
-use crate::error::{OrientationError, Result};
-use crate::network::{OrientationCnn, crop_batch};
+use super::labelled_crop::LabelledCrop;
+use crate::error::TrainingError;
 
 /// Crops near a class, in classes: the standard deviation of the bell by which they count.
 const BELL: Labels = Labels::VonMises { sigma_classes: 4.0 };
@@ -34,25 +33,25 @@ impl OrientationStart {
     /// The network with these parameters, and classes made from a part's crops.
     ///
     /// # Errors
-    /// [`OrientationError::Start`] for parameters of another network.
-    pub fn apply(&self, network: OrientationCnn, crops: &[LabelledCrop]) -> Result<OrientationCnn> {
+    /// [`TrainingError::Start`] for parameters of another network.
+    pub fn apply(&self, network: OrientationCnn, crops: &[LabelledCrop]) -> Result<OrientationCnn, TrainingError> {
         let (network, report) = state_dict::import(network, &self.parameters);
         let named = |missing: &Vec<String>| missing.iter().find(|name| !name.starts_with("classes.")).cloned();
         let wrong_shape = report.mismatched.first().map(|(name, ..)| name.clone());
         if let Some(name) = wrong_shape.or(named(&report.missing)).or(report.unused.first().cloned()) {
-            return Err(OrientationError::Start { name });
+            return Err(TrainingError::Start { name });
         }
         let layers = self.classes(&network.valid(), crops)?;
         Ok(state_dict::import(network, &layers).0)
     }
 
-    fn classes(&self, network: &OrientationCnn, crops: &[LabelledCrop]) -> Result<StateDict> {
+    fn classes(&self, network: &OrientationCnn, crops: &[LabelledCrop]) -> Result<StateDict, TrainingError> {
         let (classes, device) = (network.config().classes, network.device());
         let hidden = network.config().hidden;
         let blank = ClassImprint::init(hidden, &mut Initializer::blank(&device));
         let (imprint, report) = state_dict::import(blank, &self.imprint);
         if !report.is_complete() {
-            return Err(OrientationError::Start { name: "imprint".to_owned() });
+            return Err(TrainingError::Start { name: "imprint".to_owned() });
         }
         let num_classes = classes.num_classes;
         let mut sums = Tensor::<2>::zeros([num_classes, hidden], &device);
@@ -81,9 +80,9 @@ impl OrientationStart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::OrientationConfig;
     use image::Rgb;
     use sdg_geometry::Angle;
+    use sdg_orientation::OrientationConfig;
 
     fn config() -> OrientationConfig {
         OrientationConfig {

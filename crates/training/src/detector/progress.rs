@@ -4,7 +4,9 @@ use burn::tensor::Tensor;
 use sdg_detection::Losses;
 use serde::{Deserialize, Serialize};
 
-use crate::validation::Validation;
+use super::validation::Validation;
+use crate::pace::Ending;
+use crate::run::LossFigures;
 
 /// The losses of one step, summed over their weights' batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,6 +30,14 @@ impl LossValues {
     /// Their sum: what the step descends.
     pub fn total(&self) -> f64 {
         self.rpn_cls + self.rpn_loc + self.cls + self.box_reg + self.keypoint + self.mask
+    }
+}
+
+impl LossFigures for LossValues {
+    const NAME: &'static str = "loss";
+
+    fn total(&self) -> f64 {
+        self.total()
     }
 }
 
@@ -84,19 +94,6 @@ pub enum TrainingEvent {
     },
     /// A validation was done.
     Validated(ValidationRecord),
-}
-
-/// Why a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Ending {
-    /// All steps were done.
-    Completed,
-    /// A validation was good enough.
-    EarlyStop,
-    /// The time budget was used up.
-    TimeBudget,
-    /// The observer asked to stop.
-    Interrupted,
 }
 
 /// The whole run in figures.

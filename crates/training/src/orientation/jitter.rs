@@ -2,9 +2,7 @@
 
 use rand::Rng;
 use sdg_geometry::BoundingBox;
-
-use crate::config::check;
-use crate::error::Result;
+use sdg_orientation::{OrientationError, check_setting};
 
 /// How far a box may be off, uniformly drawn for each axis.
 ///
@@ -32,9 +30,14 @@ impl BoxJitter {
         BoundingBox { x1: x - half_width, y1: y - half_height, x2: x + half_width, y2: y + half_height }
     }
 
-    pub(crate) fn validate(&self) -> Result<()> {
-        check((0.0..=0.5).contains(&self.position), "jitter.position", "a share between 0 and 0.5", self.position)?;
-        check((0.0..=1.0).contains(&self.size), "jitter.size", "between 0 and 1", self.size)
+    pub(super) fn validate(&self) -> Result<(), OrientationError> {
+        check_setting(
+            (0.0..=0.5).contains(&self.position),
+            "jitter.position",
+            "a share between 0 and 0.5",
+            self.position,
+        )?;
+        check_setting((0.0..=1.0).contains(&self.size), "jitter.size", "between 0 and 1", self.size)
     }
 }
 

@@ -1,11 +1,36 @@
-//! Panics of one unit of work as errors.
+//! One unit of work: its panics as errors, its time, and what there is to say of it.
 
+use std::fmt::Display;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
 
 use anyhow::{Result, anyhow};
 
+use crate::progress::EvaluationProgress;
+
 /// What there is to say of a unit whose teaching failed while it waited.
 pub(super) const NO_MODEL: &str = "there is no model";
+
+/// Does a unit unless the run is interrupted, and says what came of it; `work` gives that in words, or `None` where it
+/// was interrupted.
+///
+/// # Errors
+/// Those of `work`, and its panic.
+pub(super) fn do_unit(
+    unit: &impl Display,
+    is_interrupted: &(dyn Fn() -> bool + Sync),
+    progress: &EvaluationProgress,
+    work: impl FnOnce() -> Result<Option<String>>,
+) -> Result<ControlFlow<()>> {
+    if is_interrupted() {
+        return Ok(ControlFlow::Break(()));
+    }
+    let started = Instant::now();
+    let Some(summary) = caught(work)? else { return Ok(ControlFlow::Break(())) };
+    progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
+    Ok(ControlFlow::Continue(()))
+}
 
 /// Turns a panic into an error, so that the units beside it are kept.
 pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {

@@ -7,9 +7,9 @@ use std::time::Duration;
 use burn::tensor::Device;
 use image::{Rgb, RgbImage};
 use sdg_geometry::Angle;
-use sdg_orientation::training::{LabelledCrop, OrientationEvent, OrientationTraining, TrainedOrientation, train};
-use sdg_orientation::{OrientationConfig, OrientationError};
-use sdg_training::{Ending, OneCycle};
+use sdg_orientation::OrientationConfig;
+use sdg_training::orientation::{LabelledCrop, OrientationEvent, OrientationTraining, TrainedOrientation, train};
+use sdg_training::{Ending, OneCycle, TrainingError};
 
 /// A bar through the middle at an angle, bright towards its end.
 fn bar(degrees: f64) -> LabelledCrop {
@@ -108,5 +108,5 @@ fn a_loss_that_is_no_number_is_an_error() {
     let untaught = network().init(&Device::flex().autodiff(), 4).unwrap();
     let wild = OrientationTraining { schedule: OneCycle { peak: 1e30, warm_up: 0.2 }, ..settings(20) };
     let result = train(untaught, &wild, &bars, &[bar(0.0)], &mut |_| ControlFlow::Continue(()));
-    assert!(matches!(result, Err(OrientationError::Diverged { .. })), "{:?}", result.map(|taught| taught.steps));
+    assert!(matches!(result, Err(TrainingError::Diverged { .. })), "{:?}", result.map(|taught| taught.steps));
 }

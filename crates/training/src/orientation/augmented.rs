@@ -1,25 +1,13 @@
 //! Crops with their true angle, made from demonstrations.
 
-use image::RgbImage;
-use nalgebra::{Point2, Rotation2};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_demonstration::{Augmenter, Demonstration, Sample, SampleObject};
-use sdg_geometry::{Angle, BoundingBox};
+use sdg_demonstration::{Augmenter, Demonstration, Sample};
+use sdg_geometry::Angle;
 
 use super::config::CropStyle;
-use super::jitter::BoxJitter;
-use crate::crop::CropWindow;
-use crate::error::Result;
-
-/// A crop and the angle of the part on it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LabelledCrop {
-    /// The crop, square.
-    pub crop: RgbImage,
-    /// Direction of the grasp line on the crop.
-    pub angle: Angle,
-}
+use super::labelled_crop::LabelledCrop;
+use crate::error::TrainingError;
 
 /// Makes crops from augmented scenes: those of scene *i* of a seed are always the same.
 pub struct AugmentedCrops {
@@ -41,7 +29,12 @@ impl AugmentedCrops {
     ///
     /// # Errors
     /// No demonstration, or one that lacks a grasp line or does not lie on its image.
-    pub fn new(demonstrations: &[Demonstration], style: &CropStyle, size_px: u32, seed: u64) -> Result<Self> {
+    pub fn new(
+        demonstrations: &[Demonstration],
+        style: &CropStyle,
+        size_px: u32,
+        seed: u64,
+    ) -> Result<Self, TrainingError> {
         for demonstration in demonstrations {
             demonstration.annotation.require_grasp()?;
         }
@@ -76,49 +69,13 @@ impl AugmentedCrops {
     }
 }
 
-impl LabelledCrop {
-    /// The crop of an object by a window turned by `turn`, around a box that is a little off; `None` where the object is not
-    /// to be seen. Windows are turned about objects with an outline alone.
-    pub fn of(
-        object: &SampleObject,
-        image: &RgbImage,
-        turn: Angle,
-        jitter: &BoxJitter,
-        size_px: u32,
-        rng: &mut Pcg64Mcg,
-    ) -> Option<Self> {
-        let seen = jitter.apply(&box_in_turned_frame(object, turn, image)?, rng);
-        let straight = CropWindow::around(&seen).ok()?;
-        let window = CropWindow { center: image_from_turned(turn) * straight.center, turn, ..straight };
-        let (start, end) = (object.keypoints.first()?.point(), object.keypoints.last()?.point());
-        let direction = Angle::from_direction(end.x - start.x, end.y - start.y);
-        Some(Self { crop: window.read(image, size_px), angle: window.crop_angle(direction) })
-    }
-}
-
-/// From the frame of a window turned by `turn`, with the image's origin, to the image.
-fn image_from_turned(turn: Angle) -> Rotation2<f64> {
-    Rotation2::new(turn.radians())
-}
-
-/// The part's tight box as it would be on the image turned back by `turn`; `None` without extent.
-fn box_in_turned_frame(object: &SampleObject, turn: Angle, image: &RgbImage) -> Option<BoundingBox> {
-    let Some(outline) = object.outline.as_ref().filter(|_| turn != Angle::ZERO) else {
-        return Some(object.bbox);
-    };
-    // Nothing is seen beyond the image's border.
-    let seen = outline.clip(f64::from(image.width()), f64::from(image.height()));
-    let turned_from_image = image_from_turned(turn).inverse();
-    BoundingBox::around(seen.vertices.iter().map(|vertex: &Point2<f64>| turned_from_image * vertex))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::OrientationTraining;
-    use image::Rgb;
+    use crate::orientation::{BoxJitter, OrientationTraining};
+    use image::{Rgb, RgbImage};
     use sdg_demonstration::Annotation;
-    use sdg_geometry::{GraspLine, Polygon};
+    use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 
     /// Between the marked line and the one measured on a small, noisy crop.
     const DIRECTION_TOLERANCE_DEGREES: f64 = 8.0;

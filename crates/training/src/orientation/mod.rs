@@ -30,13 +30,15 @@
 mod augmented;
 mod config;
 mod jitter;
+mod labelled_crop;
 mod measured;
 mod start;
 mod trainer;
 
-pub use augmented::{AugmentedCrops, LabelledCrop};
+pub use augmented::AugmentedCrops;
 pub use config::{CropStyle, EarlyStop, OrientationTraining};
 pub use jitter::BoxJitter;
+pub use labelled_crop::LabelledCrop;
 pub use measured::{AngleErrors, HIT_DEGREES};
 pub use start::OrientationStart;
 pub use trainer::{OrientationEvent, TrainedOrientation, teach, train};

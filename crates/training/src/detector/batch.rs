@@ -1,7 +1,4 @@
-//! Batches, prepared on another thread while the network is busy with the one before.
-
-use std::collections::VecDeque;
-use std::sync::mpsc;
+//! The batches of a detector: samples resized for the network, with the truth about each.
 
 use sdg_demonstration::{Sample, SampleObject};
 use sdg_detection::config::{ImageTransformConfig, ResizeRule};
@@ -9,6 +6,7 @@ use sdg_detection::{ImageTransform, ObjectMask, Target, TransformedImage};
 use sdg_geometry::Polygon;
 
 use crate::error::TrainingError;
+use crate::prefetch::BatchRequest;
 
 /// Where samples come from: each a function of its index alone.
 #[derive(Clone, Copy)]
@@ -26,10 +24,9 @@ pub(crate) enum View {
     Window,
 }
 
-/// A batch that is asked for.
+/// How many samples a step learns from, and of what view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct BatchRequest {
-    pub(crate) step: usize,
+pub(crate) struct BatchKind {
     pub(crate) view: View,
     pub(crate) size: usize,
 }
@@ -40,16 +37,13 @@ pub(crate) struct Batch {
     pub(crate) targets: Vec<Target>,
 }
 
-/// Batches asked for ahead: one in use, one ready, one in the making.
-const AHEAD: usize = 2;
-
 /// Makes a batch: samples `step · size` to `step · size + size - 1` of its view.
-fn prepare(
-    request: BatchRequest,
+pub(super) fn prepare(
+    request: BatchRequest<BatchKind>,
     transform: &ImageTransformConfig,
     source: &SampleSource<'_>,
 ) -> Result<Batch, TrainingError> {
-    let BatchRequest { step, view, size } = request;
+    let BatchRequest { step, kind: BatchKind { view, size } } = request;
     let mut batch = Batch { images: Vec::with_capacity(size), targets: Vec::with_capacity(size) };
     for i in (step * size)..(step + 1) * size {
         let sample = match view {
@@ -79,8 +73,8 @@ pub fn first_windows(
     transform: &ImageTransformConfig,
     source: &SampleSource<'_>,
 ) -> Result<(Vec<TransformedImage>, Vec<Target>), TrainingError> {
-    let Batch { images, targets } =
-        prepare(BatchRequest { step: 0, view: View::Window, size: count }, transform, source)?;
+    let windows = BatchRequest { step: 0, kind: BatchKind { view: View::Window, size: count } };
+    let Batch { images, targets } = prepare(windows, transform, source)?;
     Ok((images, targets))
 }
 
@@ -99,65 +93,10 @@ fn outline(object: &SampleObject) -> Polygon {
     object.outline.clone().unwrap_or_else(|| Polygon::from_box(&object.bbox))
 }
 
-/// Batches in the order of their steps, prepared ahead on another thread.
-pub(crate) struct Batches {
-    requests: mpsc::Sender<BatchRequest>,
-    batches: mpsc::Receiver<Result<Batch, TrainingError>>,
-    pending: VecDeque<BatchRequest>,
-}
-
-impl Batches {
-    /// The batch that is wanted. The ones after it are asked for as if nothing changed; when something did, they are
-    /// thrown away, so that what is trained on depends on the requests alone and not on which thread was faster.
-    pub(crate) fn next(&mut self, wanted: BatchRequest) -> Result<Batch, TrainingError> {
-        if self.pending.front().is_some_and(|first| *first != wanted) {
-            while self.pending.pop_front().is_some() {
-                let _ = self.receive();
-            }
-        }
-        for step in wanted.step + self.pending.len()..=wanted.step + AHEAD {
-            let request = BatchRequest { step, ..wanted };
-            self.pending.push_back(request);
-            // Fails only when the thread has ended, which receiving then tells.
-            let _ = self.requests.send(request);
-        }
-        self.pending.pop_front();
-        self.receive()
-    }
-
-    fn receive(&mut self) -> Result<Batch, TrainingError> {
-        match self.batches.recv() {
-            Ok(batch) => batch,
-            // The thread ends early only by a panic, which the scope raises again.
-            Err(mpsc::RecvError) => panic!("the thread that prepares batches ended"),
-        }
-    }
-}
-
-/// Runs `consume` while another thread prepares the batches that it asks for. The thread ends with `consume`.
-pub(crate) fn with_batches<T>(
-    transform: &ImageTransformConfig,
-    source: SampleSource<'_>,
-    consume: impl FnOnce(&mut Batches) -> T,
-) -> T {
-    std::thread::scope(|scope| {
-        let (requests, asked) = mpsc::channel::<BatchRequest>();
-        let (sender, batches) = mpsc::channel();
-        scope.spawn(move || {
-            for request in asked {
-                // An error here means that nobody waits any more.
-                if sender.send(prepare(request, transform, &source)).is_err() {
-                    return;
-                }
-            }
-        });
-        consume(&mut Batches { requests, batches, pending: VecDeque::new() })
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::prefetch::with_batches;
     use image::{Rgb, RgbImage};
     use sdg_detection::presets;
 
@@ -165,21 +104,25 @@ mod tests {
         Sample { image: RgbImage::from_pixel(width, 32, Rgb([index as u8; 3])), objects: Vec::new() }
     }
 
-    fn first_pixels(requests: &[BatchRequest]) -> Vec<(usize, f32)> {
+    fn first_pixels(requests: &[BatchRequest<BatchKind>]) -> Vec<(usize, f32)> {
         let source = SampleSource { frames: &|i| sample(320, i), windows: &|i| sample(64, 100 + i) };
-        with_batches(&presets::edge(12).input, source, |batches| {
-            requests
-                .iter()
-                .map(|request| batches.next(*request).unwrap())
-                .map(|b| (b.images[0].width, b.images[0].pixels[0]))
-                .collect()
-        })
+        let transform = presets::edge(12).input;
+        with_batches(
+            |request| prepare(request, &transform, &source),
+            |batches| {
+                requests
+                    .iter()
+                    .map(|request| batches.next(*request).unwrap())
+                    .map(|b| (b.images[0].width, b.images[0].pixels[0]))
+                    .collect()
+            },
+        )
     }
 
     #[test]
     fn what_was_prepared_ahead_for_another_view_is_thrown_away() {
-        let window = |step| BatchRequest { step, view: View::Window, size: 3 };
-        let frame = |step| BatchRequest { step, view: View::Frame, size: 2 };
+        let window = |step| BatchRequest { step, kind: BatchKind { view: View::Window, size: 3 } };
+        let frame = |step| BatchRequest { step, kind: BatchKind { view: View::Frame, size: 2 } };
         let mixed = first_pixels(&[window(0), window(1), frame(2), frame(3)]);
         let apart = [first_pixels(&[window(0), window(1)]), first_pixels(&[frame(2), frame(3)])].concat();
         assert_eq!(mixed, apart);

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::validation::Validation;
 use crate::error::TrainingError;
+use crate::optimizer::Optimizer;
 use crate::schedule::OneCycle;
-use crate::validation::Validation;
 
 /// How a detector is trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,18 +35,6 @@ pub struct TrainingConfig {
     pub time_budget: Option<Duration>,
     /// Decides the samples, their order and every random choice of the losses.
     pub seed: u64,
-}
-
-/// What a step makes of the gradients.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Optimizer {
-    /// Steps as long as the gradients are steady: learns from nothing in a few hundred of them.
-    AdamW,
-    /// Stochastic gradient descent with momentum, as Detectron2 fine-tunes.
-    Sgd {
-        /// Share of the last step that the next one keeps.
-        momentum: f64,
-    },
 }
 
 /// The part of a run that learns from windows: small pictures just around the part, at the scale of whole frames.

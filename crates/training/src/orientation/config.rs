@@ -3,13 +3,11 @@
 use std::time::Duration;
 
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, SceneStyle};
-use sdg_training::OneCycle;
+use sdg_orientation::{Labels, OrientationError, check_setting};
 
 use super::jitter::BoxJitter;
 use super::measured::AngleErrors;
-use crate::angle_classes::Labels;
-use crate::config::check;
-use crate::error::Result;
+use crate::schedule::OneCycle;
 
 /// How the orientation CNN is trained.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +30,7 @@ pub struct OrientationTraining {
     pub validation_crops: usize,
     /// When a run is good enough to end before its last step.
     pub early_stop: Option<EarlyStop>,
-    /// Wall-clock time for the whole run; see [`sdg_training::TrainingConfig::time_budget`].
+    /// Wall-clock time for the whole run; see [`crate::TrainingConfig::time_budget`].
     pub time_budget: Option<Duration>,
     /// Decides the crops and their order.
     pub seed: u64,
@@ -126,30 +124,30 @@ impl OrientationTraining {
     }
 
     /// Refuses settings that no run can have.
-    pub(crate) fn validate(&self) -> Result<()> {
-        check(self.steps > 0, "steps", "at least 1", self.steps)?;
-        check(
+    pub(super) fn validate(&self) -> Result<(), OrientationError> {
+        check_setting(self.steps > 0, "steps", "at least 1", self.steps)?;
+        check_setting(
             self.crops.crops_per_scene > 0 && self.batch_size.is_multiple_of(self.crops.crops_per_scene),
             "crops_per_scene",
             &format!("a divisor of the batch size {}", self.batch_size),
             self.crops.crops_per_scene,
         )?;
-        check(self.batch_size > 0, "batch_size", "at least 1", self.batch_size)?;
-        check(self.validation_crops > 0, "validation_crops", "at least 1", self.validation_crops)?;
-        check(self.crops.distinct_scenes != Some(0), "distinct_scenes", "at least 1", 0)?;
+        check_setting(self.batch_size > 0, "batch_size", "at least 1", self.batch_size)?;
+        check_setting(self.validation_crops > 0, "validation_crops", "at least 1", self.validation_crops)?;
+        check_setting(self.crops.distinct_scenes != Some(0), "distinct_scenes", "at least 1", 0)?;
         let OneCycle { peak, warm_up } = self.schedule;
-        check(peak > 0.0 && peak.is_finite(), "learning rate", "a positive number", peak)?;
-        check(warm_up > 0.0 && warm_up < 1.0, "warm-up", "a share between 0 and 1", warm_up)?;
+        check_setting(peak > 0.0 && peak.is_finite(), "learning rate", "a positive number", peak)?;
+        check_setting(warm_up > 0.0 && warm_up < 1.0, "warm-up", "a share between 0 and 1", warm_up)?;
         if let Labels::VonMises { sigma_classes } = self.labels {
             let usable = (0.5..=90.0).contains(&sigma_classes);
-            check(usable, "sigma_classes", "0.5 to 90 classes", sigma_classes)?;
+            check_setting(usable, "sigma_classes", "0.5 to 90 classes", sigma_classes)?;
         }
         if let AugmentationStyle::Scenes(scenes) = &self.crops.augmentation.style {
             let share = scenes.positive_share;
-            check(share == 1.0, "positive_share", "1, since every crop needs the part", share)?;
+            check_setting(share == 1.0, "positive_share", "1, since every crop needs the part", share)?;
         }
         if let Some(stop) = &self.early_stop {
-            check(stop.every > 0, "early_stop.every", "at least 1 step", stop.every)?;
+            check_setting(stop.every > 0, "early_stop.every", "at least 1 step", stop.every)?;
         }
         self.crops.jitter.validate()
     }

@@ -10,9 +10,9 @@ use crate::views::TrialPictureView;
 /// Answers what is asked of picture `id`; `None` where there is no such address.
 pub fn answer(session: &Session, request: &Request, method: &str, id: usize, rest: &[&str]) -> Option<Response> {
     Some(match (method, rest) {
-        ("GET", ["picture"]) => picture_of(session.scene(id).and_then(|scene| scene.picture.for_browser())),
+        ("GET", ["picture"]) => picture_of(session.trial_picture(id).and_then(|trial| trial.picture.for_browser())),
         ("POST", ["detect"]) => {
-            let pixels = session.scene(id).and_then(|scene| scene.picture.pixels());
+            let pixels = session.trial_picture(id).and_then(|trial| trial.picture.pixels());
             json_of(pixels.and_then(|pixels| detect(session, &pixels)))
         }
         ("POST", ["accept"]) => json_of(read("marks", &request.body).and_then(|marks| session.accept(id, marks))),
@@ -23,5 +23,5 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 /// Takes a picture from the page.
 pub fn add(session: &Session, request: &Request) -> Result<TrialPictureView> {
     let name = request.head.query_value("name").unwrap_or_else(|| "picture".to_owned());
-    session.add_scene(&name, &request.body)
+    session.add_trial_picture(&name, &request.body)
 }

@@ -1,0 +1,127 @@
+//! The presets: networks, trainings and augmentations by name.
+
+use std::str::FromStr;
+
+use sdg_demonstration::AugmentationConfig;
+use sdg_detection::presets;
+use sdg_geometry::RotationalSymmetry;
+use sdg_orientation::OrientationConfig;
+use sdg_training::TrainingConfig;
+use sdg_training::orientation::OrientationTraining;
+
+use super::detector_plan::DetectorPlan;
+use super::{paper, r50};
+use crate::error::{GraspError, Result};
+use crate::facts::ModelKind;
+use crate::{NUM_KEYPOINTS, models};
+
+/// As often as an orientation CNN may fold the circle: what is left of it, 5°, is negligible. Chosen by that
+/// reasoning.
+const MAX_FOLD: usize = 72;
+
+/// A network, its training and its augmentation under one name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// Made for two cores: minutes from photo to grasp.
+    #[default]
+    Edge,
+    /// Detectron2's R50-FPN, fine-tuned from imported weights.
+    R50Detectron2,
+    /// torchvision's R50-FPN, fine-tuned from imported weights.
+    R50Torchvision,
+    /// The paper's protocol: hours on two cores.
+    Paper,
+}
+
+impl Preset {
+    /// Every preset of this version.
+    pub const ALL: [Self; 4] = [Self::Edge, Self::R50Detectron2, Self::R50Torchvision, Self::Paper];
+
+    /// The name on the command line and in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Edge => "edge",
+            Self::R50Detectron2 => "r50-detectron2",
+            Self::R50Torchvision => "r50-torchvision",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// Whether its frozen stages are worth nothing without imported weights.
+    pub(super) fn needs_base_weights(self) -> bool {
+        match self {
+            Self::Edge | Self::Paper => false,
+            Self::R50Detectron2 | Self::R50Torchvision => true,
+        }
+    }
+
+    /// The detector of a model, taught from weights or from nothing; `None` for model S, which has none.
+    pub(super) fn detector(self, kind: ModelKind, has_base_weights: bool) -> Option<DetectorPlan> {
+        let rcnn = models::rcnn_kind(kind)?;
+        let network = match self {
+            Self::Edge => presets::edge_of(rcnn),
+            Self::R50Detectron2 => r50::on_two_cores(presets::r50_detectron2(rcnn)),
+            Self::R50Torchvision => r50::on_two_cores(presets::r50_torchvision(rcnn)),
+            Self::Paper => paper::network(rcnn, has_base_weights),
+        };
+        let teaches_keypoints = self == Self::Edge && !kind.has_keypoints();
+        let keypoints = || presets::edge(NUM_KEYPOINTS).roi_heads.keypoint_head;
+        Some(DetectorPlan { network, auxiliary_keypoints: teaches_keypoints.then(keypoints).flatten() })
+    }
+
+    pub(super) fn training(self, kind: ModelKind, seed: u64) -> TrainingConfig {
+        match self {
+            Self::Edge => TrainingConfig::edge(seed),
+            Self::R50Detectron2 | Self::R50Torchvision => r50::fine_tuning(seed),
+            Self::Paper => paper::training(kind, seed),
+        }
+    }
+
+    /// The training samples: of the network's input size, so that nothing is computed to be thrown away.
+    pub(super) fn samples(self) -> AugmentationConfig {
+        match self {
+            Self::Edge => AugmentationConfig::default().with_output_size(320, 240),
+            Self::R50Detectron2 | Self::R50Torchvision => {
+                AugmentationConfig::default().with_output_size(640, r50::SHORT_SIDE_PX)
+            }
+            Self::Paper => paper::samples(),
+        }
+    }
+
+    pub(super) fn orientation(self, symmetry: RotationalSymmetry, seed: u64) -> OrientationPlan {
+        let (network, mut training) = match self {
+            Self::Edge | Self::R50Detectron2 | Self::R50Torchvision => {
+                (OrientationConfig::edge(), OrientationTraining::edge(seed))
+            }
+            Self::Paper => (OrientationConfig::paper(), OrientationTraining::paper(seed)),
+        };
+        let fold = match symmetry {
+            RotationalSymmetry::Fold(count) => (count as usize).min(MAX_FOLD),
+            RotationalSymmetry::Full => {
+                // Every answer is right: there is nothing to learn.
+                training.steps = 1;
+                MAX_FOLD
+            }
+            _ => 1,
+        };
+        OrientationPlan { network: network.with_symmetry(fold), training }
+    }
+}
+
+impl FromStr for Preset {
+    type Err = GraspError;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == text).ok_or_else(|| GraspError::UnknownPreset {
+            known: Self::ALL.map(Self::name).to_vec(),
+            found: text.to_owned(),
+        })
+    }
+}
+
+/// The orientation CNN and its training.
+#[derive(Debug, Clone)]
+pub(crate) struct OrientationPlan {
+    pub(crate) network: OrientationConfig,
+    pub(crate) training: OrientationTraining,
+}

@@ -1,0 +1,74 @@
+//! Batches, prepared on another thread while the network is busy with the one before.
+
+use std::collections::VecDeque;
+use std::sync::mpsc;
+
+use crate::error::TrainingError;
+
+/// A batch that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BatchRequest<K> {
+    /// The step that learns from it.
+    pub(crate) step: usize,
+    /// Of what kind, where a run has several.
+    pub(crate) kind: K,
+}
+
+/// Batches asked for ahead: one in use, one ready, one in the making.
+const AHEAD: usize = 2;
+
+/// Batches in the order of their steps, prepared ahead on another thread.
+pub(crate) struct Batches<K, B> {
+    requests: mpsc::Sender<BatchRequest<K>>,
+    batches: mpsc::Receiver<Result<B, TrainingError>>,
+    pending: VecDeque<BatchRequest<K>>,
+}
+
+impl<K: Copy + PartialEq, B> Batches<K, B> {
+    /// The batch that is wanted. The ones after it are asked for as if nothing changed; when something did, they are
+    /// thrown away, so that what is trained on depends on the requests alone and not on which thread was faster.
+    pub(crate) fn next(&mut self, wanted: BatchRequest<K>) -> Result<B, TrainingError> {
+        if self.pending.front().is_some_and(|first| *first != wanted) {
+            while self.pending.pop_front().is_some() {
+                let _ = self.receive();
+            }
+        }
+        for step in wanted.step + self.pending.len()..=wanted.step + AHEAD {
+            let request = BatchRequest { step, ..wanted };
+            self.pending.push_back(request);
+            // Fails only when the thread has ended, which receiving then tells.
+            let _ = self.requests.send(request);
+        }
+        self.pending.pop_front();
+        self.receive()
+    }
+
+    fn receive(&mut self) -> Result<B, TrainingError> {
+        match self.batches.recv() {
+            Ok(batch) => batch,
+            // The thread ends early only by a panic, which the scope raises again.
+            Err(mpsc::RecvError) => panic!("the thread that prepares batches ended"),
+        }
+    }
+}
+
+/// Runs `consume` while another thread prepares the batches that it asks for, in the order of the requests. The thread
+/// ends with `consume`.
+pub(crate) fn with_batches<K: Copy + PartialEq + Send, B: Send, T>(
+    mut prepare: impl FnMut(BatchRequest<K>) -> Result<B, TrainingError> + Send,
+    consume: impl FnOnce(&mut Batches<K, B>) -> T,
+) -> T {
+    std::thread::scope(|scope| {
+        let (requests, asked) = mpsc::channel::<BatchRequest<K>>();
+        let (sender, batches) = mpsc::channel();
+        scope.spawn(move || {
+            for request in asked {
+                // An error here means that nobody waits any more.
+                if sender.send(prepare(request)).is_err() {
+                    return;
+                }
+            }
+        });
+        consume(&mut Batches { requests, batches, pending: VecDeque::new() })
+    })
+}

@@ -1,0 +1,175 @@
+//! The loop that teaches every network: batch, loss, gradients, step; now and then a validation.
+//!
+//! What is taught is a [`Task`]; the loop knows only the order of things, the learning rate and the ends of a run.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use burn::module::Module;
+use burn::optim::GradientsParams;
+use burn::tensor::Tensor;
+
+use crate::error::TrainingError;
+use crate::optimizer::Stepper;
+use crate::pace::{Ending, Pace};
+use crate::schedule::OneCycle;
+
+/// A network and what it learns.
+pub(crate) trait Task {
+    /// The network, on a device that carries autodiff while it is taught.
+    type Network: Module;
+    /// What a step learns from.
+    type Batch;
+    /// The loss of a step in figures.
+    type Losses: LossFigures;
+
+    /// The batch of a step, when `progress` of the run, in [0, 1], is done.
+    ///
+    /// # Errors
+    /// A sample that the network refuses.
+    fn batch(&mut self, step: usize, progress: f64) -> Result<Self::Batch, TrainingError>;
+
+    /// The loss to descend, a scalar `[1]`, and its figures.
+    ///
+    /// # Errors
+    /// A batch that the network refuses.
+    fn losses(
+        &self,
+        network: &Self::Network,
+        batch: &Self::Batch,
+        step: usize,
+    ) -> Result<(Tensor<1>, Self::Losses), TrainingError>;
+
+    /// Hears of a step and may end the run.
+    fn after_step(&mut self, step: &Step<'_, Self>) -> ControlFlow<()>;
+
+    /// Measures the network, here without gradients, after some steps.
+    ///
+    /// # Errors
+    /// Held-back samples that cannot be looked at.
+    fn validate(
+        &mut self,
+        network: Self::Network,
+        steps_done: usize,
+        start: Instant,
+    ) -> Result<Validated, TrainingError>;
+}
+
+/// A loss in figures.
+pub(crate) trait LossFigures: Copy {
+    /// What messages call it.
+    const NAME: &'static str;
+
+    /// The loss that the step descends.
+    fn total(&self) -> f64;
+}
+
+/// A step that was made.
+pub(crate) struct Step<'a, T: Task + ?Sized> {
+    /// From zero.
+    pub(crate) step: usize,
+    pub(crate) batch: &'a T::Batch,
+    pub(crate) learning_rate: f64,
+    /// Before the update.
+    pub(crate) losses: T::Losses,
+    /// Steps that the run will have, as known now.
+    pub(crate) planned_steps: usize,
+    /// Since the start of the run.
+    pub(crate) elapsed_secs: f64,
+}
+
+/// What a validation decides.
+pub(crate) struct Validated {
+    /// Steps from here to the end of the run, where the network is good enough.
+    pub(crate) cool_down: Option<usize>,
+    /// Whether the run goes on.
+    pub(crate) flow: ControlFlow<()>,
+}
+
+/// What a loop needs to know of a run's settings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunSettings {
+    /// Optimiser steps, unless early stop or the time budget ends the run before.
+    pub(crate) steps: usize,
+    /// Wall-clock time for the whole run.
+    pub(crate) time_budget: Option<Duration>,
+    /// Learning rate over the run.
+    pub(crate) schedule: OneCycle,
+    /// When to validate, besides at the end.
+    pub(crate) validations: Option<ValidationSteps>,
+}
+
+/// The steps after which a network is validated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ValidationSteps {
+    /// No validation before this step.
+    pub(crate) first: usize,
+    /// Steps between validations.
+    pub(crate) every: usize,
+}
+
+impl ValidationSteps {
+    fn include(&self, steps_done: usize) -> bool {
+        steps_done >= self.first && steps_done.is_multiple_of(self.every)
+    }
+}
+
+/// A run that is over.
+pub(crate) struct Ended<N> {
+    /// After the last step, without gradients.
+    pub(crate) network: N,
+    /// Steps made.
+    pub(crate) steps: usize,
+    pub(crate) ending: Ending,
+}
+
+/// Teaches a network. A run that is not interrupted ends with a validation.
+///
+/// # Errors
+/// A loss that is not finite, and the task's own.
+pub(crate) fn run<T: Task>(
+    task: &mut T,
+    mut network: T::Network,
+    mut optimizer: Stepper,
+    settings: &RunSettings,
+    start: Instant,
+) -> Result<Ended<T::Network>, TrainingError> {
+    let elapsed_secs = || start.elapsed().as_secs_f64();
+    let mut pace = Pace::new(settings.steps, settings.time_budget.map(|budget| budget.as_secs_f64()));
+    let (mut step, mut validated_at) = (0, None);
+    let ending = loop {
+        if let Some(ending) = pace.ending(step, elapsed_secs()) {
+            // The last steps have the lowest learning rate: what they made of the network is not known yet.
+            if validated_at != Some(step) {
+                task.validate(network.valid(), step, start)?;
+            }
+            break ending;
+        }
+        let batch = task.batch(step, pace.progress(step, elapsed_secs()))?;
+        let learning_rate = settings.schedule.learning_rate(pace.progress(step, elapsed_secs()));
+        let (total, losses) = task.losses(&network, &batch, step)?;
+        if !losses.total().is_finite() {
+            return Err(TrainingError::Diverged { name: T::Losses::NAME, step, loss: losses.total(), learning_rate });
+        }
+        let gradients = GradientsParams::from_grads(total.backward(), &network);
+        network = optimizer.step(learning_rate, network, gradients);
+        let (planned_steps, elapsed_secs) = (pace.planned_steps(), elapsed_secs());
+        let made = Step { step, batch: &batch, learning_rate, losses, planned_steps, elapsed_secs };
+        let flow = task.after_step(&made);
+        step += 1;
+        if flow.is_break() {
+            break Ending::Interrupted;
+        }
+        if settings.validations.is_some_and(|steps| steps.include(step)) {
+            let Validated { cool_down, flow } = task.validate(network.valid(), step, start)?;
+            validated_at = Some(step);
+            if flow.is_break() {
+                break Ending::Interrupted;
+            }
+            if let Some(length) = cool_down {
+                pace.start_cool_down(step, start.elapsed().as_secs_f64(), length);
+            }
+        }
+    };
+    Ok(Ended { network: network.valid(), steps: step, ending })
+}
