@@ -1,12 +1,15 @@
 //! A Franka arm with its hand, over the Franka Control Interface.
 //!
 //! ```text
-//! CheckedMotion ─ Playback ─ one joint position a millisecond ─► robot's joint impedance
-//!                    ▲ Watch sees every state, and may stop the motion on its path
+//! CheckedMotion ─ Playback ─ Follower ─ one joint position a millisecond ─► robot's joint impedance
+//!                    ▲           ▲ where the robot's reference is, after commands that were lost
+//!                    └ Watch sees every state, and may stop the motion on its path
 //! ```
 //! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
 
 mod address;
+mod correction;
+mod follower;
 mod hand_worker;
 mod real_time;
 
@@ -26,6 +29,7 @@ use crate::safety::CheckedMotion;
 use crate::watch::{StopReason, Watch};
 
 pub use address::RobotAddress;
+use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
@@ -92,22 +96,17 @@ impl FrankaArm {
 
     /// The loop of a motion; runs in a thread of its own where it is scheduled in real time.
     fn play(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
-        let mut playback = Playback::new(motion);
-        let mut last = *motion.start();
+        let mut follower = Follower::new(Playback::new(motion), self.robot.version());
         let mut stopped: Option<StopReason> = None;
         let played = self.robot.control_joint_positions(InternalController::JointImpedance, |state, elapsed| {
             if let Some(reason) = watch.observe(&arm_state(state)) {
                 stopped.get_or_insert_with(|| reason.clone());
-                playback.stop();
+                follower.stop();
             }
-            // The first call asks for where the arm is; later ones for as many cycles on as have passed.
-            for _ in 0..elapsed.as_millis() {
-                match playback.next_reference() {
-                    Some(reference) => last = reference.q,
-                    None => return ControlFlow::Break(last.into()),
-                }
+            match follower.next(state, elapsed.as_millis() as u64) {
+                Next::Position(q) => ControlFlow::Continue(q.into()),
+                Next::Last(q) => ControlFlow::Break(q.into()),
             }
-            ControlFlow::Continue(last.into())
         });
         match (played, stopped) {
             (Err(error), _) => Err(self.error(error)),
