@@ -18,7 +18,7 @@ use std::time::Duration;
 
 use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
-use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status};
+use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status, Version};
 use sdg_kinematics::JointVector;
 
 use crate::arm::Arm;
@@ -27,6 +27,7 @@ use crate::error::{Result, RobotError};
 use crate::playback::Playback;
 use crate::safety::CheckedMotion;
 use crate::watch::{StopReason, Watch};
+use crate::workcell::RobotModel;
 
 pub use address::RobotAddress;
 use follower::{Follower, Next};
@@ -58,18 +59,37 @@ impl FrankaArm {
     /// Connects to arm and hand.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] where one of them does not answer, [`RobotError::Configuration`] where the kernel refuses the real-time
+    /// [`RobotError::Unreachable`] where one of them does not answer, [`RobotError::Device`] for another version of the protocol, [`RobotError::Configuration`] where the kernel refuses the real-time
     /// scheduling that was asked for.
     pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
         if scheduling == Scheduling::RealTime {
             check_real_time()?;
         }
         let config = RobotConfig { port: address.port, timeout: TIMEOUT, ..RobotConfig::default() };
-        let robot = Robot::connect(&address.host, &config).map_err(|error| address.lost("robot", &error))?;
+        let robot = Robot::connect(&address.host, &config).map_err(|error| address.refused("robot", error))?;
         let config = HandConfig { port: address.hand_port, timeout: TIMEOUT };
-        let hand = Hand::connect(&address.host, &config).map_err(|error| address.lost("hand", &error))?;
+        let hand = Hand::connect(&address.host, &config).map_err(|error| address.refused("hand", error))?;
         let hand = HandWorker::new(hand);
         Ok(Self { robot, hand, address: address.clone(), scheduling, sensitivity: None })
+    }
+
+    /// Refuses a robot of another model than the workcell's file says: the limits that motions are checked with would be another's.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`].
+    pub fn check_model(&self, expected: RobotModel) -> Result<()> {
+        let found = match self.robot.version() {
+            Version::V5 => RobotModel::Panda,
+            Version::V10 => RobotModel::Fr3,
+        };
+        if found == expected {
+            return Ok(());
+        }
+        Err(RobotError::Configuration {
+            what: "model of the robot".to_owned(),
+            expected: format!("\"{}\", as the workcell's file says", expected.name()),
+            found: format!("a robot that speaks the protocol of \"{}\" at {}", found.name(), self.address),
+        })
     }
 
     /// Finds the fingers' range: once after the hand was switched on.
