@@ -43,6 +43,8 @@ mod machine;
 mod page_camera;
 #[cfg(feature = "annotate")]
 mod page_teacher;
+#[cfg(feature = "simulation")]
+mod parts;
 pub mod picture_detector;
 mod pictures;
 mod progress;

@@ -105,7 +105,13 @@ fn what_is_no_model_is_refused() {
     fs::write(&fake, b"").unwrap();
     assert_refused(&["detect", "--grasp-model", fake.to_str().unwrap(), image], 1, &["fake.sdg", "an empty file"]);
     assert_refused(&["detect", "--grasp-model", image, image], 1, &["expected a grasp model", "a PNG image"]);
-    assert_refused(&["rehearse", "--grasp-model", image, "--object", "teapot"], 1, &["teapot", "pendulum"]);
+    assert_refused(
+        &["rehearse", "--grasp-model", image, "--object", "teapot"],
+        2,
+        &["--object: ", "teapot", "pendulum"],
+    );
+    assert_refused(&["simulate", "--fci", "--object", "teapot"], 2, &["--object: ", "teapot", "pendulum"]);
+    assert_refused(&["demo", "--object", "teapot"], 2, &["--object: ", "teapot", "pendulum"]);
 }
 
 #[test]

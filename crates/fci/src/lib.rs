@@ -42,7 +42,7 @@ pub mod wire;
 mod wire_error;
 
 pub use error::{FciError, Result};
-pub use limits::{Limits, RateLimits};
+pub use limits::{Limits, RateLimits, VelocityNearEnd};
 pub use message::read_message;
 pub use pose::{is_rigid, isometry, transform};
 pub use robot_error::{NUM_ERRORS, RobotError, RobotErrors};

@@ -30,6 +30,13 @@ pub enum RobotError {
     /// The arm does not move, since it stopped before.
     #[error("nothing moves until a person has looked and runs `sdg robot recover`: {0}")]
     Latched(String),
+    /// Arm or hand never answered.
+    #[error("{peer} could not be reached: {why}")]
+    Unreachable {
+        /// Arm or hand, with its address.
+        peer: String,
+        why: String,
+    },
     /// Arm or hand no longer answer.
     #[error("the connection to {peer} is lost: {why}")]
     Lost {
@@ -56,7 +63,12 @@ impl RobotError {
     pub fn latches(&self) -> bool {
         !matches!(
             self,
-            Self::Unsafe(_) | Self::Planning(_) | Self::Latched(_) | Self::Perception(_) | Self::Configuration { .. }
+            Self::Unsafe(_)
+                | Self::Planning(_)
+                | Self::Latched(_)
+                | Self::Unreachable { .. }
+                | Self::Perception(_)
+                | Self::Configuration { .. }
         )
     }
 }

@@ -45,6 +45,11 @@ impl<'a> Playback<'a> {
         Self { motion, num_cycles: 0, stopping: None }
     }
 
+    /// Where the motion starts, rad.
+    pub fn start(&self) -> &JointVector {
+        self.motion.start()
+    }
+
     /// Begins a controlled stop; another call changes nothing.
     pub fn stop(&mut self) {
         if self.stopping.is_none() {

@@ -53,6 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if parts.is_empty() {
         parts = ObjectSpec::names().map(str::to_owned).collect();
     }
+    let (mut num_held, mut num_fewer, mut num_attempts_made) = (0, 0, 0);
     for name in parts {
         let spec = ObjectSpec::by_name(&name)?;
         let (mut in_process, mut network, mut differing) = (0, 0, Vec::new());
@@ -73,6 +74,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!(
             "{name}: {in_process} in one process, {network} over the network, of {num_attempts}; other: {differing:?}"
         );
+        num_attempts_made += num_attempts;
+        num_held += network;
+        num_fewer += in_process as i64 - network as i64;
     }
+    println!("all: {num_held} of {num_attempts_made} over the network, {num_fewer} fewer than in one process");
     Ok(())
 }

@@ -21,7 +21,8 @@ use crate::files;
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{
-    self, Consent, DryRun, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, confirm, write_states,
+    self, Consent, DryRun, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
+    write_states,
 };
 use crate::shared_args::ComputeArgs;
 
@@ -96,6 +97,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
             [options.width, options.height] = prepared.camera.size_px();
             let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
+            arm.check_model(prepared.workcell.robot)?;
             let limits = prepared.workcell.safety_limits();
             attempt(args, &prepared, &mut arm, limits, LivePictures(camera), &interrupt, Some(&address.to_string()))
         }
@@ -171,7 +173,7 @@ fn attempt<A: Arm, P: Pictures<A>>(
     let mut finder = ModelFinder::new(prepared.model.clone(), prepared.camera, pictures);
     if args.dry_run {
         let target = finder.find(arm)?.filter(|target| target.score >= sdg_robot::SURE);
-        dry_run(args, prepared, arm, limits.clone(), target)?;
+        dry_run(args, prepared, arm, limits.clone(), target, finder.seen.as_ref())?;
     }
     if args.dry_run || address.is_some() {
         let question = match address {
@@ -201,13 +203,14 @@ fn dry_run<A: Arm>(
     arm: &mut A,
     limits: SafetyLimits,
     target: Option<GraspTarget>,
+    seen: Option<&SeenOutline>,
 ) -> Result<()> {
     let (state, hand) = (arm.state()?, arm.hand()?);
     let mount = prepared.camera.mount();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config)?;
     eprintln!("what would be done:");
     plan.tell(target.is_some())?;
-    for file in plan.draw(&args.out)? {
+    for file in plan.draw(&args.out, seen.filter(|_| target.is_some()))? {
         eprintln!("  {}", file.display());
     }
     Ok(())

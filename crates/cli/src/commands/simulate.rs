@@ -7,13 +7,13 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_fci::server::{Pace, Server, ServerConfig, ServerStatistics};
-use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{PandaPlant, WorkcellConfig};
 use serde_json::json;
 
 use crate::exit::Outcome;
 use crate::interrupt::Interrupt;
+use crate::parts::part_named;
 
 /// How often Ctrl-C and the server are looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -47,7 +47,7 @@ pub struct SimulateArgs {
 
 /// Serves until Ctrl-C.
 pub fn run(args: &SimulateArgs) -> Result<Outcome> {
-    let object = args.object.as_deref().map(ObjectSpec::by_name).transpose()?;
+    let object = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
     let variation = VariationConfig { appearance: false, distractors: 0..=0, ..VariationConfig::default() };
     let scene = SceneVariation::sample(object.as_ref(), &variation, args.seed);
     let plant = PandaPlant::new(&WorkcellConfig::new(scene))?;

@@ -8,6 +8,8 @@ use sdg_robot::{
     SafetyLimits, Watch, grasp,
 };
 
+use super::finder::SeenOutline;
+
 /// A grasp that is planned and not carried out.
 #[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs the start"))]
 pub(crate) struct DryRun {
@@ -79,20 +81,23 @@ impl DryRun {
         Ok(())
     }
 
-    /// Draws the motion as an animation and its last picture into a folder; the files.
+    /// Draws the motion and the part that was seen as an animation and its last picture into a folder; the files. The part stays on the
+    /// table: it is drawn where the camera saw it.
     ///
     /// # Errors
     /// Files that cannot be written, and errors of the renderer.
     #[cfg(feature = "simulation")]
-    pub(crate) fn draw(&self, folder: &Path) -> Result<Vec<PathBuf>> {
+    pub(crate) fn draw(&self, folder: &Path, seen: Option<&SeenOutline>) -> Result<Vec<PathBuf>> {
         use sdg_report::{Animation, AnimationOptions};
-        use sdg_simulation::scene::SceneVariation;
+        use sdg_simulation::scene::{SceneVariation, SeenPart};
         use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
 
         /// Pictures of a motion at most: a slow one is shown faster.
         const MAX_FRAMES: f64 = 120.0;
         const SHOWN_FPS: f64 = 8.0;
-        let mut cell = Workcell::new(&WorkcellConfig::new(SceneVariation::nominal(None)))?;
+        let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
+        let scene = SceneVariation::nominal(None);
+        let mut cell = Workcell::new(&WorkcellConfig { seen_part, ..WorkcellConfig::new(scene) })?;
         let render = RenderConfig { width: 400, height: 300, ..RenderConfig::default() };
         let mut renderer = Renderer::new(cell.data().model(), render)?;
         let period_secs = (self.arm.duration_secs() / MAX_FRAMES).max(1.0 / SHOWN_FPS);
@@ -113,7 +118,7 @@ impl DryRun {
 
     /// Without the simulator there is nothing to draw with.
     #[cfg(not(feature = "simulation"))]
-    pub(crate) fn draw(&self, _folder: &Path) -> Result<Vec<PathBuf>> {
+    pub(crate) fn draw(&self, _folder: &Path, _seen: Option<&SeenOutline>) -> Result<Vec<PathBuf>> {
         eprintln!("this sdg was built without the simulator and draws no motion");
         Ok(Vec::new())
     }

@@ -145,6 +145,14 @@ impl Pictures<sdg_simulation::Workcell> for SimulatedPictures {
     }
 }
 
+/// Where a part lies: its outline, m in the base frame, and the z of the table and of the outline.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs it"))]
+pub(crate) struct SeenOutline {
+    pub(crate) outline_in_base: Vec<nalgebra::Point2<f64>>,
+    pub(crate) z_m: [f64; 2],
+}
+
 /// A model behind a calibrated camera on or beside an arm.
 pub(crate) struct ModelFinder<P> {
     pub(crate) pictures: P,
@@ -154,11 +162,13 @@ pub(crate) struct ModelFinder<P> {
     taken: Option<Instant>,
     /// The last picture with what was found in it.
     pub(crate) last: Option<RgbImage>,
+    /// The best part of the last picture.
+    pub(crate) seen: Option<SeenOutline>,
 }
 
 impl<P> ModelFinder<P> {
     pub(crate) fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
-        Self { pictures, camera, model, detector: None, taken: None, last: None }
+        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None }
     }
 }
 
@@ -184,6 +194,13 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         let found = detector.detect(&picture, Verification::ByShape).map_err(failed)?;
         let detections: Vec<_> = found.iter().map(|found| found.detection.clone()).collect();
         self.last = Some(crate::pictures::with_detections(&picture, &detections));
+        let table_m = self.camera.table_height_m;
+        let mark_m = self.model.facts().lengths.map_or(table_m, |lengths| table_m + lengths.mark_height_m);
+        self.seen = found.first().and_then(|best| best.detection.outline.as_ref()).and_then(|outline| {
+            let on_plane = |pixel| over_table.camera.at_height(pixel, mark_m).map(|p_in_base| p_in_base.xy());
+            let outline_in_base = outline.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
+            Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
+        });
         Ok(found.first().map(|best| GraspTarget {
             base_from_tcp: best.pose.frame_from_tcp(),
             jaw_width_m: best.pose.opening_m,

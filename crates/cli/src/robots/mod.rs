@@ -20,7 +20,7 @@ pub(crate) use confirm::{Consent, confirm};
 pub(crate) use dry_run::DryRun;
 #[cfg(feature = "simulation")]
 pub(crate) use finder::SimulatedPictures;
-pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera};
+pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;

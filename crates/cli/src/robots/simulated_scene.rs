@@ -1,10 +1,10 @@
 //! `sim:PART?seed=N` for a simulated arm: what lies on its table.
 
 use anyhow::Result;
-use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 
 use crate::exit::Usage;
+use crate::parts::part_named;
 
 /// The scene of an address without its `sim:`.
 ///
@@ -12,7 +12,7 @@ use crate::exit::Usage;
 /// A part or an option that there is not.
 pub(crate) fn simulated_scene(text: &str) -> Result<SceneVariation> {
     let (part, options) = text.split_once('?').unwrap_or((text, ""));
-    let part = ObjectSpec::by_name(part)?;
+    let part = part_named("--from", part)?;
     let mut seed = 1;
     for option in options.split('&').filter(|option| !option.is_empty()) {
         let number = option.strip_prefix("seed=").and_then(|number| number.parse().ok());
@@ -33,6 +33,6 @@ mod tests {
         assert_eq!(scene("pendulum").spec.name, "pendulum");
         assert_ne!(scene("key?seed=2").base_from_object, scene("key?seed=3").base_from_object);
         assert!(simulated_scene("key?speed=3").unwrap_err().is::<Usage>());
-        assert!(simulated_scene("keys").is_err());
+        assert!(simulated_scene("keys").unwrap_err().is::<Usage>());
     }
 }

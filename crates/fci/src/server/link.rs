@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::error::{FciError, Result};
 use crate::message::read_message;
@@ -14,6 +14,9 @@ use crate::wire::{Header, HeaderKind};
 
 /// A client that does not take a response within this time is gone.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// A client that connects while another is served waits so long for that one's end, which another thread tells: who has just
+/// disconnected may connect again at once. Shorter than clients wait for an answer (1 s).
+const HANDOVER: Duration = Duration::from_millis(500);
 
 /// What a listening thread or a reading one tells the loop.
 #[derive(Debug)]
@@ -41,6 +44,14 @@ struct Client {
     udp_port: Option<u16>,
 }
 
+/// A client that connected while another was served.
+#[derive(Debug)]
+struct WaitingClient {
+    stream: TcpStream,
+    address: SocketAddr,
+    until: Instant,
+}
+
 /// A TCP port with one client at a time, and the UDP socket beside it.
 #[derive(Debug)]
 pub struct Link {
@@ -50,6 +61,7 @@ pub struct Link {
     events: Receiver<LinkEvent>,
     sender: Sender<LinkEvent>,
     client: Option<Client>,
+    waiting: Option<WaitingClient>,
     num_sessions: u64,
     is_stopping: Arc<AtomicBool>,
     listener: Option<JoinHandle<()>>,
@@ -80,6 +92,7 @@ impl Link {
             events,
             sender,
             client: None,
+            waiting: None,
             num_sessions: 0,
             is_stopping,
             listener: Some(thread),
@@ -94,8 +107,9 @@ impl Link {
     /// The next thing that a client has sent, without waiting.
     pub fn poll(&mut self) -> Option<Incoming> {
         loop {
+            self.admit_waiting();
             match self.events.try_recv() {
-                Ok(LinkEvent::Connected(stream, address)) => self.welcome(stream, address),
+                Ok(LinkEvent::Connected(stream, address)) => self.meet(stream, address),
                 Ok(LinkEvent::Message(session, header, payload)) if self.is_of(session) => {
                     return Some(Incoming::Request(header, payload));
                 }
@@ -178,12 +192,30 @@ impl Link {
         self.client.as_ref().is_some_and(|client| client.session == session)
     }
 
-    /// Takes a client, or closes its connection where there is one already.
-    fn welcome(&mut self, stream: TcpStream, address: SocketAddr) {
-        if self.client.is_some() {
+    /// Takes a client, or lets it wait where there is one already; a third one is turned away.
+    fn meet(&mut self, stream: TcpStream, address: SocketAddr) {
+        if self.client.is_none() {
+            self.welcome(stream, address);
+        } else if self.waiting.is_none() {
+            self.waiting = Some(WaitingClient { stream, address, until: Instant::now() + HANDOVER });
+        } else {
             let _ = stream.shutdown(Shutdown::Both);
-            return;
         }
+    }
+
+    /// Takes the client that waits once there is room, or turns it away once it has waited long enough.
+    fn admit_waiting(&mut self) {
+        let Some(waiting) = self.waiting.take() else { return };
+        if self.client.is_none() {
+            self.welcome(waiting.stream, waiting.address);
+        } else if Instant::now() < waiting.until {
+            self.waiting = Some(waiting);
+        } else {
+            let _ = waiting.stream.shutdown(Shutdown::Both);
+        }
+    }
+
+    fn welcome(&mut self, stream: TcpStream, address: SocketAddr) {
         self.num_sessions += 1;
         let (session, kind, sender) = (self.num_sessions, self.kind, self.sender.clone());
         let set_up = || -> std::io::Result<TcpStream> {

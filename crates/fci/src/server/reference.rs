@@ -67,6 +67,10 @@ impl JointReference {
         let exceeds = |values: &JointVector, limits: &[f64; 7]| {
             values.iter().zip(limits).any(|(value, limit)| value.abs() > limit * ROUNDING)
         };
+        let is_too_fast = (0..7).any(|joint| {
+            let [min, max] = limits.velocity_range(joint, self.q[joint]);
+            !(min * ROUNDING..=max * ROUNDING).contains(&self.dq[joint])
+        });
         let out_of_range = (0..7).any(|joint| !(limits.q_min[joint]..=limits.q_max[joint]).contains(&self.q[joint]));
         let [position, velocity, velocity_step, acceleration_step] = match generator {
             MotionGeneratorMode::CartesianPosition | MotionGeneratorMode::CartesianVelocity => [
@@ -86,7 +90,7 @@ impl JointReference {
             matches!(generator, MotionGeneratorMode::JointVelocity | MotionGeneratorMode::CartesianVelocity);
         let violated = [
             (position, out_of_range),
-            (velocity, exceeds(&self.dq, &limits.velocity)),
+            (velocity, is_too_fast),
             (if is_velocity { acceleration_step } else { velocity_step }, exceeds(&self.ddq, &limits.acceleration)),
             (acceleration_step, exceeds(&jerk, &limits.jerk)),
         ];

@@ -1,12 +1,15 @@
 //! A Franka arm with its hand, over the Franka Control Interface.
 //!
 //! ```text
-//! CheckedMotion ─ Playback ─ one joint position a millisecond ─► robot's joint impedance
-//!                    ▲ Watch sees every state, and may stop the motion on its path
+//! CheckedMotion ─ Playback ─ Follower ─ one joint position a millisecond ─► robot's joint impedance
+//!                    ▲           ▲ where the robot's reference is, after commands that were lost
+//!                    └ Watch sees every state, and may stop the motion on its path
 //! ```
 //! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
 
 mod address;
+mod correction;
+mod follower;
 mod hand_worker;
 mod real_time;
 
@@ -15,7 +18,7 @@ use std::time::Duration;
 
 use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
-use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status};
+use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status, Version};
 use sdg_kinematics::JointVector;
 
 use crate::arm::Arm;
@@ -24,8 +27,10 @@ use crate::error::{Result, RobotError};
 use crate::playback::Playback;
 use crate::safety::CheckedMotion;
 use crate::watch::{StopReason, Watch};
+use crate::workcell::RobotModel;
 
 pub use address::RobotAddress;
+use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};
 
@@ -54,18 +59,37 @@ impl FrankaArm {
     /// Connects to arm and hand.
     ///
     /// # Errors
-    /// [`RobotError::Lost`] where one of them does not answer, [`RobotError::Configuration`] where the kernel refuses the real-time
+    /// [`RobotError::Unreachable`] where one of them does not answer, [`RobotError::Device`] for another version of the protocol, [`RobotError::Configuration`] where the kernel refuses the real-time
     /// scheduling that was asked for.
     pub fn connect(address: &RobotAddress, scheduling: Scheduling) -> Result<Self> {
         if scheduling == Scheduling::RealTime {
             check_real_time()?;
         }
         let config = RobotConfig { port: address.port, timeout: TIMEOUT, ..RobotConfig::default() };
-        let robot = Robot::connect(&address.host, &config).map_err(|error| address.lost("robot", &error))?;
+        let robot = Robot::connect(&address.host, &config).map_err(|error| address.refused("robot", error))?;
         let config = HandConfig { port: address.hand_port, timeout: TIMEOUT };
-        let hand = Hand::connect(&address.host, &config).map_err(|error| address.lost("hand", &error))?;
+        let hand = Hand::connect(&address.host, &config).map_err(|error| address.refused("hand", error))?;
         let hand = HandWorker::new(hand);
         Ok(Self { robot, hand, address: address.clone(), scheduling, sensitivity: None })
+    }
+
+    /// Refuses a robot of another model than the workcell's file says: the limits that motions are checked with would be another's.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`].
+    pub fn check_model(&self, expected: RobotModel) -> Result<()> {
+        let found = match self.robot.version() {
+            Version::V5 => RobotModel::Panda,
+            Version::V10 => RobotModel::Fr3,
+        };
+        if found == expected {
+            return Ok(());
+        }
+        Err(RobotError::Configuration {
+            what: "model of the robot".to_owned(),
+            expected: format!("\"{}\", as the workcell's file says", expected.name()),
+            found: format!("a robot that speaks the protocol of \"{}\" at {}", found.name(), self.address),
+        })
     }
 
     /// Finds the fingers' range: once after the hand was switched on.
@@ -92,22 +116,17 @@ impl FrankaArm {
 
     /// The loop of a motion; runs in a thread of its own where it is scheduled in real time.
     fn play(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
-        let mut playback = Playback::new(motion);
-        let mut last = *motion.start();
+        let mut follower = Follower::new(Playback::new(motion), self.robot.version());
         let mut stopped: Option<StopReason> = None;
         let played = self.robot.control_joint_positions(InternalController::JointImpedance, |state, elapsed| {
             if let Some(reason) = watch.observe(&arm_state(state)) {
                 stopped.get_or_insert_with(|| reason.clone());
-                playback.stop();
+                follower.stop();
             }
-            // The first call asks for where the arm is; later ones for as many cycles on as have passed.
-            for _ in 0..elapsed.as_millis() {
-                match playback.next_reference() {
-                    Some(reference) => last = reference.q,
-                    None => return ControlFlow::Break(last.into()),
-                }
+            match follower.next(state, elapsed.as_millis() as u64) {
+                Next::Position(q) => ControlFlow::Continue(q.into()),
+                Next::Last(q) => ControlFlow::Break(q.into()),
             }
-            ControlFlow::Continue(last.into())
         });
         match (played, stopped) {
             (Err(error), _) => Err(self.error(error)),

@@ -1,6 +1,7 @@
 //! What a motion may do, and the motion that was found to keep to it.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
+use sdg_fci::Limits;
 use sdg_kinematics::{ArmPart, CartesianLimits, JointLimits, JointVector, NUM_JOINTS, Panda, Trajectory};
 
 use crate::arm_state::PERIOD_SECS;
@@ -33,6 +34,8 @@ pub struct SafetyLimits {
     pub min_table_clearance_m: f64,
     /// The arm's shape, against itself.
     pub capsules: LinkCapsules,
+    /// What the robot itself holds its client to, for the velocities that fall near the ends of an FR3's joints.
+    pub robot: &'static Limits,
 }
 
 impl Default for SafetyLimits {
@@ -46,7 +49,31 @@ impl Default for SafetyLimits {
             fingertip_beyond_tcp_m: 0.004,
             min_table_clearance_m: 0.001,
             capsules: LinkCapsules::panda(),
+            robot: &Limits::PANDA,
         }
+    }
+}
+
+impl SafetyLimits {
+    /// The FR3's limits over a table at the base's height. The tcp is not allowed to be faster than a Panda's.
+    pub fn fr3() -> Self {
+        let robot = &Limits::FR3;
+        let joints = JointLimits {
+            position_min: robot.q_min.into(),
+            position_max: robot.q_max.into(),
+            velocity_max: robot.velocity.into(),
+            acceleration_max: robot.acceleration.into(),
+            jerk_max: robot.jerk.into(),
+        };
+        let cartesian = CartesianLimits {
+            acceleration_m_s2: robot.translation.acceleration,
+            jerk_m_s3: robot.translation.jerk,
+            angular_velocity_rad_s: robot.rotation.velocity,
+            angular_acceleration_rad_s2: robot.rotation.acceleration,
+            angular_jerk_rad_s3: robot.rotation.jerk,
+            ..CartesianLimits::franka()
+        };
+        Self { joints, cartesian, robot, ..Self::default() }
     }
 }
 
@@ -133,6 +160,11 @@ impl SafetyLimits {
                 if found < min - rounding || found > max + rounding {
                     return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
                 }
+            }
+            let [min, max] = self.robot.velocity_range(idx, q[idx]);
+            if dq[idx] < min - ROUNDING || dq[idx] > max + ROUNDING {
+                let (quantity, found, unit) = ("velocity", dq[idx], "rad/s");
+                return Err(Violation::Joint { time_secs, quantity, joint, found, min, max, unit });
             }
         }
         Ok(Derivatives { ddq: Some(*ddq), ..Derivatives::default() })

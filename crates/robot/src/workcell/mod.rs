@@ -53,6 +53,16 @@ pub enum RobotModel {
     Fr3,
 }
 
+impl RobotModel {
+    /// The name in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Panda => "panda",
+            Self::Fr3 => "fr3",
+        }
+    }
+}
+
 /// Where the camera is mounted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mounting {
@@ -100,11 +110,15 @@ pub struct Workcell {
 impl Workcell {
     /// What every motion in this workcell keeps to.
     pub fn safety_limits(&self) -> SafetyLimits {
+        let of_robot = match self.robot {
+            RobotModel::Panda => SafetyLimits::default(),
+            RobotModel::Fr3 => SafetyLimits::fr3(),
+        };
         SafetyLimits {
             workspace: Some(self.workspace),
             table_height_m: self.table_height_m,
             fingertip_beyond_tcp_m: self.fingertip_beyond_tcp_m,
-            ..SafetyLimits::default()
+            ..of_robot
         }
     }
 

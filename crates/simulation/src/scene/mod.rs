@@ -15,6 +15,7 @@ mod fragment;
 mod light;
 pub mod mesh;
 mod other_camera;
+mod seen_part;
 pub mod solids;
 mod table;
 pub mod texture;
@@ -33,6 +34,7 @@ pub use distractor::{Distractor, DistractorKind};
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
 pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, other_view};
+pub use seen_part::SeenPart;
 pub use table::{Table, TableSurface};
 pub(crate) use views::shows_whole;
 pub use views::{

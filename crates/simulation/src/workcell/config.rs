@@ -5,7 +5,7 @@ use sdg_geometry::PinholeCamera;
 
 use crate::attempt_errors::AttemptErrors;
 use crate::render::RenderConfig;
-use crate::scene::SceneVariation;
+use crate::scene::{SceneVariation, SeenPart};
 
 /// What a workcell is made of.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub struct WorkcellConfig {
     pub errors: AttemptErrors,
     /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,
+    /// A part that a camera has seen, to be drawn and not to be touched.
+    pub seen_part: Option<SeenPart>,
     /// Where the camera is, if not in the MJCF's place on the hand.
     pub camera_place: Option<CameraPlace>,
 }
@@ -30,6 +32,7 @@ impl WorkcellConfig {
             wrist_render: RenderConfig::default(),
             errors: AttemptErrors::default(),
             wrist_camera: None,
+            seen_part: None,
             camera_place: None,
         }
     }

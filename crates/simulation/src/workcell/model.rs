@@ -19,7 +19,10 @@ pub(crate) const CAMERA_IN_BASE: &str = "beside";
 
 /// The robot, the table and what stands on it as MuJoCo's model, with further MJCF sections.
 pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc<Model>> {
-    let fragment = config.scene.fragment();
+    let mut fragment = config.scene.fragment();
+    if let Some(seen) = &config.seen_part {
+        fragment.append(seen.fragment());
+    }
     let fovy_deg = match &config.wrist_camera {
         Some(camera) => Some(Frustum::around(camera)?.vertical_field_of_view_rad().to_degrees()),
         None => None,

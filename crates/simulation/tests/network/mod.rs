@@ -1,10 +1,16 @@
 //! A simulated Panda on the network, and a twin of its workcell that tells the truth about it.
 
 #![allow(clippy::unwrap_used)]
+#![allow(dead_code, reason = "each test file and the example use some of it")]
 
 use sdg_fci::server::{Pace, Server, ServerConfig};
-use sdg_robot::{FrankaArm, GraspTarget, PartFinder, RobotAddress, Scheduling};
-use sdg_simulation::{AttemptConfig, PandaPlant, SharedPositions, Workcell, marked_grasp};
+use sdg_kinematics::{JointLimits, JointVector, Trajectory};
+use sdg_robot::{Arm, FrankaArm, GraspConfig, GraspTarget, PartFinder, RobotAddress, Scheduling};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::{
+    AttemptConfig, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp,
+};
 
 /// A server with free ports, on this computer.
 pub fn serve(twin: &Workcell, pace: Pace) -> (Server, SharedPositions) {
@@ -48,4 +54,22 @@ impl PartFinder<FrankaArm> for Twin {
         let spec = self.cell.config().scene.object.as_ref().map(|object| object.spec.clone());
         Ok(spec.zip(self.cell.base_from_object()).map(|(spec, pose)| marked_grasp(&spec, &pose)))
     }
+}
+
+/// A workcell with a part and at most two distractors.
+pub fn cell(part: &str, seed: u64) -> Workcell {
+    let spec = ObjectSpec::by_name(part).unwrap();
+    let config = VariationConfig { appearance: false, distractors: 0..=2, ..VariationConfig::default() };
+    let scene = SceneVariation::sample(Some(&spec), &config, seed);
+    let wrist_render = RenderConfig { shadow_size: 0, samples: 0, ..RenderConfig::default() };
+    let mut cell = Workcell::new(&WorkcellConfig { wrist_render, ..WorkcellConfig::new(scene) }).unwrap();
+    cell.reset_for_attempt(&GraspConfig::default(), seed).unwrap();
+    cell
+}
+
+/// A motion of two seconds from where the arm is.
+pub fn some_motion(arm: &mut impl Arm) -> Trajectory {
+    let start = arm.state().unwrap().q_commanded;
+    let end = start + JointVector::from([0.4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]);
+    Trajectory::point_to_point(&start, &end, &JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap()).unwrap()
 }

@@ -5,13 +5,13 @@ use std::time::Duration;
 use anyhow::Result;
 use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
 use sdg_report::write_atomically;
-use sdg_simulation::objects::ObjectSpec;
 
 use super::DemoArgs;
 use crate::commands::rehearse::{finish, show_attempt};
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::parts::part_named;
 use crate::rehearsal::{Rehearsal, RehearsalErrors};
 use crate::run_page::{self, RunPage, TaughtHere};
 use crate::shipped;
@@ -25,7 +25,7 @@ const VIEWS_SEED: u64 = 7_000_000;
 
 /// Teach, try, grasp, report.
 pub fn run(args: &DemoArgs) -> Result<Outcome> {
-    let object = ObjectSpec::by_name(&args.object)?;
+    let object = part_named("--object", &args.object)?;
     let demonstration = shipped::demonstration(&args.object)?;
     files::prepare_folder(&args.out)?;
 

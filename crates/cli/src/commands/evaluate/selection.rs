@@ -8,6 +8,7 @@ use sdg_simulation::objects::ObjectSpec;
 use super::args::EvaluateArgs;
 use crate::evaluation::Settings;
 use crate::exit::Usage;
+use crate::parts::part_named;
 
 /// The preset, and what the store's results depend on.
 ///
@@ -53,7 +54,7 @@ pub fn objects(names: &[String], all: impl Iterator<Item = &'static str>) -> Res
     let names: Vec<String> = if names.is_empty() { all.map(str::to_owned).collect() } else { names.to_vec() };
     let mut objects: Vec<ObjectSpec> = Vec::new();
     for name in names {
-        let object = ObjectSpec::by_name(name.trim()).map_err(|error| Usage(format!("--objects: {error}")))?;
+        let object = part_named("--objects", name.trim())?;
         if objects.iter().any(|known| known.name == object.name) {
             return Err(Usage(format!("--objects: expected each part once, found {} again", object.name)).into());
         }

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use anyhow::{Context, Result};
 use sdg_grasp::{GraspError, Verification};
 use sdg_report::AttemptSummary;
-use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use super::RehearseArgs;
@@ -14,12 +13,13 @@ use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::parts::part_named;
 use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, step_name};
 use crate::run_page::{self, RunPage};
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
-    let object = ObjectSpec::by_name(&args.object)?;
+    let object = part_named("--object", &args.object)?;
     let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     let camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
     if camera.is_some() && model.facts().lengths.is_none() {

@@ -49,6 +49,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     let (workcell, _) = robots::read_workcell(path)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
+    arm.check_model(workcell.robot)?;
     let interrupt = Interrupt::watch();
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
     let home = workcell.home().unwrap_or_else(ready_pose);

@@ -117,3 +117,26 @@ fn motions_to_any_place_over_the_table_pass_at_the_default_speed() {
         limits.check(trajectory).unwrap_or_else(|violation| panic!("({x}, {y}, {z}): {violation}"));
     }
 }
+
+#[test]
+fn an_fr3_may_not_do_all_that_a_panda_may() {
+    let to = |change: [f64; 7], scale| {
+        let end = ready_pose() + JointVector::from(change);
+        Trajectory::point_to_point(&ready_pose(), &end, &JointLimits::franka().scaled(scale, scale, 0.1).unwrap())
+    };
+    // Joint 6 from 1.571 to 0.5 rad: an FR3's ends at 0.541, and must be slow before it; a Panda's ends at -0.018.
+    let bent = to([0.0, 0.0, 0.0, 0.0, 0.0, -1.07, 0.0], 0.2).unwrap();
+    SafetyLimits::default().check(bent.clone()).unwrap();
+    let refused = SafetyLimits::fr3().check(bent).unwrap_err();
+    assert!(matches!(refused, Violation::Joint { joint: 6, .. }), "{refused}");
+    // 18 rad/s² in joint 7, where a Panda may have 20 and an FR3 10.
+    let hard = to([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5], 0.9).unwrap();
+    SafetyLimits::default().check(hard.clone()).unwrap();
+    let refused = SafetyLimits::fr3().check(hard).unwrap_err();
+    assert!(matches!(refused, Violation::Joint { quantity: "acceleration", joint: 7, .. }), "{refused}");
+    // As near to the end of joint 1 as it goes, slowly and fast.
+    let near_the_end = |scale| to([2.74, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], scale).unwrap();
+    SafetyLimits::fr3().check(near_the_end(0.1)).unwrap();
+    let refused = SafetyLimits::fr3().check(near_the_end(0.6)).unwrap_err();
+    assert!(matches!(refused, Violation::Joint { quantity: "velocity", joint: 1, max, .. } if max < 2.0), "{refused}");
+}

@@ -1,0 +1,103 @@
+//! Commands within the robot's limits, whatever was asked for.
+//!
+//! # Source
+//! `limitRate` of libfranka (`rate_limiting.h`), which limits from the robot's last reference: after commands that were lost, the
+//! reference is where the robot went without them, and not where the client wanted it.
+
+use crate::limits::Limits;
+use crate::wire::RobotState;
+
+/// One cycle in seconds.
+const PERIOD_SECS: f64 = 1e-3;
+/// How far below each limit commands stay (rad/s, rad/s², rad/s³), as libfranka's do.
+const MARGIN: f64 = 1e-3;
+/// Velocities stay so far below their limits that the robot, which bridges a lost command at constant acceleration, keeps to them
+/// for so many of them, as libfranka 0.9.2 has it.
+const NUM_LOST_BEFORE_LIMIT: f64 = 3.0;
+
+/// The joint positions (rad) nearest to `q` that the robot accepts after `state`: velocity, acceleration and jerk within `limits`,
+/// and a velocity that can still be kept within them. Positions are not limited.
+pub fn limit_joint_positions(limits: &Limits, state: &RobotState, q: &[f64; 7]) -> [f64; 7] {
+    std::array::from_fn(|joint| {
+        let (last_q, last_dq, last_ddq) = (state.q_desired[joint], state.dq_desired[joint], state.ddq_desired[joint]);
+        let (max_acceleration, max_jerk) = (limits.acceleration[joint] - MARGIN, limits.jerk[joint] - MARGIN);
+        let margin = MARGIN + NUM_LOST_BEFORE_LIMIT * PERIOD_SECS * max_acceleration;
+        let [min_velocity, max_velocity] = limits.velocity_range(joint, last_q);
+        let (min_velocity, max_velocity) = ((min_velocity + margin).min(0.0), (max_velocity - margin).max(0.0));
+        let acceleration = ((q[joint] - last_q) / PERIOD_SECS - last_dq) / PERIOD_SECS;
+        let step = max_jerk * PERIOD_SECS;
+        // Near the velocity's limit, no more acceleration than can be taken back before it.
+        let braking = max_jerk / max_acceleration;
+        let largest = (braking * (max_velocity - last_dq)).min(max_acceleration);
+        let smallest = (braking * (min_velocity - last_dq)).max(-max_acceleration);
+        let acceleration = acceleration.min(largest).max(smallest).clamp(-max_acceleration, max_acceleration);
+        // The jerk comes last, other than in libfranka: the velocity's limit of an FR3 falls on the way to a joint's end, and
+        // following it at once would be a jerk beyond the limit. The margin has room for that.
+        let acceleration = acceleration.clamp(last_ddq - step, last_ddq + step);
+        last_q + (last_dq + acceleration * PERIOD_SECS) * PERIOD_SECS
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits::PANDA;
+
+    /// The state after the robot has accepted a position.
+    fn accept(state: &mut RobotState, q: &[f64; 7]) -> [[f64; 7]; 2] {
+        let (dq_before, ddq_before) = (state.dq_desired, state.ddq_desired);
+        for joint in 0..7 {
+            state.dq_desired[joint] = (q[joint] - state.q_desired[joint]) / PERIOD_SECS;
+            state.ddq_desired[joint] = (state.dq_desired[joint] - dq_before[joint]) / PERIOD_SECS;
+        }
+        state.q_desired = *q;
+        [state.ddq_desired, std::array::from_fn(|joint| (state.ddq_desired[joint] - ddq_before[joint]) / PERIOD_SECS)]
+    }
+
+    #[test]
+    fn what_keeps_to_the_limits_is_sent_as_it_is() {
+        let mut state = RobotState { q_desired: [0.1; 7], ..RobotState::default() };
+        state.dq_desired[1] = 1.0;
+        state.ddq_desired[1] = 3.0;
+        let mut q = state.q_desired;
+        // 1.004 rad/s: 4 rad/s², 1000 rad/s³.
+        q[1] += 1.004e-3;
+        let limited = limit_joint_positions(&LIMITS, &state, &q);
+        assert!((0..7).all(|joint| (limited[joint] - q[joint]).abs() < 1e-15), "{limited:?}");
+    }
+
+    #[test]
+    fn whatever_is_asked_for_each_step_keeps_to_every_limit() {
+        for limits in [Limits::PANDA, Limits::FR3] {
+            let mut state = RobotState { q_desired: [0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0], ..RobotState::default() };
+            let (mut fastest, mut hardest) = ([0.0_f64; 7], [0.0_f64; 7]);
+            for cycle in 0..6000 {
+                // From one end of the ranges to the other and back, as fast as may be.
+                let goal = if cycle % 3000 < 1500 { limits.q_max } else { limits.q_min };
+                let limited = limit_joint_positions(&limits, &state, &goal);
+                let [ddq, jerk] = accept(&mut state, &limited);
+                for joint in 0..7 {
+                    let dq = state.dq_desired[joint];
+                    let [min, max] = limits.velocity_range(joint, state.q_desired[joint]);
+                    // What limits an FR3's joints 5 and 7 near their ends falls faster than they may brake: that takes a plan.
+                    let can_brake = limits.velocity_near_ends.is_none_or(|near| near[joint].slope < 20.0);
+                    assert!(
+                        !can_brake || (min..=max).contains(&dq),
+                        "joint {joint} at {}: {dq}",
+                        state.q_desired[joint]
+                    );
+                    assert!(ddq[joint].abs() <= limits.acceleration[joint], "joint {joint}: {}", ddq[joint]);
+                    assert!(jerk[joint].abs() <= limits.jerk[joint], "joint {joint}: {}", jerk[joint]);
+                    fastest[joint] = fastest[joint].max(dq.abs());
+                    hardest[joint] = hardest[joint].max(ddq[joint].abs());
+                }
+            }
+            // The limits are used: they are not kept by standing still.
+            for joint in 0..7 {
+                assert!(fastest[joint] > 0.9 * limits.velocity[joint], "joint {joint}: {}", fastest[joint]);
+                assert!(hardest[joint] > 0.9 * limits.acceleration[joint], "joint {joint}: {}", hardest[joint]);
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! The commands of a motion, for a robot that may have lost some of them.
+//!
+//! ```text
+//! robot's time since the last state ─ Playback ─ where the trajectory is at that time ──────────┐
+//! state: q_d, dq_d, ddq_d ─ not what was sent last? ─ the difference, led back to zero smoothly ┴ sum ─ rate limit ─ command
+//! ```
+//! A command that comes too late is lost, and the robot goes on without it at constant acceleration. The trajectory goes on by the
+//! robot's time, and the next command must lead from where the robot went back to where the trajectory is by then.
+
+use sdg_fci::Limits;
+use sdg_fci::client::limit_joint_positions;
+use sdg_fci::wire::{RobotState, Version};
+use sdg_kinematics::JointVector;
+
+use super::correction::{Correction, Deviation};
+use crate::arm_state::PERIOD_SECS;
+use crate::playback::Playback;
+
+/// A reference that differs from the last command by less is that command, rad: version 10 has single precision.
+const SAME_RAD_V5: f64 = 1e-10;
+const SAME_RAD_V10: f64 = 5e-7;
+/// A reference slower than this is at rest, rad/s and rad/s².
+const STANDING_RAD_S: f64 = 1e-4;
+const STANDING_RAD_S2: f64 = 0.05;
+/// So near to the motion's end it has arrived, rad: at the tcp, a hundredth of a millimetre.
+const ARRIVED_RAD: f64 = 1e-5;
+/// So many cycles after its end a motion is ended, wherever the robot says that its reference is.
+const MAX_CYCLES_AFTER_END: u32 = 2000;
+
+/// A motion's next command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Next {
+    /// Joint positions, rad.
+    Position(JointVector),
+    /// The last ones: the robot's reference stands there.
+    Last(JointVector),
+}
+
+/// Follows a motion by the robot's clock.
+#[derive(Debug)]
+pub(super) struct Follower<'a> {
+    playback: Playback<'a>,
+    limits: &'static Limits,
+    same_rad: f64,
+    /// The trajectory's last three positions, the newest first.
+    trajectory: [JointVector; 3],
+    sent: Option<JointVector>,
+    correction: Option<Correction>,
+    cycles_after_end: u32,
+    num_corrections: u32,
+}
+
+impl<'a> Follower<'a> {
+    /// Begins at the trajectory's start, with the limits of the robot that speaks this version.
+    pub(super) fn new(playback: Playback<'a>, version: Version) -> Self {
+        let start = *playback.start();
+        let same_rad = match version {
+            Version::V5 => SAME_RAD_V5,
+            Version::V10 => SAME_RAD_V10,
+        };
+        Self {
+            playback,
+            limits: Limits::of(version),
+            same_rad,
+            trajectory: [start; 3],
+            sent: None,
+            correction: None,
+            cycles_after_end: 0,
+            num_corrections: 0,
+        }
+    }
+
+    /// Begins a controlled stop on the path.
+    pub(super) fn stop(&mut self) {
+        self.playback.stop();
+    }
+
+    /// How often the robot was elsewhere than it was commanded to be.
+    #[cfg(test)]
+    pub(super) fn num_corrections(&self) -> u32 {
+        self.num_corrections
+    }
+
+    /// The answer to a state that is so many milliseconds younger than the last one (0 at first).
+    pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
+        let mut is_over = false;
+        // The trajectory was asked for the time of the cycle after the last state.
+        for _ in 1..elapsed_ms {
+            is_over |= self.advance();
+        }
+        let reference = Deviation {
+            q: JointVector::from(state.q_desired),
+            dq: JointVector::from(state.dq_desired),
+            ddq: JointVector::from(state.ddq_desired),
+        };
+        let is_as_sent = self.sent.is_some_and(|sent| (reference.q - sent).amax() <= self.same_rad);
+        if !is_as_sent {
+            let deviation = reference - self.on_trajectory();
+            self.num_corrections += u32::from(self.sent.is_some());
+            self.correction = Some(Correction::new(deviation, self.limits));
+        }
+        is_over |= self.advance();
+        let offset = self.correction.as_mut().and_then(Correction::next);
+        if offset.is_none() {
+            self.correction = None;
+        }
+        let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
+        let limited = JointVector::from(limit_joint_positions(self.limits, state, &wanted.into()));
+        // Rounding is no limit.
+        let command = if (limited - wanted).amax() < 1e-12 { wanted } else { limited };
+        // What was held back is seen as a difference in the next cycle.
+        self.sent = (command == wanted).then_some(command);
+        self.cycles_after_end = if is_over { self.cycles_after_end + 1 } else { 0 };
+        let is_standing = reference.dq.amax() < STANDING_RAD_S && reference.ddq.amax() < STANDING_RAD_S2;
+        let has_arrived = is_standing && (reference.q - self.trajectory[0]).amax() <= ARRIVED_RAD;
+        if is_over && (has_arrived || self.cycles_after_end > MAX_CYCLES_AFTER_END) {
+            return Next::Last(command);
+        }
+        Next::Position(command)
+    }
+
+    /// One cycle on along the trajectory; whether it has ended.
+    fn advance(&mut self) -> bool {
+        let [newest, second, _] = self.trajectory;
+        let next = self.playback.next_reference();
+        self.trajectory = [next.map_or(newest, |reference| reference.q), newest, second];
+        next.is_none()
+    }
+
+    /// The trajectory as the robot sees it: derivatives are differences over a cycle.
+    fn on_trajectory(&self) -> Deviation {
+        let [q, before, earlier] = self.trajectory;
+        let (dq, dq_before) = ((q - before) / PERIOD_SECS, (before - earlier) / PERIOD_SECS);
+        Deviation { q, dq, ddq: (dq - dq_before) / PERIOD_SECS }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,50 @@
+//! A part of which a camera has seen the outline: drawn in plans, touched by nothing.
+
+use nalgebra::{Isometry3, Point2};
+
+use super::fragment::MjcfFragment;
+use super::solids::extrude;
+
+/// Thinner than this, m, it would not show.
+const MIN_HEIGHT_M: f64 = 2e-3;
+/// Outlines of a smaller area, m², are drawn as nothing.
+const MIN_AREA_M2: f64 = 1e-6;
+
+/// A part as a camera has seen it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenPart {
+    /// Its outline in the robot's base frame, m, in either direction of turn.
+    pub outline_in_base: Vec<Point2<f64>>,
+    /// The z that it stands on and the z of its outline, m in the base frame.
+    pub z_m: [f64; 2],
+}
+
+impl SeenPart {
+    /// The outline raised from the table, in a colour that no shipped part has.
+    pub(crate) fn fragment(&self) -> MjcfFragment {
+        let mut fragment = MjcfFragment::default();
+        let [bottom_m, top_m] = self.z_m;
+        let mut outline = self.outline_in_base.clone();
+        let area_m2 = signed_area(&outline);
+        if area_m2.is_nan() || area_m2.abs() < MIN_AREA_M2 {
+            return fragment;
+        }
+        if area_m2 < 0.0 {
+            outline.reverse();
+        }
+        let mesh = extrude(&outline, &[], (top_m - bottom_m).max(MIN_HEIGHT_M), 0.0)
+            .transformed(&Isometry3::translation(0.0, 0.0, bottom_m));
+        fragment.add_mesh("seen_part", &mesh);
+        fragment.write(format_args!(
+            "<worldbody><geom name=\"seen_part\" type=\"mesh\" mesh=\"seen_part\" contype=\"0\" conaffinity=\"0\" \
+             rgba=\"0.95 0.45 0.1 1\"/></worldbody>"
+        ));
+        fragment
+    }
+}
+
+/// Positive for vertices in counter-clockwise order.
+fn signed_area(outline: &[Point2<f64>]) -> f64 {
+    let following = outline.iter().cycle().skip(1);
+    outline.iter().zip(following).map(|(a, b)| 0.5 * (a.x * b.y - a.y * b.x)).sum()
+}
