@@ -27,6 +27,7 @@ mod analytic;
 mod approach;
 mod check;
 mod clearance;
+pub mod collision;
 mod error;
 mod ik;
 mod inverse;
