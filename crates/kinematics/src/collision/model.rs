@@ -9,7 +9,7 @@ use super::lanes::ToLocal;
 use super::shape::Shape;
 use crate::check::check_pose;
 use crate::joints::{JointVector, NUM_JOINTS};
-use crate::panda::{Frames, Panda};
+use crate::panda::{DH_D_M, Frames, Panda};
 
 /// A solid thing that stands still in the base frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -185,6 +185,22 @@ impl CollisionModel {
             }
         }
         nearest
+    }
+
+    /// The obstacle that overlaps the arm's column the deepest, if one does, and how deep (m): the part of link 1 around joint 1's axis, which stands
+    /// still in every motion.
+    pub fn overlap_with_column(&self) -> Option<(String, f64)> {
+        let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, DH_D_M[0]));
+        let mut deepest: Option<(String, f64)> = None;
+        for (index, obstacle) in self.obstacles.iter().enumerate() {
+            let obstacle_from_base = obstacle.base_from_obstacle.inverse();
+            let [from, to] = [column.from, column.to].map(|end| obstacle_from_base * end);
+            let depth_m = column.radius_m - obstacle.shape.nearest_on_segment(&from, &to).1;
+            if depth_m > deepest.as_ref().map_or(0.0, |deepest| deepest.1) && !self.may_touch[1][index] {
+                deepest = Some((obstacle.name.clone(), depth_m));
+            }
+        }
+        deepest
     }
 
     /// Whether something is in the hand.
