@@ -32,13 +32,15 @@ pub struct PlanOptions {
     pub step_rad: f64,
     /// Configurations that the search may check before it gives up.
     pub max_checks: usize,
-    /// Attempts to shorten the way.
+    /// Attempts to shorten a way.
     pub num_shortcuts: usize,
+    /// Searches of which the cheapest way is taken, where no straight motion leads to a goal.
+    pub num_searches: usize,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60 }
+        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 2 }
     }
 }
 
@@ -62,9 +64,9 @@ pub struct Plan {
     pub goal_idx: usize,
     /// Configurations that were checked in all.
     pub num_checks: usize,
-    /// Of these, before the way was shortened.
+    /// Of these, before the first way was shortened.
     pub num_search_checks: usize,
-    /// About how long the way took before it was shortened, and takes now, with stops at the waypoints at full speed, s.
+    /// About how long the first way took before it was shortened, and the plan takes, with stops at the waypoints at full speed, s.
     pub cost_secs: [f64; 2],
 }
 
@@ -85,9 +87,10 @@ impl Plan {
 }
 
 impl Panda {
-    /// Plans a motion from `start` to the goal pose that is cheapest to reach, around the obstacles of a model.
+    /// Plans a motion from `start` to one of several goal poses, around the obstacles of a model.
     ///
-    /// Tried are all poses of `goals` (turns about a part's symmetry, exchanged fingers) with every way of the arm and many angles of joint 7.
+    /// Tried are all poses of `goals` (turns about a part's symmetry, exchanged fingers) with every way of the arm and many angles of joint 7: the
+    /// quickest that a straight motion reaches, or else the cheapest of what [`PlanOptions::num_searches`] searches towards all of them find.
     /// With an approach, the way ends where the approach begins, at a configuration from which the whole approach is free.
     ///
     /// # Units and frames
@@ -113,15 +116,30 @@ impl Panda {
 
         let mut stops = Stops::default();
         let mut rng = Pcg64Mcg::seed_from_u64(options.seed);
-        let found = self
-            .search(&mut checker, start, &goals, options, &mut rng, &mut stops)
-            .ok_or_else(|| not_found(&checker, &stops))?;
+        let mut growth = Growth { step_rad: options.step_rad, max_checks: options.max_checks };
+        let first = match straight(&mut checker, start, &goals) {
+            Some(found) => found,
+            None => rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops)
+                .ok_or_else(|| not_found(&checker, &stops))?,
+        };
         let num_search_checks = checker.num_checked();
-        let Found { mut waypoints, goal_idx } = found;
-        let before_secs = cost_secs(&waypoints, &self.limits);
-        shorten(&mut checker, &self.limits, &mut waypoints, options.num_shortcuts, &mut rng);
+        let first_secs = cost_secs(&first.waypoints, &self.limits);
+        let is_straight = first.waypoints.len() == 2;
+        let mut best = first;
+        shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
+        // A further search may take some times as long as the first: it is for a better way, not for any.
+        growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
+        for _ in 1..if is_straight { 1 } else { options.num_searches } {
+            let further = rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops);
+            let Some(mut further) = further else { continue };
+            shorten(&mut checker, &self.limits, &mut further.waypoints, options.num_shortcuts, &mut rng);
+            if cost_secs(&further.waypoints, &self.limits) < cost_secs(&best.waypoints, &self.limits) {
+                best = further;
+            }
+        }
+        let Found { waypoints, goal_idx } = best;
         Ok(Plan {
-            cost_secs: [before_secs, cost_secs(&waypoints, &self.limits)],
+            cost_secs: [first_secs, cost_secs(&waypoints, &self.limits)],
             waypoints,
             approach: approaches.into_iter().nth(goal_idx),
             goal_idx: goals[goal_idx].pose_idx,
@@ -176,25 +194,20 @@ impl Panda {
         }
         Ok((kept, paths))
     }
+}
 
-    /// Straight to the quickest goal that can be reached so, or else by a search; the quicker of two searches is taken.
-    fn search(
-        &self,
-        checker: &mut Checker<'_>,
-        start: &JointVector,
-        goals: &[GoalConfiguration],
-        options: &PlanOptions,
-        rng: &mut Pcg64Mcg,
-        stops: &mut Stops,
-    ) -> Option<Found> {
-        // Goals come the quickest first: nothing found later can be quicker than the first that is reached straight.
-        if let Some(goal_idx) = goals.iter().position(|goal| checker.is_edge_free(start, &goal.q)) {
-            return Some(Found { waypoints: vec![*start, goals[goal_idx].q], goal_idx });
-        }
-        let roots: Vec<JointVector> = goals.iter().map(|goal| goal.q).collect();
-        let growth = Growth { step_rad: options.step_rad, max_checks: options.max_checks };
-        rrt_connect(checker, &self.limits, start, &roots, growth, rng, stops)
-    }
+/// Checks that every further search may take, and how many times those of the first.
+const MIN_FURTHER_CHECKS: usize = 1000;
+const FURTHER_CHECKS_RATIO: usize = 2;
+
+/// Straight to the quickest goal that can be reached so; goals come the quickest first.
+fn straight(checker: &mut Checker<'_>, start: &JointVector, goals: &[GoalConfiguration]) -> Option<Found> {
+    let goal_idx = goals.iter().position(|goal| checker.is_edge_free(start, &goal.q))?;
+    Some(Found { waypoints: vec![*start, goals[goal_idx].q], goal_idx })
+}
+
+fn roots(goals: &[GoalConfiguration]) -> Vec<JointVector> {
+    goals.iter().map(|goal| goal.q).collect()
 }
 
 /// Positions this far beyond a limit are rounding.

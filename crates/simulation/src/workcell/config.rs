@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
+use sdg_kinematics::collision::Obstacle;
 
 use crate::attempt_errors::AttemptErrors;
 use crate::render::RenderConfig;
@@ -20,6 +21,8 @@ pub struct WorkcellConfig {
     pub wrist_camera: Option<PinholeCamera>,
     /// Where the camera is, if not in the MJCF's place on the hand.
     pub camera_place: Option<CameraPlace>,
+    /// What stands in the cell besides the table.
+    pub obstacles: Vec<Obstacle>,
 }
 
 impl WorkcellConfig {
@@ -31,6 +34,7 @@ impl WorkcellConfig {
             errors: AttemptErrors::default(),
             wrist_camera: None,
             camera_place: None,
+            obstacles: Vec::new(),
         }
     }
 }
