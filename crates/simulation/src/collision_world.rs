@@ -47,7 +47,7 @@ impl CollisionWorld {
             .replace("contype=\"0\" conaffinity=\"0\"", "contype=\"2\" conaffinity=\"3\"");
         let geoms = obstacles_mjcf(obstacles, "contype=\"1\" conaffinity=\"0\"");
         let xml = format!(
-            "<mujoco><compiler angle=\"radian\"/><size njmax=\"4000\" nconmax=\"2000\" nstack=\"8000000\"/>\
+            "<mujoco><compiler angle=\"radian\"/><size njmax=\"1500\" nconmax=\"1000\" nstack=\"1000000\"/>\
              <include file=\"{PANDA_FILE}\"/>{EXCLUDED}<worldbody>{geoms}</worldbody></mujoco>"
         );
         let model =

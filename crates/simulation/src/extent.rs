@@ -152,8 +152,8 @@ mod tests {
 
         /// The joints' blunt ends are flat, those of capsules round.
         const MAX_EXCESS_M: f64 = 0.045;
-        /// Surface points are found from directions some three degrees apart, which puts them a little too far out.
-        const ROUNDING_M: f64 = 0.0005;
+        /// Surface points are found from directions two degrees apart, which puts those of large flat faces that much too far out.
+        const ROUNDING_M: f64 = 0.0015;
         const OPENING_M: f64 = 0.05;
         let directions = |count: usize| -> Vec<Vector3<f64>> {
             (0..count)
@@ -164,7 +164,8 @@ mod tests {
                 })
                 .collect()
         };
-        let (normals, rays) = (directions(4000), directions(500));
+        let (mut normals, rays) = (directions(8000), directions(500));
+        normals.extend([Vector3::x(), Vector3::y(), Vector3::z()].iter().flat_map(|axis| [*axis, -axis]));
         let xml = "<mujoco><compiler angle='radian'/><include file='panda.xml'/></mujoco>";
         let model = Arc::new(Model::from_xml(xml, &[panda_asset()]).unwrap());
         let ids = PandaIds::find(&model).unwrap();
