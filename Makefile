@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser clean
+.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -103,6 +103,15 @@ bench-browser: build web ## The page's speed against onnxruntime-web in headless
 	benches/peers/install.sh target/bench/venv
 	benches/browser/install.sh target/bench/onnxruntime-web
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
+
+# PyPI's ompl goes into target/plan-peers. A quarter of an hour on two cores.
+bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks a second, and OMPL on the same model
+	$(CARGO) build $(PROFILE) --locked -p sdg-simulation --example planning
+	target/release/examples/planning rate
+	target/release/examples/planning proof 1000
+	[ -x target/plan-peers/bin/python ] || python3 -m venv target/plan-peers
+	target/plan-peers/bin/pip install --quiet --disable-pip-version-check ompl
+	target/plan-peers/bin/python benches/peers/ompl_planning.py target/release/examples/planning 300 0 0.005
 
 clean: ## Removes what was built and reported
 	$(CARGO) clean

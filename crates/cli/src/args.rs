@@ -13,6 +13,7 @@ use crate::commands::devices::DevicesArgs;
 use crate::commands::evaluate::EvaluateArgs;
 use crate::commands::grasp::GraspArgs;
 use crate::commands::man::ManArgs;
+use crate::commands::plan::PlanArgs;
 use crate::commands::rehearse::RehearseArgs;
 use crate::commands::robot::RobotCommand;
 use crate::commands::teach::TeachArgs;
@@ -47,6 +48,8 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// One grasp, from the picture to the lifted part, with a real arm or a simulated one
     Grasp(GraspArgs),
+    /// A motion around the obstacles of a workcell, told and drawn; nothing moves
+    Plan(PlanArgs),
     /// A real arm by hand: state, home, recovery, hand
     #[command(subcommand)]
     Robot(RobotCommand),
@@ -97,6 +100,8 @@ mod tests {
             "sdg evaluate --axes tilt,covered --axis-views 3 --models S --search-points 32 --against other --json",
             "sdg evaluate --pictures d --grasp-model m.sdg",
             "sdg evaluate --pictures d --grasp-model m.sdg --no-verify --min-score 0.4 --label rod --device flex --report r --json",
+            "sdg plan --workcell w.toml --start 0,-45,0,-135,0,90,45 --goal 500,-100,200,90",
+            "sdg plan --workcell w.toml --goal 500,0,200 --goal -300,400,300,180,0,-90 --turns 4 --held-mm 30,100 --seed 2 --json --no-drawing",
             "sdg augment --demo a.png:a.json --count 5 --out samples",
             "sdg annotation convert photo.json photo.txt --image photo.png --format yolo-pose --json",
             "sdg completions bash",

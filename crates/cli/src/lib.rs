@@ -93,6 +93,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         Command::Grasp(grasp) => commands::grasp::run(grasp),
+        Command::Plan(plan) => commands::plan::run(plan),
         Command::Robot(robot) => commands::robot::run(robot),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),

@@ -5,8 +5,9 @@
 //!                                └──► straight path ──► timed ───┴──► Trajectory::sample(t) = q, q̇, q̈
 //! ```
 //!
-//! Left out: collisions other than with the table's plane, planning around obstacles, dynamics (masses, torques),
-//! communication with a real robot.
+//! [`collision`] says what the arm would touch, [`planning`] finds motions around it.
+//!
+//! Left out: dynamics (masses, torques), communication with a real robot.
 //!
 //! ```
 //! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -27,6 +28,7 @@ mod analytic;
 mod approach;
 mod check;
 mod clearance;
+pub mod collision;
 mod error;
 mod ik;
 mod inverse;
@@ -35,6 +37,7 @@ mod limits;
 mod nearest;
 mod panda;
 mod path;
+pub mod planning;
 #[cfg(test)]
 mod test_poses;
 mod trajectory;

@@ -82,6 +82,30 @@ impl Data {
         self.check()
     }
 
+    /// Computes where everything is and what overlaps, and nothing else: no forces, no time.
+    ///
+    /// # Errors
+    /// [`SimulationError::MuJoCo`] or [`SimulationError::Unstable`].
+    pub(crate) fn collide(&mut self) -> Result<()> {
+        // SAFETY: model and data are live and belong together; collision reads what kinematics wrote.
+        guarded("mj_collision", || unsafe {
+            mj::mj_kinematics(self.model.as_ptr(), self.ptr);
+            mj::mj_collision(self.model.as_ptr(), self.ptr);
+        })?;
+        self.check()
+    }
+
+    /// Pairs of geoms that overlap, and how deep (m), after [`Data::collide`].
+    pub(crate) fn overlaps(&self) -> impl Iterator<Item = (Id<Geom>, Id<Geom>, f64)> + '_ {
+        let raw = self.raw();
+        // SAFETY: the array has `ncon` valid entries and lives as long as the data.
+        let contacts = unsafe { std::slice::from_raw_parts(raw.contact, raw.ncon as usize) };
+        contacts
+            .iter()
+            .filter(|contact| contact.dist < 0.0)
+            .map(|contact| (Id::new(contact.geom1 as usize), Id::new(contact.geom2 as usize), -contact.dist))
+    }
+
     /// Moves one timestep on.
     ///
     /// # Errors

@@ -141,4 +141,105 @@ mod tests {
         }
         assert!(num_held > 100, "{num_held} shapes were looked at");
     }
+
+    /// How the planner's capsules fit: no visible shape of a link stands out of them, and they stand out of the link's shapes, visible and touching
+    /// ones, by no more than is said.
+    #[test]
+    fn the_capsules_of_the_planner_fit_the_simulated_arm() {
+        use crate::panda::{PandaIds, panda_asset};
+        use nalgebra::Point3;
+        use sdg_kinematics::collision::{Body as ArmBody, Capsule, CollisionModel};
+
+        /// The joints' blunt ends are flat, those of capsules round.
+        const MAX_EXCESS_M: f64 = 0.045;
+        /// Surface points are found from directions two degrees apart, which puts those of large flat faces that much too far out.
+        const ROUNDING_M: f64 = 0.0015;
+        const OPENING_M: f64 = 0.05;
+        let directions = |count: usize| -> Vec<Vector3<f64>> {
+            (0..count)
+                .map(|i| {
+                    let z = 1.0 - (2 * i + 1) as f64 / count as f64;
+                    let around = i as f64 * 2.399_963_229_728_653;
+                    Vector3::new((1.0 - z * z).sqrt() * around.cos(), (1.0 - z * z).sqrt() * around.sin(), z)
+                })
+                .collect()
+        };
+        let (mut normals, rays) = (directions(8000), directions(500));
+        normals.extend([Vector3::x(), Vector3::y(), Vector3::z()].iter().flat_map(|axis| [*axis, -axis]));
+        let xml = "<mujoco><compiler angle='radian'/><include file='panda.xml'/></mujoco>";
+        let model = Arc::new(Model::from_xml(xml, &[panda_asset()]).unwrap());
+        let ids = PandaIds::find(&model).unwrap();
+        let mut data = Data::new(model.clone()).unwrap();
+        ids.set_finger_position_m(&mut data, 0.5 * OPENING_M);
+        data.forward().unwrap();
+        let planner = CollisionModel::new(Vec::new(), OPENING_M).unwrap();
+        // Of each body: its geoms as a point inside, support values along the normals from there, and whether the geom is seen.
+        let mut solids: Vec<Vec<(Point3<f64>, Vec<f64>, bool)>> = vec![Vec::new(); 9];
+        for geom in model.ids::<Geom>() {
+            // SAFETY: the array has `ngeom` entries.
+            let is_seen = unsafe { *model.raw().geom_contype.add(geom.index()) == 0 };
+            let name = model.name(model.body_of(geom)).unwrap();
+            let (body, frame) = match name.strip_prefix("link") {
+                Some(number) => (number.parse().unwrap(), name.as_str()),
+                None => (8, "link7"),
+            };
+            let body_from_geom = data.world_from_body(model.id(frame).unwrap()).inverse() * data.world_from_geom(geom);
+            let support = normals
+                .iter()
+                .map(|n| reach(model.raw(), geom.index(), &(body_from_geom.rotation.inverse() * n)))
+                .collect();
+            solids[body].push((Point3::from(body_from_geom.translation.vector), support, is_seen));
+        }
+        let mut is_fit = true;
+        for (body, geoms) in solids.iter().enumerate() {
+            let arm_body = match body {
+                0 => ArmBody::BASE,
+                8 => ArmBody::HAND,
+                link => ArmBody::link(link),
+            };
+            let capsules = planner.capsules(arm_body);
+            let to_capsules = |p: &Point3<f64>| {
+                let ball = Capsule { from: *p, to: *p, radius_m: 0.0 };
+                capsules.iter().map(|capsule| capsule.distance_m(&ball)).fold(f64::INFINITY, f64::min)
+            };
+            let mut uncovered_m = f64::NEG_INFINITY;
+            for (centre, support, _) in geoms.iter().filter(|(_, _, is_seen)| *is_seen) {
+                for ray in &rays {
+                    let to_surface = normals
+                        .iter()
+                        .zip(support)
+                        .filter(|(n, _)| n.dot(ray) > 1e-3)
+                        .map(|(n, h)| h / n.dot(ray))
+                        .fold(f64::INFINITY, f64::min);
+                    let p = centre + ray * to_surface;
+                    // The foot's underside stands on the table.
+                    if body > 0 || p.z > 0.02 {
+                        uncovered_m = uncovered_m.max(to_capsules(&p));
+                    }
+                }
+            }
+            let to_geoms = |p: &Point3<f64>| {
+                let to_geom = |(centre, support, _): &(Point3<f64>, Vec<f64>, bool)| {
+                    let from_centre = p - centre;
+                    normals.iter().zip(support).map(|(n, h)| n.dot(&from_centre) - h).fold(f64::NEG_INFINITY, f64::max)
+                };
+                geoms.iter().map(to_geom).fold(f64::INFINITY, f64::min)
+            };
+            let mut excess_m: f64 = 0.0;
+            for capsule in capsules {
+                for end in [capsule.from, capsule.to, capsule.middle()] {
+                    for ray in rays.iter().step_by(3) {
+                        let p = end + ray * capsule.radius_m;
+                        if to_capsules(&p) > -1e-9 {
+                            excess_m = excess_m.max(to_geoms(&p));
+                        }
+                    }
+                }
+            }
+            let (uncovered_mm, excess_mm) = (uncovered_m * 1e3, excess_m * 1e3);
+            println!("{arm_body}: shapes stand out by {uncovered_mm:.1} mm, capsules by {excess_mm:.1} mm");
+            is_fit &= uncovered_m <= ROUNDING_M && excess_m <= MAX_EXCESS_M;
+        }
+        assert!(is_fit, "at most {ROUNDING_M} m uncovered and {MAX_EXCESS_M} m of excess are expected");
+    }
 }

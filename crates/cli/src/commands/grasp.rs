@@ -106,6 +106,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
 
 fn prepare(args: &GraspArgs) -> Result<Prepared> {
     let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
+    robots::refuse_obstacles(&workcell, &args.workcell)?;
     let pace = robots::pace(args.speed)?;
     if !(args.max_detection_age_secs > 0.0 && args.max_detection_age_secs.is_finite()) {
         let found = args.max_detection_age_secs;

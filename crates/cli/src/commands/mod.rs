@@ -11,6 +11,7 @@ pub mod devices;
 pub mod evaluate;
 pub mod grasp;
 pub mod man;
+pub mod plan;
 pub mod rehearse;
 pub mod robot;
 #[cfg(feature = "simulation")]

@@ -24,7 +24,7 @@ pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenO
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;
-pub(crate) use workcell_file::read_workcell;
+pub(crate) use workcell_file::{read_workcell, refuse_obstacles};
 
 /// `--robot`: an address, or the simulated arm of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]

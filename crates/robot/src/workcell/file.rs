@@ -6,6 +6,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::error::WorkcellError;
+use super::obstacle::{ObstacleSection, obstacles};
+use super::source::{MAX_REACH_MM, Numbers, Source};
 use super::{Mounting, RobotModel, Workcell};
 use crate::franka::RobotAddress;
 use crate::safety::WorkspaceBox;
@@ -15,8 +17,6 @@ use crate::sequence::LookOut;
 const FORMAT: i64 = 1;
 /// A table is not farther from the base's height, mm.
 const MAX_TABLE_MM: f64 = 1000.0;
-/// Where an arm can be at all, mm.
-const MAX_REACH_MM: f64 = 1500.0;
 /// No finger is longer than this beyond the tcp, mm.
 const MAX_FINGERTIP_MM: f64 = 100.0;
 /// What the hand holds for long, N.
@@ -40,7 +40,7 @@ struct File {
     workspace: Workspace,
     look_out: Spanned<Vec<Spanned<LookOutSection>>>,
     #[serde(default)]
-    obstacle: Vec<Spanned<toml::Value>>,
+    obstacle: Vec<Spanned<ObstacleSection>>,
     #[serde(default)]
     tray: Vec<Spanned<toml::Value>>,
 }
@@ -89,58 +89,6 @@ struct LookOutSection {
     joints_deg: Option<Spanned<Numbers<NUM_JOINTS>>>,
 }
 
-/// So many numbers and no more; serde's own arrays pass over what follows.
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(try_from = "Vec<f64>")]
-struct Numbers<const N: usize>([f64; N]);
-
-impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
-    type Error = String;
-
-    fn try_from(found: Vec<f64>) -> Result<Self, String> {
-        let count = found.len();
-        found.try_into().map(Self).map_err(|_| format!("expected {N} numbers, found {count}"))
-    }
-}
-
-/// The text, to turn places in it into lines.
-struct Source<'t>(&'t str);
-
-impl Source<'_> {
-    fn error(&self, at: usize, what: impl Into<String>) -> WorkcellError {
-        let end = at.min(self.0.len());
-        let line = 1 + self.0.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count();
-        WorkcellError { line, what: what.into() }
-    }
-
-    fn expected<T>(
-        &self,
-        place: &Spanned<T>,
-        name: &str,
-        expected: &str,
-        found: impl std::fmt::Display,
-    ) -> WorkcellError {
-        self.error(place.span().start, format!("{name}: expected {expected}, found {found}"))
-    }
-
-    fn number(&self, value: &Spanned<f64>, name: &str, [min, max]: [f64; 2]) -> Result<f64, WorkcellError> {
-        let found = *value.get_ref();
-        if (min..=max).contains(&found) {
-            return Ok(found);
-        }
-        Err(self.expected(value, name, &format!("a number from {min} to {max}"), found))
-    }
-
-    fn range_m(&self, value: &Spanned<Numbers<2>>, name: &str) -> Result<[f64; 2], WorkcellError> {
-        let Numbers([min, max]) = *value.get_ref();
-        if min < max && min >= -MAX_REACH_MM && max <= MAX_REACH_MM {
-            return Ok([min * 1e-3, max * 1e-3]);
-        }
-        let expected = format!("[smallest, largest] in mm, within {MAX_REACH_MM} of the base");
-        Err(self.expected(value, name, &expected, format!("[{min}, {max}]")))
-    }
-}
-
 impl Workcell {
     /// Reads a workcell's file.
     ///
@@ -185,13 +133,10 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
             ));
         }
     };
-    for (name, sections) in [("obstacle", &file.obstacle), ("tray", &file.tray)] {
-        if let Some(section) = sections.first() {
-            let why = format!(
-                "{name}: no motion is planned around it yet, so the arm might run into it; take it out of the cell and of this file"
-            );
-            return Err(source.error(section.span().start, why));
-        }
+    if let Some(section) = file.tray.first() {
+        let why =
+            "tray: nothing is placed yet, and the arm might run into it; take it out of the cell and of this file";
+        return Err(source.error(section.span().start, why));
     }
     let option = |value: &Option<Spanned<f64>>, name: &str, range: [f64; 2]| {
         value.as_ref().map(|value| source.number(value, name, range)).transpose()
@@ -217,6 +162,7 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         mounting,
         table_height_m: source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3,
         workspace: WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) },
+        obstacles: obstacles(&source, &file.obstacle)?,
         look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
     })
 }

@@ -29,15 +29,24 @@
 //! joints_deg = [0, -45, 0, -135, 0, 90, 45]
 //! yaw_deg = 0                       # with camera_at_mm; may be left out
 //!
-//! [[obstacle]]                      # refused as long as no motion is planned around it
-//! [[tray]]                          # likewise
+//! [[obstacle]]                      # any number; sdg plan plans around them, other motions are refused
+//! name = "fixture"
+//! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
+//! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of what is solid; its middle, in the base frame
+//! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; may be left out
+//!
+//! [[tray]]                          # refused as long as nothing is placed
 //! ```
 //! Every error names the line. This crate holds no file: text in, a [`Workcell`] out.
 
 mod error;
 mod file;
+mod obstacle;
+mod source;
 
+use nalgebra::Isometry3;
 use sdg_kinematics::JointVector;
+use sdg_kinematics::collision::{Body, CollisionError, CollisionModel, Obstacle, Shape};
 
 use crate::safety::{SafetyLimits, WorkspaceBox};
 use crate::sequence::{GraspConfig, LookOut};
@@ -105,7 +114,12 @@ pub struct Workcell {
     pub workspace: WorkspaceBox,
     /// Where the arm looks out from.
     pub look_outs: Vec<LookOut>,
+    /// What stands in the cell besides the table.
+    pub obstacles: Vec<Obstacle>,
 }
+
+/// The table's name among the obstacles.
+const TABLE: &str = "table";
 
 impl Workcell {
     /// What every motion in this workcell keeps to.
@@ -134,6 +148,22 @@ impl Workcell {
             load,
             ..GraspConfig::default()
         }
+    }
+
+    /// The arm with its fingers at an opening (m), the table and the obstacles.
+    ///
+    /// # Errors
+    /// An opening that the hand does not have; obstacles were checked when the file was read.
+    pub fn collision_model(&self, opening_m: f64) -> Result<CollisionModel, CollisionError> {
+        let table = Obstacle {
+            name: TABLE.to_owned(),
+            shape: Shape::Plane,
+            base_from_obstacle: Isometry3::translation(0.0, 0.0, self.table_height_m),
+        };
+        let mut model = CollisionModel::new([&[table], &self.obstacles[..]].concat(), opening_m)?;
+        // Link 1 turns about the vertical only: a table that is higher than the base's foot is around it, not in its way.
+        model.allow(Body::link(1), TABLE)?;
+        Ok(model)
     }
 
     /// Joint angles of the first look-out pose that is given as such.

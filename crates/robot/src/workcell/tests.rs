@@ -77,10 +77,79 @@ fn errors_name_the_line() {
 }
 
 #[test]
-fn what_no_motion_is_planned_around_is_refused() {
-    for name in ["obstacle", "tray"] {
-        let error = Workcell::from_toml(&format!("{WHOLE}\n[[{name}]]\nname = \"box\"\n")).unwrap_err();
-        assert!(error.to_string().starts_with(&format!("line 30: {name}: no motion is planned around it")), "{error}");
+fn trays_are_refused() {
+    let error = Workcell::from_toml(&format!("{WHOLE}\n[[tray]]\nname = \"a\"\n")).unwrap_err();
+    assert!(error.to_string().starts_with("line 30: tray: nothing is placed yet"), "{error}");
+}
+
+const OBSTACLES: &str = r#"
+[[obstacle]]
+name = "fixture"
+box_mm = [200, 100, 300]
+at_mm = [500, 300, 150]
+rpy_deg = [0, 0, 90]
+
+[[obstacle]]
+name = "post"
+cylinder_mm = [40, 600]
+at_mm = [300, -400, 300]
+
+[[obstacle]]
+name = "hose"
+capsule_mm = [30, 230]
+at_mm = [300, 400, 300]
+
+[[obstacle]]
+name = "curtain"
+plane_normal = [-1, 0, 0]
+at_mm = [900, 0, 0]
+"#;
+
+#[test]
+fn obstacles_stand_where_the_file_says() {
+    use nalgebra::Point3;
+    let cell = Workcell::from_toml(&format!("{WHOLE}{OBSTACLES}")).unwrap();
+    let distance_mm = |name: &str, p: [f64; 3]| {
+        let obstacle = cell.obstacles.iter().find(|obstacle| obstacle.name == name).unwrap();
+        let local = obstacle.base_from_obstacle.inverse() * Point3::from(p.map(|x| x * 1e-3));
+        obstacle.shape.signed_distance_m(&local) * 1e3
+    };
+    for (name, p, expected) in [
+        // Turned by 90 degrees, the box is 100 mm wide along x.
+        ("fixture", [560.0, 300.0, 150.0], 10.0),
+        ("fixture", [500.0, 420.0, 150.0], 20.0),
+        ("fixture", [500.0, 300.0, 305.0], 5.0),
+        ("post", [350.0, -400.0, 300.0], 30.0),
+        ("post", [300.0, -400.0, 610.0], 10.0),
+        ("hose", [300.0, 400.0, 420.0], 5.0),
+        ("curtain", [850.0, 10.0, 20.0], 50.0),
+    ] {
+        assert!((distance_mm(name, p) - expected).abs() < 1e-6, "{name}: {}", distance_mm(name, p));
+    }
+    let model = cell.collision_model(0.08).unwrap();
+    let names: Vec<&str> = model.obstacles().iter().map(|obstacle| obstacle.name.as_str()).collect();
+    assert_eq!(names, ["table", "fixture", "post", "hose", "curtain"]);
+    assert_eq!(model.obstacles()[0].base_from_obstacle.translation.z, -0.0125);
+}
+
+#[test]
+fn obstacles_that_make_no_sense_name_the_line() {
+    let whole = format!("{WHOLE}{OBSTACLES}");
+    for (line, from, to, expected) in [
+        (32, "box_mm = [200, 100, 300]", "box_mm = [200, 0, 300]", "box_mm: expected lengths from 1 to 5000 mm"),
+        (33, "at_mm = [500, 300, 150]", "at_mm = [500, nan, 150]", "at_mm: expected numbers within 3000 mm"),
+        (34, "[0, 0, 90]", "[0, 0, 900]", "rpy_deg: expected angles from -360 to 360"),
+        (37, "\"post\"", "\"fixture\"", "name: expected a name of its own, found a second \"fixture\""),
+        (37, "\"post\"", "\"table\"", "found a second \"table\""),
+        (36, "cylinder_mm = [40, 600]", "", "expected one of box_mm, cylinder_mm"),
+        (36, "cylinder_mm", "capsule_mm = [1, 2]\ncylinder_mm", "expected one of box_mm, cylinder_mm"),
+        (43, "[30, 230]", "[30, 20]", "the length at least the diameter"),
+        (48, "[-1, 0, 0]", "[0, 0, 0]", "plane_normal: expected a direction"),
+        (48, "plane_normal", "shape", "unknown field `shape`"),
+    ] {
+        assert!(whole.contains(from), "{from}");
+        let error = Workcell::from_toml(&whole.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.starts_with(&format!("line {line}: ")), "{to}: {error}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
+use sdg_kinematics::collision::Obstacle;
 
 use crate::attempt_errors::AttemptErrors;
 use crate::render::RenderConfig;
@@ -22,6 +23,8 @@ pub struct WorkcellConfig {
     pub seen_part: Option<SeenPart>,
     /// Where the camera is, if not in the MJCF's place on the hand.
     pub camera_place: Option<CameraPlace>,
+    /// What stands in the cell besides the table.
+    pub obstacles: Vec<Obstacle>,
 }
 
 impl WorkcellConfig {
@@ -34,6 +37,7 @@ impl WorkcellConfig {
             wrist_camera: None,
             seen_part: None,
             camera_place: None,
+            obstacles: Vec::new(),
         }
     }
 }

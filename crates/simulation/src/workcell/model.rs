@@ -9,6 +9,7 @@ use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_
 use crate::error::Result;
 use crate::lens::Frustum;
 use crate::model::Model;
+use crate::obstacles::obstacles_mjcf;
 use crate::panda::{PANDA_FILE, changed_panda_asset};
 use crate::scene::pose_attributes;
 
@@ -42,9 +43,13 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
                 format!("<worldbody><camera name=\"{CAMERA_IN_BASE}\" {pose} fovy=\"{fovy_deg:.12}\"/></worldbody>");
         }
     }
+    let obstacles = match &config.obstacles[..] {
+        [] => String::new(),
+        obstacles => format!("<worldbody>{}</worldbody>", obstacles_mjcf(obstacles, "rgba=\"0.85 0.55 0.25 1\"")),
+    };
     let xml = include_str!("../../assets/workcell.xml")
         .replace("PANDA_FILE", PANDA_FILE)
-        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + sections));
+        .replace("<!-- SCENE -->", &(fragment.sections + &camera_in_base + &obstacles + sections));
     let mut assets = fragment.files;
     assets.push(changed_panda_asset(config.errors.pad_friction, fovy_deg, hand_from_camera.as_ref()));
     Ok(Arc::new(Model::from_xml(&xml, &assets)?))

@@ -47,6 +47,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     };
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = robots::read_workcell(path)?;
+    robots::refuse_obstacles(&workcell, path)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
     arm.check_model(workcell.robot)?;

@@ -1,0 +1,103 @@
+//! Numbers on the command line of `sdg plan`.
+
+use std::str::FromStr;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use sdg_kinematics::{JointVector, NUM_JOINTS};
+
+/// `--start`: joint angles, given in degrees.
+#[derive(Debug, Clone, Copy)]
+pub struct JointsDeg(pub JointVector);
+
+/// `--goal`: `base_from_tcp`, given in mm and degrees.
+#[derive(Debug, Clone, Copy)]
+pub struct GoalPose(pub Isometry3<f64>);
+
+/// `--held-mm`.
+#[derive(Debug, Clone, Copy)]
+pub struct Held {
+    pub diameter_m: f64,
+    pub length_m: f64,
+}
+
+impl FromStr for JointsDeg {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let angles = numbers(text)?;
+        if angles.len() != NUM_JOINTS {
+            return Err(format!("expected {NUM_JOINTS} angles in degrees, found {}", angles.len()));
+        }
+        Ok(Self(JointVector::from_fn(|joint, _| angles[joint].to_radians())))
+    }
+}
+
+impl FromStr for GoalPose {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = numbers(text)?;
+        let ([x, y, z], [roll, pitch, yaw]) = match numbers[..] {
+            [x, y, z] => ([x, y, z], [180.0, 0.0, 0.0]),
+            [x, y, z, yaw] => ([x, y, z], [180.0, 0.0, yaw]),
+            [x, y, z, roll, pitch, yaw] => ([x, y, z], [roll, pitch, yaw]),
+            _ => {
+                let found = numbers.len();
+                return Err(format!("expected X,Y,Z or X,Y,Z,YAW or X,Y,Z,ROLL,PITCH,YAW, found {found} numbers"));
+            }
+        };
+        let turn = UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians());
+        Ok(Self(Isometry3::from_parts(Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3), turn)))
+    }
+}
+
+impl FromStr for Held {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match numbers(text)?[..] {
+            [diameter, length] if diameter > 0.0 && length > 0.0 && diameter <= 1000.0 && length <= 1000.0 => {
+                Ok(Self { diameter_m: diameter * 1e-3, length_m: length * 1e-3 })
+            }
+            _ => Err(format!("expected DIAMETER,LENGTH in mm, each above 0 and at most 1000, found \"{text}\"")),
+        }
+    }
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    text.split(',')
+        .map(|part| match part.trim().parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(format!("expected finite numbers with commas between them, found \"{part}\"")),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn poses_point_down_unless_told_otherwise() {
+        let GoalPose(short) = "500,-100,200".parse().unwrap();
+        assert!((short.translation.vector - Vector3::new(0.5, -0.1, 0.2)).norm() < 1e-12);
+        assert!((short.rotation * Vector3::z() + Vector3::z()).norm() < 1e-12);
+        let GoalPose(turned) = "500,0,200,90".parse().unwrap();
+        assert!((turned.rotation * Vector3::x() - Vector3::y()).norm() < 1e-12);
+        let GoalPose(level) = "500,0,200,0,90,0".parse().unwrap();
+        assert!((level.rotation * Vector3::z() - Vector3::x()).norm() < 1e-12);
+        assert!("500,0".parse::<GoalPose>().unwrap_err().contains("found 2 numbers"));
+        assert!("500,x,3".parse::<GoalPose>().unwrap_err().contains("found \"x\""));
+        assert!("500,nan,3".parse::<GoalPose>().is_err());
+    }
+
+    #[test]
+    fn joints_are_seven() {
+        let JointsDeg(q) = "0,-45,0,-135,0,90,45".parse().unwrap();
+        assert!((q - sdg_kinematics::ready_pose()).amax() < 1e-12);
+        assert!("0,-45".parse::<JointsDeg>().unwrap_err().contains("found 2"));
+        assert!("30,0".parse::<Held>().is_err());
+        assert!((("30,100".parse::<Held>().unwrap()).diameter_m - 0.03).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,127 @@
+//! `sdg plan`: a motion around the obstacles of a workcell, told and drawn; nothing moves.
+
+mod arguments;
+#[cfg(feature = "simulation")]
+mod drawing;
+mod explain;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use sdg_kinematics::collision::Capsule;
+use sdg_kinematics::planning::PlanOptions;
+use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, Panda, Trajectory, ready_pose};
+use sdg_robot::DEFAULT_SPEED;
+use sdg_robot::workcell::Workcell;
+
+use crate::exit::{Outcome, Usage};
+use crate::robots;
+use arguments::{GoalPose, Held, JointsDeg};
+use explain::Explained;
+
+/// `sdg plan`
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The workcell's file, with an [[obstacle]] for everything that stands in the cell
+    #[arg(long, value_name = "FILE")]
+    pub workcell: PathBuf,
+    /// Where the arm is: seven joint angles in degrees, as in 0,-45,0,-135,0,90,45; without it, the workcell's first joints_deg, or the ready pose
+    #[arg(long, value_name = "Q", allow_hyphen_values = true)]
+    pub start: Option<JointsDeg>,
+    /// Where the tcp is to be in the base frame: X,Y,Z in mm, or X,Y,Z,YAW with the hand straight down and turned by YAW degrees, or
+    /// X,Y,Z,ROLL,PITCH,YAW (180,0,YAW is straight down). Given several times, the pose that is quickest to reach is taken
+    #[arg(long, value_name = "POSE", required = true, allow_hyphen_values = true)]
+    pub goal: Vec<GoalPose>,
+    /// In how many turns about the hand's axis the goal is the same: 2 exchanges the fingers, 1 means the pose as it is
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=36))]
+    pub turns: u32,
+    /// What the hand holds, as a capsule around the hand's axis from the tcp on: DIAMETER,LENGTH in mm
+    #[arg(long, value_name = "SIZE")]
+    pub held_mm: Option<Held>,
+    /// How far the fingers are open
+    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3)]
+    pub opening_mm: f64,
+    /// Distance to keep from everything
+    #[arg(long, value_name = "MM", default_value_t = 3.0)]
+    pub margin_mm: f64,
+    /// Share of the joints' velocity limits, above 0 and at most 0.6
+    #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
+    pub speed: f64,
+    /// Decides the random configurations of the search: the same seed gives the same path
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Folder for what is drawn
+    #[arg(long, value_name = "DIR", default_value = "plan")]
+    pub out: PathBuf,
+    /// Draw nothing
+    #[arg(long)]
+    pub no_drawing: bool,
+    /// Print the path as one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Plans, tells and draws.
+pub fn run(args: &PlanArgs) -> Result<Outcome> {
+    let pace = robots::pace(args.speed)?;
+    let (workcell, _) = robots::read_workcell(&args.workcell)?;
+    let mut model = workcell.collision_model(args.opening_mm * 1e-3).map_err(|error| Usage(error.to_string()))?;
+    if let Some(Held { diameter_m, length_m }) = args.held_mm {
+        let radius_m = 0.5 * diameter_m;
+        let far = (length_m - radius_m).max(0.0);
+        model.hold(&[Capsule::new([0.0; 3], [0.0, 0.0, far], radius_m)]).map_err(|error| Usage(error.to_string()))?;
+    }
+    let start = args.start.map_or_else(|| workcell.home().unwrap_or_else(ready_pose), |JointsDeg(q)| q);
+    let goals = goals(args);
+    let mut options = PlanOptions::default();
+    (options.seed, options.margin_m) = (args.seed, args.margin_mm * 1e-3);
+
+    let started = Instant::now();
+    let plan = Panda::new().plan(&model, &start, &goals, None, &options).context("no plan")?;
+    let planning_ms = started.elapsed().as_secs_f64() * 1e3;
+    let motions = plan.trajectories(&pace.free_limits(), &CartesianLimits::franka())?;
+    let explained = Explained::new(&model, &plan, &motions, args.turns, planning_ms);
+    eprint!("{}", explained.text());
+    if let Some(refused) = refused_by_limits(&workcell, &motions) {
+        eprintln!("  sdg grasp would refuse it: {refused}");
+    }
+    if args.json {
+        println!("{}", explained.json());
+    }
+    if !args.no_drawing {
+        draw(args, &workcell, &motions)?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// All poses in all their turns.
+fn goals(args: &PlanArgs) -> Vec<Isometry3<f64>> {
+    let turn = |index: u32| {
+        let angle_rad = std::f64::consts::TAU * f64::from(index) / f64::from(args.turns);
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad)
+    };
+    args.goal.iter().flat_map(|GoalPose(pose)| (0..args.turns).map(move |index| pose * turn(index))).collect()
+}
+
+/// The first of the limits on every motion of `sdg grasp` that these break: the workspace, the table, the tcp's speed.
+fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<String> {
+    let limits = workcell.safety_limits();
+    motions.iter().find_map(|motion| limits.check(motion.clone()).err()).map(|violation| violation.to_string())
+}
+
+#[cfg(feature = "simulation")]
+fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<()> {
+    for file in drawing::draw(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
+        eprintln!("  {}", file.display());
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "simulation"))]
+fn draw(_args: &PlanArgs, _workcell: &Workcell, _motions: &[Trajectory]) -> Result<()> {
+    eprintln!("  this sdg was built without the simulator and draws no motion");
+    Ok(())
+}

@@ -1,0 +1,466 @@
+//! Collision checks of several configurations side by side, and of whole motions.
+//!
+//! An edge is the straight motion in joint space between two configurations. It is checked by *conservative advancement*: at a
+//! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
+//! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
+//! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
+
+use super::arm_shape::{FIRST_MOVING, NUM_BODIES, SELF_PAIRS};
+use super::lanes::{
+    FrameLanes, Lane, Lane3, NUM_LANES, link_frames, point_distances, segment_distances, segment_shape_distances,
+    shape_distances,
+};
+use super::model::CollisionModel;
+use super::shape::{self, DistanceAndSlope, Shape};
+use crate::joints::{JointVector, NUM_JOINTS};
+
+/// Checks configurations and motions against a [`CollisionModel`], and counts them.
+#[derive(Debug, Clone)]
+pub struct Checker<'a> {
+    model: &'a CollisionModel,
+    margin_m: f64,
+    arch: pulp::Arch,
+    /// Where the bodies' balls and capsules are, for each lane.
+    placed: Placed,
+    num_checked: usize,
+}
+
+#[derive(Debug, Clone)]
+struct Placed {
+    balls: [Lane3; NUM_BODIES],
+    capsules: [Vec<(Lane3, Lane3)>; NUM_BODIES],
+}
+
+/// By what distances are divided before the smallest is sought: for a pair of bodies, and for a body and what stands still.
+#[derive(Debug, Clone)]
+struct Weights {
+    self_pairs: [f64; SELF_PAIRS.len()],
+    bodies: [f64; NUM_BODIES],
+    /// Added to each distance, m.
+    offset_m: f64,
+}
+
+impl Weights {
+    const DISTANCES: Self = Self { self_pairs: [1.0; SELF_PAIRS.len()], bodies: [1.0; NUM_BODIES], offset_m: 0.0 };
+}
+
+/// The lanes that are not at their ends.
+#[derive(Debug, Clone, Copy)]
+struct Lanes {
+    lanes: [usize; NUM_LANES],
+    len: usize,
+}
+
+impl Lanes {
+    fn all() -> Self {
+        Self { lanes: std::array::from_fn(|lane| lane), len: NUM_LANES }
+    }
+
+    fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        let before = *self;
+        self.len = 0;
+        for &lane in before.lanes[..before.len].iter().filter(|&&lane| is_kept(lane)) {
+            self.lanes[self.len] = lane;
+            self.len += 1;
+        }
+    }
+}
+
+/// What the lanes have come to.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    /// The smallest weighted distance.
+    least: Lane,
+    /// Whether a distance is below the margin.
+    is_blocked: [bool; NUM_LANES],
+}
+
+impl<'a> Checker<'a> {
+    /// For motions that keep `margin_m` away from everything at every configuration that is checked, and never touch anything between these.
+    ///
+    /// A larger margin makes longer steps beside obstacles.
+    pub fn new(model: &'a CollisionModel, margin_m: f64) -> Self {
+        assert!(margin_m > 0.0 && margin_m.is_finite(), "a margin is positive, found {margin_m} m");
+        let capsules = std::array::from_fn(|body| vec![(Lane3::ZERO, Lane3::ZERO); model.arm.capsules[body].len()]);
+        let placed = Placed { balls: [Lane3::ZERO; NUM_BODIES], capsules };
+        Self { model, margin_m, arch: pulp::Arch::new(), placed, num_checked: 0 }
+    }
+
+    /// The model that this checks against.
+    pub fn model(&self) -> &'a CollisionModel {
+        self.model
+    }
+
+    /// The distance kept at checked configurations, m.
+    pub fn margin_m(&self) -> f64 {
+        self.margin_m
+    }
+
+    /// How many configurations were checked so far; lanes that had nothing to do are not counted.
+    pub fn num_checked(&self) -> usize {
+        self.num_checked
+    }
+
+    /// The distance between the two nearest things at each configuration, m, negative where they overlap.
+    ///
+    /// Distances to boxes, cylinders and capsules are at most a 2⁻¹³th of the body's length too large (0.03 mm).
+    pub fn distances_m(&mut self, configurations: &[JointVector]) -> Vec<f64> {
+        let mut distances = Vec::with_capacity(configurations.len());
+        for chunk in configurations.chunks(NUM_LANES) {
+            let q = std::array::from_fn(|lane| chunk[lane.min(chunk.len() - 1)]);
+            let found = self.evaluate(&q, &Weights::DISTANCES, false);
+            distances.extend_from_slice(&found.least[..chunk.len()]);
+            self.num_checked += chunk.len();
+        }
+        distances
+    }
+
+    /// Whether a configuration keeps the margin.
+    pub fn is_free(&mut self, q: &JointVector) -> bool {
+        self.num_checked += 1;
+        !self.evaluate(&[*q; NUM_LANES], &Weights::DISTANCES, true).is_blocked[0]
+    }
+
+    /// Whether the straight motion in joint space from one configuration to another is free, both ends included.
+    pub fn is_edge_free(&mut self, from: &JointVector, to: &JointVector) -> bool {
+        self.blocked_share(from, to).is_none()
+    }
+
+    /// The first place found on the straight motion that does not keep the margin, as a share of the way; not always the one nearest to the start.
+    pub fn blocked_share(&mut self, from: &JointVector, to: &JointVector) -> Option<f64> {
+        let delta = to - from;
+        let weights = self.edge_weights(&delta);
+        // Lane i starts at i of L - 1 parts of the way and goes to where the next one started; the last one is at the end.
+        let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
+        let mut share: Lane = std::array::from_fn(start);
+        let mut active: Lanes = Lanes::all();
+        while active.len > 0 {
+            let places: Lane = std::array::from_fn(|place| share[active.lanes[place.min(active.len - 1)]]);
+            let q = places.map(|share| from + delta * share);
+            let found = self.evaluate(&q, &weights, true);
+            self.num_checked += active.len;
+            if let Some(place) = (0..active.len).find(|&place| found.is_blocked[place]) {
+                return Some(places[place]);
+            }
+            for place in 0..active.len {
+                share[active.lanes[place]] += found.least[place];
+            }
+            active.retain(|lane| lane + 1 < NUM_LANES && share[lane] < start(lane + 1));
+        }
+        None
+    }
+
+    /// How far along an edge, as a share of it, each pair may go for a metre of distance.
+    fn edge_weights(&self, delta: &JointVector) -> Weights {
+        let reach_m = &self.model.arm.reach_m;
+        let speed_m = |body: usize, since_joint: usize| -> f64 {
+            (since_joint..NUM_JOINTS).map(|joint_idx| reach_m[body][joint_idx] * delta[joint_idx].abs()).sum()
+        };
+        // A pair that does not move against each other gets infinity: any distance lasts for the whole edge.
+        let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };
+        Weights {
+            self_pairs: std::array::from_fn(|pair| {
+                let (one, other) = SELF_PAIRS[pair];
+                // What happens before the first body's own joint moves both alike.
+                per_metre(speed_m(other, one))
+            }),
+            bodies: std::array::from_fn(|body| per_metre(speed_m(body, 0))),
+            offset_m: self.margin_m,
+        }
+    }
+
+    /// Looks at all pairs; ends early, with some lane blocked, where `until_blocked` allows it.
+    fn evaluate(&mut self, q: &[JointVector; NUM_LANES], weights: &Weights, until_blocked: bool) -> Found {
+        let Self { model, margin_m, arch, placed, .. } = self;
+        arch.dispatch(
+            #[inline(always)]
+            || evaluate(model, *margin_m, placed, q, weights, until_blocked),
+        )
+    }
+}
+
+#[inline(always)]
+fn evaluate(
+    model: &CollisionModel,
+    margin_m: f64,
+    placed: &mut Placed,
+    q: &[JointVector; NUM_LANES],
+    weights: &Weights,
+    until_blocked: bool,
+) -> Found {
+    place(model, placed, q);
+    let mut search = Search {
+        margin_m,
+        offset_m: weights.offset_m,
+        found: Found { least: [f64::INFINITY; NUM_LANES], is_blocked: [false; NUM_LANES] },
+    };
+    for (index, obstacle) in model.obstacles.iter().enumerate() {
+        let to_local = &model.obstacle_frames[index];
+        match obstacle.shape {
+            Shape::Plane => {
+                search.obstacle(model, placed, index, to_local, weights, |p, d| shape::plane(p, d));
+            }
+            Shape::Box { half_m } => {
+                search.obstacle(model, placed, index, to_local, weights, |p, d| shape::solid_box(p, d, half_m));
+            }
+            Shape::Cylinder { radius_m, half_length_m } => {
+                search.obstacle(model, placed, index, to_local, weights, |p, d| {
+                    shape::cylinder(p, d, radius_m, half_length_m)
+                });
+            }
+            Shape::Capsule { radius_m, half_length_m } => {
+                search.obstacle(model, placed, index, to_local, weights, |p, d| {
+                    shape::capsule(p, d, radius_m, half_length_m)
+                });
+            }
+        }
+        if until_blocked && search.is_any_blocked() {
+            return search.found;
+        }
+    }
+    search.self_pairs(model, placed, weights);
+    search.found
+}
+
+#[inline(always)]
+fn place(model: &CollisionModel, placed: &mut Placed, q: &[JointVector; NUM_LANES]) {
+    let frames = link_frames(q);
+    for body in 0..NUM_BODIES {
+        let frame = if body == 0 { FrameLanes::base() } else { frames[body.min(NUM_JOINTS) - 1] };
+        placed.balls[body] = frame.place(model.arm.bounds[body].0.coords.into());
+        for (out, capsule) in placed.capsules[body].iter_mut().zip(&model.arm.capsules[body]) {
+            *out = (frame.place(capsule.from.coords.into()), frame.place(capsule.to.coords.into()));
+        }
+    }
+}
+
+struct Search {
+    margin_m: f64,
+    offset_m: f64,
+    found: Found,
+}
+
+impl Search {
+    /// Whether a lower bound of the distance, with something to take away from it, leaves nothing to find in any lane.
+    #[inline(always)]
+    fn can_skip(&self, bounds: &Lane, less_m: f64, weight: f64) -> bool {
+        let mut is_needed = false;
+        for i in 0..NUM_LANES {
+            let bound = bounds[i] - less_m;
+            is_needed |= (bound + self.offset_m) * weight < self.found.least[i] || bound < self.margin_m;
+        }
+        !is_needed
+    }
+
+    #[inline(always)]
+    fn take(&mut self, distances: &Lane, less_m: f64, weight: f64) {
+        for i in 0..NUM_LANES {
+            let distance_m = distances[i] - less_m;
+            let weighted = (distance_m + self.offset_m) * weight;
+            self.found.least[i] = if weighted < self.found.least[i] { weighted } else { self.found.least[i] };
+            self.found.is_blocked[i] |= distance_m < self.margin_m;
+        }
+    }
+
+    #[inline(always)]
+    fn is_any_blocked(&self) -> bool {
+        self.found.is_blocked.iter().any(|&is_blocked| is_blocked)
+    }
+
+    #[inline(always)]
+    fn obstacle(
+        &mut self,
+        model: &CollisionModel,
+        placed: &Placed,
+        index: usize,
+        to_local: &super::lanes::ToLocal,
+        weights: &Weights,
+        shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
+    ) {
+        // From the hand inwards: what is far out is most often near something.
+        for body in (FIRST_MOVING..NUM_BODIES).rev() {
+            let capsules = &model.arm.capsules[body];
+            if model.may_touch[body][index] || capsules.is_empty() {
+                continue;
+            }
+            let weight = weights.bodies[body];
+            let ball = shape_distances(&to_local.apply(&placed.balls[body]), shape);
+            if self.can_skip(&ball, model.arm.bounds[body].1, weight) {
+                continue;
+            }
+            for (capsule, (from, to)) in capsules.iter().zip(&placed.capsules[body]) {
+                let local = (to_local.apply(from), to_local.apply(to));
+                let middle = shape_distances(&middle(&local), shape);
+                let half_length_m = 0.5 * (capsule.to - capsule.from).norm();
+                if self.can_skip(&middle, half_length_m + capsule.radius_m, weight) {
+                    continue;
+                }
+                self.take(&segment_shape_distances(&local, shape), capsule.radius_m, weight);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn self_pairs(&mut self, model: &CollisionModel, placed: &Placed, weights: &Weights) {
+        let arm = &model.arm;
+        for (pair, &(one, other)) in SELF_PAIRS.iter().enumerate() {
+            let (ones, others) = (&arm.capsules[one], &arm.capsules[other]);
+            if others.is_empty() {
+                continue;
+            }
+            let weight = weights.self_pairs[pair];
+            let balls = point_distances(&placed.balls[one], &placed.balls[other]);
+            if self.can_skip(&balls, arm.bounds[one].1 + arm.bounds[other].1, weight) {
+                continue;
+            }
+            for (a, a_placed) in ones.iter().zip(&placed.capsules[one]) {
+                for (b, b_placed) in others.iter().zip(&placed.capsules[other]) {
+                    self.take(&segment_distances(a_placed, b_placed), a.radius_m + b.radius_m, weight);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn middle(segment: &(Lane3, Lane3)) -> Lane3 {
+    let mut middle = Lane3::ZERO;
+    for i in 0..NUM_LANES {
+        middle.x[i] = 0.5 * (segment.0.x[i] + segment.1.x[i]);
+        middle.y[i] = 0.5 * (segment.0.y[i] + segment.1.y[i]);
+        middle.z[i] = 0.5 * (segment.0.z[i] + segment.1.z[i]);
+    }
+    middle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_shape::Body;
+    use super::super::capsule::Capsule;
+    use super::super::model::Obstacle;
+    use super::*;
+    use crate::joints::ready_pose;
+    use crate::test_poses::random_configuration;
+    use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+    use rand::{Rng, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    /// One obstacle of each shape around the arm, and a bar in its hand.
+    fn crowded(rng: &mut Pcg64Mcg) -> CollisionModel {
+        let shapes = [
+            Shape::Plane,
+            Shape::Box { half_m: [0.1, 0.05, 0.2] },
+            Shape::Cylinder { radius_m: 0.08, half_length_m: 0.3 },
+            Shape::Capsule { radius_m: 0.05, half_length_m: 0.1 },
+        ];
+        let obstacles = shapes.iter().enumerate().map(|(index, &shape)| {
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::from_fn(|_, _| rng.random_range(-2.0..2.0)));
+            let (turn, at) = match shape {
+                Shape::Plane => (UnitQuaternion::identity(), Vector3::new(0.0, 0.0, -0.05)),
+                _ => (turn, Vector3::from_fn(|_, _| rng.random_range(-0.8..0.8))),
+            };
+            Obstacle { name: index.to_string(), shape, base_from_obstacle: Isometry3::from_parts(at.into(), turn) }
+        });
+        let mut model = CollisionModel::new(obstacles.collect(), 0.04).unwrap();
+        model.hold(&[Capsule::new([-0.1, 0.0, 0.02], [0.1, 0.0, 0.02], 0.015)]).unwrap();
+        model
+    }
+
+    #[test]
+    fn lanes_agree_with_pair_by_pair() {
+        // A 2⁻¹³th of the longest capsule's axis, 0.2 m.
+        const TOLERANCE_M: f64 = 3e-5;
+        let mut rng = Pcg64Mcg::seed_from_u64(21);
+        let mut num_inside = 0;
+        for _ in 0..40 {
+            let model = crowded(&mut rng);
+            let mut checker = Checker::new(&model, 0.01);
+            let configurations: Vec<JointVector> = (0..11).map(|_| random_configuration(&mut rng)).collect();
+            let distances = checker.distances_m(&configurations);
+            for (q, found) in configurations.iter().zip(distances) {
+                let expected = model.nearest(q);
+                let error = found - expected.distance_m;
+                assert!((-1e-9..TOLERANCE_M).contains(&error), "{found} is not {expected:?}");
+                assert_eq!(checker.is_free(q), found >= 0.01);
+                num_inside += usize::from(found < 0.0);
+            }
+        }
+        assert!((40..400).contains(&num_inside), "{num_inside} of 440 collide");
+    }
+
+    #[test]
+    fn gradients_agree_with_finite_differences() {
+        const STEP_RAD: f64 = 1e-6;
+        let mut rng = Pcg64Mcg::seed_from_u64(22);
+        let (mut num_compared, mut num_kinks) = (0, 0);
+        for _ in 0..300 {
+            let model = crowded(&mut rng);
+            let q = random_configuration(&mut rng);
+            let found = model.nearest(&q);
+            // With a capsule's axis inside an obstacle, the way out may change from one face to another.
+            if found.distance_m < -0.01 {
+                continue;
+            }
+            for joint_idx in 0..NUM_JOINTS {
+                let mut step = JointVector::zeros();
+                step[joint_idx] = STEP_RAD;
+                let [before, after] = [-1.0, 1.0].map(|sign| model.nearest(&(q + step * sign)).distance_m);
+                let numeric = (after - before) / (2.0 * STEP_RAD);
+                // Where two pairs are equally near, or a segment lies along a face, the distance has no derivative.
+                let is_kink = (after + before - 2.0 * found.distance_m).abs() > 1e-9;
+                if is_kink {
+                    num_kinks += 1;
+                } else {
+                    num_compared += 1;
+                    let error = (numeric - found.gradient[joint_idx]).abs();
+                    assert!(error < 2e-4, "joint {}: {numeric}, {found:?}", joint_idx + 1);
+                }
+            }
+        }
+        assert!(num_compared > 1000 && num_kinks < 50, "{num_compared} compared, {num_kinks} kinks");
+    }
+
+    #[test]
+    fn nothing_between_the_checked_configurations_touches() {
+        let mut rng = Pcg64Mcg::seed_from_u64(23);
+        let (mut num_free, mut num_blocked) = (0, 0);
+        for _ in 0..150 {
+            let model = crowded(&mut rng);
+            let mut checker = Checker::new(&model, 0.003);
+            let from = random_configuration(&mut rng);
+            let to = from + (random_configuration(&mut rng) - from) * rng.random_range(0.05..0.5);
+            let between: Vec<JointVector> = (0..=500).map(|i| from + (to - from) * (f64::from(i) / 500.0)).collect();
+            let least = checker.distances_m(&between).into_iter().fold(f64::INFINITY, f64::min);
+            match checker.blocked_share(&from, &to) {
+                None => {
+                    num_free += 1;
+                    assert!(least >= -1e-4, "{least}");
+                }
+                Some(share) => {
+                    num_blocked += 1;
+                    let there = checker.distances_m(&[from + (to - from) * share])[0];
+                    assert!(there < 0.003, "{there} at {share}");
+                }
+            }
+        }
+        assert!(num_free > 20 && num_blocked > 20, "{num_free} free, {num_blocked} blocked");
+    }
+
+    #[test]
+    fn an_allowed_pair_may_touch_and_others_may_not() {
+        // A plate in reach of the finger tips only: they are at 0.4869 m in the ready pose.
+        let table = Obstacle {
+            name: "table".to_owned(),
+            shape: Shape::Box { half_m: [0.1, 0.1, 0.005] },
+            base_from_obstacle: Isometry3::translation(0.307, 0.0, 0.485),
+        };
+        let mut model = CollisionModel::new(vec![table], 0.08).unwrap();
+        let found = model.nearest(&ready_pose());
+        assert_eq!((found.body, found.other.as_str()), (Body::HAND, "table"));
+        assert!(found.distance_m < 0.0 && found.to_string().contains("mm inside table"), "{found}");
+        assert!(!Checker::new(&model, 0.001).is_free(&ready_pose()));
+        model.allow(Body::HAND, "table").unwrap();
+        assert!(Checker::new(&model, 0.001).is_free(&ready_pose()), "{}", model.nearest(&ready_pose()));
+        assert!(model.allow(Body::HAND, "tray").unwrap_err().to_string().contains("there are: table"));
+    }
+}

@@ -1,0 +1,41 @@
+//! Obstacles that make no sense.
+
+/// Errors of building a collision model.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CollisionError {
+    /// A length is not a positive, finite number.
+    #[error("{obstacle}: {what} must be {expected}, found {found}")]
+    Size {
+        /// Which obstacle.
+        obstacle: String,
+        /// Which of its lengths.
+        what: &'static str,
+        /// What is accepted.
+        expected: &'static str,
+        /// What was given, m.
+        found: f64,
+    },
+    /// A pose holds NaN or an infinity, or its quaternion is not of unit length.
+    #[error("{obstacle}: {reason}")]
+    Pose {
+        /// Which obstacle.
+        obstacle: String,
+        /// What is wrong with its pose.
+        reason: String,
+    },
+    /// Two obstacles of one name, which a message could not tell apart.
+    #[error("two obstacles are named \"{name}\"")]
+    NameTwice {
+        /// The name.
+        name: String,
+    },
+    /// A pair that may touch names an obstacle that does not exist.
+    #[error("no obstacle is named \"{name}\"; there are: {existing}")]
+    UnknownObstacle {
+        /// What was asked for.
+        name: String,
+        /// The names that exist.
+        existing: String,
+    },
+}

@@ -1,0 +1,256 @@
+//! The arm among obstacles: which bodies may not touch, and how far they are apart.
+
+use nalgebra::{Isometry3, Point3};
+
+use super::arm_shape::{ArmShape, Body, FIRST_MOVING, HELD, NUM_BODIES, SELF_PAIRS, base_from_body};
+use super::capsule::Capsule;
+use super::error::CollisionError;
+use super::lanes::ToLocal;
+use super::shape::Shape;
+use crate::check::check_pose;
+use crate::joints::{JointVector, NUM_JOINTS};
+use crate::panda::{DH_D_M, Frames, Panda};
+
+/// A solid thing that stands still in the base frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its name in messages.
+    pub name: String,
+    /// Its shape, in its own frame.
+    pub shape: Shape,
+    /// Where it stands.
+    pub base_from_obstacle: Isometry3<f64>,
+}
+
+/// Two things that are near each other, and how near.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Proximity {
+    /// The body of the arm.
+    pub body: Body,
+    /// The obstacle's or the other body's name.
+    pub other: String,
+    /// Distance of their surfaces, m; negative where they overlap.
+    pub distance_m: f64,
+    /// Derivative of the distance by each joint, m/rad; one of several where a capsule's axis is inside an obstacle or parallel to
+    /// what is nearest.
+    pub gradient: JointVector,
+}
+
+impl std::fmt::Display for Proximity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mm = self.distance_m * 1e3;
+        if mm < 0.0 {
+            write!(f, "{} is {:.0} mm inside {}", self.body, -mm, self.other)
+        } else {
+            write!(f, "{} is {mm:.0} mm from {}", self.body, self.other)
+        }
+    }
+}
+
+/// The arm's shape, the obstacles around it, and the pairs that may not touch.
+#[derive(Debug, Clone)]
+pub struct CollisionModel {
+    pub(super) arm: ArmShape,
+    pub(super) obstacles: Vec<Obstacle>,
+    pub(super) obstacle_frames: Vec<ToLocal>,
+    /// `may_touch[body][obstacle]`.
+    pub(super) may_touch: [Vec<bool>; NUM_BODIES],
+}
+
+impl CollisionModel {
+    /// The Panda with its fingers at an opening (m) among obstacles.
+    ///
+    /// The base is not compared with obstacles: it is bolted to one.
+    ///
+    /// # Errors
+    /// [`CollisionError`] for lengths and poses that make no sense, and for names given twice.
+    pub fn new(obstacles: Vec<Obstacle>, opening_m: f64) -> Result<Self, CollisionError> {
+        for (index, obstacle) in obstacles.iter().enumerate() {
+            check_obstacle(obstacle)?;
+            if obstacles[..index].iter().any(|other| other.name == obstacle.name) {
+                return Err(CollisionError::NameTwice { name: obstacle.name.clone() });
+            }
+        }
+        if !(0.0..=crate::panda::HAND_OPENING_MAX_M).contains(&opening_m) {
+            return Err(CollisionError::Size {
+                obstacle: "the hand".to_owned(),
+                what: "opening",
+                expected: "from 0 to 0.08 m",
+                found: opening_m,
+            });
+        }
+        let obstacle_frames = obstacles.iter().map(|obstacle| to_local(&obstacle.base_from_obstacle)).collect();
+        let may_touch = std::array::from_fn(|_| vec![false; obstacles.len()]);
+        Ok(Self { arm: ArmShape::panda(opening_m), obstacles, obstacle_frames, may_touch })
+    }
+
+    /// Puts a part into the hand: capsules that hold it, in the tcp's frame. It may touch hand and links 6 and 7.
+    ///
+    /// # Errors
+    /// [`CollisionError`] for coordinates that are not finite and radii that are not positive.
+    pub fn hold(&mut self, part_in_tcp: &[Capsule]) -> Result<(), CollisionError> {
+        let name = || "the held part".to_owned();
+        for capsule in part_in_tcp {
+            check_length(&name(), "radius_m", capsule.radius_m)?;
+            if ![capsule.from, capsule.to].iter().all(|end| end.coords.iter().all(|x| x.is_finite())) {
+                let reason = format!("ends must be finite numbers, found {} and {}", capsule.from, capsule.to);
+                return Err(CollisionError::Pose { obstacle: name(), reason });
+            }
+        }
+        self.arm.hold(part_in_tcp);
+        Ok(())
+    }
+
+    /// Lets a body touch an obstacle, as the fingers the table on an approach.
+    ///
+    /// # Errors
+    /// [`CollisionError::UnknownObstacle`].
+    pub fn allow(&mut self, body: Body, obstacle: &str) -> Result<(), CollisionError> {
+        match self.obstacles.iter().position(|candidate| candidate.name == obstacle) {
+            Some(index) => {
+                self.may_touch[body.index()][index] = true;
+                Ok(())
+            }
+            None => {
+                let existing = self.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect::<Vec<_>>();
+                let existing = if existing.is_empty() { "none".to_owned() } else { existing.join(", ") };
+                Err(CollisionError::UnknownObstacle { name: obstacle.to_owned(), existing })
+            }
+        }
+    }
+
+    /// The obstacles.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
+    /// The capsules of a body: in the base frame for the base, in the link's for a link, in link 7's for hand and held part.
+    pub fn capsules(&self, body: Body) -> &[Capsule] {
+        &self.arm.capsules[body.index()]
+    }
+
+    /// The two things that are nearest to each other, with the derivative of their distance.
+    ///
+    /// Computed pair by pair and without bounds: slow, and what [`super::Checker`] is tested against.
+    pub fn nearest(&self, q: &JointVector) -> Proximity {
+        let frames = Panda::new().frames(q);
+        let placed: [Vec<Capsule>; NUM_BODIES] = std::array::from_fn(|body| {
+            let base_from_body = base_from_body(&frames, body);
+            self.arm.capsules[body].iter().map(|capsule| capsule.moved(&base_from_body)).collect()
+        });
+        let mut nearest = Proximity {
+            body: Body::BASE,
+            other: "anything".to_owned(),
+            distance_m: f64::INFINITY,
+            gradient: JointVector::zeros(),
+        };
+        for (one, other) in SELF_PAIRS {
+            for a in &placed[one] {
+                for b in &placed[other] {
+                    let (p, q) = a.nearest_points(b);
+                    let distance_m = (q - p).norm() - a.radius_m - b.radius_m;
+                    if distance_m < nearest.distance_m {
+                        let normal = (q - p).try_normalize(0.0).unwrap_or_else(nalgebra::Vector3::x);
+                        // The surfaces' nearest points move as the axes' do: turning about an axis leaves its radius.
+                        let gradient =
+                            moved_along(&frames, other, &q, &normal) - moved_along(&frames, one, &p, &normal);
+                        let other_name = Body::of_index(one).to_string();
+                        nearest = Proximity { body: Body::of_index(other), other: other_name, distance_m, gradient };
+                    }
+                }
+            }
+        }
+        for (body, capsules) in placed.iter().enumerate().skip(FIRST_MOVING) {
+            for (index, obstacle) in self.obstacles.iter().enumerate() {
+                if self.may_touch[body][index] {
+                    continue;
+                }
+                let obstacle_from_base = obstacle.base_from_obstacle.inverse();
+                for capsule in capsules {
+                    let [from, to] = [capsule.from, capsule.to].map(|end| obstacle_from_base * end);
+                    let (share, distance_m) = obstacle.shape.nearest_on_segment(&from, &to);
+                    let distance_m = distance_m - capsule.radius_m;
+                    if distance_m < nearest.distance_m {
+                        let local: Point3<f64> = from + (to - from) * share;
+                        let normal = obstacle.base_from_obstacle * obstacle.shape.outward_normal(&local);
+                        let gradient = moved_along(&frames, body, &(obstacle.base_from_obstacle * local), &normal);
+                        nearest = Proximity {
+                            body: Body::of_index(body),
+                            other: obstacle.name.clone(),
+                            distance_m,
+                            gradient,
+                        };
+                    }
+                }
+            }
+        }
+        nearest
+    }
+
+    /// The obstacle that overlaps the arm's column the deepest, if one does, and how deep (m): the part of link 1 around joint 1's axis, which stands
+    /// still in every motion.
+    pub fn overlap_with_column(&self) -> Option<(String, f64)> {
+        let column = self.arm.capsules[1][0].moved(&Isometry3::translation(0.0, 0.0, DH_D_M[0]));
+        let mut deepest: Option<(String, f64)> = None;
+        for (index, obstacle) in self.obstacles.iter().enumerate() {
+            let obstacle_from_base = obstacle.base_from_obstacle.inverse();
+            let [from, to] = [column.from, column.to].map(|end| obstacle_from_base * end);
+            let depth_m = column.radius_m - obstacle.shape.nearest_on_segment(&from, &to).1;
+            if depth_m > deepest.as_ref().map_or(0.0, |deepest| deepest.1) && !self.may_touch[1][index] {
+                deepest = Some((obstacle.name.clone(), depth_m));
+            }
+        }
+        deepest
+    }
+
+    /// Whether something is in the hand.
+    pub fn holds_a_part(&self) -> bool {
+        !self.arm.capsules[HELD].is_empty()
+    }
+}
+
+/// How fast a point of a body moves along a direction by each joint, m/rad.
+fn moved_along(frames: &Frames, body: usize, point: &Point3<f64>, direction: &nalgebra::Vector3<f64>) -> JointVector {
+    JointVector::from_fn(|joint_idx, _| {
+        if joint_idx >= body.min(NUM_JOINTS) {
+            return 0.0;
+        }
+        let base_from_link = &frames.base_from_link[joint_idx];
+        let axis = base_from_link.rotation * nalgebra::Vector3::z();
+        axis.cross(&(point.coords - base_from_link.translation.vector)).dot(direction)
+    })
+}
+
+fn to_local(base_from_obstacle: &Isometry3<f64>) -> ToLocal {
+    let rotation = base_from_obstacle.rotation.inverse().to_rotation_matrix();
+    let rows = std::array::from_fn(|row| std::array::from_fn(|column| rotation[(row, column)]));
+    ToLocal { rows, origin: base_from_obstacle.translation.vector.into() }
+}
+
+fn check_obstacle(obstacle: &Obstacle) -> Result<(), CollisionError> {
+    let name = &obstacle.name;
+    check_pose("the pose", &obstacle.base_from_obstacle)
+        .map_err(|error| CollisionError::Pose { obstacle: name.clone(), reason: error.to_string() })?;
+    match obstacle.shape {
+        Shape::Plane => Ok(()),
+        Shape::Box { half_m } => half_m.iter().try_for_each(|&half| check_length(name, "half_m", half)),
+        Shape::Cylinder { radius_m, half_length_m } => {
+            check_length(name, "radius_m", radius_m)?;
+            check_length(name, "half_length_m", half_length_m)
+        }
+        Shape::Capsule { radius_m, half_length_m } => {
+            check_length(name, "radius_m", radius_m)?;
+            // A sphere has no length.
+            if half_length_m == 0.0 { Ok(()) } else { check_length(name, "half_length_m", half_length_m) }
+        }
+    }
+}
+
+fn check_length(obstacle: &str, what: &'static str, found: f64) -> Result<(), CollisionError> {
+    const MAX_M: f64 = 100.0;
+    if found > 0.0 && found <= MAX_M {
+        return Ok(());
+    }
+    let expected = "a positive number of metres, at most 100";
+    Err(CollisionError::Size { obstacle: obstacle.to_owned(), what, expected, found })
+}

@@ -1,0 +1,88 @@
+//! Why there is no plan: which link, which obstacle, which limit.
+
+use crate::collision::Proximity;
+use crate::error::KinematicsError;
+
+/// Errors of planning.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// An input that makes no sense, a start beyond the joints' ranges, or a goal that no configuration reaches.
+    #[error("{what}: {cause}")]
+    Kinematics {
+        /// Which input.
+        what: String,
+        /// What is wrong with it.
+        cause: KinematicsError,
+    },
+    /// No goal was given.
+    #[error("expected at least one goal pose, found none")]
+    NoGoal,
+    /// An option is outside its range.
+    #[error("{option} must be {expected}, found {found}")]
+    InvalidOption {
+        /// Which option.
+        option: &'static str,
+        /// What is accepted.
+        expected: &'static str,
+        /// What was given.
+        found: f64,
+    },
+    /// An obstacle stands where the arm's first link always is.
+    #[error(
+        "the obstacle \"{obstacle}\" encloses the robot: it overlaps the arm's column by {:.0} mm, which no motion changes",
+        .depth_m * 1e3
+    )]
+    EnclosesRobot {
+        /// Its name.
+        obstacle: String,
+        /// How deep, m.
+        depth_m: f64,
+    },
+    /// The start is in collision, or nearer to something than the margin.
+    #[error("the start is not free: {nearest}; at least {:.1} mm are asked for", .margin_m * 1e3)]
+    StartBlocked {
+        /// What it is too near to.
+        nearest: Proximity,
+        /// The distance asked for, m.
+        margin_m: f64,
+    },
+    /// Every configuration that reaches the goal is in collision, or nearer to something than the margin.
+    #[error(
+        "the goal is not free: {num_configurations} configurations reach it, and in the best of them {nearest}; at least {:.1} mm are \
+         asked for",
+        .margin_m * 1e3
+    )]
+    GoalBlocked {
+        /// How many configurations within the joints' ranges were tried.
+        num_configurations: usize,
+        /// What the freest of them is too near to.
+        nearest: Proximity,
+        /// The distance asked for, m.
+        margin_m: f64,
+    },
+    /// The straight approach ends early from every configuration that reaches its start.
+    #[error("the approach can be followed for {:.0} % of its way at best: {why}", .share * 100.0)]
+    ApproachBlocked {
+        /// The largest share of the way that was free, 0 to 1.
+        share: f64,
+        /// What ends it there.
+        why: String,
+    },
+    /// The search ended without a path.
+    #[error("no path found in {num_checks} collision checks; the search was stopped most often by: {}", list(.blockers))]
+    NotFound {
+        /// Configurations that were checked.
+        num_checks: usize,
+        /// Pairs that blocked motions, the most frequent first, each with its share.
+        blockers: Vec<(String, f64)>,
+    },
+}
+
+fn list(blockers: &[(String, f64)]) -> String {
+    if blockers.is_empty() {
+        return "nothing".to_owned();
+    }
+    let each = blockers.iter().map(|(pair, share)| format!("{pair} ({:.0} %)", share * 100.0));
+    each.collect::<Vec<_>>().join(", ")
+}

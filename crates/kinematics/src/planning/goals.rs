@@ -1,0 +1,100 @@
+//! Configurations that reach a goal: every way of the arm at many angles of joint 7, of which the free ones are kept.
+
+use nalgebra::Isometry3;
+
+use super::error::PlanError;
+use super::shortcut::motion_secs;
+use crate::analytic::analytic_solutions;
+use crate::check::check_pose;
+use crate::collision::Checker;
+use crate::ik::IkOptions;
+use crate::joints::JointVector;
+use crate::panda::Panda;
+
+/// Angles of joint 7 that are tried.
+const NUM_ANGLES: usize = 48;
+/// Configurations that are kept at most, the quickest to reach first.
+const MAX_KEPT: usize = 24;
+/// Those that are kept differ by at least this, rad.
+const MIN_APART_RAD: f64 = 0.25;
+/// Positions this far beyond a limit are rounding.
+const LIMIT_ROUNDING_RAD: f64 = 1e-9;
+
+/// A configuration that reaches a goal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GoalConfiguration {
+    pub(super) q: JointVector,
+    /// Which of the poses that were asked for.
+    pub(super) pose_idx: usize,
+}
+
+/// The free configurations of all poses, the quickest to reach from `start` first.
+///
+/// # Errors
+/// Poses that make no sense or cannot be reached, or whose configurations are all blocked.
+pub(super) fn free_configurations(
+    panda: &Panda,
+    checker: &mut Checker<'_>,
+    start: &JointVector,
+    poses: &[Isometry3<f64>],
+) -> Result<Vec<GoalConfiguration>, PlanError> {
+    if poses.is_empty() {
+        return Err(PlanError::NoGoal);
+    }
+    let mut reaching = Vec::new();
+    for (pose_idx, pose) in poses.iter().enumerate() {
+        check_pose("the pose", pose).map_err(|cause| PlanError::Kinematics { what: "the goal".to_owned(), cause })?;
+        reaching.extend(configurations(panda, start, pose).into_iter().map(|q| GoalConfiguration { q, pose_idx }));
+    }
+    if reaching.is_empty() {
+        // The grid may pass by what only a sliver of angles reaches; inverse kinematics looks closer, and says why not.
+        for (pose_idx, pose) in poses.iter().enumerate() {
+            match panda.inverse(pose, start, &IkOptions::default()) {
+                Ok(solution) => reaching.push(GoalConfiguration { q: solution.q, pose_idx }),
+                Err(cause) if pose_idx + 1 == poses.len() && reaching.is_empty() => {
+                    return Err(PlanError::Kinematics { what: "the goal".to_owned(), cause });
+                }
+                Err(_) => {}
+            }
+        }
+    }
+    let configurations: Vec<JointVector> = reaching.iter().map(|goal| goal.q).collect();
+    let distances = checker.distances_m(&configurations);
+    let mut free: Vec<GoalConfiguration> = reaching
+        .iter()
+        .zip(&distances)
+        .filter(|(_, distance_m)| **distance_m >= checker.margin_m())
+        .map(|(goal, _)| *goal)
+        .collect();
+    if free.is_empty() {
+        let freest = (0..distances.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b]));
+        let freest = freest.expect("configurations that reach the goal were found above");
+        return Err(PlanError::GoalBlocked {
+            num_configurations: reaching.len(),
+            nearest: checker.model().nearest(&configurations[freest]),
+            margin_m: checker.margin_m(),
+        });
+    }
+    let secs = |goal: &GoalConfiguration| motion_secs(start, &goal.q, panda.limits());
+    free.sort_by(|a, b| secs(a).total_cmp(&secs(b)));
+    let mut kept: Vec<GoalConfiguration> = Vec::new();
+    for goal in free {
+        if kept.len() < MAX_KEPT && kept.iter().all(|other| (other.q - goal.q).norm() >= MIN_APART_RAD) {
+            kept.push(goal);
+        }
+    }
+    Ok(kept)
+}
+
+fn configurations(panda: &Panda, start: &JointVector, pose: &Isometry3<f64>) -> Vec<JointVector> {
+    let limits = panda.limits();
+    let base_from_flange = pose * panda.flange_from_tcp().inverse();
+    let (low, high) = (limits.position_min[6], limits.position_max[6]);
+    let grid = (0..NUM_ANGLES).map(|i| low + (high - low) * (i as f64 + 0.5) / NUM_ANGLES as f64);
+    grid.flat_map(|q7| analytic_solutions(&base_from_flange, q7, start[0]))
+        .flatten()
+        .filter(|solution| solution.infeasibility <= 0.0)
+        .map(|solution| solution.q)
+        .filter(|q| limits.worst_violation(q, LIMIT_ROUNDING_RAD).is_none())
+        .collect()
+}

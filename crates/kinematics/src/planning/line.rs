@@ -1,0 +1,81 @@
+//! Straight motions of the tcp among obstacles: approach and retreat.
+
+use nalgebra::Isometry3;
+
+use crate::collision::Checker;
+use crate::error::KinematicsError;
+use crate::joints::JointVector;
+use crate::panda::Panda;
+use crate::path::{JointPath, LineOptions};
+
+/// A straight motion of the tcp, and how much of it is free.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CheckedLine {
+    /// Share of the way that can be followed without touching anything that may not be touched, 0 to 1.
+    pub share: f64,
+    /// The whole motion, where [`CheckedLine::share`] is 1.
+    pub path: Option<JointPath>,
+    /// What ends it, where it is less.
+    pub blocked_by: Option<String>,
+}
+
+/// Follows the straight line from the tcp's pose at `start` to a pose, and checks it against the checker's model.
+///
+/// What may be touched on the way (the part by the fingers, the table by the part) is a matter of that model:
+/// [`crate::collision::CollisionModel::allow`].
+///
+/// # Errors
+/// [`KinematicsError`] for input that makes no sense; a line that cannot be followed is no error but a share below 1.
+pub fn checked_line(
+    panda: &Panda,
+    checker: &mut Checker<'_>,
+    start: &JointVector,
+    base_from_tcp_end: &Isometry3<f64>,
+) -> Result<CheckedLine, KinematicsError> {
+    let whole = panda.straight_path(start, base_from_tcp_end, &LineOptions::default());
+    let (path, reached_share, ended_by) = match whole {
+        Ok(path) => (Some(path), 1.0, None),
+        Err(
+            error @ (KinematicsError::PathJointLimit { at_share, .. } | KinematicsError::PathBlocked { at_share, .. }),
+        ) => {
+            // What comes before that place may be blocked as well.
+            let base_from_start = panda.forward(start);
+            let share = at_share * FOLLOWED_AGAIN;
+            let end = base_from_start.lerp_slerp(base_from_tcp_end, share);
+            (panda.straight_path(start, &end, &LineOptions::default()).ok(), share, Some(error.to_string()))
+        }
+        Err(error) => return Err(error),
+    };
+    let Some(path) = path else {
+        return Ok(CheckedLine { share: 0.0, path: None, blocked_by: ended_by });
+    };
+    Ok(match first_blocked(checker, &path) {
+        Some((share, why)) => CheckedLine { share: share * reached_share, path: None, blocked_by: Some(why) },
+        None if ended_by.is_some() => CheckedLine { share: reached_share, path: None, blocked_by: ended_by },
+        None => CheckedLine { share: 1.0, path: Some(path), blocked_by: None },
+    })
+}
+
+/// Of the part that could be followed, so much is followed again to be checked: its end is where a joint meets its limit.
+const FOLLOWED_AGAIN: f64 = 0.98;
+
+/// Where a path is blocked first, as a share of it, and by what.
+fn first_blocked(checker: &mut Checker<'_>, path: &JointPath) -> Option<(f64, String)> {
+    let margin_mm = checker.margin_m() * 1e3;
+    let why = |checker: &Checker<'_>, q: &JointVector| {
+        format!("{}, at least {margin_mm:.1} mm are asked for", checker.model().nearest(q))
+    };
+    let waypoints: Vec<&JointVector> = path.waypoints().collect();
+    if !checker.is_free(waypoints[0]) {
+        return Some((0.0, why(checker, waypoints[0])));
+    }
+    let num_pieces = waypoints.len() - 1;
+    for (piece, pair) in waypoints.windows(2).enumerate() {
+        // Between waypoints the joints' path is straight up to some µm.
+        if let Some(share) = checker.blocked_share(pair[0], pair[1]) {
+            let q = pair[0] + (pair[1] - pair[0]) * share;
+            return Some((piece as f64 / num_pieces as f64, why(checker, &q)));
+        }
+    }
+    None
+}

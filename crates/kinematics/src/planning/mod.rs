@@ -1,0 +1,20 @@
+//! Motions around obstacles.
+//!
+//! ```text
+//! start ────────────────────────┐
+//! goal poses ─> configurations ─┼─> RRT-Connect ─> shorter way ─> Plan ─> trajectories
+//! CollisionModel ─> Checker ────┘                     approach ──┘
+//! ```
+//!
+//! There is no clock here: a search ends after so many collision checks, and gives the same plan on every machine.
+
+mod error;
+mod goals;
+mod line;
+mod plan;
+mod rrt;
+mod shortcut;
+
+pub use error::PlanError;
+pub use line::{CheckedLine, checked_line};
+pub use plan::{Plan, PlanOptions, StraightApproach};

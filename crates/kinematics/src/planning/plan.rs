@@ -1,0 +1,246 @@
+//! From a configuration to the best of several poses, around obstacles.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Translation3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+use super::error::PlanError;
+use super::goals::{GoalConfiguration, free_configurations};
+use super::line::checked_line;
+use super::rrt::{Found, Growth, Stops, rrt_connect};
+use super::shortcut::{cost_secs, shorten};
+use crate::check::check_joints;
+use crate::collision::{Checker, CollisionModel};
+use crate::error::KinematicsError;
+use crate::joints::JointVector;
+use crate::limits::{CartesianLimits, JointLimits};
+use crate::panda::Panda;
+use crate::path::JointPath;
+use crate::trajectory::Trajectory;
+
+/// How a plan is looked for.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct PlanOptions {
+    /// Decides the random configurations: the same seed gives the same plan.
+    pub seed: u64,
+    /// Distance kept to obstacles and between links that may not touch, m.
+    pub margin_m: f64,
+    /// The longest motion that is added to a tree at once, rad.
+    pub step_rad: f64,
+    /// Configurations that the search may check before it gives up.
+    pub max_checks: usize,
+    /// Attempts to shorten a way.
+    pub num_shortcuts: usize,
+    /// Searches of which the cheapest way is taken, where no straight motion leads to a goal.
+    pub num_searches: usize,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 2 }
+    }
+}
+
+/// The straight end of a motion: the tcp moves along its own z axis.
+#[derive(Debug, Clone, Copy)]
+pub struct StraightApproach<'a> {
+    /// How long it is, m.
+    pub length_m: f64,
+    /// What may be touched on it: the same obstacles with more pairs that may touch.
+    pub model: &'a CollisionModel,
+}
+
+/// A way around obstacles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Configurations, start and end included, between which the arm moves straight in joint space, rad.
+    pub waypoints: Vec<JointVector>,
+    /// The straight end, where one was asked for.
+    pub approach: Option<JointPath>,
+    /// Which of the goal poses is reached.
+    pub goal_idx: usize,
+    /// Configurations that were checked in all.
+    pub num_checks: usize,
+    /// Of these, before the first way was shortened.
+    pub num_search_checks: usize,
+    /// About how long the first way took before it was shortened, and the plan takes, with stops at the waypoints at full speed, s.
+    pub cost_secs: [f64; 2],
+}
+
+impl Plan {
+    /// The motions in time: one a straight part, each from rest to rest.
+    ///
+    /// # Errors
+    /// As [`Trajectory::point_to_point`] and [`Trajectory::along_path`].
+    pub fn trajectories(
+        &self,
+        limits: &JointLimits,
+        cartesian_limits: &CartesianLimits,
+    ) -> Result<Vec<Trajectory>, KinematicsError> {
+        let straight = self.waypoints.windows(2).map(|pair| Trajectory::point_to_point(&pair[0], &pair[1], limits));
+        let approach = self.approach.iter().map(|path| Trajectory::along_path(path.clone(), limits, cartesian_limits));
+        straight.chain(approach).collect()
+    }
+}
+
+impl Panda {
+    /// Plans a motion from `start` to one of several goal poses, around the obstacles of a model.
+    ///
+    /// Tried are all poses of `goals` (turns about a part's symmetry, exchanged fingers) with every way of the arm and many angles of joint 7: the
+    /// quickest that a straight motion reaches, or else the cheapest of what [`PlanOptions::num_searches`] searches towards all of them find.
+    /// With an approach, the way ends where the approach begins, at a configuration from which the whole approach is free.
+    ///
+    /// # Units and frames
+    /// `start` in rad, `goals` as `base_from_tcp` in m.
+    ///
+    /// # Errors
+    /// [`PlanError`] names what blocks: a limit, a pair of bodies, an obstacle.
+    pub fn plan(
+        &self,
+        model: &CollisionModel,
+        start: &JointVector,
+        goals: &[Isometry3<f64>],
+        approach: Option<&StraightApproach<'_>>,
+        options: &PlanOptions,
+    ) -> Result<Plan, PlanError> {
+        check_options(options, approach)?;
+        let mut checker = Checker::new(model, options.margin_m);
+        self.check_start(&mut checker, start)?;
+        let (goals, approaches) = match approach {
+            None => (free_configurations(self, &mut checker, start, goals)?, Vec::new()),
+            Some(approach) => self.approaches(&mut checker, start, goals, approach)?,
+        };
+
+        let mut stops = Stops::default();
+        let mut rng = Pcg64Mcg::seed_from_u64(options.seed);
+        let mut growth = Growth { step_rad: options.step_rad, max_checks: options.max_checks };
+        let first = match straight(&mut checker, start, &goals) {
+            Some(found) => found,
+            None => rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops)
+                .ok_or_else(|| not_found(&checker, &stops))?,
+        };
+        let num_search_checks = checker.num_checked();
+        let first_secs = cost_secs(&first.waypoints, &self.limits);
+        let is_straight = first.waypoints.len() == 2;
+        let mut best = first;
+        shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
+        // A further search may take some times as long as the first: it is for a better way, not for any.
+        growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
+        for _ in 1..if is_straight { 1 } else { options.num_searches } {
+            let further = rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops);
+            let Some(mut further) = further else { continue };
+            shorten(&mut checker, &self.limits, &mut further.waypoints, options.num_shortcuts, &mut rng);
+            if cost_secs(&further.waypoints, &self.limits) < cost_secs(&best.waypoints, &self.limits) {
+                best = further;
+            }
+        }
+        let Found { waypoints, goal_idx } = best;
+        Ok(Plan {
+            cost_secs: [first_secs, cost_secs(&waypoints, &self.limits)],
+            waypoints,
+            approach: approaches.into_iter().nth(goal_idx),
+            goal_idx: goals[goal_idx].pose_idx,
+            num_checks: checker.num_checked(),
+            num_search_checks,
+        })
+    }
+
+    fn check_start(&self, checker: &mut Checker<'_>, start: &JointVector) -> Result<(), PlanError> {
+        let kinematics = |cause| PlanError::Kinematics { what: "the start".to_owned(), cause };
+        check_joints("joint positions", start).map_err(kinematics)?;
+        if let Some(violation) = self.limits.worst_violation(start, LIMIT_ROUNDING_RAD) {
+            return Err(kinematics(KinematicsError::JointOutOfRange { what: "joint positions", violation }));
+        }
+        if let Some((obstacle, depth_m)) = checker.model().overlap_with_column() {
+            return Err(PlanError::EnclosesRobot { obstacle, depth_m });
+        }
+        if !checker.is_free(start) {
+            let nearest = checker.model().nearest(start);
+            return Err(PlanError::StartBlocked { nearest, margin_m: checker.margin_m() });
+        }
+        Ok(())
+    }
+
+    /// Configurations before the approach from which it is free, and the approaches.
+    fn approaches(
+        &self,
+        checker: &mut Checker<'_>,
+        start: &JointVector,
+        goals: &[Isometry3<f64>],
+        approach: &StraightApproach<'_>,
+    ) -> Result<(Vec<GoalConfiguration>, Vec<JointPath>), PlanError> {
+        let before: Vec<Isometry3<f64>> =
+            goals.iter().map(|goal| goal * Translation3::new(0.0, 0.0, -approach.length_m)).collect();
+        let mut on_approach = Checker::new(approach.model, checker.margin_m());
+        let (mut kept, mut paths) = (Vec::new(), Vec::new());
+        let mut best = (0.0, "nothing of it is free".to_owned());
+        for goal in free_configurations(self, checker, start, &before)? {
+            let line = checked_line(self, &mut on_approach, &goal.q, &goals[goal.pose_idx])
+                .map_err(|cause| PlanError::Kinematics { what: "the approach".to_owned(), cause })?;
+            match line.path {
+                Some(path) => {
+                    kept.push(goal);
+                    paths.push(path);
+                }
+                None if line.share >= best.0 => best = (line.share, line.blocked_by.unwrap_or_default()),
+                None => {}
+            }
+        }
+        if kept.is_empty() {
+            return Err(PlanError::ApproachBlocked { share: best.0, why: best.1 });
+        }
+        Ok((kept, paths))
+    }
+}
+
+/// Checks that every further search may take, and how many times those of the first.
+const MIN_FURTHER_CHECKS: usize = 1000;
+const FURTHER_CHECKS_RATIO: usize = 2;
+
+/// Straight to the quickest goal that can be reached so; goals come the quickest first.
+fn straight(checker: &mut Checker<'_>, start: &JointVector, goals: &[GoalConfiguration]) -> Option<Found> {
+    let goal_idx = goals.iter().position(|goal| checker.is_edge_free(start, &goal.q))?;
+    Some(Found { waypoints: vec![*start, goals[goal_idx].q], goal_idx })
+}
+
+fn roots(goals: &[GoalConfiguration]) -> Vec<JointVector> {
+    goals.iter().map(|goal| goal.q).collect()
+}
+
+/// Positions this far beyond a limit are rounding.
+const LIMIT_ROUNDING_RAD: f64 = 1e-9;
+
+fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
+    /// Pairs that are told.
+    const MAX_TOLD: usize = 3;
+    let mut counts = BTreeMap::<String, usize>::new();
+    for q in stops.configurations() {
+        let nearest = checker.model().nearest(q);
+        *counts.entry(format!("{} and {}", nearest.body, nearest.other)).or_default() += 1;
+    }
+    let total = stops.configurations().len().max(1) as f64;
+    let mut blockers: Vec<(String, f64)> =
+        counts.into_iter().map(|(pair, count)| (pair, count as f64 / total)).collect();
+    blockers.sort_by(|a, b| b.1.total_cmp(&a.1));
+    blockers.truncate(MAX_TOLD);
+    PlanError::NotFound { num_checks: checker.num_checked(), blockers }
+}
+
+fn check_options(options: &PlanOptions, approach: Option<&StraightApproach<'_>>) -> Result<(), PlanError> {
+    for (option, found, max, expected) in [
+        ("margin_m", options.margin_m, 0.1, "above 0 and at most 0.1 m"),
+        ("step_rad", options.step_rad, 10.0, "above 0 and at most 10 rad"),
+        ("length_m", approach.map_or(0.1, |approach| approach.length_m), 1.0, "above 0 and at most 1 m"),
+    ] {
+        if !(found > 0.0 && found <= max) {
+            return Err(PlanError::InvalidOption { option, expected, found });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,82 @@
+//! Shorter ways: parts of a way that a straight motion can replace.
+
+use rand::Rng;
+use rand_pcg::Pcg64Mcg;
+
+use crate::collision::Checker;
+use crate::joints::JointVector;
+use crate::limits::JointLimits;
+
+/// About what a stop at a waypoint costs: braking from and accelerating to a good part of the full speed, s.
+const STOP_SECS: f64 = 0.15;
+/// A replacement that gains less than this is not worth its checks, s.
+const MIN_GAIN_SECS: f64 = 0.01;
+
+/// About how long a way takes with a stop at every waypoint, at full speed, s.
+pub(super) fn cost_secs(waypoints: &[JointVector], limits: &JointLimits) -> f64 {
+    let motion_secs: f64 = waypoints.windows(2).map(|pair| motion_secs(&pair[0], &pair[1], limits)).sum();
+    motion_secs + STOP_SECS * waypoints.len().saturating_sub(2) as f64
+}
+
+/// How long the slowest joint takes at its full speed, s.
+pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLimits) -> f64 {
+    (to - from).abs().component_div(&limits.velocity_max).max()
+}
+
+/// Replaces parts of a way by straight motions as long as `attempts` last: first from waypoint to waypoint, then between random places.
+pub(super) fn shorten(
+    checker: &mut Checker<'_>,
+    limits: &JointLimits,
+    waypoints: &mut Vec<JointVector>,
+    attempts: usize,
+    rng: &mut Pcg64Mcg,
+) {
+    skip_waypoints(checker, waypoints);
+    for _ in 0..attempts {
+        if waypoints.len() <= 2 {
+            return;
+        }
+        let total = waypoints.windows(2).map(|pair| motion_secs(&pair[0], &pair[1], limits)).sum::<f64>();
+        let (a, b) = (rng.random_range(0.0..1.0) * total, rng.random_range(0.0..1.0) * total);
+        let (first, second) = (place(waypoints, limits, a.min(b)), place(waypoints, limits, a.max(b)));
+        if first.0 == second.0 {
+            continue;
+        }
+        let mut shorter = waypoints[..=first.0].to_vec();
+        shorter.extend([first.1, second.1]);
+        shorter.extend_from_slice(&waypoints[second.0 + 1..]);
+        if cost_secs(&shorter, limits) < cost_secs(waypoints, limits) - MIN_GAIN_SECS
+            && checker.is_edge_free(&first.1, &second.1)
+        {
+            *waypoints = shorter;
+            skip_waypoints(checker, waypoints);
+        }
+    }
+}
+
+/// From each waypoint straight to the last one that can be reached so.
+fn skip_waypoints(checker: &mut Checker<'_>, waypoints: &mut Vec<JointVector>) {
+    let mut kept = vec![waypoints[0]];
+    let mut at = 0;
+    while at + 1 < waypoints.len() {
+        let next = (at + 2..waypoints.len())
+            .rev()
+            .find(|&next| checker.is_edge_free(&waypoints[at], &waypoints[next]))
+            .unwrap_or(at + 1);
+        kept.push(waypoints[next]);
+        at = next;
+    }
+    *waypoints = kept;
+}
+
+/// The motion that is under way after a time, by the waypoint that it starts from, and where the arm is then.
+fn place(waypoints: &[JointVector], limits: &JointLimits, mut secs: f64) -> (usize, JointVector) {
+    for (index, pair) in waypoints.windows(2).enumerate() {
+        let duration_secs = motion_secs(&pair[0], &pair[1], limits);
+        if secs <= duration_secs && duration_secs > 0.0 {
+            return (index, pair[0] + (pair[1] - pair[0]) * (secs / duration_secs));
+        }
+        secs -= duration_secs;
+    }
+    (waypoints.len() - 2, waypoints[waypoints.len() - 1])
+}

@@ -1,0 +1,61 @@
+//! The text of a workcell's file, to turn places in it into lines, and what is read of it again and again.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::error::WorkcellError;
+
+/// Where an arm can be at all, mm.
+pub(super) const MAX_REACH_MM: f64 = 1500.0;
+
+/// So many numbers and no more; serde's own arrays pass over what follows.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
+
+impl<const N: usize> TryFrom<Vec<f64>> for Numbers<N> {
+    type Error = String;
+
+    fn try_from(found: Vec<f64>) -> Result<Self, String> {
+        let count = found.len();
+        found.try_into().map(Self).map_err(|_| format!("expected {N} numbers, found {count}"))
+    }
+}
+
+/// The text, to turn places in it into lines.
+pub(super) struct Source<'t>(pub(super) &'t str);
+
+impl Source<'_> {
+    pub(super) fn error(&self, at: usize, what: impl Into<String>) -> WorkcellError {
+        let end = at.min(self.0.len());
+        let line = 1 + self.0.as_bytes()[..end].iter().filter(|&&byte| byte == b'\n').count();
+        WorkcellError { line, what: what.into() }
+    }
+
+    pub(super) fn expected<T>(
+        &self,
+        place: &Spanned<T>,
+        name: &str,
+        expected: &str,
+        found: impl std::fmt::Display,
+    ) -> WorkcellError {
+        self.error(place.span().start, format!("{name}: expected {expected}, found {found}"))
+    }
+
+    pub(super) fn number(&self, value: &Spanned<f64>, name: &str, [min, max]: [f64; 2]) -> Result<f64, WorkcellError> {
+        let found = *value.get_ref();
+        if (min..=max).contains(&found) {
+            return Ok(found);
+        }
+        Err(self.expected(value, name, &format!("a number from {min} to {max}"), found))
+    }
+
+    pub(super) fn range_m(&self, value: &Spanned<Numbers<2>>, name: &str) -> Result<[f64; 2], WorkcellError> {
+        let Numbers([min, max]) = *value.get_ref();
+        if min < max && min >= -MAX_REACH_MM && max <= MAX_REACH_MM {
+            return Ok([min * 1e-3, max * 1e-3]);
+        }
+        let expected = format!("[smallest, largest] in mm, within {MAX_REACH_MM} of the base");
+        Err(self.expected(value, name, &expected, format!("[{min}, {max}]")))
+    }
+}

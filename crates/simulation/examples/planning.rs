@@ -1,0 +1,161 @@
+//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning serve`.
+//!
+//! - `rate`: configurations that the collision model checks in a second on one core.
+//! - `proof`: plans COUNT problems, and follows each path in MuJoCo at steps of 1 ms.
+//!
+//!   Both are timed by the clock and by the time that Linux gave the thread, which other programs on the machine do not change.
+//! - `serve`: answers collision checks on standard input, for planners of others (benches/peers/ompl_planning.py): a problem's seed as u64
+//!   (u64::MAX ends), answered by start and goal configuration (14 f64); then any number of configurations (7 f64), each answered by a byte (1 free),
+//!   until seven NaN. Little-endian.
+
+use std::error::Error;
+use std::io::{Read, Write};
+use std::time::Instant;
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_kinematics::collision::Checker;
+use sdg_kinematics::planning::PlanOptions;
+use sdg_kinematics::{CartesianLimits, JointLimits, JointVector, Panda};
+use sdg_simulation::{CollisionWorld, PlanningProblem};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let number = |place: usize, default: u64| args.get(place).map_or(Ok(default), |text| text.parse());
+    match args.first().map(String::as_str) {
+        Some("rate") => rate(),
+        Some("proof") => proof(number(1, 1000)?, number(2, 0)?),
+        Some("serve") => serve(),
+        _ => Err("expected rate, proof [COUNT] [FIRST_SEED] or serve".into()),
+    }
+}
+
+/// The clock, and the processor's time of this thread.
+struct Stopwatch {
+    started: Instant,
+    processor_ms: f64,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self { started: Instant::now(), processor_ms: processor_ms() }
+    }
+
+    /// By the clock and by the processor, ms.
+    fn elapsed_ms(&self) -> [f64; 2] {
+        [self.started.elapsed().as_secs_f64() * 1e3, processor_ms() - self.processor_ms]
+    }
+}
+
+/// What this thread has had of a processor, ms; NaN where Linux does not tell.
+fn processor_ms() -> f64 {
+    std::fs::read_to_string("/proc/thread-self/schedstat")
+        .ok()
+        .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(f64::NAN, |nanoseconds| nanoseconds * 1e-6)
+}
+
+/// Random configurations among eight obstacles.
+fn rate() -> Result<(), Box<dyn Error>> {
+    const COUNT: usize = 200_000;
+    let problem =
+        (0..).map(PlanningProblem::random).find(|problem| problem.obstacles.len() == 8).ok_or("no problem")?;
+    let limits = JointLimits::franka();
+    let mut rng = Pcg64Mcg::seed_from_u64(1);
+    let configurations: Vec<JointVector> = (0..COUNT)
+        .map(|_| JointVector::from_fn(|i, _| rng.random_range(limits.position_min[i]..limits.position_max[i])))
+        .collect();
+    let watch = Stopwatch::start();
+    let distances = Checker::new(&problem.model, 0.003).distances_m(&configurations);
+    let [clock, processor] = watch.elapsed_ms().map(|ms| COUNT as f64 / ms * 1e3);
+    let num_free = distances.iter().filter(|distance| **distance > 0.0).count();
+    println!(
+        "configurations a second among 8 obstacles on one core: {processor:.0} by the processor's time, {clock:.0} by the clock \
+         ({num_free} of {COUNT} free)"
+    );
+    Ok(())
+}
+
+fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
+    let (panda, limits) = (Panda::new(), JointLimits::franka());
+    let (mut millis, mut clock_millis) = (Vec::new(), Vec::new());
+    let (mut search_checks, mut all_checks) = (Vec::new(), Vec::new());
+    let (mut num_colliding, mut num_steps, mut num_bent) = (0, 0, 0);
+    for seed in first_seed..first_seed + count {
+        let problem = PlanningProblem::random(seed);
+        let options = PlanOptions::default();
+        let watch = Stopwatch::start();
+        let planned = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
+        let [clock_ms, processor_ms] = watch.elapsed_ms();
+        let plan = match planned {
+            Ok(plan) => plan,
+            Err(error) => {
+                println!("problem {seed}: {error} ({processor_ms:.0} ms)");
+                continue;
+            }
+        };
+        millis.push(processor_ms);
+        clock_millis.push(clock_ms);
+        num_bent += usize::from(plan.waypoints.len() > 2);
+        search_checks.push(plan.num_search_checks as f64);
+        all_checks.push(plan.num_checks as f64);
+        let mut world = CollisionWorld::new(&problem.obstacles, sdg_kinematics::HAND_OPENING_MAX_M)?;
+        let mut deepest = None;
+        for motion in plan.trajectories(&limits, &CartesianLimits::franka())? {
+            for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
+                num_steps += 1;
+                if let Some(overlap) = world.deepest(&motion.sample(step as f64 * 1e-3).0)? {
+                    deepest = Some(overlap);
+                }
+            }
+        }
+        if let Some(overlap) = deepest {
+            num_colliding += 1;
+            println!("problem {seed}: MuJoCo finds {overlap:?}");
+        }
+    }
+    let share =
+        |sorted: &[f64], share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied();
+    for values in [&mut millis, &mut clock_millis, &mut search_checks, &mut all_checks] {
+        values.sort_by(f64::total_cmp);
+    }
+    println!("{} of {count} found; {num_colliding} paths collide in MuJoCo at {num_steps} steps of 1 ms", millis.len());
+    for (name, values) in
+        [("ms", &millis), ("checks before shortening", &search_checks), ("checks in all", &all_checks)]
+    {
+        let [median, p99, max] = [0.5, 0.99, 1.0].map(|at| share(values, at).unwrap_or(f64::NAN));
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        println!("{name}: median {median:.1}, mean {mean:.1}, 99 % {p99:.1}, most {max:.1}");
+    }
+    Ok(())
+}
+
+fn serve() -> Result<(), Box<dyn Error>> {
+    let (mut input, mut output) = (std::io::stdin().lock(), std::io::stdout().lock());
+    loop {
+        let mut seed = [0; 8];
+        input.read_exact(&mut seed)?;
+        let seed = u64::from_le_bytes(seed);
+        if seed == u64::MAX {
+            return Ok(());
+        }
+        let problem = PlanningProblem::random(seed);
+        for number in problem.start.iter().chain(problem.goal.iter()) {
+            output.write_all(&number.to_le_bytes())?;
+        }
+        output.flush()?;
+        let mut checker = Checker::new(&problem.model, PlanOptions::default().margin_m);
+        loop {
+            let mut bytes = [0; 56];
+            input.read_exact(&mut bytes)?;
+            let q = JointVector::from_fn(|i, _| {
+                f64::from_le_bytes(bytes[8 * i..8 * i + 8].try_into().expect("eight bytes a number"))
+            });
+            if q.iter().all(|x| x.is_nan()) {
+                break;
+            }
+            output.write_all(&[u8::from(checker.is_free(&q))])?;
+            output.flush()?;
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Random problems of planning: a start and a goal among obstacles.
+
+use nalgebra::Isometry3;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_kinematics::collision::{Checker, CollisionModel, Obstacle};
+use sdg_kinematics::{HAND_OPENING_MAX_M, JointLimits, JointVector, Panda};
+
+use crate::obstacles::random_obstacles;
+
+/// A start and a goal among random obstacles, both free.
+#[derive(Debug, Clone)]
+pub struct PlanningProblem {
+    /// One to eight.
+    pub obstacles: Vec<Obstacle>,
+    /// The same as a model, with the hand open.
+    pub model: CollisionModel,
+    /// Where the arm is, rad.
+    pub start: JointVector,
+    /// Where the tcp is to be, m.
+    pub base_from_goal: Isometry3<f64>,
+    /// A free configuration that reaches the goal, rad.
+    pub goal: JointVector,
+}
+
+impl PlanningProblem {
+    /// Distance of start and goal from everything, m: more than planners keep.
+    const FREE_M: f64 = 0.01;
+    /// Distance of start and goal from the joints' limits, rad.
+    const INSIDE_RAD: f64 = 0.05;
+
+    /// The problem of a seed, always the same. Start and goal are drawn from all of the joints' ranges.
+    pub fn random(seed: u64) -> Self {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let obstacles = random_obstacles(rng.random_range(1..=8), rng.random());
+        let model = CollisionModel::new(obstacles.clone(), HAND_OPENING_MAX_M).expect("random obstacles make sense");
+        let limits = JointLimits::franka();
+        let mut checker = Checker::new(&model, Self::FREE_M);
+        let mut free = || loop {
+            let q = JointVector::from_fn(|i, _| {
+                rng.random_range(limits.position_min[i] + Self::INSIDE_RAD..limits.position_max[i] - Self::INSIDE_RAD)
+            });
+            if checker.is_free(&q) {
+                return q;
+            }
+        };
+        let (start, goal) = (free(), free());
+        Self { obstacles, base_from_goal: Panda::new().forward(&goal), start, goal, model }
+    }
+}
