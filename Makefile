@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser test-v4l test-peers network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -49,6 +49,9 @@ test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated 
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)
+
+network-grasps: setup ## Grasps of all parts over TCP and UDP beside the same in one process, in lockstep and in real time (NETWORK_GRASPS=5: fewer)
+	@scripts/network-grasps.sh
 
 test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
 	@scripts/install.sh libvulkan1 mesa-vulkan-drivers

@@ -13,8 +13,9 @@ use std::time::Duration;
 use fci_support::{connect, connect_hand, serve, serve_panda};
 use sdg_fci::client::{Answer, InternalController, Robot};
 use sdg_fci::server::Pace;
-use sdg_fci::wire::{Load, RobotMode, RobotState};
+use sdg_fci::wire::{Load, RobotMode, RobotState, Status};
 use sdg_fci::{FciError, Limits, RobotError, isometry};
+use sdg_kinematics::{JointVector, Panda};
 
 /// How far the arm may lag behind its reference in these slow motions: the stiffness of 3000 N·m/rad yields 0.3 mrad to 1 N·m.
 const LAG_RAD: f64 = 2e-3;
@@ -197,6 +198,54 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
             }
         }
     }
+}
+
+/// How far the end effector's motion is from a direction that the joints cannot do.
+fn smallest_singular_value(q: &[f64; 7]) -> f64 {
+    Panda::new().jacobian(&JointVector::from(*q)).svd(false, false).singular_values.min()
+}
+
+#[test]
+fn no_cartesian_motion_starts_at_a_singular_pose_and_one_does_just_beside_it() {
+    /// What the server asks for, as franka-sim does.
+    const MIN_SINGULAR_VALUE: f64 = 0.05;
+    let (_server, mut robot) = serve_panda();
+    let home = robot.read_state().unwrap().q_desired;
+    // Nearly stretched out.
+    let mut stretched = home;
+    (stretched[1], stretched[3], stretched[5]) = (0.0, -0.1, 1.6);
+    let between = |share: f64| -> [f64; 7] {
+        std::array::from_fn(|joint| home[joint] + share * (stretched[joint] - home[joint]))
+    };
+    assert!(smallest_singular_value(&home) > 0.06 && smallest_singular_value(&stretched) < 0.04);
+    // The share of the way at which the smallest singular value is the least that is allowed.
+    let (mut beside, mut singular) = (0.0, 1.0);
+    while singular - beside > 1e-6 {
+        let middle = 0.5 * (beside + singular);
+        let is_beside = smallest_singular_value(&between(middle)) > MIN_SINGULAR_VALUE;
+        *(if is_beside { &mut beside } else { &mut singular }) = middle;
+    }
+    for (share, is_refused) in [(beside - 0.002, false), (beside + 0.002, true)] {
+        limit_cases::go_to(&mut robot, &between(share)).unwrap();
+        let controller = InternalController::JointImpedance;
+        let held = [
+            robot.control_poses(controller, |state, _| ControlFlow::Break(state.base_from_ee_commanded)),
+            robot.control_twists(controller, |_, _| ControlFlow::Break([0.0; 6])),
+        ];
+        for ended in held {
+            match ended {
+                Ok(_) => assert!(!is_refused, "at {share}"),
+                Err(error) => {
+                    assert!(is_refused, "{error}");
+                    let FciError::Refused { status, .. } = &error else { panic!("{error}") };
+                    assert_eq!(*status, Status::StartAtSingularPose);
+                }
+            }
+        }
+        // It is no error: the joints may go on.
+        assert_eq!(robot.read_state().unwrap().robot_mode, RobotMode::Idle);
+    }
+    limit_cases::go_to(&mut robot, &home).unwrap();
 }
 
 #[test]

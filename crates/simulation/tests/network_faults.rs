@@ -16,7 +16,7 @@ use network::{Twin, cell, connect, serve, some_motion};
 use sdg_fci::read_message;
 use sdg_fci::server::Pace;
 use sdg_fci::wire::{Header, HeaderKind};
-use sdg_kinematics::{JointLimits, Trajectory};
+use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
 use sdg_robot::{
     Arm, ArmMode, FrankaArm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, Robot, RobotError,
     SafetyLimits, Scheduling, StopReason, Watch, grasp,
@@ -100,11 +100,13 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     arm.set_contact_sensitivity(sdg_robot::ContactSensitivity::Free).unwrap();
     let wrong = SafetyLimits { table_height_m: -0.6, ..Workcell::safety_limits() };
     let mut robot = Robot::new(&mut arm, SafetyLimits { workspace: None, ..wrong }, Watch::default());
-    let mut end = start;
-    // Forward and down: the hand meets the table.
-    end[1] += 1.3;
-    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
-    let error = robot.follow(Trajectory::point_to_point(&start, &end, &slow).unwrap()).unwrap_err();
+    // Straight down, 5 cm into the table.
+    let panda = Panda::new();
+    let mut base_from_tcp = panda.forward(&start);
+    base_from_tcp.translation.z = -0.05;
+    let path = panda.straight_path(&start, &base_from_tcp, &LineOptions::default()).unwrap();
+    let slow = CartesianLimits::franka().scaled(0.1, 0.1, 0.05).unwrap();
+    let error = robot.follow(Trajectory::along_path(path, &JointLimits::franka(), &slow).unwrap()).unwrap_err();
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");
     let line = error.to_string();
     assert!(line.contains("_reflex") && !line.contains('\n'), "{line}");

@@ -121,6 +121,22 @@ pub fn all(limits: &Limits) -> Vec<Case> {
         case("turning jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
             Signal::Twist { profile: Profile::jerk(turn.jerk * share) }
         }),
+        case("translation jerk, by poses", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+            Signal::PoseAlong { profile: Profile::jerk(limits.translation.jerk * share) }
+        }),
+        case("translation jerk, by twists", RobotError::CartesianMotionGeneratorAccelerationDiscontinuity, &|share| {
+            Signal::TwistAlong { profile: Profile::jerk(limits.translation.jerk * share) }
+        }),
+        case(
+            "translation acceleration, by poses",
+            RobotError::CartesianMotionGeneratorVelocityDiscontinuity,
+            &|share| Signal::PoseAlong { profile: Profile::acceleration(limits.translation.acceleration * share) },
+        ),
+        case(
+            "translation acceleration, by twists",
+            RobotError::CartesianMotionGeneratorAccelerationDiscontinuity,
+            &|share| Signal::TwistAlong { profile: Profile::acceleration(limits.translation.acceleration * share) },
+        ),
         case("elbow jerk", RobotError::CartesianMotionGeneratorElbowLimitViolation, &|share| Signal::Elbow {
             profile: Profile::jerk(elbow.jerk * share),
         }),
@@ -183,7 +199,12 @@ impl Case {
     pub fn is_cartesian(&self) -> bool {
         matches!(
             self.inside,
-            Signal::Pose { .. } | Signal::Twist { .. } | Signal::Elbow { .. } | Signal::StartElbow { .. }
+            Signal::Pose { .. }
+                | Signal::PoseAlong { .. }
+                | Signal::Twist { .. }
+                | Signal::TwistAlong { .. }
+                | Signal::Elbow { .. }
+                | Signal::StartElbow { .. }
         )
     }
 

@@ -20,6 +20,10 @@ pub enum Signal {
     Pose { profile: Profile },
     /// The same as a velocity.
     Twist { profile: Profile },
+    /// The way of the end effector along the base's y, as poses: turning in the base needs the least of the joints.
+    PoseAlong { profile: Profile },
+    /// The same as a velocity.
+    TwistAlong { profile: Profile },
     /// The elbow, the end effector standing.
     Elbow { profile: Profile },
     /// Joint 7's torque, the others standing.
@@ -87,7 +91,7 @@ impl Signal {
                 MotionGeneratorMode::JointPosition
             }
             Signal::JointVelocity { .. } => MotionGeneratorMode::JointVelocity,
-            Signal::Twist { .. } => MotionGeneratorMode::CartesianVelocity,
+            Signal::Twist { .. } | Signal::TwistAlong { .. } => MotionGeneratorMode::CartesianVelocity,
             Signal::Torque { .. } | Signal::SpunJoint { .. } => {
                 let generator = match version {
                     Version::V5 => MotionGeneratorMode::JointVelocity,
@@ -167,6 +171,14 @@ impl Signal {
             }
             Signal::Twist { profile } => {
                 motion.twist[5] = profile.value(ms);
+                return profile.is_over(ms);
+            }
+            Signal::PoseAlong { profile } => {
+                motion.base_from_ee[13] += profile.offset(ms);
+                return profile.is_over(ms);
+            }
+            Signal::TwistAlong { profile } => {
+                motion.twist[1] = profile.value(ms);
                 return profile.is_over(ms);
             }
             Signal::Elbow { profile } => {

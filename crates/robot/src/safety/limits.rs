@@ -58,21 +58,18 @@ impl SafetyLimits {
     /// The FR3's limits over a table at the base's height. The tcp is not allowed to be faster than a Panda's.
     pub fn fr3() -> Self {
         let robot = &Limits::FR3;
-        let joints = JointLimits {
-            position_min: robot.q_min.into(),
-            position_max: robot.q_max.into(),
-            velocity_max: robot.velocity.into(),
-            acceleration_max: robot.acceleration.into(),
-            jerk_max: robot.jerk.into(),
-        };
-        let cartesian = CartesianLimits {
-            acceleration_m_s2: robot.translation.acceleration,
-            jerk_m_s3: robot.translation.jerk,
-            angular_velocity_rad_s: robot.rotation.velocity,
-            angular_acceleration_rad_s2: robot.rotation.acceleration,
-            angular_jerk_rad_s3: robot.rotation.jerk,
-            ..CartesianLimits::franka()
-        };
+        let mut joints = JointLimits::franka();
+        joints.position_min = robot.q_min.into();
+        joints.position_max = robot.q_max.into();
+        joints.velocity_max = robot.velocity.into();
+        joints.acceleration_max = robot.acceleration.into();
+        joints.jerk_max = robot.jerk.into();
+        let mut cartesian = CartesianLimits::franka();
+        cartesian.acceleration_m_s2 = robot.translation.acceleration;
+        cartesian.jerk_m_s3 = robot.translation.jerk;
+        cartesian.angular_velocity_rad_s = robot.rotation.velocity;
+        cartesian.angular_acceleration_rad_s2 = robot.rotation.acceleration;
+        cartesian.angular_jerk_rad_s3 = robot.rotation.jerk;
         Self { joints, cartesian, robot, ..Self::default() }
     }
 }

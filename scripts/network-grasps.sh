@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Whole grasps of every shipped part over TCP and UDP, NETWORK_GRASPS (20) attempts each, beside the same attempts in one process:
+# in lockstep, and in real time. The example says what counts as a failure.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+attempts=${NETWORK_GRASPS:-20}
+${CARGO:-cargo} build --release --locked -p sdg-simulation --example network_grasps
+example=${CARGO_TARGET_DIR:-target}/release/examples/network_grasps
+
+# A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
+realtime=
+if chrt -f 30 true 2>/dev/null; then realtime="chrt -f 30"; fi
+
+echo "== in lockstep"
+"$example" lockstep "$attempts"
+echo "== in real time, real-time priority: ${realtime:-none}"
+$realtime "$example" realtime "$attempts"
