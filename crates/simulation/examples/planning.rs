@@ -80,7 +80,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     let (panda, limits) = (Panda::new(), JointLimits::franka());
     let (mut millis, mut clock_millis) = (Vec::new(), Vec::new());
     let (mut search_checks, mut all_checks) = (Vec::new(), Vec::new());
-    let (mut num_colliding, mut num_steps, mut num_bent) = (0, 0, 0);
+    let (mut num_colliding, mut num_steps) = (0, 0);
     for seed in first_seed..first_seed + count {
         let problem = PlanningProblem::random(seed);
         let options = PlanOptions::default();
@@ -96,7 +96,6 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         };
         millis.push(processor_ms);
         clock_millis.push(clock_ms);
-        num_bent += usize::from(plan.waypoints.len() > 2);
         search_checks.push(plan.num_search_checks as f64);
         all_checks.push(plan.num_checks as f64);
         let mut world = CollisionWorld::new(&problem.obstacles, sdg_kinematics::HAND_OPENING_MAX_M)?;
