@@ -142,9 +142,12 @@ fn wrong_files_and_options_are_refused_before_anything_moves() {
         fs::write(&path, whole.replace(from, to)).unwrap();
         path
     };
-    let obstacle =
-        write("obstacle.toml", "[[look_out]]\ncamera_at_mm = [480, 100, 580]", "[[obstacle]]\nname = \"post\"");
-    grasp(&obstacle, &sim, 1, &["obstacle.toml: line 30: obstacle: no motion is planned around it"]);
+    let second_look_out = "[[look_out]]\ncamera_at_mm = [480, 100, 580]";
+    let post = "[[obstacle]]\nname = \"post\"\ncapsule_mm = [40, 300]\nat_mm = [300, 400, 150]";
+    let obstacle = write("obstacle.toml", second_look_out, post);
+    grasp(&obstacle, &sim, 1, &["obstacle.toml: expected no obstacle, found \"post\"", "are not planned around it"]);
+    let nowhere = write("nowhere.toml", second_look_out, "[[obstacle]]\nname = \"post\"");
+    grasp(&nowhere, &sim, 1, &["nowhere.toml: line 30: missing field `at_mm`"]);
     let model_name = write("robot.toml", "\"panda\"", "\"ur5\"");
     grasp(&model_name, &sim, 1, &["robot.toml: line 6: model: expected \"panda\" or \"fr3\", found \"ur5\""]);
     // The camera's file is looked for beside the workcell's.
@@ -210,7 +213,8 @@ fn a_real_arm_is_not_driven_without_real_time_scheduling() {
     let folder = tempfile::tempdir().unwrap();
     let model = taught(folder.path(), true);
     let workcell = shipped("workcell/workcell.toml");
-    let grasp = ["grasp", "--from", "dir:/tmp", "--grasp-model", text(&model), "--workcell", text(&workcell)];
+    let pictures = format!("dir:{}", shipped("demonstrations/pendulum").display());
+    let grasp = ["grasp", "--from", &pictures, "--grasp-model", text(&model), "--workcell", text(&workcell)];
     let home = ["robot", "home", "--workcell", text(&workcell)];
     for command in [&grasp[..], &home] {
         // Nobody is at this address: it is refused before anything is connected to.

@@ -1,11 +1,7 @@
 //! The network's shape, as plain data that a model file can carry.
 
-use burn::tensor::Device;
-use sdg_detection::initialization::Initializer;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
-
-use crate::network::ComparisonNetwork;
 
 /// A setting that no network can be built with.
 #[derive(Debug, Error)]
@@ -62,25 +58,8 @@ impl ComparisonConfig {
         self.trunk_map_px() >> self.stage_channels.len()
     }
 
-    /// Builds the network with parameters drawn from a seed. For training the device must carry autodiff.
-    ///
-    /// # Errors
-    /// A setting that is out of its range.
-    pub fn init(&self, device: &Device, seed: u64) -> Result<ComparisonNetwork, ComparisonError> {
-        self.check()?;
-        Ok(ComparisonNetwork::init(self, &mut Initializer::new(device, seed)))
-    }
-
-    /// Builds the network without drawing its parameters, for who sets all of them next.
-    ///
-    /// # Errors
-    /// As [`Self::init`].
-    pub fn init_blank(&self, device: &Device) -> Result<ComparisonNetwork, ComparisonError> {
-        self.check()?;
-        Ok(ComparisonNetwork::init(self, &mut Initializer::blank(device)))
-    }
-
-    fn check(&self) -> Result<(), ComparisonError> {
+    /// Checks that the network can be built.
+    pub(crate) fn check(&self) -> Result<(), ComparisonError> {
         let check = |holds: bool, field, expected, found: String| match holds {
             true => Ok(()),
             false => Err(ComparisonError { field, expected, found }),
@@ -127,7 +106,7 @@ mod tests {
         let message = |change: fn(&mut ComparisonConfig)| {
             let mut config = ComparisonConfig::edge();
             change(&mut config);
-            config.init_blank(&Device::flex()).unwrap_err().to_string()
+            config.check().unwrap_err().to_string()
         };
         let odd = message(|c| c.input_px = 72);
         assert!(odd.contains("input_px must be 16 to 256") && odd.ends_with("found 72"), "{odd}");

@@ -7,7 +7,7 @@ use sdg_detection::initialization::{Distribution, Initializer};
 use sdg_detection::layers::Linear;
 use sdg_orientation::{ConvNormRelu, Stage};
 
-use crate::config::ComparisonConfig;
+use crate::config::{ComparisonConfig, ComparisonError};
 use crate::view::{DIFFERENCES, Offset, View, batch};
 
 /// Side of the first convolution's kernel.
@@ -41,8 +41,28 @@ pub struct Reading {
     pub offset: Offset,
 }
 
+impl ComparisonConfig {
+    /// Builds the network with parameters drawn from a seed. For training the device must carry autodiff.
+    ///
+    /// # Errors
+    /// A setting that is out of its range.
+    pub fn init(&self, device: &Device, seed: u64) -> Result<ComparisonNetwork, ComparisonError> {
+        self.check()?;
+        Ok(ComparisonNetwork::init(self, &mut Initializer::new(device, seed)))
+    }
+
+    /// Builds the network without drawing its parameters, for who sets all of them next.
+    ///
+    /// # Errors
+    /// As [`Self::init`].
+    pub fn init_blank(&self, device: &Device) -> Result<ComparisonNetwork, ComparisonError> {
+        self.check()?;
+        Ok(ComparisonNetwork::init(self, &mut Initializer::blank(device)))
+    }
+}
+
 impl ComparisonNetwork {
-    pub(crate) fn init(config: &ComparisonConfig, init: &mut Initializer) -> Self {
+    fn init(config: &ComparisonConfig, init: &mut Initializer) -> Self {
         let groups = config.norm_groups;
         let trunk = stages(3, FIRST_KERNEL, &config.trunk_channels, &config.trunk_convs, groups, init);
         let of_trunk = config.trunk_channels.last().copied().unwrap_or(3);

@@ -82,7 +82,7 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     let (mut search_checks, mut all_checks) = (Vec::new(), Vec::new());
     let (mut num_colliding, mut num_steps) = (0, 0);
     for seed in first_seed..first_seed + count {
-        let problem = PlanningProblem::random(seed);
+        let problem = PlanningProblem::obstructed(seed);
         let options = PlanOptions::default();
         let watch = Stopwatch::start();
         let planned = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
@@ -138,7 +138,7 @@ fn serve() -> Result<(), Box<dyn Error>> {
         if seed == u64::MAX {
             return Ok(());
         }
-        let problem = PlanningProblem::random(seed);
+        let problem = PlanningProblem::obstructed(seed);
         for number in problem.start.iter().chain(problem.goal.iter()) {
             output.write_all(&number.to_le_bytes())?;
         }

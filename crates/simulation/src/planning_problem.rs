@@ -3,7 +3,8 @@
 use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_kinematics::collision::{Checker, CollisionModel, Obstacle};
+use sdg_kinematics::collision::{Checker, CollisionModel, Obstacle, Shape};
+use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{HAND_OPENING_MAX_M, JointLimits, JointVector, Panda};
 
 use crate::obstacles::random_obstacles;
@@ -26,6 +27,9 @@ pub struct PlanningProblem {
 impl PlanningProblem {
     /// Distance of start and goal from everything, m: more than planners keep.
     const FREE_M: f64 = 0.01;
+    /// Obstacles that are added to a problem at most, and their size, m.
+    const MAX_ADDED: usize = 4;
+    const BALL_RADIUS_M: f64 = 0.08;
     /// Distance of start and goal from the joints' limits, rad.
     const INSIDE_RAD: f64 = 0.05;
 
@@ -46,5 +50,34 @@ impl PlanningProblem {
         };
         let (start, goal) = (free(), free());
         Self { obstacles, base_from_goal: Panda::new().forward(&goal), start, goal, model }
+    }
+
+    /// The same with up to [`Self::MAX_ADDED`] more obstacles, each a ball in the middle of the tcp's way on the straight motion
+    /// that was found before: of random problems alone, nearly all are solved by a straight motion.
+    pub fn obstructed(seed: u64) -> Self {
+        let panda = Panda::new();
+        let mut problem = Self::random(seed);
+        for number in 0..Self::MAX_ADDED {
+            let options = PlanOptions::default();
+            let plan = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
+            // What needs a bent way, or has none that is found, is hard enough.
+            let Some([from, to]) = plan.ok().and_then(|plan| <[JointVector; 2]>::try_from(plan.waypoints).ok()) else {
+                break;
+            };
+            let middle = panda.forward(&((from + to) * 0.5)).translation;
+            let obstacle = Obstacle {
+                name: format!("ball {number}"),
+                shape: Shape::Capsule { radius_m: Self::BALL_RADIUS_M, half_length_m: 0.0 },
+                base_from_obstacle: middle.into(),
+            };
+            let obstacles: Vec<Obstacle> = problem.obstacles.iter().cloned().chain([obstacle]).collect();
+            let Ok(model) = CollisionModel::new(obstacles.clone(), HAND_OPENING_MAX_M) else { break };
+            let mut checker = Checker::new(&model, Self::FREE_M);
+            if !checker.is_free(&problem.start) || !checker.is_free(&problem.goal) {
+                break;
+            }
+            problem = Self { obstacles, model, ..problem };
+        }
+        problem
     }
 }

@@ -12,7 +12,7 @@ fn no_path_of_fifty_collides_in_mujoco() {
     const MIN_FOUND: usize = 49;
     let (mut num_found, mut num_bent, mut num_steps) = (0, 0, 0);
     for seed in 0..COUNT {
-        let problem = PlanningProblem::random(seed);
+        let problem = PlanningProblem::obstructed(seed);
         let goals = [problem.base_from_goal];
         let mut options = PlanOptions::default();
         options.max_checks = 300_000;
@@ -29,5 +29,5 @@ fn no_path_of_fifty_collides_in_mujoco() {
         }
     }
     println!("{num_found} of {COUNT} found, {num_bent} not straight, {num_steps} steps");
-    assert!(num_found >= MIN_FOUND && num_bent >= 1 && num_steps > 20_000);
+    assert!(num_found >= MIN_FOUND && num_bent >= 20 && num_steps > 20_000);
 }
