@@ -173,8 +173,10 @@ mod tests {
         ids.set_finger_position_m(&mut data, 0.5 * OPENING_M);
         data.forward().unwrap();
         let planner = CollisionModel::new(Vec::new(), OPENING_M).unwrap();
-        // Of each body: its geoms as a point inside, support values along the normals from there, and whether the geom is seen.
-        let mut solids: Vec<Vec<(Point3<f64>, Vec<f64>, bool)>> = vec![Vec::new(); 9];
+        /// A geom: a point inside, support values along the normals from there, and whether it is seen.
+        type Solid = (Point3<f64>, Vec<f64>, bool);
+        // Those of each body.
+        let mut solids: Vec<Vec<Solid>> = vec![Vec::new(); 9];
         for geom in model.ids::<Geom>() {
             // SAFETY: the array has `ngeom` entries.
             let is_seen = unsafe { *model.raw().geom_contype.add(geom.index()) == 0 };

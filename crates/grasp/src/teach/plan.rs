@@ -39,7 +39,7 @@ pub(crate) struct Plan {
 #[derive(Debug, Clone)]
 pub(crate) enum ReadingPlan {
     /// Model A, which has a second network.
-    BoxAndCrop(OrientationPlan),
+    BoxAndCrop(Box<OrientationPlan>),
     /// Model B.
     BoxAndKeypoints,
     /// Model C.
@@ -53,7 +53,7 @@ impl Plan {
     pub(crate) fn new(options: &TeachOptions) -> Option<Self> {
         let &TeachOptions { kind, preset, seed, symmetry, .. } = options;
         let reading = match kind {
-            ModelKind::A => ReadingPlan::BoxAndCrop(preset.orientation(symmetry, seed)),
+            ModelKind::A => ReadingPlan::BoxAndCrop(Box::new(preset.orientation(symmetry, seed))),
             ModelKind::B => ReadingPlan::BoxAndKeypoints,
             ModelKind::C => ReadingPlan::Keypoints,
             ModelKind::D => ReadingPlan::Mask,
@@ -97,7 +97,8 @@ impl Plan {
 
     /// Other detector steps; the orientation CNN's change in proportion.
     fn set_steps(&mut self, steps: usize) {
-        if let ReadingPlan::BoxAndCrop(OrientationPlan { training, .. }) = &mut self.reading {
+        if let ReadingPlan::BoxAndCrop(orientation) = &mut self.reading {
+            let training = &mut orientation.training;
             training.steps = (training.steps * steps).div_ceil(self.training.steps);
         }
         self.training.steps = steps;

@@ -72,7 +72,8 @@ pub(super) fn small_plan(options: &TeachOptions) -> Plan {
     plan.samples = plan.samples.with_output_size(96, 72);
     plan.training.steps = STEPS;
     plan.training.validation = ValidationConfig { every: STEPS, first: STEPS, samples: 4 };
-    if let ReadingPlan::BoxAndCrop(OrientationPlan { network, training }) = &mut plan.reading {
+    if let ReadingPlan::BoxAndCrop(orientation) = &mut plan.reading {
+        let OrientationPlan { network, training } = &mut **orientation;
         network.input_px = 32;
         (network.stage_channels, network.stage_convs, network.hidden) = (vec![8, 16], vec![1, 1], 16);
         (training.steps, training.validation_crops) = (STEPS, 4);

@@ -4,6 +4,7 @@
 //! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
 //! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
 //! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
+#![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::{FIRST_MOVING, NUM_BODIES, SELF_PAIRS};
 use super::lanes::{
@@ -198,7 +199,7 @@ fn evaluate(
         let to_local = &model.obstacle_frames[index];
         match obstacle.shape {
             Shape::Plane => {
-                search.obstacle(model, placed, index, to_local, weights, |p, d| shape::plane(p, d));
+                search.obstacle(model, placed, index, to_local, weights, shape::plane);
             }
             Shape::Box { half_m } => {
                 search.obstacle(model, placed, index, to_local, weights, |p, d| shape::solid_box(p, d, half_m));

@@ -1,6 +1,7 @@
 //! The arm at several configurations at once, one a lane: arrays of one coordinate each, which the compiler turns into vectors.
 //!
 //! L lanes; every function is one loop over them without branches.
+#![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::panda::{DH_A_M, DH_ALPHA_RAD, DH_D_M};
