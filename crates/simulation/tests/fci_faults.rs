@@ -5,9 +5,10 @@
 #[path = "fci_support/bare_client.rs"]
 mod bare_client;
 mod fci_support;
+mod old_robot;
 
 use std::io::Write;
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::ops::ControlFlow;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -303,14 +304,7 @@ fn other_versions_are_refused_by_both_sides() {
     let (_client, response) = BareClient::connect(&server, 3);
     assert_eq!((response.status, &response.rest[..]), (Status::IncompatibleVersion, &[5, 0][..]));
 
-    // A robot that speaks version 4, as old Pandas do.
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    let old_robot = thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let (header, _) = read_message(&mut stream, HeaderKind::Robot).unwrap().unwrap();
-        stream.write_all(&Header::message(HeaderKind::Robot, 0, header.command_id, &[1, 4, 0])).unwrap();
-    });
+    let (address, old_robot) = old_robot::serve();
     let error = Robot::connect(&address.to_string(), &RobotConfig::default()).unwrap_err();
     assert_eq!(error.to_string(), "the robot speaks version 4 of the protocol, expected 5 (Panda) or 10 (FR3)");
     old_robot.join().unwrap();

@@ -6,16 +6,13 @@
 #![allow(clippy::unwrap_used)]
 
 mod network;
+mod old_robot;
 
-use std::io::Write;
-use std::net::TcpListener;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use network::{Twin, cell, connect, serve, some_motion};
-use sdg_fci::read_message;
 use sdg_fci::server::Pace;
-use sdg_fci::wire::{Header, HeaderKind};
 use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
 use sdg_robot::{
     Arm, ArmMode, FrankaArm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, Robot, RobotError,
@@ -164,13 +161,7 @@ fn a_part_that_slips_is_told_by_the_hand() {
 
 #[test]
 fn a_robot_of_another_version_is_reached_and_not_driven() {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap();
-    let old_robot = thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let (header, _) = read_message(&mut stream, HeaderKind::Robot).unwrap().unwrap();
-        stream.write_all(&Header::message(HeaderKind::Robot, 0, header.command_id, &[1, 4, 0])).unwrap();
-    });
+    let (address, old_robot) = old_robot::serve();
     let address = format!("127.0.0.1:{}", address.port()).parse().unwrap();
     let error = FrankaArm::connect(&address, Scheduling::Ordinary).unwrap_err().to_string();
     assert_eq!(error, "the robot speaks version 4 of the protocol, expected 5 (Panda) or 10 (FR3)");
