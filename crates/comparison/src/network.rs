@@ -13,7 +13,7 @@ use crate::view::{DIFFERENCES, Offset, View, batch};
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
 /// Added to the square of a cell's length, so that a cell without features has a direction of zero.
-const LEAST_SQUARE: f64 = 1e-4;
+const SQUARE_EPSILON: f64 = 1e-4;
 /// The log-odds, and the offset's four values.
 const NUM_OUTPUTS: usize = 5;
 
@@ -111,7 +111,7 @@ impl ComparisonNetwork {
 
     /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
     fn correlation(&self, demonstration: &Tensor<4>, picture: &Tensor<4>) -> Tensor<4> {
-        let unit = |map: &Tensor<4>| map.clone() / (map.clone().square().sum_dim(1) + LEAST_SQUARE).sqrt();
+        let unit = |map: &Tensor<4>| map.clone() / (map.clone().square().sum_dim(1) + SQUARE_EPSILON).sqrt();
         let reach = self.config.reach;
         let [_, _, height, width] = picture.dims();
         let one = unit(demonstration);

@@ -19,7 +19,7 @@ const SIDE_PER_LENGTH: f64 = 1.25;
 /// Grey values that make one unit of the colours: about the deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 /// Added to the deviation on the part, so that noise on an even part stays small, in grey values.
-const LEAST_DEVIATION: f32 = 12.0;
+const DEVIATION_EPSILON: f32 = 12.0;
 /// Points of a pixel along each axis that are asked whether they lie inside the outline.
 const MASK_SAMPLES: u32 = 2;
 
@@ -152,7 +152,7 @@ fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
         let squares: f32 = (0..3).map(|channel| (f32::from(rgb[channel]) - means[channel]).powi(2)).sum();
         variance += inside * squares / (3.0 * weight);
     }
-    let deviation = variance.sqrt() + LEAST_DEVIATION;
+    let deviation = variance.sqrt() + DEVIATION_EPSILON;
     for (i, rgb) in crop.as_raw().chunks_exact(3).enumerate() {
         for channel in 0..3 {
             let grey = f32::from(rgb[channel]);

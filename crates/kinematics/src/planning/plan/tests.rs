@@ -51,8 +51,8 @@ fn a_way_leads_over_the_wall_and_touches_nothing() {
         for motion in found.trajectories(&JointLimits::franka(), &CartesianLimits::franka()).unwrap() {
             let num_cycles = (motion.duration_secs() / 0.001) as usize;
             let q: Vec<JointVector> = (0..=num_cycles).map(|i| motion.sample(i as f64 * 0.001).0).collect();
-            let least_m = checker.distances_m(&q).into_iter().fold(f64::INFINITY, f64::min);
-            assert!(least_m > 0.0, "seed {seed}: {least_m} m");
+            let min_m = checker.distances_m(&q).into_iter().fold(f64::INFINITY, f64::min);
+            assert!(min_m > 0.0, "seed {seed}: {min_m} m");
         }
         costs.push(found.cost_secs[1]);
     }
