@@ -8,7 +8,7 @@
 //! ```
 
 use anyhow::Result;
-use burn::tensor::{Device, Int, Tensor, TensorData, activation};
+use burn::tensor::{Device, Tensor, TensorData, activation};
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use rand::seq::IndexedRandom;
@@ -45,9 +45,6 @@ const MIN_WRONG_SIZE: f64 = 0.35;
 /// Turns that another part's demonstration is tried in.
 const NUM_TURNS: usize = 12;
 
-/// Weight of the offset's loss against that of the log-odds.
-const OFFSET_WEIGHT: f64 = 0.3;
-
 /// The comparison network of preset `edge`.
 pub struct ComparisonTask {
     config: ComparisonConfig,
@@ -59,8 +56,8 @@ pub struct ComparisonTask {
 /// A question and its answer.
 struct Pair {
     view: View,
-    /// The offset's outputs where it shows the part.
-    same: Option<[f64; 4]>,
+    /// Whether it shows the part in that pose.
+    is_same: bool,
 }
 
 impl ComparisonTask {
@@ -115,25 +112,15 @@ impl Asked<'_> {
         let Some(shown) = self.shown(part_idx, Some(image)) else { return pairs };
         let truth = instance.image_from_demonstration.compose(&shown.photo_from_shown);
         let has_turn = self.task.pictures.has_turn(part_idx);
-        let mut ask = |shown: &Shown, pose: &PlanarSimilarity, truth: Option<&PlanarSimilarity>| {
-            pairs.push(Pair {
-                view: shown.reference.view(image, pose),
-                same: truth.map(|truth| {
-                    let mut outputs = shown.reference.offset(pose, truth).outputs();
-                    // Which of the turns that look alike was meant cannot be told.
-                    if !has_turn {
-                        outputs[2] = f64::NAN;
-                    }
-                    outputs
-                }),
-            });
+        let mut ask = |shown: &Shown, pose: &PlanarSimilarity, is_same: bool| {
+            pairs.push(Pair { view: shown.reference.view(image, pose), is_same });
         };
         let near = self.near(&shown, &truth, 1.0);
-        ask(&shown, &near, Some(&truth));
+        ask(&shown, &near, true);
         let near = self.near(&shown, &truth, 0.5);
-        ask(&shown, &near, Some(&truth));
+        ask(&shown, &near, true);
         let wrong = self.wrong(&shown, &truth, has_turn);
-        ask(&shown, &wrong, None);
+        ask(&shown, &wrong, false);
 
         let photo_from_part = |idx: usize| self.task.pictures.photo(idx).photo_from_part;
         let image_from_part = instance.image_from_demonstration.compose(&photo_from_part(part_idx));
@@ -148,7 +135,7 @@ impl Asked<'_> {
                 false => self.fitted(&other, &nominal, instance),
             };
             let pose = self.near(&other, &pose, 0.5);
-            ask(&other, &pose, None);
+            ask(&other, &pose, false);
         }
         pairs
     }
@@ -265,27 +252,13 @@ impl Task for ComparisonTask {
         let pairs = self.pairs(settings, step);
         let n = pairs.len();
         if n == 0 {
-            return Ok(vec![("same", Tensor::zeros([1], &device)), ("offset", Tensor::zeros([1], &device))]);
+            return Ok(vec![("same", Tensor::zeros([1], &device))]);
         }
-        let (views, same): (Vec<View>, Vec<_>) = pairs.into_iter().map(|pair| (pair.view, pair.same)).unzip();
-        let outputs = network.forward(batch(&views, &device));
-        let signs: Vec<f32> = same.iter().map(|same| if same.is_some() { 1.0 } else { -1.0 }).collect();
+        let (views, is_same): (Vec<View>, Vec<bool>) = pairs.into_iter().map(|pair| (pair.view, pair.is_same)).unzip();
+        let signs: Vec<f32> = is_same.into_iter().map(|is_same| if is_same { 1.0 } else { -1.0 }).collect();
         let signs = Tensor::<2>::from_data(TensorData::new(signs, [n, 1]), &device);
-        let answer = activation::log_sigmoid(outputs.clone().narrow(1, 0, 1) * signs).mean().neg();
-
-        let shown: Vec<usize> = (0..n).filter(|i| same[*i].is_some()).collect();
-        let values: Vec<f32> = same.into_iter().flatten().flatten().map(|value| value as f32).collect();
-        let is_known: Vec<f32> = values.iter().map(|value| if value.is_nan() { 0.0 } else { 1.0 }).collect();
-        let values: Vec<f32> = values.into_iter().map(|value| if value.is_nan() { 0.0 } else { value }).collect();
-        let tensor = |values: Vec<f32>| Tensor::<2>::from_data(TensorData::new(values, [shown.len(), 4]), &device);
-        let indices: Vec<i64> = shown.iter().map(|i| *i as i64).collect();
-        let indices = Tensor::<1, Int>::from_data(TensorData::new(indices, [shown.len()]), &device);
-        let offsets = outputs.narrow(1, 1, 4).select(0, indices);
-        // Huber's loss, of unit 0.3.
-        let error = ((offsets - tensor(values)) * tensor(is_known)).abs();
-        let small = error.clone().clamp_max(0.3);
-        let offset = (small.clone() * (error - small * 0.5)).mean() / 0.3;
-        Ok(vec![("same", answer), ("offset", offset * OFFSET_WEIGHT)])
+        let log_odds = network.forward(batch(&views, &device));
+        Ok(vec![("same", activation::log_sigmoid(log_odds * signs).mean().neg())])
     }
 }
 
@@ -314,7 +287,7 @@ mod tests {
             let again = task.pairs(&settings, step);
             assert_eq!(pairs.len(), again.len());
             assert!(pairs.iter().zip(&again).all(|(one, other)| one.view == other.view));
-            pairs.iter().for_each(|pair| means[usize::from(pair.same.is_some())].push(f64::from(difference(pair))));
+            pairs.iter().for_each(|pair| means[usize::from(pair.is_same)].push(f64::from(difference(pair))));
         }
         let [not, same] = means.map(|values| (values.len(), sdg_geometry::median(values).unwrap()));
         assert!(same.0 > 40 && not.0 > same.0, "{same:?} {not:?}");

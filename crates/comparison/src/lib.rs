@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! demonstration, outline ─ upright, S×S ───────────────┐
-//!                                                      ├─ 16 channels ─ convolutions ─ log-odds, offset of the pose
+//!                                                      ├─ 16 channels ─ convolutions ─ log-odds
 //! picture, pose ─ turned upright by the pose, S×S ─────┘
 //! ```
 //!
@@ -30,8 +30,8 @@
 //! let outline = Polygon::from_box(&BoundingBox::new(20.0, 20.0, 100.0, 60.0)?);
 //! let reference = Reference::new(&RgbImage::new(120, 80), &outline, network.config().input_px);
 //! let view = reference.view(&RgbImage::new(640, 480), &PlanarSimilarity::IDENTITY);
-//! let readings = read_sync(network.compare(&[view]));
-//! assert!(readings[0].log_odds.is_finite());
+//! let log_odds = read_sync(network.compare(&[view]));
+//! assert!(log_odds[0].is_finite());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
@@ -42,5 +42,5 @@ mod network;
 mod view;
 
 pub use config::{ComparisonConfig, ComparisonError};
-pub use network::{ComparisonNetwork, Reading};
-pub use view::{CHANNELS, Offset, Reference, View, batch};
+pub use network::ComparisonNetwork;
+pub use view::{CHANNELS, Reference, View, batch};

@@ -1,4 +1,4 @@
-//! The network: views in, log-odds and offsets out.
+//! The network: views in, log-odds out.
 
 use burn::module::Module;
 use burn::tensor::ops::PadMode;
@@ -8,37 +8,26 @@ use sdg_detection::layers::Linear;
 use sdg_orientation::{ConvNormRelu, Stage};
 
 use crate::config::{ComparisonConfig, ComparisonError};
-use crate::view::{DIFFERENCES, Offset, View, batch};
+use crate::view::{DIFFERENCES, View, batch};
 
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
 /// Added to the square of a cell's length, so that a cell without features has a direction of zero.
 const SQUARE_EPSILON: f64 = 1e-4;
-/// The log-odds, and the offset's four values.
-const NUM_OUTPUTS: usize = 5;
 
 /// The comparison network.
 #[derive(Module, Debug)]
 pub struct ComparisonNetwork {
-    /// From a square of the demonstration or of the picture to its map. Never trained here: it is another network's.
+    /// From a square of the demonstration or of the picture to its map; the same for both.
     pub trunk: Vec<Stage>,
     /// From what differs to the last map.
     pub stages: Vec<Stage>,
     /// From the flat last map.
     pub hidden: Linear,
-    /// To the log-odds and the offset.
-    pub outputs: Linear,
+    /// To the log-odds.
+    pub output: Linear,
     #[module(skip)]
     config: ComparisonConfig,
-}
-
-/// What the network says of a view.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
-    /// That it shows the part in the pose that it was made by.
-    pub log_odds: f64,
-    /// By how much the pose is off, where it shows the part.
-    pub offset: Offset,
 }
 
 impl ComparisonConfig {
@@ -70,10 +59,9 @@ impl ComparisonNetwork {
         let head = stages(compared, 3, &config.stage_channels, &config.stage_convs, groups, init);
         let flat = config.stage_channels.last().copied().unwrap_or(compared) * config.last_map_px().pow(2);
         let hidden = Linear::init(flat, config.hidden, Distribution::he_normal(flat), init);
-        // Small first outputs: undecided, and no offset.
-        let outputs = Linear::init(config.hidden, NUM_OUTPUTS, Distribution::Normal { std: 0.01 }, init);
-        let trunk = trunk.into_iter().map(Module::no_grad).collect();
-        Self { trunk, stages: head, hidden, outputs, config: config.clone() }
+        // Small first outputs: undecided.
+        let output = Linear::init(config.hidden, 1, Distribution::Normal { std: 0.01 }, init);
+        Self { trunk, stages: head, hidden, output, config: config.clone() }
     }
 
     /// The configuration that the network was built from.
@@ -83,14 +71,14 @@ impl ComparisonNetwork {
 
     /// The device that the parameters are on.
     pub fn device(&self) -> Device {
-        self.outputs.weight.val().device()
+        self.output.weight.val().device()
     }
 
-    /// The raw outputs for views of a [`batch`].
+    /// The log-odds that each view of a [`batch`] shows the part in the pose that it was made by.
     ///
     /// # Shapes
     /// - `views`: `[N, CHANNELS, S, S]`
-    /// - output: `[N, 5]`: log-odds, then shift x, shift y, turn, logarithm of size over their units
+    /// - output: `[N, 1]`
     pub fn forward(&self, views: Tensor<4>) -> Tensor<2> {
         let [n, _, side, _] = views.dims();
         let map = |first: usize| through(&self.trunk, views.clone().narrow(1, first, 3));
@@ -106,7 +94,7 @@ impl ComparisonNetwork {
         let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
         let map = through(&self.stages, compared);
         let flat: Tensor<2> = map.reshape([n as i64, -1]);
-        self.outputs.forward(activation::relu(self.hidden.forward(flat)))
+        self.output.forward(activation::relu(self.hidden.forward(flat)))
     }
 
     /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
@@ -123,19 +111,14 @@ impl ComparisonNetwork {
         Tensor::cat(products, 1)
     }
 
-    /// What the network says of each view.
-    pub async fn compare(&self, views: &[View]) -> Vec<Reading> {
+    /// The log-odds that each view shows the part in the pose that it was made by.
+    pub async fn compare(&self, views: &[View]) -> Vec<f64> {
         if views.is_empty() {
             return Vec::new();
         }
         let outputs = self.forward(batch(views, &self.device()));
         let read = outputs.into_data_async().await.expect("what the device computes can be read");
-        let values: Vec<f64> = read.iter::<f32>().map(f64::from).collect();
-        let reading = |row: &[f64]| {
-            let offset = Offset::from_outputs([row[1], row[2], row[3], row[4]]);
-            Reading { log_odds: row[0], offset }
-        };
-        values.chunks_exact(NUM_OUTPUTS).map(reading).collect()
+        read.iter::<f32>().map(f64::from).collect()
     }
 }
 
@@ -194,10 +177,10 @@ mod tests {
         let reference = reference(&network);
         let views = [view(&reference, 0.0), view(&reference, 25.0)];
         let together = read_sync(network.compare(&views));
-        assert_ne!(together[0].log_odds, together[1].log_odds);
-        for (view, reading) in views.into_iter().zip(&together) {
+        assert_ne!(together[0], together[1]);
+        for (view, log_odds) in views.into_iter().zip(&together) {
             let alone = read_sync(network.compare(&[view]))[0];
-            assert!((alone.log_odds - reading.log_odds).abs() < 1e-4, "{alone:?} {reading:?}");
+            assert!((alone - log_odds).abs() < 1e-4, "{alone} {log_odds}");
         }
         assert_eq!(read_sync(network.compare(&[])), []);
     }

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use image::RgbImage;
-use nalgebra::{Point2, Vector2};
+use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::{CropWindow, OUTSIDE};
 
@@ -31,34 +31,6 @@ impl View {
     /// `[CHANNELS, S, S]`.
     pub fn values(&self) -> &[f32] {
         &self.0
-    }
-}
-
-/// How far a pose is off, in the frame of the view that it was made by.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Offset {
-    /// Shift of the middle, in sides of the view.
-    pub shift: Vector2<f64>,
-    /// Turn.
-    pub turn: Angle,
-    /// Logarithm of the factor of size.
-    pub log_scale: f64,
-}
-
-impl Offset {
-    /// One of each of the network's outputs: a tenth of a side, ten degrees, a tenth of the size.
-    const UNITS: [f64; 4] = [0.1, 0.1, std::f64::consts::PI / 18.0, 0.1];
-
-    /// Of outputs of the network.
-    pub(crate) fn from_outputs(outputs: [f64; 4]) -> Self {
-        let [x, y, turn, log_scale] = std::array::from_fn(|i| outputs[i] * Self::UNITS[i]);
-        Self { shift: Vector2::new(x, y), turn: Angle::from_radians(turn), log_scale }
-    }
-
-    /// What the network is to give for it.
-    pub fn outputs(&self) -> [f64; 4] {
-        let values = [self.shift.x, self.shift.y, self.turn.radians(), self.log_scale];
-        std::array::from_fn(|i| values[i] / Self::UNITS[i])
     }
 }
 
@@ -114,28 +86,6 @@ impl Reference {
         values.extend(pairs.map(|((own, seen), inside)| inside * (own - seen).abs()));
         values.extend_from_slice(&self.mask);
         View(values)
-    }
-
-    /// The pose that an offset corrects `pose` to.
-    pub fn corrected(&self, pose: &PlanarSimilarity, offset: &Offset) -> PlanarSimilarity {
-        let shift = offset.shift * self.window.side;
-        let about = PlanarSimilarity::about(
-            self.window.center,
-            self.window.center + shift,
-            offset.turn,
-            offset.log_scale.exp(),
-        );
-        pose.compose(&about)
-    }
-
-    /// The offset that corrects `pose` to `truth`.
-    pub fn offset(&self, pose: &PlanarSimilarity, truth: &PlanarSimilarity) -> Offset {
-        let between = pose.inverse().compose(truth);
-        Offset {
-            shift: (between.apply(&self.window.center) - self.window.center) / self.window.side,
-            turn: between.angle,
-            log_scale: between.scale.ln(),
-        }
     }
 }
 
@@ -235,21 +185,5 @@ mod tests {
         let seen = reference.view(&dark, &PlanarSimilarity::IDENTITY);
         assert!(difference(&reference, &seen, 0) > 0.5);
         assert!(difference(&reference, &seen, 3) < 0.3);
-    }
-
-    #[test]
-    fn offsets_lead_from_a_pose_to_the_truth() {
-        let (image, outline) = photo();
-        let reference = Reference::new(&image, &outline, 32);
-        let truth =
-            PlanarSimilarity::about(Point2::new(60.0, 40.0), Point2::new(300.0, 200.0), Angle::from_degrees(70.0), 1.3);
-        let pose =
-            PlanarSimilarity::about(Point2::new(60.0, 40.0), Point2::new(310.0, 195.0), Angle::from_degrees(64.0), 1.2);
-        let offset = reference.offset(&pose, &truth);
-        assert!((offset.turn.degrees() - 6.0).abs() < 1e-9 && (offset.log_scale - (1.3f64 / 1.2).ln()).abs() < 1e-12);
-        assert!((offset.shift.norm() - 125f64.sqrt() / 120.0).abs() < 1e-9, "{offset:?}");
-        let back = reference.corrected(&pose, &offset);
-        let corner = Point2::new(20.0, 30.0);
-        assert!((back.apply(&corner) - truth.apply(&corner)).norm() < 1e-9);
     }
 }

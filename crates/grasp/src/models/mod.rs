@@ -204,7 +204,7 @@ impl Network {
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
         proposals.boxes.extend(proposed.map(unread));
         for (place, mut candidate) in read.into_iter().enumerate() {
-            let (class, log_odds) = (candidate.network_score, compared.get(place).map(|reading| reading.log_odds));
+            let (class, log_odds) = (candidate.network_score, compared.get(place).copied());
             candidate.network_score = consistency::score(class, candidate.filled, log_odds);
             proposals.boxes.push((candidate.bbox, candidate.network_score));
             proposals.candidates.push(candidate);
