@@ -30,8 +30,6 @@ pub fn with_comparison(
     }
     file.parameters.retain(|name, _| !name.starts_with("comparison."));
     take(&comparison.parameters, "", "comparison.", &mut file.parameters)?;
-    // It is the orientation CNN's, and not trained.
-    file.parameters.retain(|name, _| !name.starts_with("comparison.trunk."));
     file.origin.insert("comparison".into(), format!("{}, commit {commit}", told(comparison)));
     Ok(file)
 }

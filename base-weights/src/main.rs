@@ -46,7 +46,7 @@ enum Command {
         /// Steps of the whole run.
         #[arg(long, default_value_t = 8000)]
         steps: usize,
-        /// Base weights with an orientation CNN, for the comparison network.
+        /// Base weights with an orientation CNN, whose first stages the comparison network's trunk starts from.
         #[arg(long)]
         trunk: Option<PathBuf>,
         #[command(flatten)]
@@ -150,7 +150,7 @@ fn main() -> Result<()> {
                 }
                 Pretrained::Comparison => {
                     let settings = Settings { batch_size: ComparisonTask::BATCH_SIZE, ..settings };
-                    let path = trunk.context("--trunk says whose first stages the comparison network has")?;
+                    let path = trunk.context("--trunk says whose first stages the comparison network starts from")?;
                     let orientation = BaseWeightsFile::from_bytes(&std::fs::read(&path)?)?.parameters;
                     let orientation = orientation
                         .into_iter()

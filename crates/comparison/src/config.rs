@@ -44,7 +44,7 @@ impl ComparisonConfig {
             stage_channels: vec![96, 128],
             stage_convs: vec![2, 2],
             norm_groups: 8,
-            hidden: 64,
+            hidden: 48,
         }
     }
 

@@ -8,14 +8,13 @@
 //! tensors    NAME            f16: the detector's parameters
 //!            imprint.*       f16: what makes its last layers of a part's views
 //!            orientation.*, orientation_imprint.*   f16: the same of the orientation CNN
-//!            comparison.*    f16: the comparison network, but for its trunk, which is the orientation CNN's
+//!            comparison.*    f16: the comparison network
 //! ```
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
-use sdg_comparison::ComparisonConfig;
 use sdg_detection::RcnnConfig;
 use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_training::orientation::OrientationStart;
@@ -120,27 +119,13 @@ impl BaseWeightsFile {
                 .collect(),
             reinitialized: self.reinitialized.iter().filter(own).cloned().collect(),
             imprint: self.named("imprint."),
-            comparison: self.comparison(),
+            comparison: self.named("comparison."),
             orientation: Some(OrientationStart {
                 parameters: self.named("orientation."),
                 imprint: self.named("orientation_imprint."),
             })
             .filter(|start| !start.parameters.is_empty()),
         })
-    }
-
-    /// The comparison network, whose trunk is the first stages of the orientation CNN; empty for weights without.
-    fn comparison(&self) -> StateDict {
-        let mut parameters = self.named("comparison.");
-        if !parameters.is_empty() {
-            let trunk = ComparisonConfig::edge().trunk_channels.len();
-            let stages = (0..trunk).flat_map(|stage| {
-                let of_stage = self.named(&format!("orientation.stages.{stage}."));
-                of_stage.into_iter().map(move |(name, values)| (format!("trunk.{stage}.{name}"), values))
-            });
-            parameters.extend(stages);
-        }
-        parameters
     }
 
     /// The values whose names begin so, without that beginning.
