@@ -101,6 +101,15 @@ pub(crate) struct PoseCandidate {
     pub(crate) turn_source: TurnSource,
 }
 
+impl PoseCandidate {
+    /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.
+    fn moved_to(self, demonstration: &TaughtDemonstration, image_from_cutout: PlanarSimilarity) -> Self {
+        let points = demonstration.keypoints().into_iter().map(|keypoint| image_from_cutout.apply(&keypoint.point()));
+        let keypoints = points.zip(self.keypoints.iter().map(|(_, score)| *score)).collect();
+        Self { keypoints, grasp: demonstration.grasp(&image_from_cutout), image_from_cutout, ..self }
+    }
+}
+
 /// Where a demonstration lies.
 #[derive(Debug, Clone, Copy)]
 struct Placement {
@@ -204,8 +213,12 @@ impl Network {
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
         proposals.boxes.extend(proposed.map(unread));
         for (place, mut candidate) in read.into_iter().enumerate() {
-            let (class, log_odds) = (candidate.network_score, compared.get(place).copied());
-            candidate.network_score = consistency::score(class, candidate.filled, log_odds);
+            let (class, compared) = (candidate.network_score, compared.get(place));
+            candidate.network_score = consistency::score(class, candidate.filled, compared.map(|one| one.log_odds));
+            if let Some(pose) = compared.and_then(|one| one.half_turned) {
+                let demonstration = &demonstrations[candidate.demonstration_idx];
+                candidate = candidate.moved_to(demonstration, pose);
+            }
             proposals.boxes.push((candidate.bbox, candidate.network_score));
             proposals.candidates.push(candidate);
         }
