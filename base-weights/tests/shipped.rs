@@ -18,7 +18,7 @@ fn the_file_is_whole_small_and_says_how_it_was_made() {
     assert_eq!(std::fs::read_to_string(folder.join("edge.sha256")).unwrap(), sha256);
 
     let file = BaseWeightsFile::from_bytes(&bytes).unwrap();
-    for name in ["commit", "licence", "detector", "orientation"] {
+    for name in ["commit", "licence", "detector", "orientation", "comparison"] {
         assert!(file.origin.get(name).is_some_and(|value| !value.is_empty()), "{name}: {:?}", file.origin);
     }
     assert!(file.origin["detector"].contains("seed") && file.origin["detector"].contains("steps"), "{:?}", file.origin);
@@ -27,7 +27,8 @@ fn the_file_is_whole_small_and_says_how_it_was_made() {
         options.kind = kind;
         let network = options.taught_network().unwrap();
         let weights = file.for_network(Preset::Edge.name(), &network, sha256.clone()).unwrap();
-        assert!(!weights.imprint.is_empty() && weights.orientation.is_some(), "{kind}");
+        let is_whole = !weights.imprint.is_empty() && weights.orientation.is_some() && !weights.comparison.is_empty();
+        assert!(is_whole, "{kind}");
         // Teaching draws nothing anew but the class scores, which it makes of the part's views.
         assert!(weights.reinitialized.iter().all(|name| name.contains("cls_score")), "{:?}", weights.reinitialized);
     }

@@ -3,9 +3,13 @@
 //! ```text
 //! network score ─ logistic, fitted on held-back augmentations ─ score of an unverified detection
 //! ```
+//! Scores are compared in log-odds: there those of right and of wrong detections are spread about their medians, whereas
+//! probabilities crowd next to 0 and 1.
 //! A verified detection is scored by all evidence ([`crate::verdict`]).
 
 use serde::{Deserialize, Serialize};
+
+use sdg_geometry::{median, percentile};
 
 use crate::decimal::decimal;
 
@@ -14,66 +18,74 @@ use crate::decimal::decimal;
 pub struct Calibration {
     /// The raw score that becomes 0.5.
     pub threshold: f64,
-    /// Steepness: the logistic's slope, per unit of raw score.
+    /// Steepness: the logistic's slope, per unit of the raw score's log-odds.
     pub slope: f64,
 }
 
-/// How far from the wrong scores to the right ones the threshold stands when the two are apart. Below a half,
-/// because pictures of the real workcell agree less than augmentations do, and wrong ones do not agree more. Chosen by that
+/// Scores are taken to lie at least so far from 0 and 1.
+const MIN_PROBABILITY: f64 = 1e-4;
+/// Least spread of scores on one side, in log-odds: a handful of equal ones says little of those to come. Chosen by that
 /// reasoning, not measured.
-const SHARE_OF_GAP: f64 = 0.4;
-/// The logistic at the nearer end of the gap, which sets the slope. Chosen by hand, not measured.
-const SCORE_AT_GAP_END: f64 = 0.88;
+const MIN_SPREAD: f64 = 0.3;
+/// The percentiles, on the side that faces the other scores, that say how far the scores are spread; of a normal distribution
+/// they lie 1.28 standard deviations from the median.
+const FACING_PERCENT: f64 = 10.0;
+const FACING_DEVIATIONS: f64 = 1.281_551_6;
 /// Bounds of the slope, so that a handful of scores makes neither a step nor a flat line. Chosen by that reasoning, not
-/// measured; the upper one was 60 at first.
-const SLOPE_BOUNDS: (f64, f64) = (4.0, 25.0);
-/// Share of right scores that may lie below the lower end of the gap: one odd picture does not move the threshold. Chosen
-/// by that reasoning, not measured.
-const TRIMMED: f64 = 0.02;
+/// measured.
+const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
+
+/// The log-odds of a raw score.
+fn log_odds(raw: f64) -> f64 {
+    let probability = raw.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
+    (probability / (1.0 - probability)).ln()
+}
+
+fn probability(log_odds: f64) -> f64 {
+    1.0 / (1.0 + (-log_odds).exp())
+}
 
 impl Calibration {
-    /// Leaves a score where it is, nearly: 0.5 stays 0.5. Derived: a logistic of slope 4 has slope 1 there.
-    pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 4.0 };
+    /// Leaves a score where it is.
+    pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 1.0 };
 
-    /// Finds the threshold between the raw scores of right and wrong detections.
+    /// Finds the threshold between the raw scores of right and wrong detections: where as many deviations separate it from
+    /// the median of the right ones as from that of the wrong ones. Each side's deviation is that of its scores towards the
+    /// other, so that neither one odd picture nor those that are nowhere near the threshold move it.
     ///
-    /// When they overlap, the threshold is where the fewest are on the wrong side. `None` without a right score;
-    /// without a wrong one, `no_wrong` stands for the highest of them.
+    /// `None` without a right score; without a wrong one, `no_wrong` stands for them.
     pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64) -> Option<Self> {
-        let mut right: Vec<f64> = right.iter().copied().filter(|s| s.is_finite()).collect();
-        let mut wrong: Vec<f64> = wrong.iter().copied().filter(|s| s.is_finite()).collect();
-        right.sort_by(f64::total_cmp);
-        wrong.sort_by(f64::total_cmp);
-        let lowest_right = *right.get((right.len() as f64 * TRIMMED) as usize)?;
-        let highest_wrong = wrong.last().copied().unwrap_or(no_wrong);
-        let (threshold, half_gap) = if highest_wrong < lowest_right {
-            let gap = lowest_right - highest_wrong;
-            (highest_wrong + SHARE_OF_GAP * gap, SHARE_OF_GAP * gap)
-        } else {
-            (threshold_of_fewest_errors(&right, &wrong), 0.0)
+        let in_log_odds = |scores: &[f64]| -> Vec<f64> {
+            scores.iter().copied().filter(|score| score.is_finite()).map(log_odds).collect()
         };
-        let slope = (SCORE_AT_GAP_END / (1.0 - SCORE_AT_GAP_END)).ln() / half_gap.max(f64::MIN_POSITIVE);
-        let slope = slope.clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
-        Some(Self { threshold: decimal(threshold), slope: decimal(slope) })
+        let (right, mut wrong) = (in_log_odds(right), in_log_odds(wrong));
+        if wrong.is_empty() {
+            wrong.push(log_odds(no_wrong));
+        }
+        let spread = |scores: &[f64], percent: f64| {
+            let median = median(scores.iter().copied())?;
+            let facing = percentile(scores.iter().copied(), percent)?;
+            Some((median, ((facing - median).abs() / FACING_DEVIATIONS).max(MIN_SPREAD)))
+        };
+        let (right, of_right) = spread(&right, FACING_PERCENT)?;
+        let (wrong, of_wrong) = spread(&wrong, 100.0 - FACING_PERCENT)?;
+        let threshold = (right * of_wrong + wrong * of_right) / (of_wrong + of_right);
+        // The slope of the logistic that is likeliest for two normal distributions of one deviation.
+        let deviation = 0.5 * (of_right + of_wrong);
+        let slope = ((right - wrong) / deviation.powi(2)).clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
+        Some(Self { threshold: decimal(probability(threshold)), slope: decimal(slope) })
+    }
+
+    /// Of a file of version 1 or 2, whose slope is per unit of the raw score: the same at the threshold.
+    pub(crate) fn of_older_file(self) -> Self {
+        let threshold = self.threshold.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
+        Self { threshold, slope: decimal(self.slope * threshold * (1.0 - threshold)) }
     }
 
     /// The calibrated score, in (0, 1).
     pub fn apply(&self, raw: f64) -> f64 {
-        1.0 / (1.0 + (-self.slope * (raw - self.threshold)).exp())
+        probability(self.slope * (log_odds(raw) - log_odds(self.threshold)))
     }
-}
-
-/// The middle between two neighbouring scores that leaves the fewest right ones below and wrong ones above.
-/// Both lists sorted upwards, `right` not empty.
-fn threshold_of_fewest_errors(right: &[f64], wrong: &[f64]) -> f64 {
-    let mut all: Vec<f64> = right.iter().chain(wrong).copied().collect();
-    all.sort_by(f64::total_cmp);
-    let errors = |threshold: f64| {
-        let missed = right.partition_point(|&s| s < threshold);
-        let false_alarms = wrong.len() - wrong.partition_point(|&s| s < threshold);
-        missed + false_alarms
-    };
-    all.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).min_by_key(|&threshold| errors(threshold)).unwrap_or(all[0])
 }
 
 #[cfg(test)]
@@ -81,31 +93,63 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_threshold_stands_between_right_and_wrong() {
-        let calibration = Calibration::fit(&[0.9, 0.92, 0.95], &[0.6, 0.7], 0.0).unwrap();
-        // 0.7 + 0.4 · (0.9 - 0.7)
-        assert!((calibration.threshold - 0.78).abs() < 1e-12);
-        assert!((calibration.apply(0.78) - 0.5).abs() < 1e-12);
-        assert!(calibration.apply(0.7) < 0.2 && calibration.apply(0.9) > 0.8);
-    }
-
-    #[test]
-    fn overlapping_scores_get_the_fewest_errors() {
-        let calibration = Calibration::fit(&[0.5, 0.8, 0.9], &[0.3, 0.6], 0.0).unwrap();
-        // Between 0.6 and 0.8 one right score is lost; between 0.3 and 0.5 one wrong score passes. The lower comes first.
-        assert!((calibration.threshold - 0.4).abs() < 1e-12);
-    }
-
-    #[test]
-    fn nothing_right_is_no_calibration() {
-        assert_eq!(Calibration::fit(&[], &[0.3], 0.0), None);
-        assert_eq!(Calibration::fit(&[f64::NAN], &[], 0.0), None);
-    }
-
-    #[test]
-    fn rises_with_the_raw_score() {
-        let calibration = Calibration::NEUTRAL;
+    fn neutral_leaves_a_score_and_the_threshold_becomes_a_half() {
+        for raw in [0.01, 0.3, 0.5, 0.97] {
+            assert!((Calibration::NEUTRAL.apply(raw) - raw).abs() < 1e-12);
+        }
+        let calibration = Calibration { threshold: 0.83, slope: 2.0 };
+        assert!((calibration.apply(0.83) - 0.5).abs() < 1e-12);
         let scores: Vec<f64> = (0..=10).map(|i| calibration.apply(f64::from(i) / 10.0)).collect();
-        assert!(scores.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(scores.windows(2).all(|pair| pair[0] < pair[1]), "{scores:?}");
+    }
+
+    #[test]
+    fn an_older_files_scores_are_accepted_as_they_were() {
+        let older = Calibration { threshold: 0.78, slope: 25.0 };
+        let read = older.of_older_file();
+        for raw in [0.2, 0.77, 0.79, 0.95] {
+            let was = 1.0 / (1.0 + (-older.slope * (raw - older.threshold)).exp());
+            assert_eq!(read.apply(raw) >= 0.5, was >= 0.5, "{raw}");
+        }
+        // Next to the threshold they are the same.
+        let was = 1.0 / (1.0 + (-older.slope * 0.01_f64).exp());
+        assert!((read.apply(0.79) - was).abs() < 2e-3);
+        let neutral = Calibration { threshold: 0.5, slope: 4.0 }.of_older_file();
+        assert_eq!(neutral, Calibration::NEUTRAL);
+    }
+
+    /// Scores of these log-odds.
+    fn scores(log_odds: &[f64]) -> Vec<f64> {
+        log_odds.iter().map(|value| probability(*value)).collect()
+    }
+
+    #[test]
+    fn the_threshold_lies_nearer_to_the_scores_that_are_spread_less() {
+        let right = scores(&[2.4, 2.6, 2.8, 3.0, 3.2, 3.4, 3.6]);
+        let wrong = scores(&[-9.0, -8.0, -3.0, -1.0, 0.0, 0.5, 1.0]);
+        let calibration = Calibration::fit(&right, &wrong, 0.0).unwrap();
+        let threshold = log_odds(calibration.threshold);
+        assert!((1.0..2.4).contains(&threshold), "{threshold}");
+        assert!(3.0 - threshold < threshold + 1.0);
+        assert!(right.iter().all(|&raw| calibration.apply(raw) > 0.5));
+        assert!(wrong.iter().all(|&raw| calibration.apply(raw) < 0.5));
+    }
+
+    #[test]
+    fn one_odd_picture_of_many_moves_it_little() {
+        let mut right: Vec<f64> = (0..30).map(|i| probability(2.0 + f64::from(i) / 30.0)).collect();
+        let wrong: Vec<f64> = (0..30).map(|i| probability(-3.0 + f64::from(i) / 10.0)).collect();
+        let threshold = |right: &[f64]| log_odds(Calibration::fit(right, &wrong, 0.0).unwrap().threshold);
+        let before = threshold(&right);
+        right[0] = probability(-5.0);
+        assert!((threshold(&right) - before).abs() < 0.1);
+    }
+
+    #[test]
+    fn nothing_right_is_no_calibration_and_nothing_wrong_is_one() {
+        assert_eq!(Calibration::fit(&[], &[0.3], 0.1), None);
+        assert_eq!(Calibration::fit(&[f64::NAN], &[], 0.1), None);
+        let calibration = Calibration::fit(&[0.9, 0.92, 0.95], &[], 0.1).unwrap();
+        assert!(calibration.apply(0.9) > 0.8 && calibration.apply(0.1) < 0.2, "{calibration:?}");
     }
 }

@@ -43,7 +43,7 @@ use crate::taught_marks::TaughtMarks;
 /// The version written here. Any change that an older reader would misread raises it.
 pub const FORMAT_VERSION: u32 = 3;
 /// The oldest version that is read. Version 1 had a threshold of the agreement instead of one score from all evidence,
-/// version 2 no comparison network.
+/// version 2 no comparison network, and both a slope of the calibration per unit of the score, not of its log-odds.
 const OLDEST_VERSION: u32 = 1;
 
 /// More demonstrations than anybody takes; bounds the work on a forged file.
@@ -68,6 +68,10 @@ impl Calibrations {
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(network: Calibration, evidence: Option<NetworkEvidence>, resemblance: f64) -> Self {
         Self { network, evidence, resemblance: Some(resemblance), agreement: None }
+    }
+
+    fn of_older_file(self) -> Self {
+        Self { network: self.network.of_older_file(), ..self }
     }
 
     /// What the network's score says of a place, 0 where it proposes nothing; `None` where that is not known.
@@ -192,9 +196,11 @@ impl GraspModel {
             })
             .collect::<Result<Vec<_>>>()?;
 
+        let calibrations: Calibrations = metadata.json("calibration")?;
+        let is_older = metadata.text("format_version")? != FORMAT_VERSION.to_string();
         Ok(Self {
             preset: metadata.text("preset")?.to_owned(),
-            calibrations: metadata.json("calibration")?,
+            calibrations: if is_older { calibrations.of_older_file() } else { calibrations },
             facts,
             network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
@@ -483,7 +489,9 @@ mod tests {
         let mut older = untaught(ModelKind::C);
         older.network.as_mut().unwrap().comparison = None;
         let today = older.to_bytes().unwrap();
-        let bytes = with_metadata(&today, r#""format_version":"3""#, r#""format_version":"2""#);
+        // The same as version 2 wrote it: a slope of 4 per unit of the score is one of 1 per unit of its log-odds.
+        older.calibrations.network.slope = 4.0;
+        let bytes = with_metadata(&older.to_bytes().unwrap(), r#""format_version":"3""#, r#""format_version":"2""#);
         let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
         assert!(read.network.as_ref().unwrap().comparison.is_none());
         assert_eq!(read.to_bytes().unwrap(), today);
