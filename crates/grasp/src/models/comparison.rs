@@ -1,49 +1,66 @@
-//! The comparison network's part in a detection: whether what lies under a pose looks like the demonstration, and whether it
-//! looks more like it after half a turn.
+//! The comparison network's part in a detection: whether what lies under a pose looks like the demonstration.
 //!
-//! A part whose two ends are alike is often read the wrong way round, and its box fits both ways. So each pose is compared
-//! as it is and turned by 180° about the middle of its box.
+//! A part whose two ends are alike is often read the wrong way round, and keypoints on a short grasp line say little of where
+//! a long part ends. So the pose that a model read is compared as it is, and laid into the detected box in its direction
+//! and in the opposite one.
 
 use image::RgbImage;
 use sdg_comparison::ComparisonNetwork;
-use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
+use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// The likelier of a pose and its half turn.
+/// A pose and the log-odds that the part lies so.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Compared {
-    /// That the part lies so.
+    pub(super) image_from_cutout: PlanarSimilarity,
     pub(super) log_odds: f64,
-    /// The half turn, where it is the likelier one.
-    pub(super) half_turned: Option<PlanarSimilarity>,
 }
 
-/// Compares each pose, given with its demonstration.
+/// Compares the poses that each detection, given with its demonstration and its box, may have; the one that was read first.
 pub(super) async fn compared(
     network: &ComparisonNetwork,
     image: &RgbImage,
-    poses: impl Iterator<Item = (&TaughtDemonstration, PlanarSimilarity)>,
-) -> Vec<Compared> {
+    detections: impl Iterator<Item = (&TaughtDemonstration, &BoundingBox, PlanarSimilarity)>,
+) -> Vec<Vec<Compared>> {
     let input_px = network.config().input_px;
-    let (mut views, mut half_turns) = (Vec::new(), Vec::new());
-    for (demonstration, pose) in poses {
-        let half_turned = half_turned(demonstration, &pose);
+    let (mut views, mut poses) = (Vec::new(), Vec::new());
+    for (demonstration, bbox, pose) in detections {
+        let likely = likely_poses(demonstration, bbox, pose);
         let reference = demonstration.reference(input_px);
-        views.extend([&pose, &half_turned].map(|pose| reference.view(image, pose)));
-        half_turns.push(half_turned);
+        views.extend(likely.iter().map(|pose| reference.view(image, pose)));
+        poses.push(likely);
     }
-    let log_odds = network.compare(&views).await;
-    let likelier = |(both, half_turned): (&[f64], PlanarSimilarity)| Compared {
-        log_odds: both[0].max(both[1]),
-        half_turned: (both[1] > both[0]).then_some(half_turned),
+    let mut log_odds = network.compare(&views).await.into_iter();
+    let mut with_odds = |likely: Vec<PlanarSimilarity>| {
+        likely
+            .into_iter()
+            .zip(log_odds.by_ref())
+            .map(|(image_from_cutout, log_odds)| Compared { image_from_cutout, log_odds })
+            .collect()
     };
-    log_odds.chunks_exact(2).zip(half_turns).map(likelier).collect()
+    poses.into_iter().map(&mut with_odds).collect()
 }
 
-/// A pose turned by 180° about the middle of the box that the demonstration fills under it.
-fn half_turned(demonstration: &TaughtDemonstration, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
-    let center = demonstration.outline(image_from_cutout).bounds().center();
-    PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0).compose(image_from_cutout)
+/// The pose that was read; laid into the box where that is another; laid into it the other way round.
+fn likely_poses(
+    demonstration: &TaughtDemonstration,
+    bbox: &BoundingBox,
+    image_from_cutout: PlanarSimilarity,
+) -> Vec<PlanarSimilarity> {
+    /// Share of the box's diagonal by which the same point may be apart in two poses that are taken for one.
+    const MAX_DISTANCE: f64 = 0.01;
+    let direction = image_from_cutout.angle + demonstration.marks.grasp.angle();
+    let laid = fill_box(demonstration, bbox, direction);
+    let opposite = fill_box(demonstration, bbox, direction + Angle::from_degrees(180.0));
+    let marked = demonstration.marks.bbox;
+    let is_read = [(marked.x1, marked.y1), (marked.x2, marked.y2)].into_iter().all(|(x, y)| {
+        let corner = nalgebra::Point2::new(x, y);
+        let apart = (laid.apply(&corner) - image_from_cutout.apply(&corner)).norm();
+        apart <= MAX_DISTANCE * bbox.width().hypot(bbox.height())
+    });
+    if is_read { vec![image_from_cutout, opposite] } else { vec![image_from_cutout, laid, opposite] }
 }
 
 #[cfg(test)]
@@ -53,15 +70,19 @@ mod tests {
     use nalgebra::Point2;
 
     #[test]
-    fn half_a_turn_keeps_the_box_and_two_of_them_the_pose() {
+    fn both_directions_fill_the_box_and_what_was_read_comes_first() {
         let taught = TaughtDemonstration::new(&demonstration()).unwrap();
         let (from, to) = (taught.marks.bbox.center(), Point2::new(200.0, 140.0));
         let pose = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 1.1);
-        let turned = half_turned(&taught, &pose);
-        let [one, other] = [&pose, &turned].map(|pose| taught.outline(pose).bounds());
-        assert!(one.iou(&other) > 0.999, "{one:?} {other:?}");
-        assert!((turned.angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
-        let corner = Point2::new(3.0, 5.0);
-        assert!((half_turned(&taught, &turned).apply(&corner) - pose.apply(&corner)).norm() < 1e-9);
+        let bbox = taught.outline(&pose).bounds();
+        let likely = likely_poses(&taught, &bbox, pose);
+        assert_eq!((likely.len(), likely[0]), (2, pose));
+        assert!(taught.outline(&likely[1]).bounds().iou(&bbox) > 0.999);
+        assert!((likely[1].angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
+        // Read too small, it is laid into its box as well.
+        let small = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 0.8);
+        let likely = likely_poses(&taught, &bbox, small);
+        assert_eq!((likely.len(), likely[0]), (3, small));
+        assert!((likely[1].apply(&from) - pose.apply(&from)).norm() < 1e-6 && (likely[1].scale - 1.1).abs() < 1e-9);
     }
 }

@@ -30,6 +30,7 @@ use sdg_detection::{Detections, GeneralizedRcnn, RcnnConfig};
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
 use sdg_orientation::OrientationCnn;
 
+use self::comparison::Compared;
 use self::mask::MaskMatcher;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
@@ -88,8 +89,6 @@ pub(crate) struct PoseCandidate {
     /// The class's probability; of proposals, less where the heads contradict each other and where the place does not look
     /// like the demonstration.
     pub(crate) network_score: f64,
-    /// How much of the box the demonstration fills.
-    filled: f64,
     pub(crate) bbox: BoundingBox,
     /// Each with the network's score; empty where the model has none.
     pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
@@ -102,6 +101,32 @@ pub(crate) struct PoseCandidate {
 }
 
 impl PoseCandidate {
+    /// With its score instead of the class's probability, in the likeliest of the poses that were compared.
+    fn scored(
+        mut self,
+        demonstration: &TaughtDemonstration,
+        picture: (u32, u32),
+        compared: Option<&Vec<Compared>>,
+    ) -> Self {
+        let class = self.network_score;
+        let score = |pose: &PlanarSimilarity, log_odds: Option<f64>| {
+            consistency::score(class, consistency::filled(demonstration, pose, &self.bbox, picture), log_odds)
+        };
+        let scores = compared.into_iter().flatten().map(|one| (score(&one.image_from_cutout, Some(one.log_odds)), one));
+        // The first of equal ones: what was read.
+        let best = scores.reduce(|best, other| if other.0 > best.0 { other } else { best });
+        let Some((network_score, Compared { image_from_cutout, .. })) = best else {
+            self.network_score = score(&self.image_from_cutout, None);
+            return self;
+        };
+        self.network_score = network_score;
+        if *image_from_cutout == self.image_from_cutout {
+            self
+        } else {
+            self.moved_to(demonstration, *image_from_cutout)
+        }
+    }
+
     /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.
     fn moved_to(self, demonstration: &TaughtDemonstration, image_from_cutout: PlanarSimilarity) -> Self {
         let points = demonstration.keypoints().into_iter().map(|keypoint| image_from_cutout.apply(&keypoint.point()));
@@ -204,21 +229,18 @@ impl Network {
         }
         let compared = match &self.comparison {
             Some(network) => {
-                let poses = read.iter().map(|one| (&demonstrations[one.demonstration_idx], one.image_from_cutout));
-                comparison::compared(network, image, poses).await
+                let detections =
+                    read.iter().map(|one| (&demonstrations[one.demonstration_idx], &one.bbox, one.image_from_cutout));
+                comparison::compared(network, image, detections).await
             }
             None => Vec::new(),
         };
         let mut proposals = Proposals::default();
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
         proposals.boxes.extend(proposed.map(unread));
-        for (place, mut candidate) in read.into_iter().enumerate() {
-            let (class, compared) = (candidate.network_score, compared.get(place));
-            candidate.network_score = consistency::score(class, candidate.filled, compared.map(|one| one.log_odds));
-            if let Some(pose) = compared.and_then(|one| one.half_turned) {
-                let demonstration = &demonstrations[candidate.demonstration_idx];
-                candidate = candidate.moved_to(demonstration, pose);
-            }
+        for (place, candidate) in read.into_iter().enumerate() {
+            let demonstration = &demonstrations[candidate.demonstration_idx];
+            let candidate = candidate.scored(demonstration, image.dimensions(), compared.get(place));
             proposals.boxes.push((candidate.bbox, candidate.network_score));
             proposals.candidates.push(candidate);
         }
@@ -249,10 +271,8 @@ impl Network {
                 }
                 _ => demonstration.grasp(&image_from_cutout),
             };
-            let filled = consistency::filled(demonstration, &image_from_cutout, bbox, image.dimensions());
             Some(PoseCandidate {
                 network_score: detections.scores[i],
-                filled,
                 bbox: *bbox,
                 keypoints,
                 grasp,
