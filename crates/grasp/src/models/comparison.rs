@@ -18,16 +18,17 @@ pub(super) struct Compared {
     pub(super) log_odds: f64,
 }
 
-/// Compares the poses that each detection, given with its demonstration and its box, may have; the one that was read first.
+/// Compares the poses that each detection may have, given with its demonstration, its box, its grasp's angle and its pose; the
+/// one that was read first.
 pub(super) async fn compared(
     network: &ComparisonNetwork,
     image: &RgbImage,
-    detections: impl Iterator<Item = (&TaughtDemonstration, &BoundingBox, PlanarSimilarity)>,
+    detections: impl Iterator<Item = (&TaughtDemonstration, &BoundingBox, Angle, PlanarSimilarity)>,
 ) -> Vec<Vec<Compared>> {
     let input_px = network.config().input_px;
     let (mut views, mut poses) = (Vec::new(), Vec::new());
-    for (demonstration, bbox, pose) in detections {
-        let likely = likely_poses(demonstration, bbox, pose);
+    for (demonstration, bbox, grasp_angle, pose) in detections {
+        let likely = likely_poses(demonstration, bbox, grasp_angle, pose);
         let reference = demonstration.reference(input_px);
         views.extend(likely.iter().map(|pose| reference.view(image, pose)));
         poses.push(likely);
@@ -47,13 +48,13 @@ pub(super) async fn compared(
 fn likely_poses(
     demonstration: &TaughtDemonstration,
     bbox: &BoundingBox,
+    grasp_angle: Angle,
     image_from_cutout: PlanarSimilarity,
 ) -> Vec<PlanarSimilarity> {
     /// Share of the box's diagonal by which the same point may be apart in two poses that are taken for one.
     const MAX_DISTANCE: f64 = 0.01;
-    let direction = image_from_cutout.angle + demonstration.marks.grasp.angle();
-    let laid = fill_box(demonstration, bbox, direction);
-    let opposite = fill_box(demonstration, bbox, direction + Angle::from_degrees(180.0));
+    let laid = fill_box(demonstration, bbox, grasp_angle);
+    let opposite = fill_box(demonstration, bbox, grasp_angle + Angle::from_degrees(180.0));
     let marked = demonstration.marks.bbox;
     let is_read = [(marked.x1, marked.y1), (marked.x2, marked.y2)].into_iter().all(|(x, y)| {
         let corner = nalgebra::Point2::new(x, y);
@@ -75,13 +76,14 @@ mod tests {
         let (from, to) = (taught.marks.bbox.center(), Point2::new(200.0, 140.0));
         let pose = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 1.1);
         let bbox = taught.outline(&pose).bounds();
-        let likely = likely_poses(&taught, &bbox, pose);
+        let grasp_angle = taught.grasp(&pose).angle;
+        let likely = likely_poses(&taught, &bbox, grasp_angle, pose);
         assert_eq!((likely.len(), likely[0]), (2, pose));
         assert!(taught.outline(&likely[1]).bounds().iou(&bbox) > 0.999);
         assert!((likely[1].angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
         // Read too small, it is laid into its box as well.
         let small = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 0.8);
-        let likely = likely_poses(&taught, &bbox, small);
+        let likely = likely_poses(&taught, &bbox, grasp_angle, small);
         assert_eq!((likely.len(), likely[0]), (3, small));
         assert!((likely[1].apply(&from) - pose.apply(&from)).norm() < 1e-6 && (likely[1].scale - 1.1).abs() < 1e-9);
     }

@@ -229,8 +229,9 @@ impl Network {
         }
         let compared = match &self.comparison {
             Some(network) => {
-                let detections =
-                    read.iter().map(|one| (&demonstrations[one.demonstration_idx], &one.bbox, one.image_from_cutout));
+                let detections = read.iter().map(|one| {
+                    (&demonstrations[one.demonstration_idx], &one.bbox, one.grasp.angle, one.image_from_cutout)
+                });
                 comparison::compared(network, image, detections).await
             }
             None => Vec::new(),
