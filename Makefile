@@ -91,7 +91,7 @@ base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on 
 	target/release/sdg-base-weights export --detector $(BASE_WEIGHTS)/detector.safetensors \
 		--orientation $(BASE_WEIGHTS)/orientation.safetensors --out $(BASE_WEIGHTS)/networks.safetensors \
 		--commit $$(git rev-parse --short HEAD)
-	target/release/sdg-base-weights pretrain --network comparison --steps 3000 --trunk $(BASE_WEIGHTS)/networks.safetensors \
+	target/release/sdg-base-weights pretrain --network comparison --steps 5000 --trunk $(BASE_WEIGHTS)/networks.safetensors \
 		--checkpoint $(BASE_WEIGHTS)/comparison.safetensors --device $(DEVICE)
 	target/release/sdg-base-weights export --base $(BASE_WEIGHTS)/networks.safetensors \
 		--comparison $(BASE_WEIGHTS)/comparison.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \

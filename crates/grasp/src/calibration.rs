@@ -31,6 +31,9 @@ const MIN_SPREAD: f64 = 0.3;
 /// they lie 1.28 standard deviations from the median.
 const FACING_PERCENT: f64 = 10.0;
 const FACING_DEVIATIONS: f64 = 1.281_551_6;
+/// Deviations between the median of the wrong scores and the threshold for each between it and that of the right ones: of
+/// normal distributions 5 % of the wrong ones are accepted where 10 % of the right ones are refused (1.645 over 1.282).
+const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
 /// Bounds of the slope, so that a handful of scores makes neither a step nor a flat line. Chosen by that reasoning, not
 /// measured.
 const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
@@ -49,8 +52,8 @@ impl Calibration {
     /// Leaves a score where it is.
     pub const NEUTRAL: Self = Self { threshold: 0.5, slope: 1.0 };
 
-    /// Finds the threshold between the raw scores of right and wrong detections: where as many deviations separate it from
-    /// the median of the right ones as from that of the wrong ones. Each side's deviation is that of its scores towards the
+    /// Finds the threshold between the raw scores of right and wrong detections, by how many deviations separate it from the
+    /// median of the right ones and from that of the wrong ones. Each side's deviation is that of its scores towards the
     /// other, so that neither one odd picture nor those that are nowhere near the threshold move it.
     ///
     /// `None` without a right score; without a wrong one, `no_wrong` stands for them.
@@ -69,7 +72,8 @@ impl Calibration {
         };
         let (right, of_right) = spread(&right, FACING_PERCENT)?;
         let (wrong, of_wrong) = spread(&wrong, 100.0 - FACING_PERCENT)?;
-        let threshold = (right * of_wrong + wrong * of_right) / (of_wrong + of_right);
+        let weight = WRONG_PER_RIGHT_DEVIATION * of_wrong;
+        let threshold = (right * weight + wrong * of_right) / (weight + of_right);
         // The slope of the logistic that is likeliest for two normal distributions of one deviation.
         let deviation = 0.5 * (of_right + of_wrong);
         let slope = ((right - wrong) / deviation.powi(2)).clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
