@@ -8,6 +8,7 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
 //! | S | none | the demonstration looked for in the whole image | likewise |
 
+mod candidate;
 mod comparison;
 mod consistency;
 mod keypoints;
@@ -20,22 +21,20 @@ use burn::tensor::Device;
 #[cfg(feature = "teach")]
 use burn::tensor::read_sync;
 use image::RgbImage;
-use nalgebra::Point2;
 use sdg_comparison::ComparisonNetwork;
 #[cfg(any(feature = "teach", test))]
 use sdg_detection::presets::RcnnKind;
 #[cfg(feature = "teach")]
 use sdg_detection::state_dict;
 use sdg_detection::{Detections, GeneralizedRcnn, RcnnConfig};
-use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
+use sdg_geometry::{BoundingBox, PlanarSimilarity};
 use sdg_orientation::OrientationCnn;
 
-use self::comparison::Compared;
+pub(crate) use self::candidate::{PoseCandidate, Proposals};
 use self::mask::MaskMatcher;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TurnSource};
-use crate::sighting::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
@@ -64,75 +63,6 @@ pub(crate) enum Reading {
     Keypoints,
     /// Model D.
     Mask(MaskMatcher),
-}
-
-/// What a network says of an image.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Proposals {
-    /// Best first, those that cannot be read as a pose left out.
-    pub(crate) candidates: Vec<PoseCandidate>,
-    /// Every box with its score, also of those that are no candidates.
-    boxes: Vec<(BoundingBox, f64)>,
-}
-
-impl Proposals {
-    /// The highest score of a box about the same part as `bbox`; 0 where there is none.
-    pub(crate) fn score_at(&self, bbox: &BoundingBox) -> f64 {
-        let about_it = self.boxes.iter().filter(|(proposed, _)| proposed.iou(bbox) >= SAME_PART_IOU);
-        about_it.map(|(_, score)| *score).fold(0.0, f64::max)
-    }
-}
-
-/// A detection with the model's reading of it, not yet verified.
-#[derive(Debug, Clone)]
-pub(crate) struct PoseCandidate {
-    /// The class's probability; of proposals, less where the heads contradict each other and where the place does not look
-    /// like the demonstration.
-    pub(crate) network_score: f64,
-    pub(crate) bbox: BoundingBox,
-    /// Each with the network's score; empty where the model has none.
-    pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
-    pub(crate) grasp: PlanarGrasp,
-    /// The demonstration that it is compared with first.
-    pub(crate) demonstration_idx: usize,
-    /// Where that demonstration lies.
-    pub(crate) image_from_cutout: PlanarSimilarity,
-    pub(crate) turn_source: TurnSource,
-}
-
-impl PoseCandidate {
-    /// With its score instead of the class's probability, in the likeliest of the poses that were compared.
-    fn scored(
-        mut self,
-        demonstration: &TaughtDemonstration,
-        picture: (u32, u32),
-        compared: Option<&Vec<Compared>>,
-    ) -> Self {
-        let class = self.network_score;
-        let score = |pose: &PlanarSimilarity, log_odds: Option<f64>| {
-            consistency::score(class, consistency::filled(demonstration, pose, &self.bbox, picture), log_odds)
-        };
-        let scores = compared.into_iter().flatten().map(|one| (score(&one.image_from_cutout, Some(one.log_odds)), one));
-        // The first of equal ones: what was read.
-        let best = scores.reduce(|best, other| if other.0 > best.0 { other } else { best });
-        let Some((network_score, Compared { image_from_cutout, .. })) = best else {
-            self.network_score = score(&self.image_from_cutout, None);
-            return self;
-        };
-        self.network_score = network_score;
-        if *image_from_cutout == self.image_from_cutout {
-            self
-        } else {
-            self.moved_to(demonstration, *image_from_cutout)
-        }
-    }
-
-    /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.
-    fn moved_to(self, demonstration: &TaughtDemonstration, image_from_cutout: PlanarSimilarity) -> Self {
-        let points = demonstration.keypoints().into_iter().map(|keypoint| image_from_cutout.apply(&keypoint.point()));
-        let keypoints = points.zip(self.keypoints.iter().map(|(_, score)| *score)).collect();
-        Self { keypoints, grasp: demonstration.grasp(&image_from_cutout), image_from_cutout, ..self }
-    }
 }
 
 /// Where a demonstration lies.

@@ -1,0 +1,79 @@
+//! What a network proposes: places of an image, each with the model's reading of it.
+
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
+
+use super::comparison::Compared;
+use super::consistency;
+use crate::facts::TurnSource;
+use crate::sighting::SAME_PART_IOU;
+use crate::taught::TaughtDemonstration;
+
+/// What a network says of an image.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Proposals {
+    /// Best first, those that cannot be read as a pose left out.
+    pub(crate) candidates: Vec<PoseCandidate>,
+    /// Every box with its score, also of those that are no candidates.
+    pub(super) boxes: Vec<(BoundingBox, f64)>,
+}
+
+impl Proposals {
+    /// The highest score of a box about the same part as `bbox`; 0 where there is none.
+    pub(crate) fn score_at(&self, bbox: &BoundingBox) -> f64 {
+        let about_it = self.boxes.iter().filter(|(proposed, _)| proposed.iou(bbox) >= SAME_PART_IOU);
+        about_it.map(|(_, score)| *score).fold(0.0, f64::max)
+    }
+}
+
+/// A detection with the model's reading of it, not yet verified.
+#[derive(Debug, Clone)]
+pub(crate) struct PoseCandidate {
+    /// The class's probability; of proposals, less where the heads contradict each other and where the place does not look
+    /// like the demonstration.
+    pub(crate) network_score: f64,
+    pub(crate) bbox: BoundingBox,
+    /// Each with the network's score; empty where the model has none.
+    pub(crate) keypoints: Vec<(Point2<f64>, f64)>,
+    pub(crate) grasp: PlanarGrasp,
+    /// The demonstration that it is compared with first.
+    pub(crate) demonstration_idx: usize,
+    /// Where that demonstration lies.
+    pub(crate) image_from_cutout: PlanarSimilarity,
+    pub(crate) turn_source: TurnSource,
+}
+
+impl PoseCandidate {
+    /// With its score instead of the class's probability, in the likeliest of the poses that were compared.
+    pub(super) fn scored(
+        mut self,
+        demonstration: &TaughtDemonstration,
+        picture: (u32, u32),
+        compared: Option<&Vec<Compared>>,
+    ) -> Self {
+        let class = self.network_score;
+        let score = |pose: &PlanarSimilarity, log_odds: Option<f64>| {
+            consistency::score(class, consistency::filled(demonstration, pose, &self.bbox, picture), log_odds)
+        };
+        let scores = compared.into_iter().flatten().map(|one| (score(&one.image_from_cutout, Some(one.log_odds)), one));
+        // The first of equal ones: what was read.
+        let best = scores.reduce(|best, other| if other.0 > best.0 { other } else { best });
+        let Some((network_score, Compared { image_from_cutout, .. })) = best else {
+            self.network_score = score(&self.image_from_cutout, None);
+            return self;
+        };
+        self.network_score = network_score;
+        if *image_from_cutout == self.image_from_cutout {
+            self
+        } else {
+            self.moved_to(demonstration, *image_from_cutout)
+        }
+    }
+
+    /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.
+    fn moved_to(self, demonstration: &TaughtDemonstration, image_from_cutout: PlanarSimilarity) -> Self {
+        let points = demonstration.keypoints().into_iter().map(|keypoint| image_from_cutout.apply(&keypoint.point()));
+        let keypoints = points.zip(self.keypoints.iter().map(|(_, score)| *score)).collect();
+        Self { keypoints, grasp: demonstration.grasp(&image_from_cutout), image_from_cutout, ..self }
+    }
+}
