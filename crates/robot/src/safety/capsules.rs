@@ -26,11 +26,11 @@ pub struct LinkCapsules {
 /// Two bodies that come too near to each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SelfCollision {
-    /// Their names.
+    /// The bodies' names.
     pub bodies: [&'static str; 2],
     /// Distance of their capsules, m; negative where these overlap.
     pub distance_m: f64,
-    /// The least allowed.
+    /// The smallest distance that is allowed, m.
     pub min_m: f64,
 }
 
