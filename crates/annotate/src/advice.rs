@@ -32,7 +32,7 @@ pub struct Advice {
 /// Whether a model can be taught from the marks.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ModelAdvice {
-    /// The letter.
+    /// The grasp model.
     pub model: ModelKind,
     /// What is missing; empty when nothing is.
     pub lacks: Vec<&'static str>,
@@ -41,7 +41,7 @@ pub struct ModelAdvice {
 /// Something that the person should look at.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Remark {
-    /// A name for programs.
+    /// Stable identifier, for programs.
     pub code: &'static str,
     /// One line for the person at the page.
     pub text: String,
@@ -55,7 +55,7 @@ pub struct Remark {
 pub enum Fix {
     /// Opens or closes the jaws to so many pixels.
     JawWidth(f64),
-    /// Draws this box.
+    /// Marks the box, `[x1, y1, x2, y2]` in pixels.
     Box([f64; 4]),
 }
 

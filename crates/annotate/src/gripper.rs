@@ -9,7 +9,7 @@ use sdg_geometry::{GraspLine, Polygon};
 pub struct Gripper {
     /// From `grasp_start` to `grasp_end`, in pixels.
     pub line: GraspLine,
-    /// Pixels between the jaws.
+    /// Distance between the jaws, in pixels.
     pub jaw_width: f64,
 }
 

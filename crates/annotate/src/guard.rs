@@ -8,10 +8,10 @@
 use crate::error::{Error, Result};
 use crate::http::{Head, Response};
 
-/// What a page elsewhere would need for a guess: 128 bits.
+/// Length of the token: 128 bits, which a page elsewhere cannot guess.
 const TOKEN_BYTES: usize = 16;
 
-/// Knows the token and the server's own names.
+/// The token and the server's own names, which every request is checked against.
 #[derive(Debug, Clone)]
 pub struct Guard {
     token: String,
@@ -21,7 +21,7 @@ pub struct Guard {
 /// Why a request is turned away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// It names another server.
+    /// Its Host header names another server.
     Host,
     /// It comes from another page.
     Origin,

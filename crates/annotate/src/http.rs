@@ -34,9 +34,9 @@ pub struct Head {
 /// A request as it is answered.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Request {
-    /// Where it goes.
+    /// Request line and headers.
     pub head: Head,
-    /// What it brings.
+    /// The body's bytes.
     pub body: Vec<u8>,
 }
 
@@ -163,7 +163,7 @@ pub fn read_body(
     if body.len() < head.content_length { Err(Unreadable::Closed) } else { Ok(body) }
 }
 
-/// An answer.
+/// A response to the browser.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Response {
     /// 200, 404 …
@@ -182,7 +182,7 @@ impl Response {
         Self::new(status, "text/plain; charset=utf-8", text.as_bytes())
     }
 
-    /// An answer.
+    /// A response without further headers.
     pub fn new(status: u16, media_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Self {
         Self { status, media_type, body: body.into(), headers: Vec::new() }
     }

@@ -46,13 +46,13 @@ pub struct LiveFrame {
 /// What is wrong with a camera.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct LiveFault {
-    /// Its kind.
+    /// What kind of fault it is.
     pub kind: LiveFaultKind,
     /// The same for people, in one line.
     pub text: String,
 }
 
-/// Kinds of faults.
+/// Kinds of faults of a live camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LiveFaultKind {
@@ -64,13 +64,13 @@ pub enum LiveFaultKind {
     Torn,
     /// The camera cannot be reached; it is tried again.
     Gone,
-    /// Nothing is to be seen.
+    /// The pictures are black.
     Black,
     /// Pictures of another size than the calibrated camera's.
     OtherSize,
     /// There will be no more pictures, as at the end of a folder; the last one stays.
     Ended,
-    /// It failed for good.
+    /// It failed and is not opened again.
     Failed,
 }
 
@@ -84,7 +84,7 @@ impl LiveFaultKind {
 /// The camera that a session is opened with.
 #[derive(Debug, Clone)]
 pub struct LiveOptions {
-    /// Its pictures.
+    /// Source of its pictures.
     pub pictures: Arc<dyn LivePictures>,
     /// What the page calls it.
     pub address: String,

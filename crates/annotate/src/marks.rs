@@ -15,7 +15,7 @@ pub struct Marks {
     /// `[x1, y1, x2, y2]`.
     #[serde(rename = "box", default)]
     pub bbox: Option<[f64; 4]>,
-    /// The gripper.
+    /// Where the gripper closes.
     #[serde(default)]
     pub grasp: Option<GraspMarks>,
     /// The part's outline.
@@ -36,7 +36,7 @@ pub struct GraspMarks {
 }
 
 impl GraspMarks {
-    /// The marked line.
+    /// The grasp line through both marks.
     pub fn line(&self) -> GraspLine {
         GraspLine::new(Point2::from(self.start), Point2::from(self.end))
     }

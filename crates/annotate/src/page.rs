@@ -1,6 +1,6 @@
 //! The page's own files, compiled in: it fetches nothing from elsewhere and needs no build step.
 
-/// The document.
+/// The page's HTML document.
 pub const INDEX: &str = include_str!("../page/index.html");
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";

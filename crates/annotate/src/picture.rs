@@ -18,7 +18,7 @@ const JPEG_QUALITY: u8 = 90;
 /// One picture on the disk, known to be readable.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
     /// What the page calls it.
     pub name: String,

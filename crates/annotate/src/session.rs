@@ -328,7 +328,7 @@ impl Session {
         self.teaching.start(Arc::clone(&self.teacher), request, demonstrations, model_path)
     }
 
-    /// How the teaching stands.
+    /// State of the teaching, for the page.
     pub fn teaching_news(&self) -> News {
         self.teaching.news()
     }

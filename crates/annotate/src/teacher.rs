@@ -50,7 +50,7 @@ pub trait TaughtModel: Send + Sync {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TeachRequest {
-    /// The model's letter.
+    /// The grasp model to teach.
     pub model: ModelKind,
     /// Seconds that the training may take at most.
     #[serde(default)]
@@ -125,10 +125,10 @@ pub enum TeachingStep {
     },
 }
 
-/// A model in figures.
+/// Measured quality of a taught model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TaughtSummary {
-    /// The letter.
+    /// The grasp model.
     pub model: ModelKind,
     /// The object's name.
     pub object: String,
@@ -153,7 +153,7 @@ pub struct FoundGrasp {
     pub bbox: BoundingBox,
     /// Its outline as the demonstration lies in the image.
     pub outline: Option<Polygon>,
-    /// Where to grasp.
+    /// Grasp point, direction and width, in pixels.
     pub grasp: PlanarGrasp,
     /// Length of the marked line in this image.
     pub line_length: f64,
@@ -170,7 +170,7 @@ pub struct GraspPose {
     pub position_mm: [f64; 3],
     /// The turn about the frame's z.
     pub yaw_deg: f64,
-    /// Between the jaws.
+    /// Opening of the jaws, mm.
     pub opening_mm: f64,
     /// One standard deviation of the position.
     pub sigma_mm: f64,

@@ -17,24 +17,24 @@ use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, Tea
 /// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
 const MAX_POINTS: usize = 240;
 
-/// How a teaching stands.
+/// State of a teaching.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// None was asked for yet.
+    /// No teaching was started yet.
     #[default]
     Idle,
     /// Not ended yet.
     Running,
     /// It was asked to end with what there is.
     Stopping,
-    /// There is a model.
+    /// It has ended with a model.
     Done,
     /// It failed; there is no model.
     Failed,
 }
 
-/// The news of a teaching.
+/// State and progress of a teaching, as the page shows it.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct News {
     /// State of the teaching.
@@ -55,11 +55,11 @@ pub struct News {
     pub losses: Vec<(usize, f64)>,
     /// `[step, share found]`.
     pub validations: Vec<(usize, f64)>,
-    /// The model, when done.
+    /// Quality of the model, once it is taught.
     pub summary: Option<TaughtSummary>,
-    /// Where it was written.
+    /// File that the model was written to.
     pub written_to: Option<String>,
-    /// Why there is none.
+    /// Why it failed.
     pub error: Option<String>,
 }
 

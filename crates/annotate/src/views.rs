@@ -11,12 +11,12 @@ use crate::marks::Marks;
 pub enum Saved {
     /// There is nothing to write.
     Nothing,
-    /// They are in the file.
+    /// The marks were written to the file.
     Written {
         /// The file's name.
         file: String,
     },
-    /// They do not, and why.
+    /// The marks were refused.
     Refused {
         /// One line for the person at the page.
         why: String,
@@ -34,7 +34,7 @@ pub struct ImageView {
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// What is marked.
+    /// The marks on it.
     pub marks: Marks,
     /// Whether that stands on the disk.
     pub saved: Saved,

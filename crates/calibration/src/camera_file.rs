@@ -25,13 +25,13 @@ use serde::{Deserialize, Serialize};
 use crate::camera_sections::merged;
 use crate::error::CameraFileError;
 
-/// What poses are given in.
+/// Frame that a pose is given in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Frame {
     /// On the table, `z` up: where a printed sheet lay.
     Table,
-    /// The robot's base.
+    /// The robot's base frame.
     Base,
 }
 
@@ -58,7 +58,7 @@ pub struct CalibratedCamera {
     pub flange_from_camera: Option<Isometry3<f64>>,
 }
 
-/// Where a camera is.
+/// A camera's pose, and the table under it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TablePose {
     /// What `frame_from_camera` leads to.

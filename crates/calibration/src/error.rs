@@ -29,7 +29,7 @@ pub enum CameraFileError {
         width: u32,
         height: u32,
     },
-    /// A pose that is none.
+    /// A pose that is no rigid transform.
     #[error("expected {name} to be {expected}, found {found:?}")]
     Pose { name: String, expected: &'static str, found: Vec<f64> },
     /// The file has intrinsics alone.
@@ -152,7 +152,7 @@ pub enum CalibrationError {
     /// Robot poses that cannot be read.
     #[error("expected robot poses as documented in docs/calibration.md, found: {found}")]
     PosesUnreadable { found: String },
-    /// A robot pose that is none.
+    /// A robot pose that is no rigid transform.
     #[error("expected base_from_flange.{name} of {picture} to be {expected}, found {found:?}")]
     RobotPose { picture: String, name: &'static str, expected: &'static str, found: Vec<f64> },
     /// Robot poses that leave the transform open.
@@ -163,7 +163,7 @@ pub enum CalibrationError {
     /// Robot poses and pictures that do not belong together.
     #[error("expected robot poses and pictures that agree, found {found}{hint}")]
     HandEyeDisagrees {
-        /// By how much they do not.
+        /// How far they are apart.
         found: String,
         hint: String,
     },

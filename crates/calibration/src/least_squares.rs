@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
-/// What one picture says.
+/// Normal equations of one picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Block<const S: usize> {
     pub(crate) shared: SMatrix<f64, S, S>,
@@ -64,7 +64,7 @@ pub(crate) trait Problem<const S: usize>: Clone {
     }
 }
 
-/// Where it ended.
+/// Result of a minimisation.
 #[derive(Debug, Clone)]
 pub(crate) struct Minimum<P, const S: usize> {
     pub(crate) at: P,

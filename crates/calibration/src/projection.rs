@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x6, Point2, Point3, SMatrix, SVector, Vector2, Vector3};
 use sdg_geometry::{PinholeCamera, PlumbBob};
 
-/// Intrinsics of a camera.
+/// Number of a camera's intrinsics: two focal lengths, the principal point, five of the lens.
 pub(crate) const NUM_INTRINSICS: usize = 9;
 
 /// A pixel and its derivatives.

@@ -23,50 +23,50 @@ use crate::commands::weights::WeightsArgs;
 #[derive(Debug, Parser)]
 #[command(name = "sdg", version, propagate_version = true, arg_required_else_help = true)]
 pub struct Args {
-    /// What to do.
+    /// The command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The verbs.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The main job on shipped input: teach one object from one photo, then grasp it in simulation
+    /// Teach a shipped object from one photo, then grasp it in simulation
     Demo(DemoArgs),
-    /// Mark the grasp on photos in the browser, see what will be learnt, teach and try
+    /// Mark the grasp on photos in the browser, look at training samples, teach a model and try it
     Annotate(AnnotateArgs),
-    /// Demonstrations to a grasp model in one file
+    /// Teach a grasp model from demonstrations, into one file
     Teach(TeachArgs),
-    /// Planar grasps in images
+    /// Find planar grasps in images or live pictures
     Detect(DetectArgs),
-    /// Grasp attempts in MuJoCo
+    /// Attempt grasps in MuJoCo, and report them
     Rehearse(RehearseArgs),
-    /// A simulated robot on the network, for programs of others
+    /// Serve a simulated robot on the network, for other programs
     #[cfg(feature = "simulation")]
     Simulate(crate::commands::simulate::SimulateArgs),
-    /// The paper's protocol: every model on every part, and the paper's tables; or a model on your own labelled pictures
+    /// Measure every model on every part by the paper's protocol; or test a model on your own labelled pictures
     Evaluate(EvaluateArgs),
-    /// One grasp, from the picture to the lifted part, with a real arm or a simulated one
+    /// Grasp a part with a real or a simulated arm, from the picture to the lifted part
     Grasp(GraspArgs),
-    /// A motion around the obstacles of a workcell, told and drawn; nothing moves
+    /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
     Plan(PlanArgs),
-    /// A real arm by hand: state, home, recovery, hand
+    /// Show the state of a real arm, bring it home, recover it after an error, open and close its hand
     #[command(subcommand)]
     Robot(RobotCommand),
-    /// Augmented samples as pictures and COCO JSON, to look at
+    /// Write augmented samples as pictures and COCO JSON, to look at
     Augment(AugmentArgs),
-    /// Annotation files from one tool's format to another's
+    /// Convert annotation files from one tool's format to another's
     Annotation(AnnotationArgs),
-    /// Detectron2 and torchvision checkpoints: convert, inspect, verify
+    /// Convert, inspect and verify Detectron2 and torchvision checkpoints
     Weights(WeightsArgs),
-    /// Cameras: calibrate them, and look through them
+    /// List, calibrate and watch cameras, and save their frames
     #[command(subcommand)]
     Camera(CameraCommand),
-    /// A completion script for your shell, on standard output
+    /// Print a completion script for your shell
     Completions(CompletionsArgs),
-    /// Manual pages
+    /// Print or write manual pages
     Man(ManArgs),
-    /// What this build and this machine can compute on
+    /// List the devices that this build and this machine can compute on
     Devices(DevicesArgs),
 }
 

@@ -3,9 +3,7 @@
 use burn::module::Module;
 use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, activation};
-use sdg_detection::initialization::{Distribution, Initializer};
-use sdg_detection::layers::Linear;
-use sdg_orientation::{ConvNormRelu, Stage};
+use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
 use crate::config::{ComparisonConfig, ComparisonError};
 use crate::view::{DIFFERENCES, View, batch};
@@ -22,9 +20,9 @@ pub struct ComparisonNetwork {
     pub trunk: Vec<Stage>,
     /// From what differs to the last map.
     pub stages: Vec<Stage>,
-    /// From the flat last map.
+    /// Fully connected layer, from the flattened last map.
     pub hidden: Linear,
-    /// To the log-odds.
+    /// Fully connected layer, to the log-odds.
     pub output: Linear,
     #[module(skip)]
     config: ComparisonConfig,
@@ -157,8 +155,8 @@ mod tests {
     use crate::view::Reference;
     use burn::tensor::read_sync;
     use image::{Rgb, RgbImage};
-    use sdg_detection::state_dict;
     use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
+    use sdg_layers::state_dict;
 
     fn view(reference: &Reference, tx: f64) -> View {
         let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));

@@ -189,7 +189,7 @@ pub struct CocoFile {
 }
 
 impl CocoFile {
-    /// A file without images.
+    /// Makes a file without images.
     pub fn new() -> Self {
         Self::default()
     }

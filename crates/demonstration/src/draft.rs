@@ -18,7 +18,7 @@ const MAX_VERTICES: usize = 10_000;
 pub(crate) struct Draft {
     pub label: Option<String>,
     pub place: String,
-    /// Two or more corners.
+    /// Corners of the box, two or more.
     pub corners: Option<(Vec<Point2<f64>>, String)>,
     pub grasp_start: Option<(Point2<f64>, String)>,
     pub grasp_end: Option<(Point2<f64>, String)>,

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// The crate's result.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Why a photo, an annotation or an augmentation was refused.
@@ -91,14 +91,14 @@ pub enum Error {
     /// There is no object in the annotation of this image.
     #[error("annotation holds no object: expected {expected}, found {found}")]
     NoObject {
-        /// What would make an object.
+        /// What an object needs.
         expected: String,
         found: String,
     },
     /// Several shapes of one kind and nothing that says which belong together.
     #[error("annotation of several objects: expected a `group_id` on every shape, found {found}")]
     Ungrouped {
-        /// What cannot be told apart.
+        /// Groups and shapes that were found.
         found: String,
     },
     /// One object was expected and several are annotated.

@@ -30,7 +30,7 @@ pub struct DeclaredImage {
 }
 
 impl AnnotationFormat {
-    /// All of them.
+    /// All formats.
     pub const ALL: [Self; 4] = [Self::Coco, Self::LabelMe, Self::YoloPose, Self::OpenDr];
 
     /// The name on the command line.

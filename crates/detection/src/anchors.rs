@@ -12,7 +12,7 @@ pub const LEVEL_STRIDES: [usize; 5] = [4, 8, 16, 32, 64];
 /// Size of one level's grid of cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct GridSize {
-    /// Cells down.
+    /// Rows.
     pub height: usize,
     /// Columns.
     pub width: usize,

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 pub use mask_head::{MaskBalance, MaskHeadConfig, MaskPasting, MaskTargets};
 pub use roi_pooler::{LevelEpsilon, RoiAlignment, RoiPoolerConfig, SamplingRatio};
+pub use sdg_layers::NormKind;
 
 /// The whole detector.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,7 +94,7 @@ pub enum SizeRounding {
 pub struct ImageTransformConfig {
     /// Size of the resized image.
     pub resize: ResizeRule,
-    /// Resampling.
+    /// Filter of the resampling.
     pub filter: ResizeFilter,
     /// Channel order of the input tensor.
     pub channel_order: ChannelOrder,
@@ -105,23 +106,6 @@ pub struct ImageTransformConfig {
     pub std: [f32; 3],
     /// Width and height are padded with zeros (after normalisation) to multiples of this.
     pub size_divisibility: usize,
-}
-
-/// Normalisation after a convolution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum NormKind {
-    /// None: the convolution has a bias instead.
-    Identity,
-    /// Mean and variance over groups of channels of one image, trained.
-    Group {
-        /// Number of groups.
-        num_groups: usize,
-    },
-    /// Stored mean and variance, never trained.
-    FrozenBatch {
-        /// Added to the variance; 1e-5 in Detectron2, 0 in some of torchvision's builders.
-        eps: f64,
-    },
 }
 
 /// Residual block.
@@ -272,7 +256,7 @@ pub struct MatcherConfig {
 pub enum LowQualityMatches {
     /// They become positive: the region proposal network.
     Allowed,
-    /// They do not: the ROI heads.
+    /// They stay unmatched: the ROI heads.
     Forbidden,
 }
 
@@ -331,7 +315,7 @@ pub enum BackgroundClass {
 pub enum BoxDeltas {
     /// 4·K (background last) or 4·(K+1) (background first) outputs.
     ClassSpecific,
-    /// 4 outputs.
+    /// 4 outputs, shared by all classes.
     ClassAgnostic,
 }
 
@@ -363,7 +347,7 @@ fn is_zero(value: &f64) -> bool {
 /// Two fully connected layers, class scores and box deltas.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoxHeadConfig {
-    /// Pooling.
+    /// How features are pooled for an ROI.
     pub pooler: RoiPoolerConfig,
     /// Width of the two fully connected layers.
     pub fc_channels: usize,

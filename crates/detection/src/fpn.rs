@@ -10,10 +10,9 @@
 use burn::module::Module;
 use burn::tensor::{Tensor, s};
 use sdg_kernels::{Activation, upsample_nearest_2x};
+use sdg_layers::{Conv2d, Conv2dShape, Distribution, Initializer};
 
 use crate::config::FpnConfig;
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape};
 
 /// The convolutions of the pyramid.
 #[derive(Module, Debug)]

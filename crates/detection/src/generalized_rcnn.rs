@@ -10,13 +10,13 @@ use crate::config::{Freeze, MaskHeadConfig, RcnnConfig};
 use crate::error::{DetectionError, Result};
 use crate::fpn::Fpn;
 use crate::image_transform::{ImageTransform, TransformedImage, pad_batch};
-use crate::initialization::Initializer;
 use crate::losses::Losses;
 use crate::resnet::{ResNet, frozen};
 use crate::roi_heads::{RoiDetection, RoiHeads};
 use crate::rpn::{ImageSize, Mode, Proposals, RegionProposalNetwork};
 use crate::target::ResizedTarget;
 use crate::target::Target;
+use sdg_layers::Initializer;
 
 /// Residual network and feature pyramid.
 #[derive(Module, Debug)]
@@ -40,11 +40,11 @@ impl Backbone {
 /// pyramid's names, and `conv_fcn.0`, `mask_fcn.0` for `conv_fcn1`, `mask_fcn1`.
 #[derive(Module, Debug)]
 pub struct GeneralizedRcnn {
-    /// Features.
+    /// From the image to feature maps.
     pub backbone: Backbone,
-    /// Proposals.
+    /// From feature maps to proposals.
     pub proposal_generator: RegionProposalNetwork,
-    /// Detections.
+    /// From proposals to detections.
     pub roi_heads: RoiHeads,
     #[module(skip)]
     config: RcnnConfig,
@@ -64,7 +64,7 @@ pub struct ScoredKeypoint {
 /// What was found in one image, best first, in pixels of the original image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Detections {
-    /// Boxes.
+    /// Boxes, in pixels of the original image.
     pub boxes: Vec<BoundingBox>,
     /// Probability of each box's class.
     pub scores: Vec<f64>,

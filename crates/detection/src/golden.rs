@@ -24,9 +24,9 @@ use crate::generalized_rcnn::{Detections, GeneralizedRcnn};
 use crate::host::host_values;
 use crate::image_transform::TransformedImage;
 use crate::rpn::Mode;
-use crate::state_dict::{StateDict, WeightTensor};
 use crate::target::ObjectMask;
 use crate::target::ResizedTarget;
+use sdg_layers::state_dict::{StateDict, WeightTensor};
 
 /// Samples an image, so many that every anchor and proposal takes part in the reference's losses: nothing is drawn.
 const ALL_SAMPLES: usize = 1_000_000;
@@ -56,11 +56,11 @@ pub struct StageComparison {
     pub count: usize,
     /// Largest difference; infinite where shapes differ or a value is not finite.
     pub max_absolute: f64,
-    /// That over the largest magnitude expected.
+    /// Largest difference over the largest magnitude expected.
     pub max_relative: f64,
-    /// What is allowed.
+    /// Largest difference that passes.
     pub tolerance: Tolerance,
-    /// Whether it is inside.
+    /// Whether the difference is within the tolerance.
     pub passed: bool,
     /// What else there is to say, such as two shapes that differ.
     pub remark: Option<String>,
@@ -69,7 +69,7 @@ pub struct StageComparison {
 /// All comparisons, in the order of the stages.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct GoldenReport {
-    /// One a tensor.
+    /// One comparison for each tensor.
     pub stages: Vec<StageComparison>,
 }
 

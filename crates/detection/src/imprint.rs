@@ -21,10 +21,10 @@ use crate::boxes::Corners;
 use crate::error::Result;
 use crate::generalized_rcnn::GeneralizedRcnn;
 use crate::image_transform::{TransformedImage, pad_batch};
-use crate::initialization::{Distribution, Initializer};
 use crate::roi_pooler::Roi;
-use crate::state_dict::{StateDict, WeightTensor};
 use crate::target::{ResizedTarget, Target};
+use sdg_layers::state_dict::{StateDict, WeightTensor};
+use sdg_layers::{Distribution, Initializer};
 
 /// First factors of the products of features: small, so that pretraining starts from undecided scores.
 const FIRST_SCALE: f64 = 0.05;
@@ -241,10 +241,10 @@ mod tests {
     use crate::config::ResizeRule;
     use crate::presets::edge;
     use crate::roi_heads::heatmap::encode;
-    use crate::state_dict;
     use burn::tensor::Device;
     use image::{Rgb, RgbImage};
     use sdg_geometry::BoundingBox;
+    use sdg_layers::state_dict;
 
     const NUM_KEYPOINTS: usize = 3;
 
@@ -339,7 +339,7 @@ mod tests {
         }
         let descriptors = Tensor::<2>::from_data(TensorData::new(descriptors, [NUM_KEYPOINTS, 12]), &Device::flex());
         let products = imprint.keypoint.weights(descriptors).unsqueeze::<3>().repeat_dim(0, 2).matmul(flat);
-        let doubled = crate::layers::upsample_bilinear_2x(products.reshape([2, NUM_KEYPOINTS, 14, 14]));
+        let doubled = sdg_layers::upsample_bilinear_2x(products.reshape([2, NUM_KEYPOINTS, 14, 14]));
         let (added, doubled) = (values(added), values(doubled));
         for (idx, (one, other)) in added.iter().zip(&doubled).enumerate() {
             let (y, x) = (idx / 28 % 28, idx % 28);

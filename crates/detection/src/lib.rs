@@ -47,8 +47,6 @@ pub mod golden;
 mod host;
 pub mod image_transform;
 pub mod imprint;
-pub mod initialization;
-pub mod layers;
 pub mod losses;
 pub mod matcher;
 pub mod presets;
@@ -58,7 +56,6 @@ pub mod roi_heads;
 pub mod roi_pooler;
 pub mod rpn;
 pub mod sampler;
-pub mod state_dict;
 mod target;
 
 pub use config::RcnnConfig;
@@ -67,4 +64,5 @@ pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint
 pub use image_transform::{ImageTransform, TransformedImage};
 pub use losses::Losses;
 pub use sdg_kernels::keep_freed_memory;
+pub use sdg_layers::{self as layers, initialization, state_dict};
 pub use target::{ObjectMask, ResizedTarget, Target};

@@ -11,10 +11,9 @@
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::Tensor;
 use sdg_kernels::{Activation, MaxPool2dParams, max_pool2d};
+use sdg_layers::{Conv2d, Conv2dShape, Distribution, Initializer};
 
 use crate::config::{BlockKind, Freeze, ResNetConfig, StrideIn};
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape};
 
 /// The first convolution and pooling.
 #[derive(Module, Debug)]

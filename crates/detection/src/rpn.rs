@@ -10,14 +10,13 @@
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, read_sync};
 use rand_pcg::Pcg64Mcg;
+use sdg_layers::{Conv2d, Conv2dShape, Distribution, Initializer};
 
 use crate::anchors::{GridSize, grid_anchors};
 use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{AnchorConfig, NormKind, RpnConfig, RpnNormaliser};
 use crate::host::read_both;
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape};
 use crate::losses;
 use crate::matcher::{Match, match_boxes};
 use crate::sampler::sample;

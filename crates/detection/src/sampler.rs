@@ -9,9 +9,9 @@ use crate::matcher::Match;
 /// Indices drawn from a list of matches.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Sampled {
-    /// Positive ones.
+    /// Indices of the positive samples.
     pub positive: Vec<usize>,
-    /// Negative ones.
+    /// Indices of the negative samples.
     pub negative: Vec<usize>,
 }
 

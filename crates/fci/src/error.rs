@@ -59,5 +59,5 @@ pub enum FciError {
     Plant(String),
 }
 
-/// Results of this crate.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, FciError>;

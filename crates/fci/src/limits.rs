@@ -5,20 +5,20 @@ use crate::wire::Version;
 /// Velocity, acceleration and jerk of one kind of motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateLimits {
-    /// m/s or rad/s.
+    /// Velocity, m/s or rad/s.
     pub velocity: f64,
-    /// m/s² or rad/s².
+    /// Acceleration, m/s² or rad/s².
     pub acceleration: f64,
-    /// m/s³ or rad/s³.
+    /// Jerk, m/s³ or rad/s³.
     pub jerk: f64,
 }
 
 /// How a joint's largest velocity falls towards an end of its range: `sqrt(slope * distance) - offset`, not below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VelocityNearEnd {
-    /// rad/s.
+    /// Subtracted from the root, rad/s.
     pub offset: f64,
-    /// rad/s².
+    /// Factor on the distance, rad/s².
     pub slope: f64,
 }
 
@@ -36,21 +36,21 @@ pub struct Limits {
     pub q_min: [f64; 7],
     /// Upper ends of the joints' ranges, rad.
     pub q_max: [f64; 7],
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: [f64; 7],
     /// What velocities are limited to besides, near the ends of the joints' ranges.
     pub velocity_near_ends: Option<[VelocityNearEnd; 7]>,
-    /// rad/s².
+    /// Acceleration, rad/s².
     pub acceleration: [f64; 7],
-    /// rad/s³.
+    /// Jerk, rad/s³.
     pub jerk: [f64; 7],
-    /// N·m.
+    /// Torque, N·m.
     pub torque: [f64; 7],
-    /// N·m/s.
+    /// Rate of the torque, N·m/s.
     pub torque_rate: f64,
-    /// Of the end effector.
+    /// Limits of the end effector's translation.
     pub translation: RateLimits,
-    /// Of the end effector.
+    /// Limits of the end effector's rotation.
     pub rotation: RateLimits,
     /// Of joint 3, where it is commanded as the elbow.
     pub elbow: RateLimits,

@@ -49,7 +49,7 @@ robot_errors! {
     JointReflex = "joint_reflex",
     /// The external force passed its threshold.
     CartesianReflex = "cartesian_reflex",
-    /// The goal was missed.
+    /// The goal pose was missed by more than allowed.
     MaxGoalPoseDeviationViolation = "max_goal_pose_deviation_violation",
     /// The path was left.
     MaxPathPoseDeviationViolation = "max_path_pose_deviation_violation",

@@ -21,7 +21,7 @@ pub enum Visibility {
 pub struct Keypoint {
     /// Pixels to the right.
     pub x: f64,
-    /// Height, in pixels.
+    /// Pixels down.
     pub y: f64,
     /// Whether the place may be relied on.
     pub visibility: Visibility,
@@ -33,7 +33,7 @@ impl Keypoint {
         Self { x: point.x, y: point.y, visibility: Visibility::Visible }
     }
 
-    /// Its place.
+    /// Its position, in pixels.
     pub fn point(&self) -> Point2<f64> {
         Point2::new(self.x, self.y)
     }

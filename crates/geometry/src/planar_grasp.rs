@@ -12,7 +12,7 @@ use crate::{Angle, GraspLine, Keypoint};
 pub struct PlanarGrasp {
     /// Pixels to the right.
     pub x: f64,
-    /// Height, in pixels.
+    /// Pixels down.
     pub y: f64,
     /// Direction of the marked line, y down.
     pub angle: Angle,

@@ -58,7 +58,7 @@ impl PlanarSimilarity {
         Some(Self::about(Point2::from(mean_from), Point2::from(mean_to), angle, scale))
     }
 
-    /// Moves a point.
+    /// Transforms a point.
     pub fn apply(&self, point: &Point2<f64>) -> Point2<f64> {
         let (sin, cos) = self.angle.radians().sin_cos();
         Point2::new(
@@ -73,7 +73,7 @@ impl PlanarSimilarity {
         Self { scale: self.scale * first.scale, angle: self.angle + first.angle, tx: shift.x, ty: shift.y }
     }
 
-    /// The way back.
+    /// The inverse transform.
     pub fn inverse(&self) -> Self {
         let turn_back = Self { scale: 1.0 / self.scale, angle: -self.angle, tx: 0.0, ty: 0.0 };
         let shift = turn_back.apply(&Point2::new(self.tx, self.ty));

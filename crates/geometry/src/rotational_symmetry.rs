@@ -18,7 +18,7 @@ pub enum RotationalSymmetry {
     None,
     /// So many equal turns make a whole one, two at least: a turn by any of them cannot be seen.
     Fold(u32),
-    /// No turn can be seen.
+    /// The part looks the same at every turn.
     Full,
 }
 

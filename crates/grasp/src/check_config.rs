@@ -131,7 +131,7 @@ impl ScoreConfig {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
 
-    /// Every term with its name.
+    /// Every term of the score, by name.
     pub fn terms(&self) -> [(&'static str, Term); 9] {
         [
             ("network", self.network),

@@ -26,7 +26,7 @@ pub enum ComputeBackend {
 }
 
 impl ComputeBackend {
-    /// All, the default first.
+    /// All backends, the default first.
     pub const ALL: [Self; 4] = [Self::Flex, Self::NdArray, Self::Wgpu, Self::Cuda];
 
     /// As typed at the command line; also the cargo feature's name.

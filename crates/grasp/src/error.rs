@@ -18,7 +18,7 @@ pub enum GraspError {
     /// A device that no version has.
     #[error("expected a device out of {}, found \"{found}\"", .known.join(", "))]
     UnknownBackend {
-        /// The names that there are.
+        /// The names that exist.
         known: Vec<&'static str>,
         found: String,
     },
@@ -45,7 +45,7 @@ pub enum GraspError {
     /// A grasp model file that contradicts itself or was cut short.
     #[error("the grasp model file is damaged: expected {expected}, found {found}")]
     Damaged {
-        /// What ought to be there.
+        /// What was expected.
         expected: String,
         found: String,
     },
@@ -79,13 +79,13 @@ pub enum GraspError {
         /// Stroke of the gripper, in metres.
         max_opening_m: f64,
     },
-    /// Nothing to teach from.
+    /// No demonstration was given.
     #[error("expected at least one demonstration, found none")]
     NoDemonstration,
     /// Demonstrations that do not show one part.
     #[error("expected demonstrations of one part: {expected}; found {found}")]
     ContradictingDemonstrations {
-        /// What the first ones say.
+        /// What the earlier ones say.
         expected: String,
         found: String,
     },

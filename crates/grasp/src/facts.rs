@@ -87,7 +87,7 @@ pub struct ValidationFacts {
 /// How model A's orientation CNN came to be, and how good it was found to be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OrientationFacts {
-    /// Crops that it saw.
+    /// Number of crops that it was trained on.
     pub crops: usize,
     /// Optimiser steps.
     pub steps: usize,

@@ -65,7 +65,7 @@ pub struct GraspDetection {
     pub keypoints: Vec<(Point2<f64>, f64)>,
     /// The demonstration's outline as it lies in the image; `None` without verification.
     pub outline: Option<Polygon>,
-    /// Where to grasp.
+    /// Grasp point, direction and width, in pixels.
     pub grasp: PlanarGrasp,
     /// What the turn was first read from.
     pub turn_source: TurnSource,
@@ -97,7 +97,7 @@ impl GraspDetection {
 }
 
 impl GraspModel {
-    /// The letter.
+    /// The grasp model's kind.
     pub fn kind(&self) -> ModelKind {
         self.network.as_ref().map_or(ModelKind::S, Network::kind)
     }

@@ -90,7 +90,7 @@ impl Calibrations {
 /// What a file says of itself, without its weights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
-    /// The letter.
+    /// The grasp model's kind.
     pub model: ModelKind,
     /// The preset's name.
     pub preset: String,

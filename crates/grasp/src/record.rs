@@ -22,7 +22,7 @@ pub struct DetectionRecord {
     /// The outline's corners; absent without verification.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
-    /// Where to grasp.
+    /// Grasp point, direction and width.
     pub grasp: GraspRecord,
     /// What the turn was first read from.
     pub turn_source: TurnSource,
@@ -39,7 +39,7 @@ pub struct DetectionRecord {
 pub struct GraspRecord {
     /// Pixels to the right.
     pub x: f64,
-    /// Height, in pixels.
+    /// Pixels down.
     pub y: f64,
     /// Direction of the marked line, in (-180, 180], y down; the jaws close across it.
     pub angle_deg: f64,

@@ -44,7 +44,7 @@ pub struct Conv2dEpilogue {
     pub scale: Option<Tensor<1>>,
     /// A summand of the result's shape.
     pub residual: Option<Tensor<4>>,
-    /// What follows.
+    /// Activation of the output.
     pub activation: Activation,
 }
 

@@ -53,7 +53,7 @@ pub(crate) fn scale_channels(isa: Isa, values: &mut [f32], factors: &[f32]) {
 
 /// The sum of two lists of values.
 pub(crate) fn sum(isa: Isa, a: &[f32], b: &[f32]) -> Vec<f32> {
-    /// Values of a unit.
+    /// Values that one thread computes at a time.
     const BLOCK: usize = 32 * 1024;
     let output = Output::new(a.len());
     for_each_unit(a.len().div_ceil(BLOCK), |unit| {

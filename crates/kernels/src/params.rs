@@ -60,7 +60,7 @@ pub struct FusedConv2dParams {
     pub scaled: bool,
     /// Whether there is a residual.
     pub added: bool,
-    /// What follows.
+    /// Activation of the output.
     pub activation: Activation,
 }
 
@@ -147,11 +147,11 @@ pub struct RoiAlignParams {
 /// The numbers of one step of [`adamw`](crate::adamw).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdamWParams {
-    /// Step length.
+    /// Learning rate.
     pub learning_rate: f32,
     /// Share of the gradient's running mean that a step keeps.
     pub beta_1: f32,
-    /// The same for the mean of its squares.
+    /// Share of the running mean of its squares that a step keeps.
     pub beta_2: f32,
     /// Added to the root of the mean square.
     pub epsilon: f32,

@@ -71,7 +71,7 @@ fn to_f32(values: &[f64]) -> Vec<f32> {
     values.iter().map(|&value| value as f32).collect()
 }
 
-/// The convolution.
+/// Convolution, by its definition.
 pub(crate) fn conv_forward(x: &[f32], weight: &[f32], bias: &[f32], shape: &ConvShape) -> Vec<f32> {
     let [_, channels, height, width] = shape.output();
     let mut output: Vec<f64> = (0..shape.output().iter().product())
@@ -163,7 +163,7 @@ fn for_each_term(shape: [usize; 4], rois: &[f32], params: &RoiAlignParams, mut v
     }
 }
 
-/// ROIAlign.
+/// ROIAlign, by its definition.
 pub(crate) fn roi_align_forward(
     features: &[f32],
     shape: [usize; 4],

@@ -18,7 +18,7 @@ use crate::panda::{DH_A_M, DH_D_M, FLANGE_OFFSET_M};
 /// Number of ways the arm can take for one q7: elbow (2) × turn of the arm plane (2) × shoulder (2).
 pub(crate) const NUM_BRANCHES: usize = 8;
 
-/// One way to reach the pose.
+/// One solution of the inverse kinematics.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AnalyticSolution {
     pub q: JointVector,

@@ -24,7 +24,7 @@ pub enum ArmPart {
 pub struct Clearance {
     /// Height of the lowest point above the table, m; negative below.
     pub lowest_m: f64,
-    /// What is lowest.
+    /// The lowest part of the arm.
     pub part: ArmPart,
     /// When, s; 0 for a single configuration.
     pub time_secs: f64,

@@ -68,7 +68,7 @@ pub enum KinematicsError {
     PathBlocked {
         /// Share of the path done, 0 to 1.
         at_share: f64,
-        /// What stands in the way.
+        /// Why there is no solution.
         reason: &'static str,
     },
     /// The trajectory generator refused its input or failed.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// The circle of angle classes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AngleClasses {
-    /// K.
+    /// Number of classes, K.
     pub num_classes: usize,
     /// n: how many turns, the whole one included, leave the part looking the same; 1 for most parts.
     pub symmetry: usize,

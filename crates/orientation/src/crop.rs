@@ -95,6 +95,8 @@ impl CropWindow {
 }
 
 /// The colour between four pixels, whose centres are at halves; [`OUTSIDE`] beyond the image.
+///
+/// The pretrained weights belong to this order of the sum: `sdg-shape`'s sampling rounds other bits and ends at the border.
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (width, height) = (image.width() as i32, image.height() as i32);
     let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());

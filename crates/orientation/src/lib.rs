@@ -41,5 +41,5 @@ pub use angle_classes::{AngleClasses, AngleReading, Labels};
 pub use config::{OrientationConfig, Readout};
 pub use crop::{CropWindow, OUTSIDE, crop_for};
 pub use error::{OrientationError, Result, check_setting};
-pub use network::{ConvNormRelu, GroupNorm, OrientationCnn, Stage, crop_batch};
-pub use sdg_detection::state_dict::{ImportReport, StateDict, WeightTensor};
+pub use network::{OrientationCnn, crop_batch};
+pub use sdg_layers::state_dict::{ImportReport, StateDict, WeightTensor};

@@ -4,14 +4,12 @@
 //!
 //! The last map is flattened, not averaged: where on the crop something is seen is what tells the angle.
 
-use burn::module::{Module, Param};
+use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData, activation, read_sync};
 use image::RgbImage;
 use image::imageops::{rotate90, rotate180, rotate270};
-use sdg_detection::initialization::{Distribution, Initializer};
-use sdg_detection::layers::Linear;
-use sdg_detection::state_dict::{self, ImportReport, StateDict};
-use sdg_kernels::{Activation, Conv2dParams, GroupNormParams, conv2d, group_norm};
+use sdg_layers::state_dict::{self, ImportReport, StateDict};
+use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
 use crate::angle_classes::AngleReading;
 use crate::config::OrientationConfig;
@@ -20,67 +18,15 @@ use crate::error::{OrientationError, Result};
 
 /// Grey values that make one unit of the network's input: about the deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
-/// Added to a group's variance.
-const GROUP_NORM_EPS: f32 = 1e-5;
-
-/// A group norm's parameters.
-#[derive(Module, Debug)]
-pub struct GroupNorm {
-    /// Factor, `[C]`.
-    pub weight: Param<Tensor<1>>,
-    /// Summand, `[C]`.
-    pub bias: Param<Tensor<1>>,
-}
-
-/// A convolution without a bias, its group norm, and a ReLU.
-#[derive(Module, Debug)]
-pub struct ConvNormRelu {
-    /// Kernel, `[C_out, C_in, k, k]`.
-    pub weight: Param<Tensor<4>>,
-    /// Norm of the output.
-    pub norm: GroupNorm,
-    stride: usize,
-    num_groups: usize,
-}
-
-impl ConvNormRelu {
-    /// Draws the parameters of `shape`, `[C_out, C_in, k, k]`.
-    pub fn init(shape: [usize; 4], stride: usize, num_groups: usize, init: &mut Initializer) -> Self {
-        let [channels, in_channels, kernel, _] = shape;
-        let norm = GroupNorm {
-            weight: init.param([channels], Distribution::Constant(1.0)),
-            bias: init.param([channels], Distribution::Constant(0.0)),
-        };
-        let weight = init.param(shape, Distribution::he_normal(in_channels * kernel * kernel));
-        Self { weight, norm, stride, num_groups }
-    }
-
-    /// `[N, C_in, H, W]` to `[N, C_out, H / stride, W / stride]`.
-    pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
-        let weight = self.weight.val();
-        let padding = weight.dims()[2] / 2;
-        let convolved = conv2d(x, weight, None, Conv2dParams::square(self.stride, padding));
-        let params =
-            GroupNormParams { num_groups: self.num_groups, epsilon: GROUP_NORM_EPS, activation: Activation::Relu };
-        group_norm(convolved, self.norm.weight.val(), self.norm.bias.val(), params)
-    }
-}
-
-/// Convolutions at one size of map; the first halves it.
-#[derive(Module, Debug)]
-pub struct Stage {
-    /// In their order.
-    pub convs: Vec<ConvNormRelu>,
-}
 
 /// The orientation CNN.
 #[derive(Module, Debug)]
 pub struct OrientationCnn {
     /// From the crop to the last map.
     pub stages: Vec<Stage>,
-    /// From the flat last map.
+    /// Fully connected layer, from the flattened last map.
     pub hidden: Linear,
-    /// To the logits.
+    /// Fully connected layer, to the logits.
     pub classes: Linear,
     #[module(skip)]
     config: OrientationConfig,
@@ -205,7 +151,7 @@ impl OrientationCnn {
     }
 
     /// One distribution from those of a crop in equal turns (clockwise as seen, which adds to the angle): the
-    /// normalised geometric mean, in which one turn's firm no outweighs another's weak yes.
+    /// normalised geometric mean, in which a class that is improbable at one turn stays improbable.
     fn combined(&self, log_probabilities: &[Vec<f32>]) -> Vec<f64> {
         let (k, turns) = (self.config.classes.num_classes, log_probabilities.len());
         let mean_log: Vec<f64> = (0..k)

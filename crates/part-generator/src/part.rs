@@ -78,7 +78,7 @@ impl Part {
         Some(Self { kind, recipe, relief, center, symmetry, grasp, outline })
     }
 
-    /// How it is made.
+    /// The part's kind.
     pub fn kind(&self) -> PartKind {
         self.kind
     }
@@ -88,7 +88,7 @@ impl Part {
         self.symmetry
     }
 
-    /// Where it is held.
+    /// The part's grasp.
     pub fn grasp(&self) -> PartGrasp {
         self.grasp
     }

@@ -85,7 +85,7 @@ impl Tile {
         self.texel(floor(x), floor(y))
     }
 
-    /// Bilinear.
+    /// Value at a point, by bilinear interpolation.
     #[inline(always)]
     pub fn at(&self, x: f32, y: f32) -> f32 {
         let (u, v) = (floor(x), floor(y));

@@ -116,7 +116,7 @@ impl Report {
         self
     }
 
-    /// Small print at the end.
+    /// Adds a footer in small print.
     #[must_use]
     pub fn footer(mut self, footer: impl Into<String>) -> Self {
         self.footer = Some(footer.into());

@@ -5,7 +5,7 @@ use crate::html::{escape, format_number};
 /// Whether something is well, wrong, or neither.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Tone {
-    /// Nothing to say.
+    /// Without a colour.
     #[default]
     Plain,
     /// As it should be.
@@ -48,7 +48,7 @@ pub enum Cell {
         /// The reason, if there is one to give.
         note: Option<String>,
     },
-    /// How far something came.
+    /// Progress through a number of steps.
     Progress {
         /// Steps done.
         done: usize,

@@ -101,7 +101,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Nothing.
+    /// No load.
     pub const NONE: Self = Self { mass_kg: 0.0, center_in_flange_m: [0.0; 3] };
 }
 

@@ -21,7 +21,7 @@ pub enum RobotError {
     /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
-    /// Something held the arm up.
+    /// The motion was blocked.
     #[error("the arm was held up: {0}")]
     Blocked(String),
     /// The arm stopped by itself.
@@ -73,5 +73,5 @@ impl RobotError {
     }
 }
 
-/// Shorthand of this crate.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, RobotError>;

@@ -51,7 +51,7 @@ pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
-pub use safety::{Capsule, CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
+pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
     CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, SURE,
     camera_looking_down, grasp,

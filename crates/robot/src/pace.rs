@@ -24,7 +24,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// That of rehearsals.
+    /// Pace of rehearsals.
     pub const REHEARSED: Self =
         Self { free: [MAX_SPEED, 0.4, 0.2], approach: [0.18, 0.10, 0.05], lift: [0.25, 0.10, 0.05] };
 
@@ -45,18 +45,18 @@ impl Pace {
         Ok(Self { free: scaled(free), approach: scaled(approach), lift: scaled(lift) })
     }
 
-    /// Of free motions.
+    /// Joint limits of free motions.
     pub fn free_limits(&self) -> JointLimits {
         let [velocity, acceleration, jerk] = self.free;
         JointLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
     }
 
-    /// Of the last way down.
+    /// Limits of the tcp on the approach.
     pub fn approach_limits(&self) -> CartesianLimits {
         scaled(self.approach)
     }
 
-    /// Of the way up.
+    /// Limits of the tcp while lifting.
     pub fn lift_limits(&self) -> CartesianLimits {
         scaled(self.lift)
     }

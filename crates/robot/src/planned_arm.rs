@@ -14,7 +14,7 @@ pub enum PlannedAction {
     Motion(Box<CheckedMotion>),
     /// Standing still, s.
     Wait(f64),
-    /// The hand, as it was told.
+    /// A command of the hand.
     Hand(HandCommand),
 }
 

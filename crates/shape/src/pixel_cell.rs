@@ -1,7 +1,8 @@
 //! The four pixels around a point, for bilinear interpolation.
 //!
-//! [`GradientField`](crate::GradientField) samples maps of directions of its own; `sdg-grasp`'s plan view clamps at the
-//! border and `sdg-orientation`'s crop continues with a colour: those keep their own loops, which are inner loops.
+//! Loops of their own, each with its reason beside it: [`GradientField`](crate::GradientField) (directions, three floats),
+//! `sdg-grasp`'s plan view and `sdg-demonstration`'s raster (the border goes on), `sdg-orientation`'s crop (beyond the border a
+//! colour; weights belong to its bits), `sdg-detection`'s pasted masks (single numbers).
 
 use image::RgbImage;
 use nalgebra::Point2;

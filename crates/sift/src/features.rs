@@ -26,7 +26,7 @@ pub type Descriptor = [f32; DESCRIPTOR_LENGTH];
 pub struct Features {
     /// The place, size and orientation of each.
     pub keypoints: Vec<SiftKeypoint>,
-    /// What it looks like there.
+    /// Descriptor of each keypoint.
     pub descriptors: Vec<Descriptor>,
 }
 

@@ -70,7 +70,7 @@ pub enum RotationMethod {
     Features {
         /// Matches that passed the ratio test.
         matches: usize,
-        /// Those of them that agree with the pose.
+        /// Matches that agree with the pose.
         inliers: usize,
         /// Keypoints of the template found at the pose, repeated texture included: these fixed it.
         guided_matches: usize,

@@ -23,9 +23,9 @@ const SHAKE_SECS: f64 = 1.0;
 pub struct Shake {
     /// The farthest from the middle, in metres; less where the arm's limits ask for it.
     pub amplitude_m: f64,
-    /// Swings in a second.
+    /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// How long, in seconds.
+    /// Duration, s.
     pub duration_secs: f64,
     /// Direction of the line in the base frame, in radians about z from x.
     pub direction_rad: f64,
@@ -49,7 +49,7 @@ pub enum ArmFaultKind {
 pub struct ArmFault {
     /// From when on, in seconds of simulated time.
     pub at_secs: f64,
-    /// What.
+    /// Kind of the fault.
     pub kind: ArmFaultKind,
 }
 

@@ -225,7 +225,7 @@ impl Data {
         dense
     }
 
-    /// Where a body stands.
+    /// Pose of a body in the world.
     pub fn world_from_body(&self, body: Id<Body>) -> Isometry3<f64> {
         assert!(body.index() < Body::count(&self.model), "{body:?} is not of this model");
         // SAFETY: the arrays have 3 and 4 entries a body.
@@ -238,7 +238,7 @@ impl Data {
         isometry_from_quaternion(position, quaternion)
     }
 
-    /// Where a site stands.
+    /// Pose of a site in the world.
     pub fn world_from_site(&self, site: Id<Site>) -> Isometry3<f64> {
         assert!(site.index() < Site::count(&self.model), "{site:?} is not of this model");
         // SAFETY: the arrays have 3 and 9 entries a site.

@@ -103,5 +103,5 @@ impl From<RobotError> for SimulationError {
     }
 }
 
-/// Shorthand of this crate.
+/// Result of this crate's functions.
 pub type Result<T> = std::result::Result<T, SimulationError>;

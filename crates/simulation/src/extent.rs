@@ -95,7 +95,8 @@ mod tests {
     #[test]
     fn the_capsules_of_the_robot_hold_the_simulated_arm() {
         use crate::panda::{FINGER_TRAVEL_M, PandaIds, panda_asset};
-        use sdg_robot::{Capsule, LinkCapsules};
+        use sdg_kinematics::collision::Capsule;
+        use sdg_robot::LinkCapsules;
 
         // Directions on a spiral over the sphere, some three degrees apart.
         let directions: Vec<Vector3<f64>> = (0..4000)

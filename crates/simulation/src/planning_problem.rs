@@ -12,7 +12,7 @@ use crate::obstacles::random_obstacles;
 /// A start and a goal among random obstacles, both free.
 #[derive(Debug, Clone)]
 pub struct PlanningProblem {
-    /// One to eight.
+    /// The obstacles, one to eight.
     pub obstacles: Vec<Obstacle>,
     /// The same as a model, with the hand open.
     pub model: CollisionModel,

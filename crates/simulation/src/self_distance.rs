@@ -1,7 +1,7 @@
 //! How near the arm's links are to each other: the capsules that they touch the world with.
 
 use nalgebra::{Point3, Vector3};
-use sdg_robot::Capsule;
+use sdg_kinematics::collision::Capsule;
 
 use crate::data::Data;
 use crate::model::{Geom, Id, Kind, Model};

@@ -1,6 +1,6 @@
 //! Why a training run ended without a network.
 
-/// What went wrong.
+/// Errors of training.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]

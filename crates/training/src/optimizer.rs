@@ -25,7 +25,7 @@ pub enum Optimizer {
 pub(crate) enum Stepper {
     /// Our AdamW, one kernel a parameter.
     Fused(AdamW),
-    /// One of burn's.
+    /// An optimiser of burn.
     Composed(ModuleOptimizer),
 }
 

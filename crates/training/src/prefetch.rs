@@ -10,7 +10,7 @@ use crate::error::TrainingError;
 pub(crate) struct BatchRequest<K> {
     /// The step that learns from it.
     pub(crate) step: usize,
-    /// Of what kind, where a run has several.
+    /// Kind of the batch, where a run has several.
     pub(crate) kind: K,
 }
 

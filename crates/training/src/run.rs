@@ -55,9 +55,9 @@ pub(crate) trait Task {
     ) -> Result<Validated, TrainingError>;
 }
 
-/// A loss in figures.
+/// Values of a loss, read from the device.
 pub(crate) trait LossFigures: Copy {
-    /// What messages call it.
+    /// Name in messages.
     const NAME: &'static str;
 
     /// The loss that the step descends.
@@ -70,7 +70,7 @@ pub(crate) struct Step<'a, T: Task + ?Sized> {
     pub(crate) step: usize,
     pub(crate) batch: &'a T::Batch,
     pub(crate) learning_rate: f64,
-    /// Before the update.
+    /// Losses before the update.
     pub(crate) losses: T::Losses,
     /// Steps that the run will have, as known now.
     pub(crate) planned_steps: usize,
@@ -82,7 +82,7 @@ pub(crate) struct Step<'a, T: Task + ?Sized> {
 pub(crate) struct Validated {
     /// Steps from here to the end of the run, where the network is good enough.
     pub(crate) cool_down: Option<usize>,
-    /// Whether the run goes on.
+    /// Whether the run continues.
     pub(crate) flow: ControlFlow<()>,
 }
 
@@ -114,7 +114,7 @@ impl ValidationSteps {
     }
 }
 
-/// A run that is over.
+/// Result of a run.
 pub(crate) struct Ended<N> {
     /// After the last step, without gradients.
     pub(crate) network: N,

@@ -25,7 +25,7 @@ export class Detector {
     return summary;
   }
 
-  /** Looks at a file, or at an `ImageBitmap`, which is given away: `{record, milliseconds, decoded}`. */
+  /** Detects in a file, or in an `ImageBitmap`, which is given away: `{record, milliseconds, decoded}`. */
   look(image, verify) {
     return this.#ask({ look: image, verify }, image instanceof ImageBitmap ? [image] : []);
   }

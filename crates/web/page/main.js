@@ -35,7 +35,7 @@ function wire() {
     target.value = "";
   };
   element("camera").onclick = toggleCamera;
-  element("verify").onchange = lookAtAllAgain;
+  element("verify").onchange = detectInAllAgain;
   element("refused").onchange = showCurrent;
   element("download").onclick = download;
   element("webgpu").onchange = changeDevice;
@@ -107,7 +107,7 @@ async function openModel(file) {
     modelFile = file;
     showModel(file.name, summary);
     say("");
-    lookAtAllAgain();
+    detectInAllAgain();
     return true;
   } catch (error) {
     say("");
@@ -159,26 +159,26 @@ function addPictures(files) {
   });
   if (added.length) {
     choose(added[0]);
-    lookAtAll(added);
+    detectInAll(added);
   }
 }
 
-async function lookAtAll(some) {
+async function detectInAll(some) {
   const mine = generation;
   for (const picture of some) {
     if (mine !== generation) {
       return;
     }
-    await lookAtPicture(picture, mine);
+    await detectInPicture(picture, mine);
   }
 }
 
-function lookAtAllAgain() {
+function detectInAllAgain() {
   generation += 1;
-  lookAtAll([...pictures]);
+  detectInAll([...pictures]);
 }
 
-async function lookAtPicture(picture, mine) {
+async function detectInPicture(picture, mine) {
   if (modelOpen) {
     try {
       const result = await detector.look(picture.file, element("verify").checked);
@@ -251,7 +251,7 @@ async function toggleCamera() {
   }
   try {
     element("camera").setAttribute("aria-pressed", "true");
-    await camera.start(lookAtFrame);
+    await camera.start(detectInFrame);
   } catch (error) {
     stopCamera();
     complain(error.message);
@@ -263,7 +263,7 @@ function stopCamera() {
   element("camera").setAttribute("aria-pressed", "false");
 }
 
-async function lookAtFrame(bitmap) {
+async function detectInFrame(bitmap) {
   const shown = await createImageBitmap(bitmap);
   try {
     const result = await detector.look(bitmap, element("verify").checked);

@@ -51,7 +51,7 @@ async function answer(request) {
 /** The look, ready to be taken: files that our own decoder reads go in whole, so that a page sees what `sdg` sees. */
 async function prepared(image, verify) {
   if (image instanceof ImageBitmap) {
-    return lookAtBitmap(image, verify);
+    return detectInBitmap(image, verify);
   }
   if (image.size > MAX_IMAGE_BYTES) {
     throw new Error(`expected an image of at most ${MAX_IMAGE_BYTES} bytes, found ${image.size}`);
@@ -60,12 +60,12 @@ async function prepared(image, verify) {
   const head = String.fromCharCode(...bytes.subarray(0, 12));
   const othersOfTheWeb = head.startsWith("RIFF") || head.startsWith("GIF8") || head.slice(4, 8) === "ftyp";
   if (othersOfTheWeb) {
-    return lookAtBitmap(await createImageBitmap(image), verify);
+    return detectInBitmap(await createImageBitmap(image), verify);
   }
-  return () => model.lookAtFile(bytes, verify);
+  return () => model.detectInFile(bytes, verify);
 }
 
-function lookAtBitmap(bitmap, verify) {
+function detectInBitmap(bitmap, verify) {
   const { width, height } = bitmap;
   const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
   context.fillStyle = "white"; // As the command line lays what is transparent over white.
@@ -73,7 +73,7 @@ function lookAtBitmap(bitmap, verify) {
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
   const pixels = context.getImageData(0, 0, width, height).data;
-  return () => model.lookAtPixels(pixels, width, height, verify);
+  return () => model.detectInPixels(pixels, width, height, verify);
 }
 
 let before = Promise.resolve();

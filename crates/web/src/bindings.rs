@@ -3,7 +3,7 @@
 use sdg_grasp::{Device, Verification};
 use wasm_bindgen::prelude::*;
 
-use crate::looker::Looker;
+use crate::detector::Detector;
 
 #[wasm_bindgen]
 extern "C" {
@@ -20,7 +20,7 @@ fn start() {
 /// An opened grasp model.
 #[wasm_bindgen]
 #[derive(Debug)]
-pub struct Model(Looker);
+pub struct Model(Detector);
 
 #[wasm_bindgen]
 impl Model {
@@ -29,30 +29,36 @@ impl Model {
     /// # Errors
     /// No grasp model, one of another version, or a damaged one; a browser without a graphics card that it lends.
     pub async fn open(bytes: Vec<u8>) -> Result<Model, JsError> {
-        Ok(Self(Looker::open(&bytes, &device().await?)?))
+        Ok(Self(Detector::open(&bytes, &device().await?)?))
     }
 
-    /// What the file says of itself, as JSON; see [`Looker::summary`].
+    /// What the file says of itself, as JSON; see [`Detector::summary`].
     pub fn summary(&self) -> String {
         self.0.summary()
     }
 
-    /// Looks at a PNG or JPEG file; see [`Looker::look_at_file`].
+    /// Detects in a PNG or JPEG file; see [`Detector::detect_in_file`].
     ///
     /// # Errors
     /// No image, a damaged or an enormous one.
-    #[wasm_bindgen(js_name = lookAtFile)]
-    pub async fn look_at_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
-        Ok(self.0.look_at_file(bytes, verification(verify)).await?)
+    #[wasm_bindgen(js_name = detectInFile)]
+    pub async fn detect_in_file(&self, bytes: &[u8], verify: bool) -> Result<String, JsError> {
+        Ok(self.0.detect_in_file(bytes, verification(verify)).await?)
     }
 
-    /// Looks at the pixels of a canvas; see [`Looker::look_at_pixels`].
+    /// Detects in the pixels of a canvas; see [`Detector::detect_in_pixels`].
     ///
     /// # Errors
     /// Bytes that do not fit the size, or an enormous image.
-    #[wasm_bindgen(js_name = lookAtPixels)]
-    pub async fn look_at_pixels(&self, rgba: &[u8], width: u32, height: u32, verify: bool) -> Result<String, JsError> {
-        Ok(self.0.look_at_pixels(rgba, width, height, verification(verify)).await?)
+    #[wasm_bindgen(js_name = detectInPixels)]
+    pub async fn detect_in_pixels(
+        &self,
+        rgba: &[u8],
+        width: u32,
+        height: u32,
+        verify: bool,
+    ) -> Result<String, JsError> {
+        Ok(self.0.detect_in_pixels(rgba, width, height, verification(verify)).await?)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Grasps in the browser: a grasp model's detection as a WebAssembly module.
 //!
 //! ```text
-//! page/main.js ─ page/worker.js ─ sdg_web.js ─ Model ─ Looker ─ sdg_grasp::GraspModel
+//! page/main.js ─ page/worker.js ─ sdg_web.js ─ Model ─ Detector ─ sdg_grasp::GraspModel
 //!  canvas, camera  a thread        wasm-bindgen  bindings  plain Rust   the crates of the command line
 //! ```
 //!
@@ -18,11 +18,11 @@
 //!
 //! ```no_run
 //! use sdg_grasp::{Device, Verification};
-//! use sdg_web::Looker;
+//! use sdg_web::Detector;
 //!
 //! # async fn look() -> Result<(), Box<dyn std::error::Error>> {
-//! let looker = Looker::open(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
-//! println!("{}", looker.look_at_file(&std::fs::read("table.png")?, Verification::ByShape).await?);
+//! let detector = Detector::open(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
+//! println!("{}", detector.detect_in_file(&std::fs::read("table.png")?, Verification::ByShape).await?);
 //! # Ok(())
 //! # }
 //! ```
@@ -32,8 +32,8 @@
 
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 mod bindings;
+mod detector;
 mod error;
-mod looker;
 
+pub use detector::Detector;
 pub use error::WebError;
-pub use looker::Looker;

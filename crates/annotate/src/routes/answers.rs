@@ -9,7 +9,7 @@ use crate::http::Response;
 
 const JSON: &str = "application/json";
 
-/// The request's JSON.
+/// Reads the request's JSON body.
 pub fn read<T: DeserializeOwned>(what: &'static str, body: &[u8]) -> Result<T> {
     serde_json::from_slice(body).map_err(|error| Error::Request {
         what,

@@ -20,7 +20,7 @@ pub enum Paper {
 }
 
 impl Paper {
-    /// All of them.
+    /// All paper sizes.
     pub const ALL: [Self; 3] = [Self::A4, Self::A3, Self::Letter];
 
     /// Width and height in millimetres.
@@ -46,7 +46,7 @@ impl Paper {
 const MARGIN_MM: f64 = 8.0;
 /// White below the board and the facts under it.
 const FOOTER_MM: f64 = 30.0;
-/// The line for the ruler.
+/// Length of the printed line by which a ruler checks the print's scale.
 const RULER_MM: f64 = 100.0;
 const MM_PER_INCH: f64 = 25.4;
 const POINTS_PER_INCH: f64 = 72.0;
@@ -63,7 +63,7 @@ pub struct Sheet {
 enum Shape {
     /// Lower left corner, width, height.
     Rectangle { x: f64, y: f64, width: f64, height: f64 },
-    /// A disc.
+    /// A filled circle, in mm.
     Disc { x: f64, y: f64, radius: f64, is_dark: bool },
     /// Words from their lower left.
     Text { x: f64, y: f64, size: f64, text: String },

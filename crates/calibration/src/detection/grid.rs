@@ -9,7 +9,7 @@ use nalgebra::{Point2, Vector2};
 
 use super::saddle::Saddle;
 
-/// A place in a grid.
+/// Column and row in a grid.
 pub(super) type Place = [i32; 2];
 
 /// The four neighbours of a place, and the axis of each.

@@ -22,7 +22,7 @@ impl Luminance {
         self.width.max(self.height) as u32
     }
 
-    /// At a pixel's index.
+    /// Value at a pixel.
     pub(super) fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }

@@ -10,10 +10,10 @@ use super::luminance::Luminance;
 /// A saddle point.
 #[derive(Debug, Clone)]
 pub(super) struct Saddle {
-    /// To about a pixel.
+    /// Position, exact to about a pixel.
     pub(super) place: Point2<f64>,
     pub(super) hessian: Matrix2<f64>,
-    /// `-det H`.
+    /// `-det H`, positive at a saddle.
     pub(super) strength: f64,
 }
 

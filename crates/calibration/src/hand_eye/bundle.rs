@@ -14,7 +14,7 @@ pub(super) struct Bundle<'a> {
     board: Board,
     mount: Mount,
     views: Vec<&'a HandEyeView>,
-    /// `A_i`.
+    /// `A_i`, the flange's motions.
     motions: Vec<Isometry3<f64>>,
     pub(super) x: Isometry3<f64>,
     pub(super) y: Isometry3<f64>,

@@ -32,7 +32,7 @@ use crate::board::Board;
 use crate::error::CalibrationError;
 use crate::pose::{BoardPose, board_pose};
 
-/// Where the camera is.
+/// Result of the hand-eye calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HandEye {
     /// `flange_from_camera` or `base_from_camera`, in metres.

@@ -17,7 +17,7 @@ use crate::error::CalibrationError;
 pub struct RobotPose {
     /// The picture's file.
     pub picture: String,
-    /// In metres.
+    /// Pose of the flange in the base frame; lengths in metres.
     pub base_from_flange: Isometry3<f64>,
 }
 

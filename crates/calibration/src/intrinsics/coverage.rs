@@ -7,13 +7,13 @@ use sdg_geometry::{Polygon, convex_hull};
 
 use super::bundle::Bundle;
 
-/// One thing to photograph.
+/// What the pictures lack.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Advice {
     /// The board faces the camera in all pictures.
     FaceOn {
-        /// The largest tilt.
+        /// The largest tilt so far, degrees.
         max_tilt_deg: f64,
     },
     /// The board is tilted, but about one axis only.
@@ -31,7 +31,7 @@ pub enum Advice {
         /// Which part of the picture.
         part: &'static str,
     },
-    /// Few pictures.
+    /// There are few pictures.
     Few {
         /// How many are used.
         found: usize,

@@ -57,7 +57,7 @@ pub struct Calibration {
 pub struct PictureFit {
     /// Its corners' RMS; of a picture left out, against the camera found without it.
     pub rms_px: f64,
-    /// Where the board was.
+    /// Pose of the board in the camera's frame.
     pub camera_from_board: Isometry3<f64>,
     /// Whether it was left out, because it disagrees with the others.
     pub is_left_out: bool,

@@ -26,7 +26,7 @@ pub struct FocalEstimate {
 }
 
 impl FocalEstimate {
-    /// The error as a share.
+    /// Standard error as a share of the focal length.
     pub fn relative_sigma(&self) -> f64 {
         self.sigma_px / self.focal_px
     }
@@ -87,7 +87,7 @@ pub struct FocalCost {
     pub focal_error: f64,
     /// The height above the sheet at which positions are compared.
     pub height_m: f64,
-    /// At the sheet's middle.
+    /// At the sheet's centre, m.
     pub at_sheet_m: f64,
     /// At the worst place along the picture's border, as far as it shows that plane.
     pub at_border_m: f64,

@@ -16,7 +16,7 @@ use crate::files;
 #[derive(Debug, ClapArgs)]
 #[command(arg_required_else_help = true)]
 pub struct AnnotationArgs {
-    /// What to do with the annotation.
+    /// The command to run.
     #[command(subcommand)]
     pub command: AnnotationCommand,
 }
@@ -24,7 +24,7 @@ pub struct AnnotationArgs {
 /// The verbs of `sdg annotation`.
 #[derive(Debug, Subcommand)]
 pub enum AnnotationCommand {
-    /// What is marked on one image, written in another format
+    /// Write the marks on one image in another format
     Convert(ConvertAnnotationArgs),
 }
 

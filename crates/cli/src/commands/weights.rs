@@ -26,7 +26,7 @@ use crate::shared_args::ComputeArgs;
 #[derive(Debug, ClapArgs)]
 #[command(arg_required_else_help = true)]
 pub struct WeightsArgs {
-    /// What to do with the checkpoint.
+    /// The command to run.
     #[command(subcommand)]
     pub command: WeightsCommand,
 }
@@ -34,11 +34,11 @@ pub struct WeightsArgs {
 /// The verbs of `sdg weights`.
 #[derive(Debug, Subcommand)]
 pub enum WeightsCommand {
-    /// A checkpoint to this project's safetensors, with a report of every name
+    /// Convert a checkpoint to this project's safetensors, with a report of every name
     Convert(ConvertArgs),
-    /// What a checkpoint holds, without converting it
+    /// Print what a checkpoint holds, without converting it
     Inspect(InspectArgs),
-    /// The detector of a checkpoint, stage by stage, against what the original gave
+    /// Compare the detector of a checkpoint, stage by stage, with the outputs of the original
     Verify(VerifyArgs),
 }
 
@@ -91,7 +91,7 @@ pub struct VerifyArgs {
     /// The image that the original was given
     #[arg(long, value_name = "IMAGE")]
     pub image: PathBuf,
-    /// What the original gave at each stage: safetensors
+    /// Outputs of the original at each stage: safetensors
     #[arg(long, value_name = "FILE")]
     pub against: PathBuf,
     /// Where the network computes

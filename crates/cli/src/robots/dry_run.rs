@@ -88,32 +88,16 @@ impl DryRun {
     /// Files that cannot be written, and errors of the renderer.
     #[cfg(feature = "simulation")]
     pub(crate) fn draw(&self, folder: &Path, seen: Option<&SeenOutline>) -> Result<Vec<PathBuf>> {
-        use sdg_report::{Animation, AnimationOptions};
+        use super::motion_drawing::MotionDrawing;
+        use sdg_simulation::WorkcellConfig;
         use sdg_simulation::scene::{SceneVariation, SeenPart};
-        use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
 
-        /// Pictures of a motion at most: a slow one is shown faster.
-        const MAX_FRAMES: f64 = 120.0;
-        const SHOWN_FPS: f64 = 8.0;
+        const DRAWING: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
         let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
-        let scene = SceneVariation::nominal(None);
-        let mut cell = Workcell::new(&WorkcellConfig { seen_part, ..WorkcellConfig::new(scene) })?;
-        let render = RenderConfig { width: 400, height: 300, ..RenderConfig::default() };
-        let mut renderer = Renderer::new(cell.data().model(), render)?;
-        let period_secs = (self.arm.duration_secs() / MAX_FRAMES).max(1.0 / SHOWN_FPS);
-        let frames = PlannedArm::frames(&self.start.q_commanded, self.opening_m, self.arm.actions(), period_secs)
-            .iter()
-            .map(|(q, opening_m)| cell.scene_image_at(&mut renderer, q, *opening_m))
-            .collect::<sdg_simulation::Result<Vec<_>>>()?;
-        let options = AnimationOptions { source_fps: SHOWN_FPS, fps: SHOWN_FPS, max_width: 400, ..Default::default() };
-        let animation = Animation::encode(&frames, &options)?;
-        crate::files::prepare_folder(folder)?;
-        let (gif, still) = (folder.join("dry-run.gif"), folder.join("dry-run.png"));
-        sdg_report::write_atomically(&gif, animation.gif())?;
-        let mut png = Vec::new();
-        animation.still().write_to(&mut std::io::Cursor::new(&mut png), image::ImageFormat::Png)?;
-        sdg_report::write_atomically(&still, &png)?;
-        Ok(vec![gif, still])
+        let config = WorkcellConfig { seen_part, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
+        let period_secs = DRAWING.period_secs(self.arm.duration_secs());
+        let positions = PlannedArm::frames(&self.start.q_commanded, self.opening_m, self.arm.actions(), period_secs);
+        DRAWING.draw(folder, &config, &positions)
     }
 
     /// Without the simulator there is nothing to draw with.

@@ -61,7 +61,7 @@ impl PlacedCamera {
         [self.intrinsics.width, self.intrinsics.height]
     }
 
-    /// The same for the sequence.
+    /// The camera's mount, as the grasp sequence takes it.
     pub(crate) fn mount(&self) -> CameraMount {
         match self.place {
             Place::OnFlange(flange_from_camera) => {
@@ -71,7 +71,7 @@ impl PlacedCamera {
         }
     }
 
-    /// The same for the simulator.
+    /// Intrinsics and mount, as the simulator takes them.
     #[cfg(feature = "simulation")]
     pub(crate) fn simulated(&self) -> (sdg_geometry::PinholeCamera, sdg_simulation::CameraPlace) {
         let place = match self.place {
@@ -97,7 +97,7 @@ pub(crate) struct TakenPicture {
     pub(crate) taken: Option<Instant>,
 }
 
-/// Where pictures come from.
+/// Source of pictures while a grasp runs.
 pub(crate) trait Pictures<A: Arm> {
     /// A picture that was taken after the arm came to rest, which is before this call.
     fn take(&mut self, arm: &mut A) -> sdg_robot::Result<TakenPicture>;

@@ -4,6 +4,8 @@ mod confirm;
 mod dry_run;
 mod finder;
 #[cfg(feature = "simulation")]
+mod motion_drawing;
+#[cfg(feature = "simulation")]
 mod simulated_scene;
 mod states_file;
 mod workcell_file;
@@ -21,6 +23,8 @@ pub(crate) use dry_run::DryRun;
 #[cfg(feature = "simulation")]
 pub(crate) use finder::SimulatedPictures;
 pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
+#[cfg(feature = "simulation")]
+pub(crate) use motion_drawing::MotionDrawing;
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;

@@ -10,9 +10,9 @@ use super::raster::{Raster, floor, smoothstep};
 pub(crate) struct NoiseBank {
     /// Clouds: much coarse, little fine.
     pub cloudy: NoiseTile,
-    /// All sizes alike.
+    /// Noise with nearly the same amplitude at all scales.
     pub rough: NoiseTile,
-    /// Grain of single pixels.
+    /// Noise of single pixels.
     pub fine: NoiseTile,
 }
 

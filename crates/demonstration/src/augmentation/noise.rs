@@ -42,7 +42,7 @@ impl NoiseTile {
         Self { values: values.try_into().expect("one value was made for each pixel of the tile") }
     }
 
-    /// Bilinear.
+    /// Value at a point, by bilinear interpolation.
     #[inline(always)]
     pub fn at(&self, x: f32, y: f32) -> f32 {
         let (column, row) = (floor(x), floor(y));

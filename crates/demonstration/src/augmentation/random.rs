@@ -14,7 +14,7 @@ pub(crate) type SampleRng = Pcg64Mcg;
 pub(crate) enum Stream {
     /// What a model is taught with.
     Training = 1,
-    /// What it is validated with.
+    /// Samples for validation.
     HeldOut = 2,
     /// What is drawn once, when the augmenter is made.
     Preparation = 3,

@@ -29,7 +29,7 @@ pub struct SampleObject {
     pub outline: Option<Polygon>,
     /// Where the demonstration lies in the sample: the similarity nearest to the warp, which also tilts a little.
     pub image_from_demonstration: PlanarSimilarity,
-    /// Which demonstration it is.
+    /// Index of the demonstration that it shows.
     pub demonstration_idx: usize,
 }
 

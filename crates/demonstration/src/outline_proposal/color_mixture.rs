@@ -48,7 +48,7 @@ impl Component {
         })
     }
 
-    /// In variances.
+    /// Squared Mahalanobis distance.
     fn distance_squared(&self, color: &Vector3<f32>) -> f32 {
         let off = color - self.mean;
         off.dot(&(self.precision * off))

@@ -15,9 +15,9 @@ pub(crate) const SURELY_OUTSIDE: f32 = 1e3;
 const BOUNDARY_COST: f32 = 10.0;
 /// Share of that cost which is left on the strongest edges: keeps outlines smooth.
 const MIN_COST_SHARE: f32 = 0.05;
-/// Passes over the picture.
+/// Number of passes over the picture.
 const PASSES: usize = 60;
-/// 1 / √8.
+/// Step length of both variables, 1 / √8.
 const STEP: f32 = 0.353_553_4;
 
 /// What a boundary costs at each pixel: little where the picture has an edge.

@@ -50,7 +50,7 @@ impl MaskBalance {
 /// Convolutions, a transposed convolution, and one map for each class.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MaskHeadConfig {
-    /// Pooling.
+    /// How features are pooled for an ROI.
     pub pooler: RoiPoolerConfig,
     /// Channels of each 3×3 convolution.
     pub conv_channels: Vec<usize>,

@@ -4,13 +4,12 @@
 
 use burn::module::Module;
 use burn::tensor::{Int, Tensor, activation};
+use sdg_layers::{Distribution, Initializer, Linear};
 
 use crate::box_coder::BoxCoder;
 use crate::boxes::{Corners, clip, is_usable};
 use crate::config::{BackgroundClass, BoxDeltas, BoxHeadConfig, RoiPoolerConfig};
 use crate::host::read_both;
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Linear, relu};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::ImageSize;
@@ -50,8 +49,8 @@ impl BoxHead {
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<2> {
         let pooled = pool(features, rois, &self.pooler);
         let [r, c, s, _] = pooled.dims();
-        let hidden = relu(self.fc1.forward(pooled.reshape([r, c * s * s])));
-        relu(self.fc2.forward(hidden))
+        let hidden = activation::relu(self.fc1.forward(pooled.reshape([r, c * s * s])));
+        activation::relu(self.fc2.forward(hidden))
     }
 }
 

@@ -8,11 +8,10 @@
 
 use burn::module::Module;
 use burn::tensor::Tensor;
+use sdg_layers::{Conv2d, Conv2dShape, ConvTranspose2x, Distribution, Initializer, upsample_bilinear_2x};
 
 use crate::config::{KeypointHeadConfig, NormKind};
 use crate::host::read;
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, upsample_bilinear_2x};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 

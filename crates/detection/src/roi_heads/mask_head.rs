@@ -7,12 +7,11 @@
 //! ```
 
 use burn::module::Module;
-use burn::tensor::{Int, Tensor};
+use burn::tensor::{Int, Tensor, activation};
+use sdg_layers::{Conv2d, Conv2dShape, ConvTranspose2x, Distribution, Initializer};
 
 use crate::config::{BackgroundClass, MaskBalance, MaskHeadConfig, NormKind};
 use crate::host::read;
-use crate::initialization::{Distribution, Initializer};
-use crate::layers::{Conv2d, Conv2dShape, ConvTranspose2x, relu};
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::ImageSize;
@@ -88,7 +87,7 @@ impl MaskHead {
     pub fn forward(&self, features: &[Tensor<4>; 5], rois: &[Roi]) -> Tensor<4> {
         let pooled = pool(features, rois, &self.config.pooler);
         let hidden = self.mask_fcn.iter().fold(pooled, |x, conv| conv.forward_relu(x));
-        self.predictor.forward(relu(self.deconv.forward(hidden)))
+        self.predictor.forward(activation::relu(self.deconv.forward(hidden)))
     }
 
     /// The logits `[R, S·S]` of the map of each ROI's class.

@@ -59,7 +59,7 @@ impl BoxMask {
             let inside = (0..self.size as i64).contains(&x) && (0..self.size as i64).contains(&y);
             if inside { self.probabilities[y as usize * self.size + x as usize] } else { 0.0 }
         };
-        (cell(0, 0) * (1.0 - fx) + cell(1, 0) * fx) * (1.0 - fy) + (cell(0, 1) * (1.0 - fx) + cell(1, 1) * fx) * fy
+        blend([cell(0, 0), cell(1, 0), cell(0, 1), cell(1, 1)], fx, fy)
     }
 
     /// # Source
@@ -95,9 +95,7 @@ impl BoxMask {
             for (x, (x0, x1, fx)) in (left..).zip(&along_x) {
                 let Some(x) = on_image(x, width) else { continue };
                 let at = |row: usize, column: usize| padded.probabilities[row * padded.size + column];
-                let upper = at(*y0, *x0) * (1.0 - fx) + at(*y0, *x1) * fx;
-                let lower = at(*y1, *x0) * (1.0 - fx) + at(*y1, *x1) * fx;
-                if upper * (1.0 - fy) + lower * fy > threshold {
+                if blend([at(*y0, *x0), at(*y0, *x1), at(*y1, *x0), at(*y1, *x1)], *fx, *fy) > threshold {
                     mask.set(x, y, true);
                 }
             }
@@ -114,6 +112,13 @@ impl BoxMask {
         }
         Self { size, probabilities }
     }
+}
+
+/// Between four cells, upper left first: `fx` of the way to the right ones, `fy` of the way to the lower ones.
+///
+/// Both originals sum in this order; a cell of probability is one number, not a pixel of three bytes as in `sdg-shape`.
+fn blend([a, b, c, d]: [f32; 4], fx: f32, fy: f32) -> f32 {
+    (a * (1.0 - fx) + b * fx) * (1.0 - fy) + (c * (1.0 - fx) + d * fx) * fy
 }
 
 #[cfg(test)]

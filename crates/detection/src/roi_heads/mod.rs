@@ -22,12 +22,12 @@ use sdg_geometry::Keypoint;
 
 use crate::boxes::Corners;
 use crate::config::{FpnConfig, RoiHeadsConfig};
-use crate::initialization::Initializer;
 use crate::matcher::{Match, match_boxes};
 use crate::roi_pooler::Roi;
 use crate::rpn::{ImageSize, Proposals};
 use crate::sampler::{draw, sample_with_first};
 use crate::target::ResizedTarget;
+use sdg_layers::Initializer;
 
 use box_head::{BoxHead, BoxPredictor};
 use keypoint_head::KeypointHead;
@@ -41,11 +41,11 @@ pub use roi::RoiDetection;
 pub struct RoiHeads {
     /// Two fully connected layers.
     pub box_head: BoxHead,
-    /// Classes and boxes.
+    /// From the box head's features to classes and box deltas.
     pub box_predictor: BoxPredictor,
-    /// Keypoints.
+    /// Head for keypoints, where the model has one.
     pub keypoint_head: Option<KeypointHead>,
-    /// Masks.
+    /// Head for masks, where the model has one.
     pub mask_head: Option<MaskHead>,
     #[module(skip)]
     config: RoiHeadsConfig,
@@ -54,13 +54,13 @@ pub struct RoiHeads {
 /// Losses of the second stage.
 #[derive(Debug, Clone)]
 pub struct RoiLosses {
-    /// Classes.
+    /// Loss of the classes.
     pub cls: Tensor<1>,
-    /// Box deltas.
+    /// Loss of the box deltas.
     pub box_reg: Tensor<1>,
-    /// Heatmaps.
+    /// Loss of the heatmaps.
     pub keypoint: Option<Tensor<1>>,
-    /// Masks.
+    /// Loss of the masks.
     pub mask: Option<Tensor<1>>,
 }
 

@@ -39,7 +39,7 @@ impl Default for ControlStatistics {
 }
 
 impl ControlStatistics {
-    /// Starts over.
+    /// Sets all counts to zero.
     pub(super) fn reset(&mut self) {
         self.answer_us.fill(0);
         *self = Self { answer_us: std::mem::take(&mut self.answer_us), ..Self::default() };

@@ -12,7 +12,7 @@ use crate::wire::MotionCommand;
 /// The first pose of a motion may be this far from where the end effector is; what libfranka does not publish, as franka-sim has it.
 const START_TRANSLATION_M: f64 = 0.05;
 const START_ROTATION_RAD: f64 = 0.1;
-/// Likewise the first elbow.
+/// The first elbow may be this far from the measured one; likewise.
 const START_ELBOW_RAD: f64 = 0.1;
 /// Below this smallest singular value of the Jacobian no Cartesian motion starts; likewise.
 pub const MIN_SINGULAR_VALUE: f64 = 0.05;

@@ -15,7 +15,7 @@ const ACCELERATING: f64 = 0.05;
 /// The estimate and what it means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contacts {
-    /// N·m.
+    /// External joint torques, N·m.
     pub torque: JointVector,
     /// At the stiffness frame's origin in the base frame, N and N·m.
     pub wrench_in_base: Vector6<f64>,

@@ -21,7 +21,7 @@ const MAX_CYCLES: u32 = 20_000;
 const HOMING_SPEED_M_S: f64 = 0.05;
 /// A target beyond this presses on whatever is there.
 const PRESSING_WIDTH_M: f64 = -0.03;
-/// °C.
+/// Temperature that the hand reports, °C.
 const TEMPERATURE: u16 = 30;
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -26,10 +26,10 @@ enum LinkEvent {
     Gone(u64),
 }
 
-/// What the loop is told.
+/// Message from the connection to the control loop.
 #[derive(Debug)]
 pub enum Incoming {
-    /// A request.
+    /// A request of the client: header and body.
     Request(Header, Vec<u8>),
     /// The client has gone or sent what is no message.
     Gone,

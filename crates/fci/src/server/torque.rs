@@ -24,11 +24,11 @@ pub fn joint_impedance(robot: &Observation, reference: &JointReference, stiffnes
 /// What the Cartesian impedance needs to know of the end effector.
 #[derive(Debug, Clone, Copy)]
 pub struct EndEffector {
-    /// Measured.
+    /// Measured pose of the end effector.
     pub base_from_ee: Isometry3<f64>,
-    /// Of the end effector, measured.
+    /// Jacobian of the end effector at the measured positions.
     pub jacobian: Jacobian,
-    /// Wanted.
+    /// Desired pose of the end effector.
     pub base_from_ee_desired: Isometry3<f64>,
     /// Wanted, m/s and rad/s in the base frame.
     pub twist_desired: Vector6<f64>,

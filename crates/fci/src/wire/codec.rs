@@ -123,12 +123,12 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Nothing yet.
+    /// An empty message.
     pub fn new(real: Real) -> Self {
         Self { bytes: Vec::new(), real }
     }
 
-    /// What was written.
+    /// The message's bytes.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }

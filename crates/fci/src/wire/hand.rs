@@ -53,26 +53,26 @@ pub enum HandRequest {
         /// The client's UDP port.
         udp_port: u16,
     },
-    /// Finds the range.
+    /// Homing: measures the range of the fingers.
     Homing,
     /// Closes to a width and presses; successful where the fingers stand between `width - inner` and `width + outer`.
     Grasp {
-        /// The part's width.
+        /// The part's width, m.
         width: f64,
         /// How much narrower it may be.
         epsilon_inner: f64,
         /// How much wider it may be.
         epsilon_outer: f64,
-        /// Closing speed.
+        /// Closing speed, m/s.
         speed: f64,
-        /// Force.
+        /// Force, N.
         force: f64,
     },
     /// Moves to a width.
     Move {
-        /// Between the fingers.
+        /// Distance between the fingers, m.
         width: f64,
-        /// Speed.
+        /// Speed, m/s.
         speed: f64,
     },
     /// Stops and lets go.
@@ -183,7 +183,7 @@ pub struct HandState {
     pub max_width: f64,
     /// Whether the last grasp holds something.
     pub is_grasped: bool,
-    /// °C.
+    /// Temperature, °C.
     pub temperature: u16,
 }
 

@@ -62,7 +62,7 @@ byte_enum! {
 byte_enum! {
     /// What the robot is doing.
     RobotMode, "robot_mode" {
-        /// None of the others.
+        /// Any other mode.
         Other = 0,
         /// Standing, ready for a motion.
         Idle = 1,

@@ -11,11 +11,11 @@ use crate::wire_error::WireError;
 /// How far a motion may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deviation {
-    /// m.
+    /// Translation, m.
     pub translation: f64,
-    /// rad.
+    /// Rotation, rad.
     pub rotation: f64,
-    /// rad.
+    /// Elbow, rad.
     pub elbow: f64,
 }
 
@@ -26,9 +26,9 @@ pub struct MoveRequest {
     pub controller: ControllerMode,
     /// What makes the references.
     pub generator: MotionGeneratorMode,
-    /// Along the path.
+    /// Largest deviation along the path.
     pub max_path_deviation: Deviation,
-    /// At the end.
+    /// Largest deviation at the end.
     pub max_goal_deviation: Deviation,
 }
 
@@ -73,7 +73,7 @@ impl CollisionBehavior {
 /// What the robot carries besides its end effector.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Load {
-    /// kg.
+    /// Mass, kg.
     pub mass: f64,
     /// Centre of mass in the flange's frame, m.
     pub center: [f64; 3],
@@ -81,7 +81,7 @@ pub struct Load {
     pub inertia: [f64; 9],
 }
 
-/// A request.
+/// A request of the client, with its parameters.
 #[allow(clippy::large_enum_variant, reason = "requests come one at a time, and none is kept")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Request {
@@ -96,7 +96,7 @@ pub enum Request {
     Move(MoveRequest),
     /// Ends the motion that runs.
     StopMove,
-    /// Asks for a wall (version 5).
+    /// Reads a virtual wall (version 5).
     GetCartesianLimit(u32),
     /// Sets the thresholds for contacts and collisions.
     SetCollisionBehavior(CollisionBehavior),

@@ -23,7 +23,7 @@ pub struct MotionCommand {
     pub twist: [f64; 6],
     /// Position of joint 3 and sign of joint 4, where `valid_elbow`.
     pub elbow: [f64; 2],
-    /// Whether `elbow` counts.
+    /// Whether `elbow` is valid.
     pub valid_elbow: bool,
     /// Whether this is the last command of the motion.
     pub finished: bool,

@@ -60,7 +60,7 @@ pub enum PlanViewError {
     #[error("expected the picture to show some of the workspace x {:?} m, y {:?} m; it shows x {:?} m, y {:?} m",
         .workspace.x_m, .workspace.y_m, .seen.x_m, .seen.y_m)]
     OutsideWorkspace {
-        /// What was asked for.
+        /// The workspace that was given.
         workspace: Workspace,
         /// What the picture shows of the plane.
         seen: Workspace,

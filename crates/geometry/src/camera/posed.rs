@@ -9,7 +9,7 @@ use super::pinhole::PinholeCamera;
 pub struct Ray {
     /// Where it starts, in metres.
     pub origin: Point3<f64>,
-    /// Where it goes.
+    /// Direction, of unit length.
     pub direction: Unit<Vector3<f64>>,
 }
 

@@ -4,11 +4,11 @@ use crate::check_config::CheckConfig;
 
 const SHAPE: &str = "crates/shape/src/config.rs";
 
-/// One constant.
+/// A constant of the code that can be fitted.
 pub(super) struct Constant {
     /// Its field of [`CheckConfig`].
     pub(super) name: &'static str,
-    /// Where its value stands.
+    /// File that its value stands in.
     pub(super) file: &'static str,
     /// What is tried, upwards; today's value among them.
     pub(super) grid: &'static [f64],
@@ -49,7 +49,7 @@ const fn searched(
     Constant { name, file, grid, field }
 }
 
-/// All of them.
+/// All constants.
 pub(super) const CONSTANTS: &[Constant] = &[
     searched("search.shape.agreement.surface_share", SHAPE, &[0.0, 0.15, 0.3, 0.45, 0.6], |c| {
         Field::Double(&mut c.search.shape.agreement.surface_share)

@@ -17,7 +17,7 @@ const WRONG_A_PICTURE: usize = 3;
 pub struct LikenessExample {
     /// Index of the picture among the part's.
     pub picture_idx: usize,
-    /// What the network sees.
+    /// The network's input.
     pub pair: Pair,
     /// Whether the picture shows the part there.
     pub is_right: bool,

@@ -16,9 +16,9 @@ pub(super) const COST_OF_WRONG: f64 = 1.0;
 pub struct Loss {
     /// The right poses' part and the wrong ones'.
     pub total: f64,
-    /// Of right poses: mean of −ln p.
+    /// Loss of right poses: mean of −ln p.
     pub right: f64,
-    /// Of wrong poses: mean of −ln (1 − q).
+    /// Loss of wrong poses: mean of −ln (1 − q).
     pub wrong: f64,
     /// Instances of which a right pose was accepted, and all instances.
     pub accepted: [usize; 2],
@@ -97,7 +97,7 @@ impl Difference {
     }
 }
 
-/// 0 of nothing.
+/// Mean; 0 for no values.
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (count, sum) = values.fold((0usize, 0.0), |(count, sum), value| (count + 1, sum + value));
     if count > 0 { sum / count as f64 } else { 0.0 }

@@ -19,9 +19,9 @@ pub struct Trial {
 pub struct ConstantReport {
     /// Its field of [`crate::CheckConfig`].
     pub name: &'static str,
-    /// Where its value stands.
+    /// File that its value stands in.
     pub file: &'static str,
-    /// Today's value.
+    /// Present value.
     pub today: f64,
     /// The value with the least loss on the training half.
     pub fitted: f64,
@@ -31,7 +31,7 @@ pub struct ConstantReport {
     pub before: Loss,
     /// On the held-out half, with the fitted value.
     pub after: Loss,
-    /// From before to after.
+    /// Difference of the losses, fitted minus present.
     pub difference: Difference,
 }
 

@@ -93,6 +93,8 @@ impl PlanMap {
 }
 
 /// The colour at a point by bilinear interpolation; beyond the border that of the nearest pixel.
+///
+/// `sdg-shape`'s sampling has no colour there, and none in a picture of one row or column.
 fn color_at(image: &RgbImage, point: &Point2<f64>) -> [f32; 3] {
     let [width, height] = [image.width(), image.height()].map(|side| f64::from(side - 1));
     let (x, y) = ((point.x - 0.5).clamp(0.0, width), (point.y - 0.5).clamp(0.0, height));

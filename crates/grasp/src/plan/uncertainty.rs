@@ -42,20 +42,20 @@ pub struct Circumstances {
 /// --example fit_uncertainty -- 160`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorLength {
-    /// Pixels at full agreement.
+    /// Error of a pose that agrees fully, in pixels.
     pub pixels: f64,
     /// How the logarithm of the noise grows with what the agreement lacks.
     pub by_disagreement: f64,
-    /// Of the marks' height times the slant.
+    /// Share of the marks' height times the slant.
     pub by_slant: f64,
-    /// Of the marks' height.
+    /// Share of the marks' height.
     pub by_height: f64,
 }
 
 impl ErrorLength {
-    /// Of the position.
+    /// Error of the position.
     pub const POSITION: Self = Self { pixels: 0.279, by_disagreement: 1.89, by_slant: 0.436, by_height: 0.039 };
-    /// Of the turn, at the distance of the part's diagonal.
+    /// Error of the turn, as a length at the distance of the part's diagonal.
     pub const TURN: Self = Self { pixels: 0.133, by_disagreement: 3.85, by_slant: 0.325, by_height: 0.019 };
 
     /// The length in metres.

@@ -10,7 +10,7 @@ use crate::error::Result;
 /// A detector and a head that is left out after teaching.
 #[derive(Debug, Clone)]
 pub(crate) struct DetectorPlan {
-    /// The model's.
+    /// The detector's configuration.
     pub(crate) network: RcnnConfig,
     /// A keypoint head that only teaching has.
     ///

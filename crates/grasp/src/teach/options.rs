@@ -19,7 +19,7 @@ use crate::plan::Lengths;
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct TeachOptions {
-    /// Which model.
+    /// The grasp model to teach.
     pub kind: ModelKind,
     /// Which network and training; without effect on model S, which has neither.
     pub preset: Preset,

@@ -47,7 +47,7 @@ impl PoolShape {
     }
 }
 
-/// The largest values.
+/// Max pooling.
 pub(crate) fn max_pool(isa: Isa, x: &[f32], shape: &PoolShape) -> Vec<f32> {
     let channels = shape.channels;
     let [out_height, out_width] = shape.out_size;

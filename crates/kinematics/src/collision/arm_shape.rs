@@ -36,6 +36,11 @@ impl Body {
         Self(index)
     }
 
+    /// Pairs of bodies that can meet, the one nearer to the base first.
+    pub fn pairs_that_can_meet() -> impl Iterator<Item = (Self, Self)> {
+        SELF_PAIRS.into_iter().map(|(one, other)| (Self(one), Self(other)))
+    }
+
     /// The place in the chain: 0 the base, 8 the hand, 9 the held part.
     pub fn index(self) -> usize {
         self.0

@@ -4,15 +4,11 @@
 //! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
 //! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
 //! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
-#![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
-use super::arm_shape::{FIRST_MOVING, NUM_BODIES, SELF_PAIRS};
-use super::lanes::{
-    FrameLanes, Lane, Lane3, NUM_LANES, link_frames, point_distances, segment_distances, segment_shape_distances,
-    shape_distances,
-};
+use super::arm_shape::SELF_PAIRS;
+use super::lanes::{Lane, NUM_LANES};
 use super::model::CollisionModel;
-use super::shape::{self, DistanceAndSlope, Shape};
+use super::pair_search::{Found, Placed, Weights, evaluate};
 use crate::joints::{JointVector, NUM_JOINTS};
 
 /// Checks configurations and motions against a [`CollisionModel`], and counts them.
@@ -21,28 +17,8 @@ pub struct Checker<'a> {
     model: &'a CollisionModel,
     margin_m: f64,
     arch: pulp::Arch,
-    /// Where the bodies' balls and capsules are, for each lane.
     placed: Placed,
     num_checked: usize,
-}
-
-#[derive(Debug, Clone)]
-struct Placed {
-    balls: [Lane3; NUM_BODIES],
-    capsules: [Vec<(Lane3, Lane3)>; NUM_BODIES],
-}
-
-/// By what distances are divided before the smallest is sought: for a pair of bodies, and for a body and what stands still.
-#[derive(Debug, Clone)]
-struct Weights {
-    self_pairs: [f64; SELF_PAIRS.len()],
-    bodies: [f64; NUM_BODIES],
-    /// Added to each distance, m.
-    offset_m: f64,
-}
-
-impl Weights {
-    const DISTANCES: Self = Self { self_pairs: [1.0; SELF_PAIRS.len()], bodies: [1.0; NUM_BODIES], offset_m: 0.0 };
 }
 
 /// The lanes that are not at their ends.
@@ -67,24 +43,13 @@ impl Lanes {
     }
 }
 
-/// What the lanes have come to.
-#[derive(Debug, Clone, Copy)]
-struct Found {
-    /// The smallest weighted distance.
-    least: Lane,
-    /// Whether a distance is below the margin.
-    is_blocked: [bool; NUM_LANES],
-}
-
 impl<'a> Checker<'a> {
     /// For motions that keep `margin_m` away from everything at every configuration that is checked, and never touch anything between these.
     ///
     /// A larger margin makes longer steps beside obstacles.
     pub fn new(model: &'a CollisionModel, margin_m: f64) -> Self {
         assert!(margin_m > 0.0 && margin_m.is_finite(), "a margin is positive, found {margin_m} m");
-        let capsules = std::array::from_fn(|body| vec![(Lane3::ZERO, Lane3::ZERO); model.arm.capsules[body].len()]);
-        let placed = Placed { balls: [Lane3::ZERO; NUM_BODIES], capsules };
-        Self { model, margin_m, arch: pulp::Arch::new(), placed, num_checked: 0 }
+        Self { model, margin_m, arch: pulp::Arch::new(), placed: Placed::new(model), num_checked: 0 }
     }
 
     /// The model that this checks against.
@@ -170,7 +135,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Looks at all pairs; ends early, with some lane blocked, where `until_blocked` allows it.
+    /// Compares all pairs; ends early, with some lane blocked, where `until_blocked` allows it.
     fn evaluate(&mut self, q: &[JointVector; NUM_LANES], weights: &Weights, until_blocked: bool) -> Found {
         let Self { model, margin_m, arch, placed, .. } = self;
         arch.dispatch(
@@ -180,165 +145,12 @@ impl<'a> Checker<'a> {
     }
 }
 
-#[inline(always)]
-fn evaluate(
-    model: &CollisionModel,
-    margin_m: f64,
-    placed: &mut Placed,
-    q: &[JointVector; NUM_LANES],
-    weights: &Weights,
-    until_blocked: bool,
-) -> Found {
-    place(model, placed, q);
-    let mut search = Search {
-        margin_m,
-        offset_m: weights.offset_m,
-        found: Found { least: [f64::INFINITY; NUM_LANES], is_blocked: [false; NUM_LANES] },
-    };
-    for (index, obstacle) in model.obstacles.iter().enumerate() {
-        let to_local = &model.obstacle_frames[index];
-        match obstacle.shape {
-            Shape::Plane => {
-                search.obstacle(model, placed, index, to_local, weights, shape::plane);
-            }
-            Shape::Box { half_m } => {
-                search.obstacle(model, placed, index, to_local, weights, |p, d| shape::solid_box(p, d, half_m));
-            }
-            Shape::Cylinder { radius_m, half_length_m } => {
-                search.obstacle(model, placed, index, to_local, weights, |p, d| {
-                    shape::cylinder(p, d, radius_m, half_length_m)
-                });
-            }
-            Shape::Capsule { radius_m, half_length_m } => {
-                search.obstacle(model, placed, index, to_local, weights, |p, d| {
-                    shape::capsule(p, d, radius_m, half_length_m)
-                });
-            }
-        }
-        if until_blocked && search.is_any_blocked() {
-            return search.found;
-        }
-    }
-    search.self_pairs(model, placed, weights);
-    search.found
-}
-
-#[inline(always)]
-fn place(model: &CollisionModel, placed: &mut Placed, q: &[JointVector; NUM_LANES]) {
-    let frames = link_frames(q);
-    for body in 0..NUM_BODIES {
-        let frame = if body == 0 { FrameLanes::base() } else { frames[body.min(NUM_JOINTS) - 1] };
-        placed.balls[body] = frame.place(model.arm.bounds[body].0.coords.into());
-        for (out, capsule) in placed.capsules[body].iter_mut().zip(&model.arm.capsules[body]) {
-            *out = (frame.place(capsule.from.coords.into()), frame.place(capsule.to.coords.into()));
-        }
-    }
-}
-
-struct Search {
-    margin_m: f64,
-    offset_m: f64,
-    found: Found,
-}
-
-impl Search {
-    /// Whether a lower bound of the distance, with something to take away from it, leaves nothing to find in any lane.
-    #[inline(always)]
-    fn can_skip(&self, bounds: &Lane, less_m: f64, weight: f64) -> bool {
-        let mut is_needed = false;
-        for i in 0..NUM_LANES {
-            let bound = bounds[i] - less_m;
-            is_needed |= (bound + self.offset_m) * weight < self.found.least[i] || bound < self.margin_m;
-        }
-        !is_needed
-    }
-
-    #[inline(always)]
-    fn take(&mut self, distances: &Lane, less_m: f64, weight: f64) {
-        for i in 0..NUM_LANES {
-            let distance_m = distances[i] - less_m;
-            let weighted = (distance_m + self.offset_m) * weight;
-            self.found.least[i] = if weighted < self.found.least[i] { weighted } else { self.found.least[i] };
-            self.found.is_blocked[i] |= distance_m < self.margin_m;
-        }
-    }
-
-    #[inline(always)]
-    fn is_any_blocked(&self) -> bool {
-        self.found.is_blocked.iter().any(|&is_blocked| is_blocked)
-    }
-
-    #[inline(always)]
-    fn obstacle(
-        &mut self,
-        model: &CollisionModel,
-        placed: &Placed,
-        index: usize,
-        to_local: &super::lanes::ToLocal,
-        weights: &Weights,
-        shape: impl Fn([f64; 3], [f64; 3]) -> DistanceAndSlope + Copy,
-    ) {
-        // From the hand inwards: what is far out is most often near something.
-        for body in (FIRST_MOVING..NUM_BODIES).rev() {
-            let capsules = &model.arm.capsules[body];
-            if model.may_touch[body][index] || capsules.is_empty() {
-                continue;
-            }
-            let weight = weights.bodies[body];
-            let ball = shape_distances(&to_local.apply(&placed.balls[body]), shape);
-            if self.can_skip(&ball, model.arm.bounds[body].1, weight) {
-                continue;
-            }
-            for (capsule, (from, to)) in capsules.iter().zip(&placed.capsules[body]) {
-                let local = (to_local.apply(from), to_local.apply(to));
-                let middle = shape_distances(&middle(&local), shape);
-                let half_length_m = 0.5 * (capsule.to - capsule.from).norm();
-                if self.can_skip(&middle, half_length_m + capsule.radius_m, weight) {
-                    continue;
-                }
-                self.take(&segment_shape_distances(&local, shape), capsule.radius_m, weight);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn self_pairs(&mut self, model: &CollisionModel, placed: &Placed, weights: &Weights) {
-        let arm = &model.arm;
-        for (pair, &(one, other)) in SELF_PAIRS.iter().enumerate() {
-            let (ones, others) = (&arm.capsules[one], &arm.capsules[other]);
-            if others.is_empty() {
-                continue;
-            }
-            let weight = weights.self_pairs[pair];
-            let balls = point_distances(&placed.balls[one], &placed.balls[other]);
-            if self.can_skip(&balls, arm.bounds[one].1 + arm.bounds[other].1, weight) {
-                continue;
-            }
-            for (a, a_placed) in ones.iter().zip(&placed.capsules[one]) {
-                for (b, b_placed) in others.iter().zip(&placed.capsules[other]) {
-                    self.take(&segment_distances(a_placed, b_placed), a.radius_m + b.radius_m, weight);
-                }
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn middle(segment: &(Lane3, Lane3)) -> Lane3 {
-    let mut middle = Lane3::ZERO;
-    for i in 0..NUM_LANES {
-        middle.x[i] = 0.5 * (segment.0.x[i] + segment.1.x[i]);
-        middle.y[i] = 0.5 * (segment.0.y[i] + segment.1.y[i]);
-        middle.z[i] = 0.5 * (segment.0.z[i] + segment.1.z[i]);
-    }
-    middle
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::arm_shape::Body;
     use super::super::capsule::Capsule;
     use super::super::model::Obstacle;
+    use super::super::shape::Shape;
     use super::*;
     use crate::joints::ready_pose;
     use crate::test_poses::random_configuration;

@@ -27,13 +27,13 @@ pub enum CollisionError {
     /// Two obstacles of one name, which a message could not tell apart.
     #[error("two obstacles are named \"{name}\"")]
     NameTwice {
-        /// The name.
+        /// The name that is given twice.
         name: String,
     },
     /// A pair that may touch names an obstacle that does not exist.
     #[error("no obstacle is named \"{name}\"; there are: {existing}")]
     UnknownObstacle {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
         /// The names that exist.
         existing: String,

@@ -14,6 +14,7 @@ mod checker;
 mod error;
 mod lanes;
 mod model;
+mod pair_search;
 mod shape;
 
 pub use arm_shape::Body;

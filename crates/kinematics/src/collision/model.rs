@@ -18,7 +18,7 @@ pub struct Obstacle {
     pub name: String,
     /// Its shape, in its own frame.
     pub shape: Shape,
-    /// Where it stands.
+    /// Pose in the base frame.
     pub base_from_obstacle: Isometry3<f64>,
 }
 

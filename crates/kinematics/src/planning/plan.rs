@@ -20,7 +20,7 @@ use crate::panda::Panda;
 use crate::path::JointPath;
 use crate::trajectory::Trajectory;
 
-/// How a plan is looked for.
+/// Options of the planner.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PlanOptions {
@@ -47,7 +47,7 @@ impl Default for PlanOptions {
 /// The straight end of a motion: the tcp moves along its own z axis.
 #[derive(Debug, Clone, Copy)]
 pub struct StraightApproach<'a> {
-    /// How long it is, m.
+    /// Length, m.
     pub length_m: f64,
     /// What may be touched on it: the same obstacles with more pairs that may touch.
     pub model: &'a CollisionModel,
@@ -214,7 +214,7 @@ fn roots(goals: &[GoalConfiguration]) -> Vec<JointVector> {
 const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
-    /// Pairs that are told.
+    /// Number of pairs that a message names.
     const MAX_TOLD: usize = 3;
     let mut counts = BTreeMap::<String, usize>::new();
     for q in stops.configurations() {

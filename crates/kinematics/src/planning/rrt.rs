@@ -48,7 +48,7 @@ impl Stops {
 #[derive(Debug)]
 struct Tree {
     nodes: Vec<JointVector>,
-    /// Of each node; a root is its own.
+    /// Parent of each node; a root is its own parent.
     parents: Vec<usize>,
 }
 

@@ -36,14 +36,14 @@ impl State {
 pub(crate) struct Edge {
     /// How far from the edge the fall begins.
     pub width: f32,
-    /// How far it falls.
+    /// Height difference.
     pub drop: f32,
     /// Round, or a straight chamfer.
     pub round: bool,
 }
 
 impl Edge {
-    /// No fall.
+    /// A sharp edge.
     pub const SHARP: Self = Self { width: 0.0, drop: 0.0, round: false };
 
     /// A chamfer of 45 degrees.
@@ -148,7 +148,7 @@ pub(crate) enum Operation {
     },
     /// The surface is raised by this, or lowered where negative, with slopes of this width.
     Emboss {
-        /// How far.
+        /// Height of the step.
         by: f32,
         /// Width of the slope.
         width: f32,

@@ -19,7 +19,7 @@ pub(crate) enum Brushing {
 /// The look of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Material {
-    /// What it scatters.
+    /// Share of the light that it scatters, by channel.
     pub albedo: Color,
     /// What it reflects when seen straight on.
     pub reflectance: Color,

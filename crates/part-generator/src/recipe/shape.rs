@@ -35,7 +35,7 @@ pub(crate) enum Shape {
     },
     /// All points within `radius` of a line through points (x, y, z of the centre line).
     Path {
-        /// The points.
+        /// Points of the centre line.
         points: Vec<[f32; 3]>,
         /// Half of the width.
         radius: f32,

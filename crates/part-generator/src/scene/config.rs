@@ -33,7 +33,7 @@ pub enum Condition {
 }
 
 impl Condition {
-    /// All of them.
+    /// All conditions.
     pub const ALL: [Self; 12] = [
         Self::Nominal,
         Self::Distance,

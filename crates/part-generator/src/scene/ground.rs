@@ -27,7 +27,7 @@ pub(crate) struct Shadow {
 /// Directions that stand for a lamp's width: shares of its radius aside and up.
 const LAMP_DIRECTIONS: [[f32; 2]; SWEEPS] = [[0.7, 0.5], [-0.7, 0.5], [0.0, -0.9], [0.0, 0.0]];
 
-/// How many there are.
+/// Number of sweeps.
 const SWEEPS: usize = 4;
 
 impl Ground {

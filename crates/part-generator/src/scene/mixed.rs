@@ -28,7 +28,7 @@ pub struct MixedSample {
 pub struct MixedInstance {
     /// Which of the parts of [`Scenes`] it is.
     pub part_idx: usize,
-    /// Where it lies.
+    /// Its marks and pose in the picture.
     pub instance: Instance,
 }
 

@@ -11,7 +11,7 @@ use super::view::{Sight, View};
 /// Mirrored surroundings of a smooth table are found at every so many pixels, and lie on lines between.
 const GLOSS_STEP_PX: usize = 4;
 
-/// Those of a table with grain.
+/// The same spacing for a table with grain.
 const RIPPLE_STEP_PX: usize = 2;
 
 /// Scratches bend the directions that a brushed surface mirrors by these slopes.

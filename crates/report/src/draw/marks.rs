@@ -53,7 +53,7 @@ pub struct DetectionMark<'a> {
     pub grasp: Option<PlanarGrasp>,
     /// The score that decides, 0 to 1.
     pub score: f64,
-    /// What verification said.
+    /// Verdict of the verification.
     pub verdict: Verdict,
 }
 

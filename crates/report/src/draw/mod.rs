@@ -27,7 +27,7 @@ impl Color {
     pub const BOX: Self = Self([124, 196, 255]);
     /// Outlines of the part.
     pub const OUTLINE: Self = Self([255, 224, 102]);
-    /// What passed a check.
+    /// Colour of detections that passed verification.
     pub const VERIFIED: Self = Self([64, 214, 170]);
     /// What was refused. Differs from [`Color::VERIFIED`] in lightness as well as in hue.
     pub const REFUSED: Self = Self([255, 92, 104]);

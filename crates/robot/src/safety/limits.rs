@@ -20,9 +20,9 @@ pub struct WorkspaceBox {
 /// What every motion keeps to.
 #[derive(Debug, Clone)]
 pub struct SafetyLimits {
-    /// Of each joint.
+    /// Limits of the joints.
     pub joints: JointLimits,
-    /// Of the tcp.
+    /// Limits of the tcp.
     pub cartesian: CartesianLimits,
     /// Where tcp and flange may be; anywhere where `None`.
     pub workspace: Option<WorkspaceBox>,

@@ -12,6 +12,6 @@ mod capsules;
 mod limits;
 mod violation;
 
-pub use capsules::{Capsule, LinkCapsules, SelfCollision};
+pub use capsules::{LinkCapsules, SelfCollision};
 pub use limits::{CheckedMotion, SafetyLimits, WorkspaceBox};
 pub use violation::Violation;

@@ -15,7 +15,7 @@ pub enum Violation {
         apart_rad: f64,
         max_rad: f64,
     },
-    /// A value that is no number.
+    /// A value that is not finite.
     #[error("at {time_secs:.3} s joint {joint} has no finite position, velocity or acceleration")]
     NotFinite {
         time_secs: f64,

@@ -18,7 +18,7 @@ pub const LOOK_HEIGHT_M: f64 = 0.58;
 pub enum LookOut {
     /// The camera on the hand looks straight down.
     CameraAt {
-        /// Where, base frame, m.
+        /// x and y of the camera in the base frame, m.
         at_m: [f64; 2],
         /// Height above the table, m.
         height_m: f64,
@@ -62,7 +62,7 @@ pub struct GraspConfig {
     pub max_detection_age_secs: f64,
     /// What the hand carries once it holds the part.
     pub load: Option<Load>,
-    /// How fast.
+    /// Speed of the motions.
     pub pace: Pace,
 }
 

@@ -35,7 +35,7 @@ const SETTLE_SECS: f64 = 0.25;
 pub enum GraspOutcome {
     /// The part was lifted, and held to the end.
     Held,
-    /// It did not come so far.
+    /// A step failed.
     Failed {
         /// The step that failed.
         step: GraspStep,
@@ -44,7 +44,7 @@ pub enum GraspOutcome {
     },
 }
 
-/// What happened.
+/// Report of a grasp.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspReport {
     /// How it ended.

@@ -94,7 +94,7 @@ impl Mounting {
 /// A workcell, as its file says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Workcell {
-    /// Which robot.
+    /// The robot's model.
     pub robot: RobotModel,
     /// Where it is on the network.
     pub address: Option<String>,
@@ -106,11 +106,11 @@ pub struct Workcell {
     pub part_mass_kg: Option<f64>,
     /// The camera's file, as it is written.
     pub camera_file: Option<String>,
-    /// Where the camera is.
+    /// How the camera is mounted.
     pub mounting: Mounting,
     /// The table's z in the base frame, m.
     pub table_height_m: f64,
-    /// Where the hand may be.
+    /// Box that tcp and flange stay in, in the base frame.
     pub workspace: WorkspaceBox,
     /// Where the arm looks out from.
     pub look_outs: Vec<LookOut>,

@@ -26,7 +26,7 @@ pub use report::AttemptReport;
 /// Where the sequence goes and how it is judged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttemptConfig {
-    /// The sequence.
+    /// Settings of the grasp sequence.
     pub grasp: GraspConfig,
     /// Height of the part's lowest point above the table that counts as grasped, in metres.
     pub success_height_m: f64,

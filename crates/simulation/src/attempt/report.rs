@@ -32,7 +32,7 @@ pub struct AttemptReport {
     pub simulated_secs: f64,
     /// Time that it took, in seconds, perception included.
     pub wall_secs: f64,
-    /// Of that, time in perception, in seconds.
+    /// Part of that time spent in perception, in seconds.
     pub perception_secs: f64,
     /// Pictures from outside, if recorded.
     pub frames: Vec<RgbImage>,

@@ -68,7 +68,7 @@ impl HeightMap {
         }
     }
 
-    /// What shows at a place.
+    /// Height (m) and number of the piece at a point.
     pub(crate) fn at(&self, point: &Point2<f64>) -> Option<(f64, u32)> {
         let cell = (point - self.corner) / self.cell_m;
         let inside = cell.x >= 0.0 && cell.y >= 0.0 && cell.x < self.width as f64 && cell.y < self.height as f64;

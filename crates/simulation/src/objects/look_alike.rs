@@ -53,11 +53,11 @@ impl fmt::Display for LookAlikeKind {
 /// A part that resembles another one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LookAlike {
-    /// In what it differs.
+    /// How it differs from the part.
     pub kind: LookAlikeKind,
     /// The part itself, to be placed like any other.
     pub spec: ObjectSpec,
-    /// What was done, in words.
+    /// The difference in words.
     pub description: String,
 }
 

@@ -24,7 +24,7 @@ const AWAY_M: f64 = -3.0;
 /// Half of the card's side, in metres.
 const CARD_HALF_M: f64 = 0.06;
 
-/// Where nothing shows it.
+/// A pose outside of every picture.
 pub(super) fn away() -> Isometry3<f64> {
     Isometry3::translation(0.5, 0.0, AWAY_M)
 }

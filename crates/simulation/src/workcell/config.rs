@@ -15,7 +15,7 @@ pub struct WorkcellConfig {
     pub scene: SceneVariation,
     /// How the wrist camera's pictures are drawn.
     pub wrist_render: RenderConfig,
-    /// What is wrong in attempts.
+    /// Errors of the workcell during attempts.
     pub errors: AttemptErrors,
     /// The camera's size, focal length and lens, where they are not those of [`PinholeCamera::WRIST`].
     pub wrist_camera: Option<PinholeCamera>,

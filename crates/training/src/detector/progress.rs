@@ -42,7 +42,7 @@ impl LossFigures for LossValues {
 }
 
 impl From<&Losses> for LossValues {
-    /// Waits for the device.
+    /// Reads the losses, which waits for the device.
     fn from(losses: &Losses) -> Self {
         let value = |loss: &Tensor<1>| f64::from(loss.clone().into_scalar::<f32>());
         Self {
@@ -76,7 +76,7 @@ pub struct ValidationRecord {
     pub steps_done: usize,
     /// Since the start of the run.
     pub elapsed_secs: f64,
-    /// The figures.
+    /// What the validation measured.
     pub validation: Validation,
 }
 

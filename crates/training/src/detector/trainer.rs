@@ -20,7 +20,7 @@ use crate::run::{RunSettings, Step, Task, Validated, ValidationSteps, run};
 pub struct Trained {
     /// The checkpoint with the best validation.
     pub detector: GeneralizedRcnn,
-    /// The run.
+    /// Steps and validations of the run.
     pub history: History,
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// A detection farther from the truth than this is not the part, in demonstration pixels. With the paper's camera (550 px
 /// focal length, 0.6 m above the table) that is 10 mm; with others it is another length.
 pub const HIT_PX: f64 = 9.2;
-/// Likewise for the angle.
+/// Largest error of the angle of a hit, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
 
 /// What the detector said of one held-back sample.
@@ -106,7 +106,7 @@ impl Validation {
 
     /// One figure to compare checkpoints by, higher is better: hits, less imprecision, less a little for false alarms,
     /// which the demonstration refuses later anyway. (With more weight on them, networks of a third of the run were
-    /// kept, unsure of everything.)
+    /// kept, whose scores were all low.)
     pub fn merit(&self) -> f64 {
         let false_alarm_rate = self.false_alarms as f64 / self.negatives.max(1) as f64;
         let imprecision = (self.median_error_px / HIT_PX).min(1.0) + (self.median_error_degrees / HIT_DEGREES).min(1.0);

@@ -15,7 +15,7 @@ pub struct AngleErrors {
 }
 
 impl AngleErrors {
-    /// Errors as they come.
+    /// From errors in degrees, in any order.
     pub fn new(mut degrees: Vec<f64>) -> Self {
         degrees.sort_by(f64::total_cmp);
         Self { sorted: degrees }

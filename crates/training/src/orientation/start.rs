@@ -25,7 +25,7 @@ const BATCH: usize = 64;
 pub struct OrientationStart {
     /// The network's, but for its classes.
     pub parameters: StateDict,
-    /// Those of the [`ClassImprint`].
+    /// Parameters of the [`ClassImprint`], by their names.
     pub imprint: StateDict,
 }
 

@@ -38,7 +38,7 @@ pub enum OrientationEvent {
     Validated {
         /// Steps done before.
         steps_done: usize,
-        /// How far it was off.
+        /// Errors of the angle.
         errors: AngleErrors,
         /// Since the start of the run.
         elapsed_secs: f64,

@@ -61,7 +61,7 @@ fn number(value: &Value, path: &str) -> f64 {
 }
 
 /// What the page finds, `device` as its `Detector` takes it; and the milliseconds of so many more looks at the last picture.
-fn look_at_all(
+fn detect_in_all(
     browser: &Browser,
     device: &str,
     model: PathBuf,
@@ -125,7 +125,7 @@ fn the_page_finds_what_the_command_line_finds_and_fast_enough() {
         let model = made.model(letter);
         let expected = detect(&model, &pictures);
         let browser = open_page(&site, &[]);
-        let (results, times) = look_at_all(&browser, PROCESSOR, model, &pictures, LOOKS);
+        let (results, times) = detect_in_all(&browser, PROCESSOR, model, &pictures, LOOKS);
         assert_same_grasps(&results, &expected, &pictures, &format!("model {letter}"));
 
         println!("model {letter}: milliseconds a frame {times:.1?}");
@@ -150,7 +150,7 @@ fn the_graphics_card_finds_what_the_command_line_finds() {
     let expected = detect(&model, pictures);
     let site = site();
     let browser = open_page(&site, &SOFTWARE_CARD);
-    let (results, _) = look_at_all(&browser, CARD, model, pictures, 0);
+    let (results, _) = detect_in_all(&browser, CARD, model, pictures, 0);
     assert_same_grasps(&results, &expected, pictures, "on the graphics card");
     let times: Vec<f64> = results.iter().map(|result| number(result, "/milliseconds")).collect();
     println!("on SwiftShader: milliseconds a frame {times:.0?}");
@@ -181,7 +181,7 @@ fn the_page_stays_fluid_and_fits_small_screens() {
         &[],
     )
     .unwrap();
-    look_at_all(&browser, PROCESSOR, model, &pictures, 0);
+    detect_in_all(&browser, PROCESSOR, model, &pictures, 0);
     let gap = browser.run("return window.longestGap", &[]).unwrap().as_f64().unwrap();
     println!("longest gap between two frames of the page: {gap:.0} ms");
     assert!(gap < MAX_PAGE_GAP_MS, "the page froze for {gap} ms");

@@ -14,10 +14,10 @@ use crate::exit::{Outcome, Usage};
 /// `sdg camera board`
 #[derive(Debug, Args)]
 pub struct BoardArgs {
-    /// Where the SVG goes
+    /// The SVG file to write
     #[arg(long, default_value = "board.svg", value_name = "FILE")]
     out: PathBuf,
-    /// Where a PDF of the same sheet goes
+    /// A PDF file of the same sheet to write, too
     #[arg(long, value_name = "FILE")]
     pdf: Option<PathBuf>,
     /// Squares across and up

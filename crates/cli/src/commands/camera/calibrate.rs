@@ -29,7 +29,7 @@ pub struct CalibrateArgs {
     /// The lens has a k3, too: for wide lenses and 20 pictures or more
     #[arg(long)]
     k3: bool,
-    /// Where the camera's file goes; comments and other programs' fields of an existing one stay
+    /// The camera file to write; comments and other programs' fields of an existing one stay
     #[arg(long, default_value = "camera.yaml", value_name = "FILE")]
     out: PathBuf,
     /// Print one JSON object

@@ -36,7 +36,7 @@ pub struct HandEyeArgs {
     /// The table's z in the robot's base, for a camera beside the robot; without it, that of the camera's file or 0
     #[arg(long, value_name = "MM", allow_hyphen_values = true)]
     table_height_mm: Option<f64>,
-    /// Where the file with the camera's place goes; without it, nothing is written
+    /// The file to write, with the camera's pose; without it, nothing is written
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object

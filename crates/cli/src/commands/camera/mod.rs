@@ -17,19 +17,19 @@ use crate::exit::Outcome;
 /// The verbs of `sdg camera`.
 #[derive(Debug, Subcommand)]
 pub enum CameraCommand {
-    /// The cameras of this machine
+    /// List the cameras of this machine
     List(list::ListArgs),
-    /// Single frames to files
+    /// Save single frames to files
     Grab(grab::GrabArgs),
-    /// A camera's frames, watched for faults
+    /// Watch a camera's frames for faults
     Watch(watch::WatchArgs),
-    /// A board to print, for calibrate, table and hand-eye
+    /// Write a board to print, for calibrate, table and hand-eye
     Board(board::BoardArgs),
-    /// Pictures of the board to a camera file
+    /// Calibrate a camera from pictures of the board, into a camera file
     Calibrate(calibrate::CalibrateArgs),
-    /// One picture of the board on the table: where the camera is
+    /// Find where a camera is, from one picture of the board on the table
     Table(table::TableArgs),
-    /// Robot poses and pictures of the board: where the camera is on the robot, or beside it
+    /// Find where a camera is on the robot, or beside it, from robot poses and pictures of the board
     HandEye(hand_eye::HandEyeArgs),
 }
 

@@ -63,13 +63,13 @@ pub struct TableArgs {
     /// How high the sheet lies above the table, on a plate
     #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM")]
     sheet_thickness_mm: f64,
-    /// The height of a part's marks, at which the cost of a wrong focal length is told
+    /// Height of a part's marks, at which the error from a wrong focal length is reported
     #[arg(long, default_value_t = 30.0, value_name = "MM")]
     mark_height_mm: f64,
     /// Focal length in pixels of a camera without file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]
     focal_px: Option<f64>,
-    /// Where the file with `table:` goes; without it, the camera's file itself
+    /// The file to write, with `table:`; without it, the camera's file itself
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print one JSON object

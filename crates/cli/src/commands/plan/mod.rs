@@ -28,14 +28,14 @@ pub struct PlanArgs {
     /// The workcell's file, with an [[obstacle]] for everything that stands in the cell
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
-    /// Where the arm is: seven joint angles in degrees, as in 0,-45,0,-135,0,90,45; without it, the workcell's first joints_deg, or the ready pose
+    /// Joint angles that the arm starts from: seven, in degrees, as in 0,-45,0,-135,0,90,45; without it, the workcell's first joints_deg, or the ready pose
     #[arg(long, value_name = "Q", allow_hyphen_values = true)]
     pub start: Option<JointsDeg>,
-    /// Where the tcp is to be in the base frame: X,Y,Z in mm, or X,Y,Z,YAW with the hand straight down and turned by YAW degrees, or
+    /// Goal of the tcp in the base frame: X,Y,Z in mm, or X,Y,Z,YAW with the hand straight down and turned by YAW degrees, or
     /// X,Y,Z,ROLL,PITCH,YAW (180,0,YAW is straight down). Given several times, the pose that is quickest to reach is taken
     #[arg(long, value_name = "POSE", required = true, allow_hyphen_values = true)]
     pub goal: Vec<GoalPose>,
-    /// In how many turns about the hand's axis the goal is the same: 2 exchanges the fingers, 1 means the pose as it is
+    /// Number of equal turns about the hand's axis in which the goal may be reached: 2 allows exchanged fingers, 1 the given pose only
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=36))]
     pub turns: u32,
     /// What the hand holds, as a capsule around the hand's axis from the tcp on: DIAMETER,LENGTH in mm
@@ -50,10 +50,10 @@ pub struct PlanArgs {
     /// Share of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]
     pub speed: f64,
-    /// Decides the random configurations of the search: the same seed gives the same path
+    /// Seed of the search's random configurations: the same seed gives the same path
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Folder for what is drawn
+    /// Folder for the drawn motion
     #[arg(long, value_name = "DIR", default_value = "plan")]
     pub out: PathBuf,
     /// Draw nothing

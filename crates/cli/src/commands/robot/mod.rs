@@ -17,15 +17,15 @@ use crate::robots::{Consent, confirm};
 /// The verbs of `sdg robot`.
 #[derive(Debug, Subcommand)]
 pub enum RobotCommand {
-    /// Where arm and hand are, and whether they can move
+    /// Print where arm and hand are, and whether they can move
     State(state::StateArgs),
-    /// The arm to its first look-out pose that is given as joint angles, or to Franka's ready pose; or the hand's fingers through their range
+    /// Move the arm to its first look-out pose that is given as joint angles, or to Franka's ready pose; or the hand's fingers through their range
     Home(home::HomeArgs),
-    /// After a reflex: clears the error, once a person has looked. Nothing moves by it
+    /// Clear the error after a reflex, once a person has looked at the cell. Nothing moves
     Recover(RecoverArgs),
-    /// Opens the hand
+    /// Open the hand
     Open(hand::OpenArgs),
-    /// Closes the hand on what is between its fingers
+    /// Close the hand on what is between its fingers
     Close(hand::CloseArgs),
 }
 

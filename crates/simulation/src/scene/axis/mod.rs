@@ -35,7 +35,7 @@ use crate::workcell::{Workcell, WorkcellConfig};
 /// A picture of an axis with the truth about it.
 #[derive(Debug, Clone)]
 pub struct AxisView {
-    /// What was made harder.
+    /// The axis along which the picture is harder.
     pub axis: Axis,
     /// Which of the axis' pictures it is.
     pub number: u64,

@@ -10,7 +10,7 @@ use crate::error::WebError;
 
 /// An opened grasp model.
 #[derive(Debug)]
-pub struct Looker {
+pub struct Detector {
     model: GraspModel,
     summary: ModelSummary,
 }
@@ -24,7 +24,7 @@ struct ImageRecord {
     detections: Vec<DetectionRecord>,
 }
 
-impl Looker {
+impl Detector {
     /// Opens a model from its file's bytes, on a device.
     ///
     /// # Errors
@@ -39,19 +39,19 @@ impl Looker {
         to_json(&self.summary)
     }
 
-    /// Looks at a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, refused detections included.
+    /// Detects in a PNG or JPEG file: `{"width", "height", "detections"}` as JSON, refused detections included.
     ///
     /// # Errors
     /// A file that is no image, is damaged, or has more pixels than [`ImageLimits`] allows.
-    pub async fn look_at_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
-        self.look_at(&decode_image(bytes, &ImageLimits::default())?, verification).await
+    pub async fn detect_in_file(&self, bytes: &[u8], verification: Verification) -> Result<String, WebError> {
+        self.detect_in(&decode_image(bytes, &ImageLimits::default())?, verification).await
     }
 
-    /// Looks at opaque pixels as a canvas gives them: rows of red, green, blue and an alpha that is passed over.
+    /// Detects in opaque pixels as a canvas gives them: rows of red, green, blue and an alpha that is passed over.
     ///
     /// # Errors
     /// Bytes that do not fit the size, or more pixels than [`ImageLimits`] allows.
-    pub async fn look_at_pixels(
+    pub async fn detect_in_pixels(
         &self,
         rgba: &[u8],
         width: u32,
@@ -68,10 +68,10 @@ impl Looker {
         }
         let rgb = rgba.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         let image = RgbImage::from_raw(width, height, rgb).ok_or_else(pixels)?;
-        self.look_at(&image, verification).await
+        self.detect_in(&image, verification).await
     }
 
-    async fn look_at(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
+    async fn detect_in(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
         let found = self.model.detect_async(image, verification).await?;
         let detections = found.iter().map(DetectionRecord::from).collect();
         Ok(to_json(&ImageRecord { width: image.width(), height: image.height(), detections }))

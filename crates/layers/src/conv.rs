@@ -1,15 +1,32 @@
-//! The layers that the network is built of, with parameters named as in PyTorch.
+//! Convolutions with what follows them, and what doubles the size of a map.
 //!
 //! Shapes: N images or ROIs, C channels, H×W cells.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Tensor, activation};
+use burn::tensor::Tensor;
 use sdg_kernels::{
     Activation, Conv2dEpilogue, Conv2dParams, GroupNormParams, conv2d, conv2d_fused, group_norm_residual,
 };
+use serde::{Deserialize, Serialize};
 
-use crate::config::NormKind;
 use crate::initialization::{Distribution, Initializer};
+
+/// Normalisation after a convolution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum NormKind {
+    /// None: the convolution has a bias instead.
+    Identity,
+    /// Mean and variance over groups of channels of one image, trained.
+    Group {
+        /// Number of groups.
+        num_groups: usize,
+    },
+    /// Stored mean and variance, never trained.
+    FrozenBatch {
+        /// Added to the variance; 1e-5 in Detectron2, 0 in some of torchvision's builders.
+        eps: f64,
+    },
+}
 
 /// Normalisation with a weight and a bias for each channel.
 #[derive(Module, Debug)]
@@ -27,7 +44,7 @@ pub struct Norm {
 }
 
 /// Added to a group's variance.
-const GROUP_NORM_EPS: f32 = 1e-5;
+pub(crate) const GROUP_NORM_EPS: f32 = 1e-5;
 
 impl Norm {
     /// A norm of `channels` channels, or `None` for [`NormKind::Identity`].
@@ -79,9 +96,9 @@ pub struct Conv2d {
 /// Shape of a [`Conv2d`]; the padding keeps the size (at stride 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conv2dShape {
-    /// C_in.
+    /// Channels of the input.
     pub in_channels: usize,
-    /// C_out.
+    /// Channels of the output.
     pub out_channels: usize,
     /// Side of the kernel, odd.
     pub kernel: usize,
@@ -167,34 +184,6 @@ impl Conv2d {
     }
 }
 
-/// A fully connected layer.
-#[derive(Module, Debug)]
-pub struct Linear {
-    /// Weight, `[out, in]`.
-    pub weight: Param<Tensor<2>>,
-    /// Bias, `[out]`.
-    pub bias: Param<Tensor<1>>,
-}
-
-impl Linear {
-    /// Draws the parameters; the bias is zero.
-    pub fn init(in_features: usize, out_features: usize, distribution: Distribution, init: &mut Initializer) -> Self {
-        Self {
-            weight: init.param([out_features, in_features], distribution),
-            bias: init.param([out_features], Distribution::Constant(0.0)),
-        }
-    }
-
-    /// Multiplies and adds.
-    ///
-    /// # Shapes
-    /// - `x`: `[N, in]`
-    /// - output: `[N, out]`
-    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        x.matmul(self.weight.val().transpose()) + self.bias.val().unsqueeze()
-    }
-}
-
 /// A transposed convolution with stride 2 and an even kernel, padded to double height and width.
 #[derive(Module, Debug)]
 pub struct ConvTranspose2x {
@@ -255,11 +244,6 @@ pub fn upsample_bilinear_2x(x: Tensor<4>) -> Tensor<4> {
         .reshape([n * c, 2 * s, 2 * s])
         .swap_dims(1, 2)
         .reshape([n, c, 2 * s, 2 * s])
-}
-
-/// Rectifies: `max(x, 0)`.
-pub fn relu<const D: usize>(x: Tensor<D>) -> Tensor<D> {
-    activation::relu(x)
 }
 
 #[cfg(test)]

@@ -1,0 +1,34 @@
+//! The fully connected layer.
+
+use burn::module::{Module, Param};
+use burn::tensor::Tensor;
+
+use crate::initialization::{Distribution, Initializer};
+
+/// A fully connected layer.
+#[derive(Module, Debug)]
+pub struct Linear {
+    /// Weight, `[out, in]`.
+    pub weight: Param<Tensor<2>>,
+    /// Bias, `[out]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+impl Linear {
+    /// Draws the parameters; the bias is zero.
+    pub fn init(in_features: usize, out_features: usize, distribution: Distribution, init: &mut Initializer) -> Self {
+        Self {
+            weight: init.param([out_features, in_features], distribution),
+            bias: init.param([out_features], Distribution::Constant(0.0)),
+        }
+    }
+
+    /// Multiplies and adds.
+    ///
+    /// # Shapes
+    /// - `x`: `[N, in]`
+    /// - output: `[N, out]`
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        x.matmul(self.weight.val().transpose()) + self.bias.val().unsqueeze()
+    }
+}
