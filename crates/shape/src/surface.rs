@@ -117,6 +117,23 @@ impl Surface {
         weighted_median(shifts)
     }
 
+    /// The points, in pixels of the image, of cells with contrast in the demonstration that the image does not show.
+    pub(crate) fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Point2<f64>> {
+        /// From this contrast on a cell tells something. Chosen by hand, not measured.
+        const MIN_CONTRAST: f64 = 0.5;
+        /// Below this correlation it differs. Chosen by hand, not measured.
+        const MAX_CORRELATION: f64 = 0.2;
+        let noise = self.config.noise_in_cell;
+        let differs = |cell: &&Vec<(Point2<f64>, [f64; 3])>| {
+            let local = Correlation::of(cell, image, image_from_cutout);
+            local.count >= MIN_IN_CELL
+                && local.contrast_taught(noise) >= MIN_CONTRAST
+                && local.value(noise) < MAX_CORRELATION
+        };
+        let points = self.cells.iter().filter(differs).flatten();
+        points.map(|(point, _)| image_from_cutout.apply(point)).collect()
+    }
+
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
     /// none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
