@@ -58,10 +58,11 @@ impl GraspTeacher for PageTeacher {
 fn step(event: &TeachingEvent) -> TeachingStep {
     match event {
         TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => {
-            TeachingStep::Step { of: "its turns", done: step + 1, planned: *planned_steps, loss: *loss }
+            TeachingStep::Step { of: "its turns", is_last: false, done: step + 1, planned: *planned_steps, loss: *loss }
         }
         TeachingEvent::Step { record, planned_steps, .. } => TeachingStep::Step {
             of: "the network",
+            is_last: true,
             done: record.step + 1,
             planned: *planned_steps,
             loss: record.losses.total(),
