@@ -67,6 +67,7 @@ mod model;
 mod model_file;
 mod models;
 mod network_evidence;
+mod photo_scale;
 mod plan;
 mod pose;
 mod prepared;
