@@ -221,6 +221,18 @@ mod tests {
     }
 
     #[test]
+    fn edges_differ_where_a_hole_is_missing_and_nowhere_else() {
+        let differing =
+            |hole| structure().differing(&GradientField::new(&plate(hole, 0.0)), &PlanarSimilarity::IDENTITY);
+        assert_eq!(differing(Some(HOLE)), []);
+        let missing = differing(None);
+        let away = |p: &Point2<f64>| (p - Point2::from(HOLE)).norm();
+        // As far as a region reaches, and no farther.
+        assert!(missing.len() > 5 && missing.iter().all(|p| away(p) < 45.0), "{missing:?}");
+        assert!(missing.iter().any(|p| away(p) < 12.0));
+    }
+
+    #[test]
     fn what_covers_a_part_of_it_is_not_visible() {
         // A bright sheet with a dark line across it lies over the right half.
         let covered = RgbImage::from_fn(200, 140, |x, y| match (x, y) {

@@ -291,6 +291,16 @@ mod tests {
     }
 
     #[test]
+    fn the_surface_differs_where_a_hole_is_and_nowhere_else() {
+        let away = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
+        assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
+        let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
+        let bushing = Point2::new(40.0, 40.0);
+        assert!(hole.len() > 20 && hole.iter().all(|p| (p - bushing).norm() < 30.0), "{hole:?}");
+        assert!(!surface().differing(&plate(1.0, false), &away).is_empty());
+    }
+
+    #[test]
     fn the_hue_shifts_with_another_paint_and_not_with_the_light() {
         let shift = |image: &RgbImage| surface().hue_shift(image, &PlanarSimilarity::IDENTITY);
         assert!(shift(&plate(1.0, false)) < 1e-9 && shift(&plate(0.6, false)) < 0.06);
