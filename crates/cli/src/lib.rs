@@ -39,6 +39,8 @@ mod interrupt;
 pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;
+#[cfg(feature = "simulation")]
+mod own_part;
 #[cfg(feature = "annotate")]
 mod page_camera;
 #[cfg(feature = "annotate")]
