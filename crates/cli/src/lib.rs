@@ -35,6 +35,7 @@ mod exit;
 mod files;
 mod found_record;
 mod found_text;
+mod held_back;
 mod interrupt;
 pub mod labelled_pictures;
 pub mod live_pictures;
