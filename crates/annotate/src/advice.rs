@@ -17,6 +17,8 @@ const MIN_LINE_PX: f64 = 12.0;
 const MIN_PART_PX: f64 = 24.0;
 /// The part may reach this far beyond a jaw: outlines are drawn by hand.
 const JAW_SLACK_PX: f64 = 1.5;
+/// Jaws that would have to open by more than this, over the narrowest opening about the same middle, lie the wrong way.
+const MAX_OPENING: f64 = 2.0;
 /// Jaws farther from the part than this share of its width were left wide open by mistake.
 const MAX_CLEARANCE: f64 = 1.0;
 
@@ -127,6 +129,11 @@ fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
             None,
         ));
     } else if marks.outline.is_some() && reach.left.max(reach.right) > half + JAW_SLACK_PX {
+        if fitting > MAX_OPENING * gripper.narrowest(&part) {
+            let text = "The gripper lies along the part: it would have to open past twice the part. Turn it across.";
+            remarks.push(remark("gripper_along", text, None));
+            return;
+        }
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
     } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
@@ -199,6 +206,14 @@ mod tests {
         assert_eq!(advice.remarks[0].code, "gripper_narrow");
         let Some(Fix::JawWidth(jaw_width)) = advice.remarks[0].fix else { panic!("{advice:?}") };
         assert_eq!(codes(&with_grasp([180.0, 130.0], [220.0, 130.0], jaw_width)), [""; 0]);
+    }
+
+    #[test]
+    fn jaws_along_the_part_are_to_be_turned_and_not_opened() {
+        // Across the part's length of 200 px, where 60 would do the other way round.
+        let along = with_grasp([200.0, 110.0], [200.0, 150.0], 66.0);
+        let advice = advise(&along, SIZE);
+        assert_eq!((advice.remarks[0].code, advice.remarks[0].fix), ("gripper_along", None));
     }
 
     #[test]

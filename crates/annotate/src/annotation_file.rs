@@ -31,6 +31,8 @@ pub struct Opened {
     pub marks: Marks,
     /// Where marks will be written.
     pub path: PathBuf,
+    /// Where they stand now; `None` where nothing stands beside the picture.
+    pub found: Option<PathBuf>,
     /// What the person should know about the file, if anything.
     pub note: Option<String>,
 }
@@ -69,10 +71,11 @@ pub fn open(picture: &Path, annotation: Option<&Path>, size: [u32; 2]) -> Result
             label: first.map(|object| object.label.clone()),
             marks: first.map(Marks::of).unwrap_or_default(),
             path: target,
+            found: Some(path.clone()),
             note,
         });
     }
-    Ok(Opened { label: None, marks: Marks::default(), path: own, note: None })
+    Ok(Opened { label: None, marks: Marks::default(), path: own, found: None, note: None })
 }
 
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>> {

@@ -1,6 +1,8 @@
 //! The gripper over the part: what lies between its jaws.
 
-use nalgebra::Vector2;
+use std::f64::consts::PI;
+
+use nalgebra::{Rotation2, Vector2};
 use sdg_geometry::{GraspLine, Polygon};
 
 /// A two-finger gripper seen from above. Its jaws are as wide as `line` is long, stand on both sides of it, and close
@@ -47,6 +49,20 @@ impl Gripper {
         let offsets = || swept.vertices.iter().map(|v| v.y - farthest);
         let (least, most) = (offsets().fold(f64::INFINITY, f64::min), offsets().fold(f64::NEG_INFINITY, f64::max));
         (least <= most).then_some(Reach { left: -least, right: most })
+    }
+
+    /// The narrowest opening of the same jaws about the same middle, turned by any angle; infinite where they would close on nothing
+    /// whatever the turn.
+    pub fn narrowest(&self, part: &Polygon) -> f64 {
+        const NUM_TURNS: u32 = 36;
+        let center = self.line.center();
+        let half = 0.5 * (self.line.end - self.line.start);
+        let turned = |turn: u32| {
+            let half = Rotation2::new(f64::from(turn) * PI / f64::from(NUM_TURNS)) * half;
+            let gripper = Self { line: GraspLine::new(center - half, center + half), ..*self };
+            Some(gripper.min_jaw_width(part)).filter(|width| *width > 0.0)
+        };
+        (0..NUM_TURNS).filter_map(turned).fold(f64::INFINITY, f64::min)
     }
 
     /// The narrowest opening whose jaws do not come down on the part; zero where they would close on nothing. The hand

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use image::metadata::Orientation;
 use image::{ImageDecoder, ImageFormat, ImageReader, RgbImage};
-use sdg_demonstration::{ImageLimits, decode_image};
+use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, decode_image};
 
 use crate::error::{Error, Result};
 
@@ -53,21 +53,22 @@ impl Picture {
         })
     }
 
-    /// Bytes for a browser, and their media type: the file itself, or, where its pixels lie on their side, a JPEG that
-    /// stands upright, so that places in both are the same.
+    /// Bytes for a browser, and their media type: the file itself, or a JPEG where browsers do not read the file, or where its pixels
+    /// lie on their side, so that places in both are the same.
     ///
     /// # Errors
     /// A file that has become unreadable.
     pub fn for_browser(&self) -> Result<(Vec<u8>, &'static str)> {
         let bytes = read(&self.path)?;
-        if is_upright(&bytes) {
-            let media_type = match image::guess_format(&bytes) {
-                Ok(ImageFormat::Png) => "image/png",
-                _ => "image/jpeg",
-            };
-            return Ok((bytes, media_type));
+        let media_type = match image::guess_format(&bytes) {
+            Ok(ImageFormat::Png) => Some("image/png"),
+            Ok(ImageFormat::Jpeg) => Some("image/jpeg"),
+            _ => None,
+        };
+        match media_type {
+            Some(media_type) if is_upright(&bytes) => Ok((bytes, media_type)),
+            _ => Ok((jpeg(&decode(&bytes, &self.name)?), "image/jpeg")),
         }
-        Ok((jpeg(&decode(&bytes, &self.name)?), "image/jpeg"))
     }
 }
 
@@ -81,7 +82,7 @@ pub fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in fs::read_dir(folder).map_err(failed())? {
         let path = entry.map_err(failed())?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        if path.is_file() && extension.is_some_and(|e| ["png", "jpg", "jpeg"].contains(&e.as_str())) {
+        if path.is_file() && extension.is_some_and(|e| IMAGE_EXTENSIONS.contains(&e.as_str())) {
             paths.push(path);
         }
     }
@@ -130,4 +131,27 @@ fn is_upright(bytes: &[u8]) -> bool {
     let decoder = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok().and_then(|r| r.into_decoder().ok());
     let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
     orientation.is_none_or(|orientation| orientation == Orientation::NoTransforms)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_browsers_do_not_read_is_sent_as_jpeg() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = RgbImage::from_pixel(8, 6, image::Rgb([200, 40, 40]));
+        for (name, media_type, is_same) in
+            [("a.png", "image/png", true), ("b.tiff", "image/jpeg", false), ("c.bmp", "image/jpeg", false)]
+        {
+            let path = folder.path().join(name);
+            picture.save(&path).unwrap();
+            let (bytes, found) = Picture::open(&path).unwrap().for_browser().unwrap();
+            assert_eq!((found, bytes == fs::read(&path).unwrap()), (media_type, is_same), "{name}");
+            let found = image::guess_format(&bytes).unwrap().to_mime_type();
+            assert_eq!(found, media_type, "{name}");
+        }
+        let names: Vec<_> = pictures_in(folder.path()).unwrap();
+        assert_eq!(names.len(), 3);
+    }
 }

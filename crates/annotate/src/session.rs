@@ -68,8 +68,9 @@ impl Session {
         for (path, annotation) in &options.images {
             let picture = Picture::open(path)?;
             let opened = annotation_file::open(&picture.path, annotation.as_deref(), picture.size)?;
-            let file = file_name(&opened.path);
-            let saved = if opened.marks.has_object() { Saved::Written { file } } else { Saved::Nothing };
+            // Where they stand, not where changes will go: that file may not be there yet.
+            let found = opened.found.filter(|_| opened.marks.has_object());
+            let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
             label = label.or(opened.label);
             images.push(MarkedPicture { picture, marks: opened.marks, file: opened.path, note: opened.note, saved });
         }

@@ -109,6 +109,8 @@ pub enum TeachingStep {
     Step {
         /// What is being taught: `the network`, `its angles`.
         of: &'static str,
+        /// Whether no other network is to be taught after it.
+        is_last: bool,
         /// Steps done.
         done: usize,
         /// Steps that there will be, as known now.

@@ -49,7 +49,8 @@ pub struct News {
     pub planned: usize,
     /// Seconds since the start.
     pub elapsed_secs: f64,
-    /// Seconds that are left, by the pace so far; `None` before the first step.
+    /// Seconds that are left, by the pace so far; `None` where that is not known: before the first step, while another network
+    /// is to follow, and after the last step, when what was taught is tried.
     pub left_secs: Option<f64>,
     /// `[step, loss]`, thinned.
     pub losses: Vec<(usize, f64)>,
@@ -61,6 +62,22 @@ pub struct News {
     pub written_to: Option<String>,
     /// Why it failed.
     pub error: Option<String>,
+}
+
+/// How one network's teaching goes.
+struct Pace {
+    /// Every so many points of the loss curve are kept.
+    stride: usize,
+    /// When its first step was told, and how many were done then.
+    since_secs: f64,
+    since_done: usize,
+}
+
+impl Pace {
+    fn left_secs(&self, elapsed_secs: f64, done: usize, planned: usize) -> Option<f64> {
+        let steps = done.checked_sub(self.since_done).filter(|steps| *steps > 0 && done < planned)?;
+        Some((elapsed_secs - self.since_secs) / steps as f64 * (planned - done) as f64)
+    }
 }
 
 /// The one teaching that may go on.
@@ -98,25 +115,24 @@ impl Teaching {
         }
     }
 
-    fn record(&self, step: TeachingStep, start: Instant, stride: &mut usize) -> ControlFlow<()> {
+    fn record(&self, step: TeachingStep, start: Instant, pace: &mut Pace) -> ControlFlow<()> {
         let mut news = locked(&self.news);
         news.elapsed_secs = start.elapsed().as_secs_f64();
         match step {
-            TeachingStep::Step { of, done, planned, loss } => {
+            TeachingStep::Step { of, is_last, done, planned, loss } => {
                 if news.of != of {
-                    // Another network: its loss is on another scale.
+                    // Another network: its loss is on another scale, and it has a pace of its own.
                     news.losses.clear();
-                    *stride = 1;
+                    *pace = Pace { stride: 1, since_secs: news.elapsed_secs, since_done: done };
                 }
                 (news.of, news.done, news.planned) = (of, done, planned);
-                let pace = news.elapsed_secs / done.max(1) as f64;
-                news.left_secs = Some(pace * planned.saturating_sub(done) as f64);
-                if done % *stride == 0 && loss.is_finite() {
+                news.left_secs = pace.left_secs(news.elapsed_secs, done, planned).filter(|_| is_last);
+                if done % pace.stride == 0 && loss.is_finite() {
                     news.losses.push((done, loss));
                 }
                 if news.losses.len() > MAX_POINTS {
-                    *stride *= 2;
-                    let stride = *stride;
+                    pace.stride *= 2;
+                    let stride = pace.stride;
                     news.losses.retain(|(step, _)| step % stride == 0);
                 }
             }
@@ -151,8 +167,8 @@ impl Teaching {
         let teaching = Arc::clone(self);
         std::thread::spawn(move || {
             let start = Instant::now();
-            let mut stride = 1;
-            let mut observe = |step| teaching.record(step, start, &mut stride);
+            let mut pace = Pace { stride: 1, since_secs: 0.0, since_done: 0 };
+            let mut observe = |step| teaching.record(step, start, &mut pace);
             let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&demonstrations, &request, &mut observe)));
             // A page that waited for a teaching which broke off would wait for ever.
             let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
@@ -187,5 +203,34 @@ fn idle(news: &News) -> Result<()> {
     match news.status {
         Status::Running | Status::Stopping => Err(Error::Busy("a teaching is going on; stop it first, or wait")),
         Status::Idle | Status::Done | Status::Failed => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_time_is_said_to_be_left_that_is_not_known() {
+        let teaching = Teaching::default();
+        let start = Instant::now();
+        let mut pace = Pace { stride: 1, since_secs: 0.0, since_done: 0 };
+        let mut left_after = |of, is_last, done| {
+            let step = TeachingStep::Step { of, is_last, done, planned: 3, loss: 1.0 };
+            assert!(teaching.record(step, start, &mut pace).is_continue());
+            teaching.news().left_secs
+        };
+        // Another network follows, so nothing of it tells when all is done.
+        assert_eq!([1, 2, 3].map(|done| left_after("its turns", false, done)), [None; 3]);
+        // One step tells no pace, and after the last one what was taught is tried.
+        assert_eq!(left_after("the network", true, 1), None);
+        assert!(left_after("the network", true, 2).is_some());
+        assert_eq!(left_after("the network", true, 3), None);
+    }
+
+    #[test]
+    fn the_pace_is_that_of_the_network_itself() {
+        let pace = Pace { stride: 1, since_secs: 20.0, since_done: 1 };
+        assert_eq!(pace.left_secs(24.0, 3, 13), Some(20.0));
     }
 }

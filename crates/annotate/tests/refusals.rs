@@ -132,7 +132,7 @@ fn requests_without_sense_are_told_in_one_line() {
     refused("PUT", "/api/images/0/marks", b"{\"bux\": 1}", &["bux"]);
     refused("PUT", "/api/images/7/marks", b"{}", &["numbered below 1", "7"]);
     refused("PUT", "/api/label", b"{\"label\": \"  \"}", &["name", "letters"]);
-    refused("POST", "/api/trial-pictures?name=a.png", b"GIF89a....", &["a.png", "PNG or JPEG"]);
+    refused("POST", "/api/trial-pictures?name=a.png", b"GIF89a....", &["a.png", "expected a PNG, JPEG"]);
     refused("POST", "/api/teaching", b"{\"model\": \"Z\"}", &["teaching", "unknown variant"]);
     refused("POST", "/api/teaching", b"{\"model\": \"C\"}", &["photo.png", "a box and a grasp"]);
     refused("POST", "/api/teaching", b"{\"model\": \"C\", \"steps\": 0}", &["steps", "1 to 1000000"]);

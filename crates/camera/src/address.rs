@@ -17,7 +17,7 @@ use crate::http::Url;
 /// | `v4l:/dev/video2`, `v4l:RealSense` | that node; the first node whose card's name contains that |
 /// | `http://[USER:PASSWORD@]HOST[:PORT]/PATH` | motion JPEG, or one JPEG or PNG that is fetched again and again |
 /// | `cmd:PROGRAM ARGUMENTS` | a program that writes JPEG, PNG or PPM pictures to its standard output |
-/// | `dir:FOLDER` | its PNG and JPEG files in the order of their names; options as below |
+/// | `dir:FOLDER` | its pictures (PNG, JPEG, PPM, WebP, BMP, TIFF) in the order of their names; options as below |
 /// | `file:PATH` | one picture, once; with `?loop` again and again |
 /// | `sim:REST` | the simulated camera, which another crate opens |
 ///

@@ -1,4 +1,4 @@
-//! Bytes of one picture to pixels: JPEG, PNG, PPM.
+//! Bytes of one picture to pixels: JPEG, PNG, PPM; from files WebP, BMP and TIFF, too.
 
 use std::io::Cursor;
 
@@ -25,8 +25,11 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<RgbImage, String> {
         [0xff, 0xd8, ..] => decode_limited(&whole_jpeg(bytes)?, ImageFormat::Jpeg),
         _ if bytes.starts_with(&PNG_START) => decode_limited(bytes, ImageFormat::Png),
         [b'P', b'6', ..] => decode_ppm(bytes),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => decode_limited(bytes, ImageFormat::WebP),
+        [b'I', b'I', 0x2a, 0, ..] | [b'M', b'M', 0, 0x2a, ..] => decode_limited(bytes, ImageFormat::Tiff),
+        [b'B', b'M', ..] => decode_limited(bytes, ImageFormat::Bmp),
         [] => Err("nothing".to_owned()),
-        _ => Err(format!("{} bytes that are no JPEG, PNG or PPM", bytes.len())),
+        _ => Err(format!("{} bytes that are no JPEG, PNG, PPM, WebP, BMP or TIFF", bytes.len())),
     }
 }
 
@@ -134,12 +137,14 @@ mod tests {
 
     #[test]
     fn pictures_cut_anywhere_are_refused() {
-        let mut png = Vec::new();
         let picture = RgbImage::from_fn(31, 17, |x, y| image::Rgb([x as u8, y as u8, 7]));
-        picture.write_to(&mut Cursor::new(&mut png), ImageFormat::Png).unwrap();
-        assert_eq!(decode(&png).unwrap(), picture);
-        for length in [0, 1, 8, 20, png.len() / 2] {
-            assert!(decode(&png[..length]).is_err(), "{length}");
+        for format in [ImageFormat::Png, ImageFormat::WebP, ImageFormat::Bmp, ImageFormat::Tiff] {
+            let mut bytes = Vec::new();
+            picture.write_to(&mut Cursor::new(&mut bytes), format).unwrap();
+            assert_eq!(decode(&bytes).unwrap(), picture);
+            for length in [0, 1, 8, 20, bytes.len() / 2] {
+                assert!(decode(&bytes[..length]).is_err(), "{format:?}, {length}");
+            }
         }
         let jpeg = crate::jpeg::tests::jpeg(31, 17);
         assert_eq!(decode(&crate::jpeg::tests::without_tables(&jpeg)).unwrap(), decode(&jpeg).unwrap());

@@ -18,7 +18,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// A file that does not decode is taken to be still written until its length stays the same for so long.
 const SETTLE_TIME: Duration = Duration::from_millis(500);
 /// What is read as a picture.
-const EXTENSIONS: [&str; 4] = ["png", "jpg", "jpeg", "ppm"];
+const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "ppm", "webp", "bmp", "tif", "tiff"];
 
 /// The pictures of a folder in the order of their names, or one file.
 pub(crate) struct Folder {

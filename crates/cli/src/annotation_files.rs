@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 
 use crate::files;
@@ -57,6 +57,39 @@ impl AnnotationFile {
     }
 }
 
+/// The marks that stand beside a photo: `photo.coco.json` (what `sdg annotate` writes where another tool's photo.json is to stay),
+/// `photo.json` (what it writes otherwise, or LabelMe), `photo.txt` (YOLO-pose), or the same below `labels` where a YOLO dataset keeps its pictures below `images`.
+///
+/// # Errors
+/// None of them is there; the message says which were looked for, and what makes one.
+pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
+    let in_labels = || {
+        let folder = photo.parent()?;
+        let mut parts: Vec<_> = folder.components().map(|part| part.as_os_str()).collect();
+        let images = parts.iter().rposition(|part| *part == "images")?;
+        parts[images] = "labels".as_ref();
+        let folder: PathBuf = parts.into_iter().collect();
+        Some(folder.join(photo.with_extension("txt").file_name()?))
+    };
+    let looked_for: Vec<PathBuf> = ["coco.json", "json", "txt"]
+        .map(|extension| photo.with_extension(extension))
+        .into_iter()
+        .chain(in_labels())
+        .collect();
+    match looked_for.iter().find(|path| path.is_file()) {
+        Some(found) => Ok(found.clone()),
+        None => {
+            let listed: Vec<String> = looked_for.iter().map(|path| path.display().to_string()).collect();
+            bail!(
+                "{0}: expected its marks beside it (.json: COCO or LabelMe; .txt: YOLO-pose), found none of {1}; `sdg annotate \
+                 {0}` makes them, IMAGE:ANNOTATION names another file",
+                photo.display(),
+                listed.join(", ")
+            )
+        }
+    }
+}
+
 /// The file that belongs to `path`, if it is there.
 fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
     match format {
@@ -80,6 +113,23 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn marks_stand_beside_their_photo() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("images/train")).unwrap();
+        fs::create_dir_all(at("labels/train")).unwrap();
+        let none = beside_photo(&at("images/train/a.jpg")).unwrap_err().to_string();
+        for looked_for in ["images/train/a.json", "images/train/a.txt", "labels/train/a.txt", "sdg annotate"] {
+            assert!(none.contains(looked_for), "{none}");
+        }
+        // From the least to the most preferred, so that each is found although the former ones are there.
+        for name in ["labels/train/a.txt", "images/train/a.txt", "images/train/a.json", "images/train/a.coco.json"] {
+            fs::write(at(name), "").unwrap();
+            assert_eq!(beside_photo(&at("images/train/a.jpg")).unwrap(), at(name));
+        }
+    }
 
     #[test]
     fn what_stands_beside_is_found() {

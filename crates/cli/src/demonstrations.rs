@@ -1,11 +1,11 @@
-//! `--demo IMAGE:ANNOTATION`: a photo and the marks on it.
+//! `--demo IMAGE:ANNOTATION`, or `--demo IMAGE` with the marks beside it: a photo and the marks on it.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use sdg_demonstration::{Demonstration, ImageFacts};
 
-use crate::annotation_files::AnnotationFile;
+use crate::annotation_files::{AnnotationFile, beside_photo};
 use crate::exit::Usage;
 use crate::files;
 
@@ -15,7 +15,7 @@ pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
 }
 
 fn read(argument: &str) -> Result<Demonstration> {
-    let (image_path, annotation_path) = split(argument)?;
+    let (image_path, annotation_path) = photo_and_marks(argument)?;
     let image = files::read_image(&image_path)?;
     let file_name = image_path.file_name().and_then(|name| name.to_str());
     let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
@@ -32,6 +32,20 @@ fn read(argument: &str) -> Result<Demonstration> {
     Ok(Demonstration { image, annotation: objects.remove(0) })
 }
 
+/// The two files of an argument; a photo alone has its marks beside it.
+fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
+    let photo = Path::new(argument);
+    if argument.contains(':') && !photo.exists() {
+        return split(argument);
+    }
+    if argument.is_empty() {
+        return Err(Usage("--demo: expected IMAGE or IMAGE:ANNOTATION, found nothing".to_owned()).into());
+    }
+    // A photo that is not there is told as that, not as one without marks.
+    files::check_readable(photo)?;
+    Ok((photo.to_owned(), beside_photo(photo)?))
+}
+
 /// Splits at a colon. Paths may have colons of their own: of several, the one between two files that exist.
 pub fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let splits: Vec<(PathBuf, PathBuf)> = argument
@@ -44,7 +58,7 @@ pub fn split(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let exist = |(image, annotation): &&(PathBuf, PathBuf)| Path::exists(image) && Path::exists(annotation);
     match splits.iter().find(exist).or(splits.last()) {
         Some(split) => Ok(split.clone()),
-        None => Err(Usage(format!("--demo: expected IMAGE:ANNOTATION, found \"{argument}\"")).into()),
+        None => Err(Usage(format!("--demo: expected IMAGE or IMAGE:ANNOTATION, found \"{argument}\"")).into()),
     }
 }
 
@@ -60,8 +74,14 @@ mod tests {
 
     #[test]
     fn half_an_argument_is_wrong_usage() {
-        for argument in ["a.png", "a.png:", ":b.json"] {
-            assert!(split(argument).unwrap_err().is::<Usage>(), "{argument}");
+        for argument in ["", "a.png:", ":b.json"] {
+            assert!(photo_and_marks(argument).unwrap_err().is::<Usage>(), "{argument}");
         }
+    }
+
+    #[test]
+    fn a_photo_that_is_not_there_is_told_as_that() {
+        let error = photo_and_marks("/nowhere/photo.png").unwrap_err();
+        assert!(crate::exit::one_line(&error).starts_with("/nowhere/photo.png: cannot read: No such file"));
     }
 }

@@ -4,6 +4,26 @@ use std::fmt;
 use std::io;
 use std::process::ExitCode;
 
+/// What every help text and manual page ends with.
+pub const EXIT_CODES: &str = "Exit codes:\n  \
+    0  done\n  \
+    1  failed; of several pictures at least one, the others have their results\n  \
+    2  wrong usage\n  \
+    3  ran, but found nothing to grasp";
+
+/// The command and all below it, each with the exit codes at the end of its help.
+pub fn with_exit_codes(command: clap::Command) -> clap::Command {
+    let command = match command.get_after_long_help().map(ToString::to_string) {
+        Some(own) => command.after_long_help(format!("{own}\n\n{EXIT_CODES}")),
+        None => command,
+    };
+    let command = match command.get_after_help().map(ToString::to_string) {
+        Some(own) => command.after_help(format!("{own}\n\n{EXIT_CODES}")),
+        None => command.after_help(EXIT_CODES),
+    };
+    command.mut_subcommands(with_exit_codes)
+}
+
 /// How a command ended that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {

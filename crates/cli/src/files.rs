@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
@@ -18,28 +18,80 @@ const MAX_MODEL_BYTES: u64 = 2 << 30;
 
 /// Reads a whole file, unless it is larger than `max_bytes`.
 pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
+    let (file, length) = open(path)?;
+    if length > max_bytes {
+        bail!("{}: expected at most {max_bytes} bytes, found {length}", path.display());
+    }
+    read_bounded(file, path, max_bytes)
+}
+
+/// Whether a file can be opened.
+///
+/// # Errors
+/// Its name and what the system says; a folder.
+pub fn check_readable(path: &Path) -> Result<()> {
+    open(path).map(drop)
+}
+
+/// The file and its length.
+fn open(path: &Path) -> Result<(File, u64)> {
     let named = || format!("{}: cannot read", path.display());
     let file = File::open(path).with_context(named)?;
     let metadata = file.metadata().with_context(named)?;
     if metadata.is_dir() {
         bail!("{}: expected a file, found a folder", path.display());
     }
-    if metadata.len() > max_bytes {
-        bail!("{}: expected at most {max_bytes} bytes, found {}", path.display(), metadata.len());
-    }
+    Ok((file, metadata.len()))
+}
+
+/// Reads to the end, unless that is further than `max_bytes`; a pipe has no length to check beforehand.
+fn read_bounded(input: impl Read, name: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    // A pipe has no length to check beforehand.
-    file.take(max_bytes + 1).read_to_end(&mut bytes).with_context(named)?;
+    input.take(max_bytes + 1).read_to_end(&mut bytes).with_context(|| format!("{}: cannot read", name.display()))?;
     if bytes.len() as u64 > max_bytes {
-        bail!("{}: expected at most {max_bytes} bytes, found more", path.display());
+        bail!("{}: expected at most {max_bytes} bytes, found more", name.display());
     }
     Ok(bytes)
 }
 
-/// Reads a PNG or JPEG.
+/// Reads a picture of any format that [`decode_image`] knows.
 pub fn read_image(path: &Path) -> Result<RgbImage> {
     let bytes = read(path, MAX_IMAGE_BYTES)?;
     decode_image(&bytes, &ImageLimits::default()).with_context(|| path.display().to_string())
+}
+
+/// Pictures that are not read, and whose error says what to do instead.
+pub const UNREADABLE_EXTENSIONS: [&str; 4] = ["heic", "heif", "avif", "gif"];
+
+/// What stands for standard input among file names.
+pub const STANDARD_INPUT: &str = "-";
+
+/// Reads a picture from standard input, to its end.
+pub fn read_standard_input_image() -> Result<RgbImage> {
+    let name = Path::new("standard input");
+    let bytes = read_bounded(std::io::stdin().lock(), name, MAX_IMAGE_BYTES)?;
+    decode_image(&bytes, &ImageLimits::default()).with_context(|| name.display().to_string())
+}
+
+/// Whether a file's name ends like one of these; case does not count.
+pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension()
+        .and_then(|extension| extension.to_str())
+        .is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
+}
+
+/// What stands in a folder, sorted by name; hidden entries are left out.
+pub fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
+    let named = || format!("{}: cannot read this folder", folder.display());
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).with_context(named)? {
+        let entry = entry.with_context(named)?;
+        if !entry.file_name().as_encoded_bytes().starts_with(b".") {
+            paths.push(entry.path());
+        }
+    }
+    paths.sort();
+    Ok(paths)
 }
 
 /// Reads a grasp model onto a device.

@@ -1,35 +1,138 @@
-//! A detection as a line of text.
+//! A detection as a line of text, and why it is refused.
 
 use sdg_calibration::Frame;
+use sdg_grasp::GraspDetection;
 
-use crate::picture_detector::Found;
+use crate::picture_detector::{Found, PictureDetector};
 
-/// A detection in words, in metres as well where positions are in `frame`.
-pub fn in_words(found: &Found, frame: Option<Frame>) -> String {
-    let Found { detection, pose } = found;
-    let grasp = detection.grasp;
-    let metric = pose.zip(frame).map(|(pose, frame)| {
-        let name = frame.name();
-        let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
+/// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
+pub const DEFAULT_MIN_SCORE: f64 = 0.5;
+/// Below it nothing resembles the part: advice would mislead. Chosen by hand.
+pub const MIN_ADVISED_SCORE: f64 = 0.1;
+/// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
+const SAME_SIZE: f64 = 0.03;
+
+/// What the words about the detections in a picture depend on.
+#[derive(Debug, Clone, Copy)]
+pub struct Wording<'a> {
+    /// What found them.
+    pub detector: &'a PictureDetector,
+    /// Width and height of the picture.
+    pub picture_size: [u32; 2],
+    /// The score from which they are accepted.
+    pub min_score: f64,
+}
+
+impl Wording<'_> {
+    /// A detection in words, in metres as well where the camera is known; for a refused one with the reasons.
+    pub fn line(&self, found: &Found) -> String {
+        let Found { detection, pose } = found;
+        let grasp = detection.grasp;
+        let metric = pose.zip(self.detector.frame()).map(|(pose, frame): (_, Frame)| {
+            let name = frame.name();
+            let [x, y, z] = pose.position_m.coords.map(|length| 1e3 * length).into();
+            format!(
+                " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
+                1e3 * pose.uncertainty.position_m,
+                pose.yaw.degrees(),
+                pose.uncertainty.yaw_rad.to_degrees(),
+                1e3 * pose.opening_m
+            )
+        });
+        let metric = metric.unwrap_or_default();
+        let refused = self.refusal(detection).map(|why| format!("; refused: {why}")).unwrap_or_default();
+        let turn_source = detection.turn_source.name();
         format!(
-            " = {name} ({x:.1}, {y:.1}, {z:.1}) ± {:.1} mm, yaw {:.1} ± {:.1}°, open {:.1} mm",
-            1e3 * pose.uncertainty.position_m,
-            pose.yaw.degrees(),
-            pose.uncertainty.yaw_rad.to_degrees(),
-            1e3 * pose.opening_m
+            "grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} ({}; turn by {turn_source}){refused}",
+            grasp.x,
+            grasp.y,
+            grasp.angle.degrees(),
+            grasp.width,
+            detection.score,
+            self.measured(detection),
         )
-    });
-    let metric = metric.unwrap_or_default();
-    let agreement = detection.agreement.map(|a| format!(", agreement {a:.2}")).unwrap_or_default();
-    let refused = detection.refused().map(|why| format!("; refused: {why}")).unwrap_or_default();
-    format!(
-        "grasp at ({:.1}, {:.1}), {:.1}°, {:.1} px wide{metric}; score {:.2} (network {:.2}{agreement}; turn by {}){refused}",
-        grasp.x,
-        grasp.y,
-        grasp.angle.degrees(),
-        grasp.width,
-        detection.score,
-        detection.network_score,
-        detection.turn_source.name(),
-    )
+    }
+
+    /// Whether a detection counts as the part.
+    pub fn is_accepted(&self, detection: &GraspDetection) -> bool {
+        detection.score >= self.min_score
+    }
+
+    /// What the score is made of, the network's share only where there is a network.
+    fn measured(&self, detection: &GraspDetection) -> String {
+        let network =
+            self.detector.model().kind().has_network().then(|| format!("network {:.2}", detection.network_score));
+        let agreement = detection.agreement.map(|agreement| format!("agreement {agreement:.2}"));
+        [network, agreement].into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    /// Why a detection is refused, the strongest reason first, and what would help; `None` for what is accepted.
+    pub fn refusal(&self, detection: &GraspDetection) -> Option<String> {
+        if self.is_accepted(detection) {
+            return None;
+        }
+        if detection.score >= DEFAULT_MIN_SCORE {
+            return Some(format!("it scores below --min-score {}", self.min_score));
+        }
+        let advice = detection.advice().filter(|_| detection.score >= MIN_ADVISED_SCORE);
+        Some(format!(
+            "{}{}",
+            self.reasons(detection, 2),
+            advice.map(|advice| format!("; {advice}")).unwrap_or_default()
+        ))
+    }
+
+    /// The strongest reasons, at most so many, in words.
+    pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
+        let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
+        let size = self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SAME_SIZE);
+        let in_words = |(name, words): (&str, &str)| match (name, size) {
+            ("size", Some(size)) => format!("its size is {size:.2} of the photo's"),
+            _ => words.to_owned(),
+        };
+        let reasons: Vec<String> = evidence
+            .objections(&self.detector.model().demonstrations()[0].check().score)
+            .into_iter()
+            .take(most)
+            .map(in_words)
+            .collect();
+        if reasons.is_empty() { "all evidence together is too weak".to_owned() } else { reasons.join("; also ") }
+    }
+
+    /// The line of a picture in which nothing is accepted; `best_refused` and how many were refused.
+    pub fn nothing(&self, refused: &[&GraspDetection]) -> String {
+        let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
+            return format!("nothing to grasp{}", self.of_other_size().unwrap_or_default());
+        };
+        let which = if refused.len() == 1 { "" } else { ", the best of them" };
+        let (x, y) = (best.grasp.x, best.grasp.y);
+        let why = self.refusal(best).unwrap_or_default();
+        // Where advice was given, another one would only compete with it.
+        let other_size =
+            best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
+        format!(
+            "nothing accepted; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2} (see --all): {why}{}",
+            refused.len(),
+            self.measured(best),
+            best.score,
+            other_size.unwrap_or_default()
+        )
+    }
+
+    /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
+    fn of_other_size(&self) -> Option<String> {
+        let PictureDetector::AnyCamera(model) = self.detector else { return None };
+        let [width, height] = self.picture_size;
+        let photo = model.demonstrations().iter().find_map(|demonstration| demonstration.marks.photo_size)?;
+        (photo != [width, height] && photo != [height, width]).then(|| {
+            let [photo_width, photo_height] = photo;
+            let tolerance = model.size_tolerance();
+            format!(
+                "; it has {width}x{height} pixels and the photo had {photo_width}x{photo_height}: if one of them is cropped and \
+                 resized, a wider --size-tolerance than {}-{} may help",
+                tolerance.start(),
+                tolerance.end()
+            )
+        })
+    }
 }

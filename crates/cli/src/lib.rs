@@ -35,10 +35,13 @@ mod exit;
 mod files;
 mod found_record;
 mod found_text;
+mod held_back;
 mod interrupt;
 pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;
+#[cfg(feature = "simulation")]
+mod own_part;
 #[cfg(feature = "annotate")]
 mod page_camera;
 #[cfg(feature = "annotate")]
@@ -65,10 +68,20 @@ pub mod trial;
 
 use std::process::ExitCode;
 
-use clap::CommandFactory;
+use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 
 use crate::args::{Args, Command};
 use crate::exit::Outcome;
+
+/// The definition of the command line, with what no verb says by itself.
+pub fn command() -> ClapCommand {
+    exit::with_exit_codes(Args::command())
+}
+
+/// Reads the arguments of this process; wrong ones end it with their message, as `--help` does with its text.
+pub fn parse_args() -> Args {
+    Args::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
+}
 
 /// Runs one command; prints the one line of an error and returns the exit code.
 pub fn run(args: &Args) -> ExitCode {
@@ -99,8 +112,8 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),
         Command::Camera(camera) => commands::camera::run(camera),
-        Command::Completions(completions) => commands::completions::run(completions, Args::command()),
-        Command::Man(man) => commands::man::run(man, Args::command()),
+        Command::Completions(completions) => commands::completions::run(completions, command()),
+        Command::Man(man) => commands::man::run(man, command()),
         Command::Devices(devices) => commands::devices::run(devices),
     };
     match done {

@@ -3,10 +3,7 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use sdg_cli::args::Args;
-
 fn main() -> ExitCode {
     sdg_grasp::keep_freed_memory();
-    sdg_cli::run(&Args::parse())
+    sdg_cli::run(&sdg_cli::parse_args())
 }

@@ -10,9 +10,10 @@ use sdg_annotate::{
 use sdg_calibration::Frame;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{PlanarPose, Preset, TeachOptions, TeachingEvent, Verification, teach};
+use sdg_grasp::{GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification, teach};
 
 use crate::camera_files::CameraFile;
+use crate::held_back::HeldBackFigures;
 use crate::picture_detector::{Found, PictureDetector};
 
 /// Teaches with one preset.
@@ -43,25 +44,37 @@ impl GraspTeacher for PageTeacher {
         let mut taught_with = |demonstrations: &[Demonstration], options: &TeachOptions| {
             teach(demonstrations, options, &mut |event| observe(step(event)))
         };
-        let detector = match &self.camera {
-            None => PictureDetector::AnyCamera(Box::new(taught_with(demonstrations, &options)?.model)),
+        // Model S is to be there at once, and tells no figures on the page.
+        let figures_of = |model: &GraspModel, demonstrations: &[Demonstration]| {
+            let figures = || HeldBackFigures::of(model, demonstrations, request.seed);
+            model.kind().has_network().then(figures).transpose()
+        };
+        let (detector, figures) = match &self.camera {
+            None => {
+                let model = taught_with(demonstrations, &options)?.model;
+                let figures = figures_of(&model, demonstrations)?;
+                (PictureDetector::AnyCamera(Box::new(model)), figures)
+            }
             Some((camera, [mark, grasp])) => {
                 let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
                 options.lengths = Some(lengths);
-                PictureDetector::calibrated(taught_with(&seen, &options)?.model, camera.clone())?
+                let model = taught_with(&seen, &options)?.model;
+                let figures = figures_of(&model, &seen)?;
+                (PictureDetector::calibrated(model, camera.clone())?, figures)
             }
         };
-        Ok(Box::new(PageModel(Mutex::new(detector))))
+        Ok(Box::new(PageModel { detector: Mutex::new(detector), figures }))
     }
 }
 
 fn step(event: &TeachingEvent) -> TeachingStep {
     match event {
         TeachingEvent::OrientationStep { step, planned_steps, loss, .. } => {
-            TeachingStep::Step { of: "its turns", done: step + 1, planned: *planned_steps, loss: *loss }
+            TeachingStep::Step { of: "its turns", is_last: false, done: step + 1, planned: *planned_steps, loss: *loss }
         }
         TeachingEvent::Step { record, planned_steps, .. } => TeachingStep::Step {
             of: "the network",
+            is_last: true,
             done: record.step + 1,
             planned: *planned_steps,
             loss: record.losses.total(),
@@ -73,11 +86,14 @@ fn step(event: &TeachingEvent) -> TeachingStep {
 }
 
 /// One look at a time: each uses every core.
-struct PageModel(Mutex<PictureDetector>);
+struct PageModel {
+    detector: Mutex<PictureDetector>,
+    figures: Option<HeldBackFigures>,
+}
 
 impl PageModel {
     fn detector(&self) -> MutexGuard<'_, PictureDetector> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.detector.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -85,14 +101,18 @@ impl TaughtModel for PageModel {
     fn summary(&self) -> TaughtSummary {
         let detector = self.detector();
         let model = detector.model();
-        let facts = model.facts();
+        let figures = self.figures.as_ref();
+        let [error_px, error_degrees] = match figures.and_then(HeldBackFigures::median_errors) {
+            Some(errors) => errors.map(Some),
+            None => [None; 2],
+        };
         TaughtSummary {
             model: model.kind(),
             object: model.object().to_owned(),
-            seconds: facts.seconds,
-            hit_rate: facts.validation.map(|held_back| held_back.hit_rate),
-            error_px: facts.validation.map(|held_back| held_back.error_px),
-            error_degrees: facts.validation.map(|held_back| held_back.error_degrees),
+            seconds: model.facts().seconds,
+            hit_rate: figures.and_then(|figures| figures.found().percent()).map(|percent| percent / 100.0),
+            error_px,
+            error_degrees,
         }
     }
 

@@ -7,8 +7,8 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_calibration::Frame;
 use sdg_grasp::{
-    GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose, TaughtDemonstration,
-    Verification,
+    Differences, GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose,
+    TaughtDemonstration, Verification,
 };
 
 use crate::camera_files::CameraFile;
@@ -106,6 +106,23 @@ impl PictureDetector {
         match self {
             Self::AnyCamera(model) => model,
             Self::Calibrated(_, detector) => detector.model(),
+        }
+    }
+
+    /// The part's size in a picture over its size in the photo; `None` where that says nothing: by a calibrated camera, or without
+    /// the check.
+    pub fn size_of(&self, detection: &GraspDetection, picture_size: [u32; 2]) -> Option<f64> {
+        match self {
+            Self::AnyCamera(model) => model.size_of(detection, picture_size),
+            Self::Calibrated(..) => None,
+        }
+    }
+
+    /// Where a picture differs from the demonstration under each detection; `None` as [`Self::size_of`].
+    pub fn differences(&self, picture: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
+        match self {
+            Self::AnyCamera(model) => model.differences(picture, detections),
+            Self::Calibrated(..) => vec![None; detections.len()],
         }
     }
 

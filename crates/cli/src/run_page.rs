@@ -43,8 +43,9 @@ const FILM_SPEED: f64 = 2.0;
 pub fn rehearsal(page: &RunPage) -> Result<Report> {
     let title = format!("{}: {} grasp attempts", page.object.title, page.rehearsed.attempts.len());
     let report = Report::new(title).kicker("Rehearsal in simulation").lead(format!(
-        "A grasp model taught from one photo looks for the {} on the table, goes to it and lifts it.",
-        page.object.title.to_lowercase()
+        "A grasp model taught from one photo looked for the {} on the table, {}.",
+        page.object.title.to_lowercase(),
+        lifted(page)
     ));
     let report = with_film(with_key_figures(report, page), page)?;
     Ok(report.section(attempts(page)).section(last_looks(page)).section(this_run(page)).footer(FOOTER))
@@ -56,10 +57,10 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
     let report = Report::new(format!("{}, taught from one photo", page.object.title))
         .kicker("Demonstration to grasp, in simulation")
         .lead(format!(
-            "One photo, one marked grasp, {:.0} seconds of teaching. The robot then looked for the part, went to it \
-             and lifted it, {} times, from poses it had not seen.",
+            "One photo, one marked grasp, {:.0} seconds of teaching. The robot then looked for the part in poses it had not \
+             seen, {}.",
             facts.seconds,
-            page.rehearsed.attempts.len()
+            lifted(page)
         ))
         .key_figure(KeyFigure::new(format!("{:.0}", facts.seconds), "s", "to teach, from one photo"));
     let mut report = with_key_figures(report, page);
@@ -81,6 +82,15 @@ pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
         report = report.section(teaching_page::teaching(history));
     }
     Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
+}
+
+/// What became of the attempts, as the end of a sentence: no more than the robot did.
+fn lifted(page: &RunPage) -> String {
+    match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
+        (0, of) => format!("and lifted it in none of {of} attempts"),
+        (successes, of) if successes == of => format!("went to it and lifted it, {of} times"),
+        (successes, of) => format!("and went to it and lifted it in {successes} of {of} attempts"),
+    }
 }
 
 fn with_key_figures(report: Report, page: &RunPage) -> Report {
@@ -106,11 +116,12 @@ fn with_film(report: Report, page: &RunPage) -> Result<Report> {
         ..AnimationOptions::default()
     };
     let film = Animation::encode(&page.rehearsed.film, &options)?;
-    Ok(report.cover(
-        Figure::animation(film)
-            .alt("The robot looks, moves over the part, comes down, closes its jaws and lifts the part.")
-            .caption("One attempt, at twice its speed: look, hover, approach, close, lift, hold."),
-    ))
+    Ok(report.cover(Figure::animation(film).alt("The robot's attempt, seen from beside the table.").caption(
+        match page.rehearsed.successes() {
+            0 => "An attempt that failed, at twice its speed.",
+            _ => "One attempt, at twice its speed: look, hover, approach, close, lift, hold.",
+        },
+    )))
 }
 
 fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
@@ -169,6 +180,7 @@ fn this_run(page: &RunPage) -> Section {
         .lead("Everything needed to see the same numbers again.")
         .facts([
             ("object", page.object.name.clone()),
+            ("part", page.object.description.clone()),
             ("grasp model", format!("{}, preset {}", page.model.kind(), page.model.preset())),
             ("taught with", format!("seed {}, {} samples, {} steps", facts.seed, facts.samples, facts.steps)),
             (

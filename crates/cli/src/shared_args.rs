@@ -36,6 +36,27 @@ impl TaughtCameraArgs {
     }
 }
 
+/// What the photo does not show of the user's own part.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct OwnPartArgs {
+    /// Instead of --object the part that the model was taught from, with its outline and photo: its height over the table; not
+    /// needed for a model taught with --camera
+    #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    pub height_mm: Option<f64>,
+    /// The longer side of its box; not needed for a model taught with --camera
+    #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    pub length_mm: Option<f64>,
+    /// What it weighs; without it, what its volume would at 1.5 g/cm3
+    #[arg(long, value_name = "G", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    pub mass_g: Option<f64>,
+    /// Coefficient of friction of its surface; without it, 0.6
+    #[arg(long, value_name = "MU", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    pub friction: Option<f64>,
+}
+
+/// The heading of these options in the help.
+const OWN_PART: &str = "Your own part";
+
 /// Smallest and largest size of a part over the nominal one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SizeTolerance {
@@ -65,6 +86,22 @@ pub fn size_tolerance(text: &str) -> Result<SizeTolerance, String> {
             Ok(SizeTolerance { low, high })
         }
         _ => Err("expected LOW-HIGH with LOW from 0.5 to 1 and HIGH from 1 to 2, such as 0.75-1.35".to_owned()),
+    }
+}
+
+/// A number from 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("expected a number from 0 to 1".to_owned()),
+    }
+}
+
+/// A positive, finite number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("expected a positive number".to_owned()),
     }
 }
 

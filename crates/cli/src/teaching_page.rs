@@ -12,6 +12,7 @@ use sdg_report::{
     draw_demonstration, draw_line,
 };
 
+use crate::held_back::HeldBackFigures;
 use crate::machine::machine;
 use crate::pictures;
 
@@ -28,6 +29,8 @@ pub const FOOTER: &str = "Made by sdg. This page is one file: it fetches nothing
 pub struct TeachingPage<'a> {
     /// The model, and how its network was trained.
     pub taught: &'a Taught,
+    /// What the finished model made of held-back samples.
+    pub figures: &'a HeldBackFigures,
     /// The photos and their marks.
     pub demonstrations: &'a [Demonstration],
     pub seed: u64,
@@ -56,13 +59,33 @@ impl TeachingPage<'_> {
                 model.kind()
             ))
             .key_figure(KeyFigure::new(format!("{:.0}", facts.seconds), "s", format!("to teach, from {photos}")));
-        if let Some(held_back) = facts.validation {
-            let percent = 100.0 * held_back.hit_rate;
-            let tone = if percent >= 80.0 { Tone::Good } else { Tone::Warning };
+        let (found, false_alarms) = (self.figures.found(), self.figures.false_alarms());
+        let tone = match found.percent() {
+            Some(percent) if percent >= 80.0 => Tone::Good,
+            Some(percent) if percent < 50.0 => Tone::Bad,
+            _ => Tone::Warning,
+        };
+        let bad_if = |is_bad: bool| if is_bad { Tone::Bad } else { Tone::Good };
+        report = report
+            .key_figure(
+                KeyFigure::new(found.count.to_string(), format!("of {}", found.of), "held-back parts found").tone(tone),
+            )
+            .key_figure(
+                KeyFigure::new(self.figures.wrong().to_string(), "", "found where they are not")
+                    .tone(bad_if(self.figures.wrong() > 0)),
+            )
+            .key_figure(
+                KeyFigure::new(
+                    false_alarms.count.to_string(),
+                    format!("of {}", false_alarms.of),
+                    "false alarms without the part",
+                )
+                .tone(bad_if(false_alarms.count > 0)),
+            );
+        if let Some(((off, unit), [_, deg])) = self.figures.median_distance().zip(self.figures.median_errors()) {
             report = report
-                .key_figure(KeyFigure::new(format!("{percent:.0}"), "%", "of held-back samples found").tone(tone))
-                .key_figure(KeyFigure::new(format!("{:.1}", held_back.error_px), "px", "median error of place"))
-                .key_figure(KeyFigure::new(format!("{:.1}", held_back.error_degrees), "°", "median error of turn"));
+                .key_figure(KeyFigure::new(format!("{off:.1}"), unit, "median error of place"))
+                .key_figure(KeyFigure::new(format!("{deg:.1}"), "°", "median error of turn"));
         }
         let mut report = report.section(demonstration(model, self.demonstrations, self.seed)?);
         if let Some(history) = &self.taught.history {

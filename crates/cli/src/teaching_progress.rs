@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::ops::ControlFlow;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sdg_grasp::{TeachingEvent, ValidationRecord};
 
 use crate::interrupt::Interrupt;
@@ -12,6 +12,11 @@ use crate::interrupt::Interrupt;
 const LINE_EVERY: usize = 20;
 /// Share of the newest loss in the smoothed one that is shown.
 const SMOOTHING: f64 = 0.1;
+
+/// The bar; the message takes what is left of the terminal's width, and is cut there.
+const TEMPLATE: &str = "teaching {bar:12.cyan/blue} {pos}/{len} {wide_msg}";
+/// What follows the last step, and takes a while.
+const AFTER_LAST_STEP: &str = "trying it on held-back samples";
 
 /// Shows events and passes Ctrl-C on.
 pub struct TeachingProgress {
@@ -25,14 +30,7 @@ pub struct TeachingProgress {
 impl TeachingProgress {
     /// A bar if standard error is a terminal, lines if not.
     pub fn new(interrupt: Interrupt) -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::new(0);
-            let template = "teaching {bar:32.cyan/blue} {pos}/{len}  {elapsed} gone, {eta} left  {msg}";
-            if let Ok(style) = ProgressStyle::with_template(template) {
-                bar.set_style(style);
-            }
-            bar
-        });
+        let bar = std::io::stderr().is_terminal().then(|| bar_on(ProgressDrawTarget::stderr()));
         Self { bar, interrupt, told_of_interrupt: false, loss: None, last_validation: String::new() }
     }
 
@@ -44,17 +42,19 @@ impl TeachingProgress {
                 let loss = self.loss.map_or(newest, |loss| loss + SMOOTHING * (newest - loss));
                 self.loss = Some(loss);
                 let done = record.step + 1;
+                let left = left_secs(*elapsed_secs, done, *planned_steps);
                 match &self.bar {
                     Some(bar) => {
-                        bar.set_length(*planned_steps as u64);
-                        bar.set_position(done as u64);
-                        bar.set_message(format!("loss {loss:.2}{}", self.last_validation));
+                        let left =
+                            left.map_or_else(|| AFTER_LAST_STEP.to_owned(), |left| format!("{} left", clock(left)));
+                        show_step(bar, done, *planned_steps, {
+                            format!("{} gone, {left}, loss {loss:.2}{}", clock(*elapsed_secs), self.last_validation)
+                        });
                     }
                     None if done % LINE_EVERY == 0 || done == *planned_steps => {
-                        let left = elapsed_secs / done as f64 * planned_steps.saturating_sub(done) as f64;
+                        let left = left.map_or_else(|| AFTER_LAST_STEP.to_owned(), |left| format!("{left:.0} s left"));
                         eprintln!(
-                            "teaching: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone, \
-                             {left:.0} s left"
+                            "teaching: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone, {left}"
                         );
                     }
                     None => {}
@@ -64,11 +64,9 @@ impl TeachingProgress {
             TeachingEvent::OrientationStep { step, planned_steps, loss, elapsed_secs } => {
                 let done = step + 1;
                 match &self.bar {
-                    Some(bar) => {
-                        bar.set_length(*planned_steps as u64);
-                        bar.set_position(done as u64);
-                        bar.set_message(format!("angles, loss {loss:.2}"));
-                    }
+                    Some(bar) => show_step(bar, done, *planned_steps, {
+                        format!("{} gone, loss {loss:.2}: angles, then the network", clock(*elapsed_secs))
+                    }),
                     None if done % LINE_EVERY == 0 || done == *planned_steps => eprintln!(
                         "teaching angles: step {done} of {planned_steps}, loss {loss:.2}, {elapsed_secs:.0} s gone"
                     ),
@@ -89,12 +87,12 @@ impl TeachingProgress {
     fn show_validation(&mut self, record: &ValidationRecord) {
         let v = &record.validation;
         self.last_validation = format!(
-            ", found {}/{}, {:.1} px, {:.1}°, {} false",
+            ", network {}/{}, {:.1} px, {:.1}°, {} false",
             v.hits, v.positives, v.median_error_px, v.median_error_degrees, v.false_alarms
         );
         if self.bar.is_none() {
             eprintln!(
-                "teaching: after {} steps found {} of {} held-back, median {:.1} px and {:.1}°, {} false alarms in {}",
+                "teaching: after {} steps the network alone finds {} of {} held-back, median {:.1} px and {:.1}°, {} false alarms in {}",
                 record.steps_done,
                 v.hits,
                 v.positives,
@@ -118,5 +116,100 @@ impl TeachingProgress {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+fn bar_on(target: ProgressDrawTarget) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(0), target);
+    if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn show_step(bar: &ProgressBar, done: usize, planned: usize, message: String) {
+    bar.set_length(planned as u64);
+    bar.set_position(done as u64);
+    bar.set_message(message);
+}
+
+/// Seconds until the last step, by the pace so far; `None` after it, when more than that is to come.
+fn left_secs(elapsed_secs: f64, done: usize, planned: usize) -> Option<f64> {
+    (done < planned).then(|| elapsed_secs / done as f64 * (planned - done) as f64)
+}
+
+/// Minutes and seconds, as a clock shows them; what is left is never told as nothing.
+fn clock(secs: f64) -> String {
+    let secs = secs.ceil() as u64;
+    format!("{}:{:02}", secs / 60, secs % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use indicatif::TermLike;
+    use std::io;
+    use std::sync::{Arc, Mutex};
+
+    /// A terminal of 80 columns that keeps what is written.
+    #[derive(Debug, Clone, Default)]
+    struct Terminal(Arc<Mutex<String>>);
+
+    impl TermLike for Terminal {
+        fn width(&self) -> u16 {
+            80
+        }
+        fn move_cursor_up(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_down(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_right(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_left(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn write_line(&self, text: &str) -> io::Result<()> {
+            self.write_str(text)
+        }
+        fn write_str(&self, text: &str) -> io::Result<()> {
+            self.0.lock().unwrap().push_str(&format!("{text}\n"));
+            Ok(())
+        }
+        fn clear_line(&self) -> io::Result<()> {
+            Ok(())
+        }
+        fn flush(&self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// Without the colours.
+    fn plain(text: &str) -> String {
+        let mut parts = text.split('\u{1b}');
+        let first = parts.next().unwrap_or_default().to_owned();
+        parts.fold(first, |text, part| text + part.split_once('m').map_or("", |(_, rest)| rest))
+    }
+
+    #[test]
+    fn the_line_is_no_wider_than_a_terminal() {
+        let terminal = Terminal::default();
+        let bar = bar_on(ProgressDrawTarget::term_like_with_hz(Box::new(terminal.clone()), 255));
+        let validation = ", network 40/48, 10.6 px, 10.5°, 12 false";
+        let message = format!("{} gone, {} left, loss 10.52{validation}", clock(3599.0), clock(3599.0));
+        show_step(&bar, 1000, 1000, message);
+        bar.force_draw();
+        let written = plain(&terminal.0.lock().unwrap());
+        assert!(written.contains("59:59 gone, 59:59 left, loss"), "{written}");
+        assert!(written.lines().all(|line| line.chars().count() <= 80), "{written}");
+    }
+
+    #[test]
+    fn nothing_is_left_only_after_the_last_step() {
+        assert_eq!(left_secs(9.0, 3, 4), Some(3.0));
+        assert_eq!(left_secs(12.0, 4, 4), None);
+        assert_eq!((clock(0.2).as_str(), clock(61.0).as_str()), ("0:01", "1:01"));
     }
 }

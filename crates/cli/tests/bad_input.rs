@@ -39,6 +39,7 @@ fn unreadable_images_are_refused_by_name() {
     let out = folder.path().join("model.sdg");
     let annotation = shipped("pendulum", "annotation.json");
     teach(&pair(Path::new("/nowhere.png"), &annotation), &out, 1, &["/nowhere.png", "cannot read"]);
+    teach("/nowhere.png", &out, 1, &["/nowhere.png", "cannot read"]);
 
     let truncated = folder.path().join("truncated.png");
     let whole = fs::read(shipped("pendulum", "image.png")).unwrap();
@@ -133,7 +134,7 @@ fn the_annotation_page_does_not_open_on_what_cannot_be_marked() {
     assert_refused(&["annotate", "/nowhere/photo.png"], 1, &["/nowhere", "cannot"]);
     let text = folder.path().join("text.png");
     fs::write(&text, "not a picture").unwrap();
-    assert_refused(&["annotate", photo, text.to_str().unwrap()], 1, &["text.png", "PNG or JPEG"]);
+    assert_refused(&["annotate", photo, text.to_str().unwrap()], 1, &["text.png", "expected a PNG, JPEG"]);
     assert_refused(&["annotate", photo, "--try", "/nowhere"], 1, &["/nowhere", "cannot read"]);
     let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port().to_string();
@@ -184,7 +185,7 @@ fn wrong_usage_is_exit_code_2() {
         vec!["annotate", "photo.png", "--preset", "huge"],
         vec!["annotate", "photo.png", "--port", "70000"],
         vec!["teach", "--out", "m.sdg"],
-        vec!["teach", "--demo", "only-an-image.png", "--out", "m.sdg"],
+        vec!["teach", "--demo", "image.png:", "--out", "m.sdg"],
         vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--model", "Z"],
         vec!["teach", "--demo", &demonstration, "--out", "m.sdg", "--preset", "huge"],
         vec!["augment", "--demo", &demonstration, "--count", "1", "--out", "x", "--preset", "huge"],

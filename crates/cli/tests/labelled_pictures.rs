@@ -266,7 +266,7 @@ fn wrong_folders_are_refused_with_what_was_expected() {
     let refused = |case: Case, parts: &[&str]| case.assert_refused(&model, &[], parts);
 
     refused(Case::new("notes.txt", ""), &["expected labels", "found 1 pictures and none"]);
-    refused(Case::new("a.json", &empty).without("a.png"), &["expected PNG or JPEG pictures", "found none"]);
+    refused(Case::new("a.json", &empty).without("a.png"), &["expected pictures (png, jpg", "found none"]);
     refused(Case::new("a.json", "{\"shapes\": ["), &["a.json", "not JSON", "line 1"]);
     refused(Case::new("labels.json", "{\"images\": [}"), &["labels.json", "not JSON"]);
     refused(Case::new("a.json", "[1, 2]"), &["a.json", "expected COCO JSON"]);

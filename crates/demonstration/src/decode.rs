@@ -1,4 +1,5 @@
-//! A photo from its bytes: PNG or JPEG by content, checked before memory is taken, upright.
+//! A photo from its bytes: PNG, JPEG and (feature `more-image-formats`) WebP, BMP and TIFF by content, checked before memory is
+//! taken, upright.
 
 use std::io::Cursor;
 
@@ -20,19 +21,46 @@ impl Default for ImageLimits {
     }
 }
 
-/// Decodes a PNG or JPEG into upright 8-bit RGB.
+/// How the names of picture files end, whose content [`decode_image`] may read.
+pub const IMAGE_EXTENSIONS: [&str; 7] = ["png", "jpg", "jpeg", "webp", "bmp", "tif", "tiff"];
+
+/// The formats and their names; those of which the decoder was not compiled are refused by name.
+const FORMATS: [(ImageFormat, &str); 5] = [
+    (ImageFormat::Png, "PNG"),
+    (ImageFormat::Jpeg, "JPEG"),
+    (ImageFormat::WebP, "WebP"),
+    (ImageFormat::Bmp, "BMP"),
+    (ImageFormat::Tiff, "TIFF"),
+];
+
+/// The formats that this build reads, as a message lists them.
+pub(crate) fn readable_formats() -> String {
+    let names: Vec<&str> =
+        FORMATS.iter().filter(|(format, _)| format.reading_enabled()).map(|(_, name)| *name).collect();
+    match names.split_last() {
+        Some((last, others)) => format!("{} or {last}", others.join(", ")),
+        None => String::new(),
+    }
+}
+
+/// Decodes a picture file into upright 8-bit RGB.
 ///
-/// The content says which of the two it is. Grey and 16-bit images are converted, transparent pixels laid over white,
-/// and the Exif orientation that phones write is applied, so that the pixels stand as a viewer shows them.
+/// The content says what it is: PNG or JPEG, and with the feature `more-image-formats` WebP, BMP or TIFF. Grey and deeper
+/// images are converted, transparent pixels laid over white, and the Exif orientation that phones write is applied, so that
+/// the pixels stand as a viewer shows them. Of several pages or frames the first one counts.
 ///
 /// # Errors
-/// Bytes of another kind, a truncated or damaged file, zero width or height, more than `limits.max_pixels`.
+/// Bytes of another kind (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
+/// or height, more than `limits.max_pixels`.
 pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
-    let (format, name) = match image::guess_format(bytes) {
-        Ok(ImageFormat::Png) => (ImageFormat::Png, "PNG"),
-        Ok(ImageFormat::Jpeg) => (ImageFormat::Jpeg, "JPEG"),
-        Ok(other) => return Err(Error::NotAnImage { found: format!("{other:?}") }),
-        Err(_) => return Err(Error::NotAnImage { found: describe(bytes) }),
+    if let Some(found) = iso_media(bytes) {
+        return Err(Error::NotAnImage { found: found.to_owned() });
+    }
+    let guessed = image::guess_format(bytes).map_err(|_| Error::NotAnImage { found: describe(bytes) })?;
+    let (format, name) = match FORMATS.iter().find(|(format, _)| *format == guessed) {
+        Some(known) if guessed.reading_enabled() => *known,
+        Some((_, name)) => return Err(Error::NotAnImage { found: (*name).to_owned() }),
+        None => return Err(Error::NotAnImage { found: format!("{guessed:?}") }),
     };
     let damaged = |error: image::ImageError| Error::DamagedImage { format: name, reason: error.to_string() };
     // Ahead of the decoder, which refuses an empty PNG with less to say.
@@ -51,7 +79,7 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
     }
 
     let mut allocation = Limits::default();
-    // 16-bit RGBA is the widest pixel that either format has.
+    // 16-bit RGBA is the widest pixel that photos have.
     allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
     decoder.set_limits(allocation).map_err(damaged)?;
     // A damaged Exif block is no reason to refuse the picture.
@@ -69,6 +97,19 @@ fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
         return Err(Error::EnormousImage { width, height, max_pixels: limits.max_pixels });
     }
     Ok(())
+}
+
+/// What an ISO media file is, of which none is read: HEIC is under patents, and no small decoder in Rust reads AVIF.
+fn iso_media(bytes: &[u8]) -> Option<&'static str> {
+    let brand = bytes.get(8..12).filter(|_| bytes.get(4..8) == Some(b"ftyp"))?;
+    match brand {
+        b"heic" | b"heix" | b"heim" | b"heis" | b"hevc" | b"hevx" | b"mif1" | b"msf1" => Some(
+            "a HEIC photo, as phones take them: on an iPhone set Settings > Camera > Formats > Most Compatible (on other \
+             phones switch HEIF pictures off) and take it again, or export it as JPEG",
+        ),
+        b"avif" | b"avis" => Some("an AVIF picture: export it as JPEG or PNG"),
+        _ => Some("a film or another ISO media file"),
+    }
 }
 
 /// Width and height from the IHDR chunk, which the standard puts first.
@@ -174,6 +215,30 @@ mod tests {
     }
 
     #[test]
+    fn webp_bmp_and_tiff_are_exact() {
+        for format in [ImageFormat::WebP, ImageFormat::Bmp, ImageFormat::Tiff] {
+            assert_eq!(decode(&encode(&gradient(), format)).unwrap(), gradient().to_rgb8(), "{format:?}");
+        }
+        let deep: ImageBuffer<Rgb<u16>, _> = ImageBuffer::from_pixel(3, 2, Rgb([257 * 10, 257 * 20, 257 * 30]));
+        assert_eq!(decode(&encode(&deep.into(), ImageFormat::Tiff)).unwrap().get_pixel(1, 1).0, [10, 20, 30]);
+        let clear = RgbaImage::from_pixel(3, 2, Rgba([0, 0, 0, 64]));
+        assert_eq!(decode(&encode(&clear.into(), ImageFormat::WebP)).unwrap().get_pixel(1, 1).0, [191; 3]);
+    }
+
+    #[test]
+    fn phones_photos_that_are_not_read_name_the_setting() {
+        let message =
+            |brand: &str| decode(format!("\0\0\0\x18ftyp{brand}\0\0\0\0").as_bytes()).unwrap_err().to_string();
+        for brand in ["heic", "heix", "mif1"] {
+            let message = message(brand);
+            assert!(message.contains("Settings > Camera > Formats > Most Compatible"), "{message}");
+            assert!(message.contains("expected a PNG, JPEG, WebP, BMP or TIFF file"), "{message}");
+        }
+        assert!(message("avif").contains("AVIF"));
+        assert!(message("isom").contains("film"));
+    }
+
+    #[test]
     fn exif_orientation_is_applied() {
         // Exif, big endian, one entry: tag 0x0112 (orientation), short, 6 = turn by 90° clockwise to show.
         let tiff = b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
@@ -206,7 +271,7 @@ mod tests {
 
     #[test]
     fn truncation_is_found_at_any_place() {
-        for format in [ImageFormat::Png, ImageFormat::Jpeg] {
+        for (format, _) in FORMATS {
             let bytes = encode(&gradient(), format);
             for keep in [bytes.len() / 4, bytes.len() / 2, bytes.len() * 9 / 10] {
                 let found = decode(&bytes[..keep]);
@@ -226,15 +291,17 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
         #[test]
-        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200), start in 0usize..3) {
-            let mut file = [&b""[..], b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0"][start].to_vec();
+        fn arbitrary_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200), start in 0usize..7) {
+            let starts: [&[u8]; 7] =
+                [b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0", b"RIFF\x40\0\0\0WEBPVP8 ", b"BM", b"II\x2a\0", b"\0\0\0\x18ftyp"];
+            let mut file = starts[start].to_vec();
             file.extend(bytes);
             let _ = decode(&file);
         }
 
         #[test]
-        fn a_damaged_byte_never_panics(at in 0.0..1.0f64, value in any::<u8>(), jpeg in any::<bool>()) {
-            let mut file = encode(&gradient(), if jpeg { ImageFormat::Jpeg } else { ImageFormat::Png });
+        fn a_damaged_byte_never_panics(at in 0.0..1.0f64, value in any::<u8>(), format in 0..FORMATS.len()) {
+            let mut file = encode(&gradient(), FORMATS[format].0);
             let at = (at * file.len() as f64) as usize;
             file[at] = value;
             let _ = decode(&file);

@@ -13,8 +13,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
-    /// The bytes are neither a PNG nor a JPEG.
-    #[error("not a readable image: expected a PNG or JPEG file, found {found}")]
+    /// The bytes are of no format that is read.
+    #[error("not a readable image: expected a {} file, found {found}", crate::decode::readable_formats())]
     NotAnImage {
         /// What the bytes look like.
         found: String,

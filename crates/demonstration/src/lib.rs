@@ -62,7 +62,7 @@ pub use augmentation::{
     AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle, Windows,
 };
 pub use coco::CocoFile;
-pub use decode::{ImageLimits, decode_image};
+pub use decode::{IMAGE_EXTENSIONS, ImageLimits, decode_image};
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};
 pub use error::{Error, Result};
 pub use format::{AnnotationFormat, DeclaredImage};

@@ -59,6 +59,7 @@ mod check_config;
 mod decimal;
 mod device;
 mod error;
+mod explanation;
 mod facts;
 #[cfg(feature = "teach")]
 pub mod fitting;
@@ -66,6 +67,7 @@ mod model;
 mod model_file;
 mod models;
 mod network_evidence;
+mod photo_scale;
 mod plan;
 mod pose;
 mod prepared;
@@ -101,6 +103,7 @@ pub use pose::{GraspPlane, GraspPose};
 pub use record::{DetectionRecord, GraspRecord};
 pub use sdg_demonstration::{ImageLimits, NUM_KEYPOINTS, decode_image};
 pub use sdg_detection::keep_freed_memory;
+pub use sdg_shape::Differences;
 #[cfg(feature = "teach")]
 pub use sdg_training::{Ending, HIT_DEGREES, HIT_PX, History, LossValues, StepRecord, Validation, ValidationRecord};
 pub use taught::TaughtDemonstration;

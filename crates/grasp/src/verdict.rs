@@ -62,21 +62,47 @@ impl Contributions {
         self.named().min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
+    /// What speaks against the part, name and words: first the strongest objection, then whatever says clearly less for the part
+    /// than it could by `config`, the greatest loss first.
+    pub fn objections(&self, config: &ScoreConfig) -> Vec<(&'static str, &'static str)> {
+        /// Less than this is lost in clear views, too. Chosen by hand.
+        const MIN_LOSS: f64 = 0.5;
+        let best = |name: &str| {
+            let term = config.terms().into_iter().find(|(known, _)| *known == name).map(|(_, term)| term)?;
+            Some(term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max))
+        };
+        let strongest = self.weakest().filter(|(_, log_odds)| *log_odds < 0.0).map(|(name, _)| name);
+        let mut lost: Vec<(&'static str, f64)> = self
+            .named()
+            .filter(|(name, _)| Some(*name) != strongest)
+            // These say nothing of where the part and the picture differ, unless they speak against the part.
+            .filter(|(name, log_odds)| !["network", "resemblance", "likeness"].contains(name) || *log_odds < 0.0)
+            .filter_map(|(name, log_odds)| Some((name, best(name)? - log_odds)))
+            .filter(|(_, loss)| *loss >= MIN_LOSS)
+            .collect();
+        lost.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let names = strongest.into_iter().chain(lost.into_iter().map(|(name, _)| name));
+        names.map(|name| (name, Self::objection(name))).collect()
+    }
+
     /// What speaks most against the part, in words; `None` where nothing does.
     pub fn strongest_objection(&self) -> Option<&'static str> {
         let (name, log_odds) = self.weakest()?;
-        let words = match name {
+        (log_odds < 0.0).then(|| Self::objection(name))
+    }
+
+    fn objection(name: &str) -> &'static str {
+        match name {
             "network" => "the network does not see the part there",
             "edges" => "too few of the part's edges are there",
-            "surface" => "the surface looks different: another side, print or light",
+            "surface" => "the surface looks different: another side, print, gloss or light",
             "hue" => "it has another colour: another part, or other light",
             "visible" => "too little of it is visible",
             "size" => "it has another size",
             "likeness" => "photo and picture, laid over each other, do not show the same part",
             "outside" => "too much of it lies outside the picture",
             _ => "other things look much like this part",
-        };
-        (log_odds < 0.0).then_some(words)
+        }
     }
 }
 
@@ -267,5 +293,15 @@ mod tests {
         let hidden = Clues { evidence: Evidence { visible: 0.2, ..clear().evidence }, ..clear() };
         let (_, contributions) = judge(&hidden, None, &ScoreConfig::DEFAULT);
         assert_eq!(contributions.strongest_objection(), Some("too little of it is visible"));
+        let covered = Clues { evidence: Evidence { likeness: Some(-1.5), edges: 0.6, ..hidden.evidence }, ..clear() };
+        let config = ScoreConfig::DEFAULT;
+        let names = |clues: &Clues| -> Vec<_> {
+            judge(clues, None, &config).1.objections(&config).into_iter().map(|(name, _)| name).collect()
+        };
+        assert_eq!(names(&hidden)[0], "visible");
+        // The strongest objection first; what only says less for the part than it could comes after it.
+        let of_covered = names(&covered);
+        assert!(of_covered.contains(&"visible") && of_covered.contains(&"edges"), "{of_covered:?}");
+        assert_eq!(names(&Clues { evidence: Evidence { edges: 0.79, ..clear().evidence }, ..clear() }).first(), None);
     }
 }

@@ -10,8 +10,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use image::RgbImage;
+use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_shape::{Evidence, GradientField};
+use sdg_shape::{Differences, Evidence, GradientField};
 
 use crate::models::PoseCandidate;
 use crate::prepared::{Prepared, WorkingSize, scaling};
@@ -226,6 +227,24 @@ fn better_way_round<'a>(
     let refined = comparison.refine_pose(&start, refined, scales);
     let agreement = comparison.agreement(&refined).both();
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
+}
+
+/// Where picture and demonstration differ at a pose, in pixels of the picture; `None` where its size is not looked for.
+pub(crate) fn differences(
+    searched: &SearchedImage<'_>,
+    demonstration_idx: usize,
+    image_from_cutout: &PlanarSimilarity,
+) -> Option<Differences> {
+    let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == demonstration_idx);
+    let distance = |sized: &&SizedDemonstration<'_>| sized.range.distance(image_from_cutout.scale);
+    let sized = of_it.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let view = &searched.views[sized.view_idx];
+    let comparison = sized.prepared.search.comparison(&view.image, &view.field);
+    let mut differences = comparison.differences(&sized.view_from_working(image_from_cutout));
+    let image_from_view = scaling(sized.working.shrink());
+    let to_image = |point: &mut Point2<f64>| *point = image_from_view.apply(point);
+    differences.edges.iter_mut().chain(&mut differences.surface).for_each(to_image);
+    Some(differences)
 }
 
 /// `pose` turned and scaled about the middle of the outline in the image.

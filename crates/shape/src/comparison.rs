@@ -16,7 +16,7 @@
 use std::ops::RangeInclusive;
 
 use image::RgbImage;
-use nalgebra::Vector2;
+use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
 
 use crate::compass_search::CompassSearch;
@@ -98,7 +98,24 @@ pub struct Evidence {
     pub likeness: Option<f64>,
 }
 
+/// Where, at a pose, the image does not show what the demonstration has, for people to look at; pixels of the image.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Differences {
+    /// Points with an edge in one of the two alone, or in another direction.
+    pub edges: Vec<Point2<f64>>,
+    /// Points of the surface whose brightness and colour do not follow the demonstration's.
+    pub surface: Vec<Point2<f64>>,
+}
+
 impl Comparison<'_> {
+    /// Where edges and surface disagree at a pose. Nothing of it counts in [`Self::evidence`], which is made of the same comparison.
+    pub fn differences(&self, image_from_demonstration: &PlanarSimilarity) -> Differences {
+        Differences {
+            edges: self.structure.differing(self.field, image_from_demonstration),
+            surface: self.surface.differing(self.image, image_from_demonstration),
+        }
+    }
+
     /// All measurements at a pose. Slower than [`Self::agreement`], which suffices to climb.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
         let (evidence, agreement) = self.evidence_without_likeness(image_from_demonstration);

@@ -90,7 +90,7 @@ mod structure;
 mod surface;
 mod template;
 
-pub use comparison::{Agreement, Comparison, Evidence};
+pub use comparison::{Agreement, Comparison, Differences, Evidence};
 pub use config::{
     AgreementConfig, GradientConfig, RefinementConfig, ScaleRange, ShapeConfig, StructureConfig, SurfaceConfig,
 };

@@ -86,25 +86,57 @@ impl Structure {
     /// # Units and frames
     /// The pose maps demonstration pixels to pixels of the image.
     pub fn agreement(&self, field: &GradientField, image_from_demonstration: &PlanarSimilarity) -> StructureAgreement {
+        let mut regions = vec![Correlation::default(); self.num_regions];
+        let mut num_outside = self.points.len();
+        self.compare(field, image_from_demonstration, |point, _, taught, seen| {
+            regions[point.region].add(taught, seen);
+            num_outside -= 1;
+        });
+        StructureAgreement {
+            visible: self.visible(&regions),
+            outside: num_outside as f64 / (self.points.len() as f64).max(1.0),
+        }
+    }
+
+    /// The points with an edge in demonstration or image, in regions that do not agree; in pixels of the image.
+    pub(crate) fn differing(
+        &self,
+        field: &GradientField,
+        image_from_demonstration: &PlanarSimilarity,
+    ) -> Vec<Point2<f64>> {
+        /// From this squared length a direction is an edge that a person sees. Chosen by hand, not measured.
+        const CLEAR: f32 = 0.25;
+        let mut regions = vec![Correlation::default(); self.num_regions];
+        let mut edges = Vec::new();
+        self.compare(field, image_from_demonstration, |point, at, taught, seen| {
+            regions[point.region].add(taught, seen);
+            if squared(taught).max(squared(seen)) >= CLEAR {
+                edges.push((point.region, at));
+            }
+        });
+        let differs = |region: usize| regions[region].value(self.config.noise) < self.config.visible_from;
+        edges.into_iter().filter(|(region, _)| differs(*region)).map(|(_, at)| at).collect()
+    }
+
+    /// Calls `visit` for every point inside the image, with its place there and the directions of demonstration, turned into the
+    /// image, and of the image.
+    fn compare(
+        &self,
+        field: &GradientField,
+        image_from_demonstration: &PlanarSimilarity,
+        mut visit: impl FnMut(&GridPoint, Point2<f64>, [f32; 2], [f32; 2]),
+    ) {
         let level_idx = field.level_idx_for(self.pixel_size * image_from_demonstration.scale);
         let (level, pixel_size) = (field.level(level_idx), f64::from(1u32 << level_idx));
         let (sin, cos) = (2.0 * image_from_demonstration.angle.radians()).sin_cos();
         let (sin, cos) = (sin as f32, cos as f32);
-        let mut regions = vec![Correlation::default(); self.num_regions];
-        let mut num_outside = 0usize;
         for point in &self.points {
             let at = image_from_demonstration.apply(&point.at);
             let [x, y] = [at.x, at.y].map(|coordinate| (coordinate / pixel_size) as f32);
-            let Some([seen_x, seen_y, _]) = level.bilinear(x, y) else {
-                num_outside += 1;
-                continue;
-            };
-            let [dx, dy] = point.direction;
-            regions[point.region].add([cos * dx - sin * dy, sin * dx + cos * dy], [seen_x, seen_y]);
-        }
-        StructureAgreement {
-            visible: self.visible(&regions),
-            outside: num_outside as f64 / (self.points.len() as f64).max(1.0),
+            if let Some([seen_x, seen_y, _]) = level.bilinear(x, y) {
+                let [dx, dy] = point.direction;
+                visit(point, at, [cos * dx - sin * dy, sin * dx + cos * dy], [seen_x, seen_y]);
+            }
         }
     }
 
@@ -121,6 +153,11 @@ impl Structure {
     }
 }
 
+/// The energy of a direction.
+fn squared([x, y]: [f32; 2]) -> f32 {
+    x * x + y * y
+}
+
 /// Sums over pairs of a taught and a seen direction.
 #[derive(Debug, Clone, Copy, Default)]
 struct Correlation {
@@ -133,8 +170,8 @@ struct Correlation {
 impl Correlation {
     fn add(&mut self, taught: [f32; 2], seen: [f32; 2]) {
         self.count += 1;
-        self.taught += taught[0] * taught[0] + taught[1] * taught[1];
-        self.seen += seen[0] * seen[0] + seen[1] * seen[1];
+        self.taught += squared(taught);
+        self.seen += squared(seen);
         self.products += taught[0] * seen[0] + taught[1] * seen[1];
     }
 
@@ -181,6 +218,18 @@ mod tests {
         let moved = PlanarSimilarity { tx: 20.0, ..PlanarSimilarity::IDENTITY };
         let moved = agreement(&plate(Some(HOLE), 20.0), &moved);
         assert!(moved.visible > 0.98, "{moved:?}");
+    }
+
+    #[test]
+    fn edges_differ_where_a_hole_is_missing_and_nowhere_else() {
+        let differing =
+            |hole| structure().differing(&GradientField::new(&plate(hole, 0.0)), &PlanarSimilarity::IDENTITY);
+        assert_eq!(differing(Some(HOLE)), []);
+        let missing = differing(None);
+        let away = |p: &Point2<f64>| (p - Point2::from(HOLE)).norm();
+        // As far as a region reaches, and no farther.
+        assert!(missing.len() > 5 && missing.iter().all(|p| away(p) < 45.0), "{missing:?}");
+        assert!(missing.iter().any(|p| away(p) < 12.0));
     }
 
     #[test]

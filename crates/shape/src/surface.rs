@@ -117,6 +117,23 @@ impl Surface {
         weighted_median(shifts)
     }
 
+    /// The points, in pixels of the image, of cells with contrast in the demonstration that the image does not show.
+    pub(crate) fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Point2<f64>> {
+        /// From this contrast on a cell tells something. Chosen by hand, not measured.
+        const MIN_CONTRAST: f64 = 0.5;
+        /// Below this correlation it differs. Chosen by hand, not measured.
+        const MAX_CORRELATION: f64 = 0.2;
+        let noise = self.config.noise_in_cell;
+        let differs = |cell: &&Vec<(Point2<f64>, [f64; 3])>| {
+            let local = Correlation::of(cell, image, image_from_cutout);
+            local.count >= MIN_IN_CELL
+                && local.contrast_taught(noise) >= MIN_CONTRAST
+                && local.value(noise) < MAX_CORRELATION
+        };
+        let points = self.cells.iter().filter(differs).flatten();
+        points.map(|(point, _)| image_from_cutout.apply(point)).collect()
+    }
+
     /// The correlation of colours between the cut-out and the image at a pose, within cells and over the whole; 0 for
     /// none, 1 for the same surface under any light.
     pub fn agreement(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> f64 {
@@ -271,6 +288,16 @@ mod tests {
         assert!(agreement(&plate(1.0, false)) > 0.85);
         assert!(agreement(&plate(0.6, false)) > 0.75);
         assert!(agreement(&plate(1.0, true)) < 0.2);
+    }
+
+    #[test]
+    fn the_surface_differs_where_a_hole_is_and_nowhere_else() {
+        let away = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
+        assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
+        let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
+        let bushing = Point2::new(40.0, 40.0);
+        assert!(hole.len() > 20 && hole.iter().all(|p| (p - bushing).norm() < 30.0), "{hole:?}");
+        assert!(!surface().differing(&plate(1.0, false), &away).is_empty());
     }
 
     #[test]

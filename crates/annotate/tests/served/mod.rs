@@ -34,7 +34,7 @@ impl GraspTeacher for InPlace {
         for done in 1..=planned {
             // Slow enough that a test can stop it.
             std::thread::sleep(Duration::from_millis(2));
-            let step = TeachingStep::Step { of: "the place", done, planned, loss: 1.0 / done as f64 };
+            let step = TeachingStep::Step { of: "the place", is_last: true, done, planned, loss: 1.0 / done as f64 };
             if observe(step).is_break() {
                 return Err("stopped before anything was learnt".into());
             }

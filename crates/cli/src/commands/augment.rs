@@ -6,19 +6,22 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 use image::ImageFormat;
-use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile, LabelledInstance};
+use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile};
+use sdg_grasp::CheckConfig;
 use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
+use crate::held_back::{HeldBackSamples, labels_of};
 
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
 pub struct AugmentArgs {
-    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
-    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    /// A photo, and after a colon its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy) unless it stands beside the
+    /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
     /// Samples to write
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -29,6 +32,10 @@ pub struct AugmentArgs {
     /// The augmentation: edge (what teaching uses), or paper (the original's)
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,
+    /// Those samples instead that `sdg teach` with the same seed tries the finished model on, at most 640x480 pixels large: the
+    /// first 40 are the ones of its figures, for model S the first 24
+    #[arg(long, conflicts_with = "preset")]
+    pub held_back: bool,
     /// Decides every random choice
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,
@@ -51,25 +58,23 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     };
     let demonstrations = demonstrations::read_all(&args.demonstrations)?;
     let label = demonstrations[0].annotation.label.clone();
+    let held_back = args
+        .held_back
+        .then(|| HeldBackSamples::new(&demonstrations, &CheckConfig::DEFAULT_SIZE_TOLERANCE, args.seed))
+        .transpose()?;
     let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
     files::prepare_folder(&args.out)?;
 
     let mut coco = CocoFile::new();
     let mut with_part = 0;
     for i in 0..u64::from(args.count) {
-        let sample = augmenter.sample(i);
+        let sample = held_back.as_ref().map_or_else(|| augmenter.sample(i), |held_back| held_back.sample(i));
         let name = format!("{i:06}.png");
         let mut png = Cursor::new(Vec::new());
         sample.image.write_to(&mut png, ImageFormat::Png)?;
         write_atomically(&args.out.join(&name), &png.into_inner())?;
 
-        // A part whose grasp the border cuts off need not be found by whoever is tested on the samples.
-        let instances: Vec<LabelledInstance> = sample
-            .objects
-            .iter()
-            .map(|object| object.annotation(&label, &sample.image))
-            .map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none()))
-            .collect();
+        let instances = labels_of(&sample, &label);
         with_part += usize::from(!instances.is_empty());
         coco.push_labelled(&name, sample.image.width(), sample.image.height(), &instances);
     }

@@ -9,7 +9,8 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, Preset, Start, Taught, TeachOptions, teach};
+use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, Preset, Start, Taught, TeachOptions, teach};
+use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -20,6 +21,7 @@ use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
+use crate::held_back::HeldBackFigures;
 use crate::interrupt::Interrupt;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
 use crate::teaching_page::TeachingPage;
@@ -33,8 +35,9 @@ pub struct TeachArgs {
     /// the whole image, ready at once)
     #[arg(long, default_value = "C", value_name = "NAME")]
     pub model: String,
-    /// A photo and its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy); repeat for several views
-    #[arg(long = "demo", required = true, value_name = "IMAGE:ANNOTATION")]
+    /// A photo, and after a colon its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy) unless it stands beside the
+    /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
+    #[arg(long = "demo", required = true, value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
     /// The file to write
     #[arg(long, value_name = "FILE")]
@@ -136,11 +139,19 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     })?;
     let bytes = taught.model.to_bytes()?;
     write_atomically(&args.out, &bytes)?;
+    // What was written, and no network apart from it, is what will be used.
+    let written = GraspModel::from_bytes(&bytes, &options.device)?;
+    let figures = HeldBackFigures::of(&written, &demonstrations, args.seed)?;
     let page = match &args.report {
         Some(folder) => {
             let command = command(args);
-            let page =
-                TeachingPage { taught: &taught, demonstrations: &demonstrations, seed: args.seed, command: &command };
+            let page = TeachingPage {
+                taught: &taught,
+                figures: &figures,
+                demonstrations: &demonstrations,
+                seed: args.seed,
+                command: &command,
+            };
             Some(page.report()?.write(folder)?)
         }
         None => None,
@@ -156,12 +167,14 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "bytes": bytes.len(),
             "teach_seconds": facts.seconds,
             "teaching": facts,
+            "held_back": figures.to_json(),
             "base_weights": report,
             "report": page.map(|path| path.display().to_string()),
         });
         println!("{line}");
     } else {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
+        println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
         if let Some(lengths) = facts.lengths {
@@ -171,6 +184,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
                 1e3 / lengths.pixels_per_m,
                 1e3 * lengths.grasp_height_m
             );
+        }
+        if let Some(warning) = too_wide(&taught.model) {
+            eprintln!("{warning}");
         }
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
         if let Some(path) = page {
@@ -250,10 +266,23 @@ fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Opt
     Ok(told.map(|report: Report| json!(report)))
 }
 
-/// What the network has learnt, for people; nothing for a model without.
+/// Where the jaws would have to open farther than the hand can: then nothing that is found can be grasped.
+fn too_wide(model: &GraspModel) -> Option<String> {
+    let pixels_per_m = model.facts().lengths?.pixels_per_m;
+    let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
+    (widest > HAND_OPENING_MAX_M).then(|| {
+        format!(
+            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
+            1e3 * widest,
+            1e3 * HAND_OPENING_MAX_M
+        )
+    })
+}
+
+/// How the network's teaching went, for people; nothing for a model without.
 fn learnt(taught: &Taught) -> String {
     let facts = taught.model.facts();
-    let (Some(history), Some(held_back)) = (&taught.history, facts.validation) else { return String::new() };
+    let Some(history) = &taught.history else { return String::new() };
     let ending = match history.ending {
         Ending::Completed => "",
         Ending::EarlyStop => ", stopped early: good enough",
@@ -263,13 +292,7 @@ fn learnt(taught: &Taught) -> String {
     let orientation = facts.orientation.map_or(String::new(), |cnn| {
         format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
     });
-    format!(
-        " ({} steps{ending}): finds {:.0} % of held-back samples, median {:.1} px and {:.1}°{orientation}",
-        facts.steps,
-        100.0 * held_back.hit_rate,
-        held_back.error_px,
-        held_back.error_degrees,
-    )
+    format!(" ({} steps{ending}{orientation})", facts.steps)
 }
 
 /// An argument that names one of a few things; another name is wrong usage.

@@ -5,21 +5,19 @@
 //! files); any other one belongs to the pictures that it names.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use sdg_demonstration::{AnnotationFormat, Error, ImageFacts, LabelFile, LabelledInstance};
+use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
 use sdg_geometry::{BoundingBox, GraspLine};
 use sdg_grasp::GraspModel;
 use serde::Serialize;
 
 use super::taught::taught_grasps;
-use crate::files;
+use crate::exit::one_line;
+use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::picture_detector::PictureDetector;
 
-/// Pictures by the ends of their names.
-const PICTURE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
 /// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
 
@@ -120,21 +118,19 @@ struct Assigned {
 }
 
 fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
-    let named = || format!("{}: cannot read this folder", folder.display());
-    let mut paths = Vec::new();
-    for entry in fs::read_dir(folder).with_context(named)? {
-        let path = entry.with_context(named)?.path();
-        if path.is_file() {
-            paths.push(path);
-        }
-    }
-    paths.sort();
-    let pictures: Vec<&PathBuf> = paths.iter().filter(|path| has_extension(path, &PICTURE_EXTENSIONS)).collect();
+    let paths: Vec<PathBuf> = files::entries(folder)?.into_iter().filter(|path| path.is_file()).collect();
+    let pictures: Vec<&PathBuf> = paths.iter().filter(|path| files::has_extension(path, &IMAGE_EXTENSIONS)).collect();
     if pictures.is_empty() {
-        bail!("{}: expected PNG or JPEG pictures, found none among {} files", folder.display(), paths.len());
+        let known = IMAGE_EXTENSIONS.join(", ");
+        bail!("{}: expected pictures ({known}), found none among {} files", folder.display(), paths.len());
+    }
+    // A phone's photos that are not read are told here, not missed in the result.
+    for path in paths.iter().filter(|path| files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
+        let why = files::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
+        left_out.push(LeftOut { file: file_name(path), why });
     }
     let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
-    for path in paths.iter().filter(|path| has_extension(path, &["json"])) {
+    for path in paths.iter().filter(|path| files::has_extension(path, &["json"])) {
         let same_name: Vec<&PathBuf> =
             pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
         let bytes = files::read(path, files::MAX_ANNOTATION_BYTES)?;
@@ -193,8 +189,9 @@ fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &P
         if !picture.is_file() {
             bail!("{}: expected the picture {name} that it labels beside it, found no such file", path.display());
         }
-        if !has_extension(&picture, &PICTURE_EXTENSIONS) {
-            bail!("{}: expected the name of a PNG or JPEG picture, found {name}", path.display());
+        if !files::has_extension(&picture, &IMAGE_EXTENSIONS) {
+            let known = IMAGE_EXTENSIONS.join(", ");
+            bail!("{}: expected the name of a picture ({known}), found {name}", path.display());
         }
         Ok(picture)
     };
@@ -273,12 +270,6 @@ fn chosen_label(
             listed()
         ),
     }
-}
-
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    path.extension()
-        .and_then(|extension| extension.to_str())
-        .is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
 fn file_name(path: &Path) -> String {

@@ -17,7 +17,8 @@ mod records;
 mod score;
 mod taught;
 
-pub use folder::{LabelledFolder, LabelledPicture, LeftOut};
+pub use crate::found_text::DEFAULT_MIN_SCORE;
+pub use folder::{Instance, LabelledFolder, LabelledPicture, LeftOut};
 pub use page::{in_words, page};
 pub use records::{Evaluated, to_json};
-pub use score::{DEFAULT_MIN_SCORE, Judged, Outcome, Tested, Totals, Truth, judge, sweep};
+pub use score::{Judged, Outcome, Tested, Totals, Truth, judge, sweep};

@@ -17,8 +17,6 @@ const MAX_DISTANCE_DIAGONALS: f64 = 0.04;
 const MAX_ANGLE_DEG: f64 = 10.0;
 /// A detection is on an optional instance without a grasp when their boxes overlap so much.
 const SAME_PART_IOU: f64 = 0.5;
-/// Below it a detection does not count: scores are calibrated so that 0.5 separates right from wrong.
-pub const DEFAULT_MIN_SCORE: f64 = 0.5;
 /// Steps of the least score at which everything is counted again.
 const NUM_SWEEP_STEPS: u32 = 50;
 

@@ -9,6 +9,7 @@
 //! centre point goes to their mean in x and y, at `grasp_height_m` above the table.
 
 mod embedded;
+mod extruded;
 mod feature_moved;
 mod features;
 mod folder;
@@ -33,6 +34,7 @@ use crate::scene::pose_attributes;
 use embedded::{EMBEDDED, NUM_PAPER_PARTS};
 use metadata::Metadata;
 
+pub use extruded::Extrusion;
 pub use metadata::{LARGEST_JAW_WIDTH_M, OBJECT_FORMAT};
 
 pub(crate) use height_map::HeightMap;

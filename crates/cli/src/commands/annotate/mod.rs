@@ -17,7 +17,7 @@ use crate::shared_args::TaughtCameraArgs;
 /// `sdg annotate`
 #[derive(Debug, ClapArgs)]
 pub struct AnnotateArgs {
-    /// Photos of one part, PNG or JPEG. Marks are read from and written to the file of the same name with .json, or
+    /// Photos of one part (PNG, JPEG, WebP, BMP, TIFF). Marks are read from and written to the file of the same name with .json, or
     /// to ANNOTATION; another tool's file is read and left as it is. With --from, one that is not there yet is the name
     /// of the photo that is taken
     #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION]")]

@@ -12,8 +12,8 @@ use serde_json::json;
 use super::AnnotateArgs;
 use crate::camera_files::CameraFile;
 use crate::demonstrations;
-use crate::exit::{Outcome, Usage};
-use crate::files;
+use crate::exit::{Outcome, Usage, one_line};
+use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::interrupt::Interrupt;
 use crate::page_camera::PageCamera;
 use crate::page_teacher::PageTeacher;
@@ -31,6 +31,15 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     }
     if let Some(out) = &args.out {
         files::check_writable(out)?;
+    }
+    for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
+        for path in files::entries(folder)? {
+            // What stands beside pictures is no news; a picture that is not read is.
+            if files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
+                let why = files::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
+                eprintln!("left out: {why}");
+            }
+        }
     }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use sdg_camera::Address;
 
+use crate::found_text::DEFAULT_MIN_SCORE;
 use crate::live_pictures::RequestArgs;
-use crate::shared_args::{ComputeArgs, SizeTolerance, size_tolerance};
+use crate::shared_args::{ComputeArgs, SizeTolerance, share, size_tolerance};
 
 /// `sdg detect`
 #[derive(Debug, ClapArgs)]
@@ -30,18 +31,21 @@ pub struct DetectArgs {
     /// with a camera, this or another one
     #[arg(long, value_name = "FILE", conflicts_with = "size_tolerance")]
     pub camera: Option<PathBuf>,
-    /// Also list detections scored below 0.5, with what speaks against them
+    /// Accept detections that score at least so much; more for fewer wrong ones, less for fewer missed ones
+    #[arg(long, value_name = "SCORE", default_value_t = DEFAULT_MIN_SCORE, value_parser = share)]
+    pub min_score: f64,
+    /// Also list detections scored below that, with what speaks against them
     #[arg(long)]
     pub all: bool,
     /// A JSON line for each image
     #[arg(long)]
     pub json: bool,
-    /// Write each image with its grasps drawn on it into this folder; with --from, show them in browsers at this port of
-    /// 127.0.0.1 instead, 0 for any
+    /// Write each image with its grasps drawn on it into this folder, under what was refused dots where edges and surface differ
+    /// from the photo; with --from, show them in browsers at this port of 127.0.0.1 instead, 0 for any
     #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
-    /// PNG or JPEG images
-    #[arg(required_unless_present = "from", value_name = "IMAGE")]
+    /// Images (PNG, JPEG, WebP, BMP, TIFF), folders of them, or - for one on standard input
+    #[arg(required_unless_present = "from", value_name = "IMAGE|DIR|-")]
     pub images: Vec<PathBuf>,
     /// Live pictures instead of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS',
     /// dir:FOLDER, file:PATH or sim:PART. Parts are followed from frame to frame; --json prints a line for each frame

@@ -10,14 +10,15 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Result;
+use image::RgbImage;
 use sdg_camera::{Address, Camera, CameraError, Frame, LatestFrame, MjpegServer};
-use sdg_grasp::{GraspDetection, TrackState, TrackerConfig, Verification};
+use sdg_grasp::{TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
 use super::args::DetectArgs;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::found_record::FoundRecord;
-use crate::found_text::in_words;
+use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
 use crate::live_pictures;
 use crate::picture_detector::{Found, PictureDetector};
@@ -63,12 +64,13 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         let picture = Arc::new(std::mem::take(&mut frame.picture));
         let parts = finder.find(&picture, frame.captured)?;
         let seconds = began.elapsed().as_secs_f64();
-        found_any |= parts.iter().any(Part::is_seen);
+        found_any |= parts.iter().any(|part| part.is_seen(args.min_score));
         write_line(&mut stdout, args, &finder.detector, &frame, picture.dimensions(), seconds, &parts)?;
         if let Some(server) = &server {
-            let seen: Vec<GraspDetection> =
-                parts.iter().filter(|part| part.is_seen()).map(|part| part.found.detection.clone()).collect();
-            server.publish(pictures::with_detections(&picture, &seen));
+            let seen = parts.iter().filter(|part| part.is_seen(args.min_score)).map(|part| &part.found.detection);
+            let mut drawn = RgbImage::clone(&picture);
+            pictures::draw_detections(&mut drawn, seen, args.min_score);
+            server.publish(drawn);
         }
     }
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
@@ -127,10 +129,10 @@ struct Part {
 
 impl Part {
     /// Whether it is there in this frame.
-    fn is_seen(&self) -> bool {
+    fn is_seen(&self, min_score: f64) -> bool {
         match self.track {
             Some((_, state, _)) => state != TrackState::Lost,
-            None => self.found.detection.is_accepted(),
+            None => self.found.detection.score >= min_score,
         }
     }
 }
@@ -158,7 +160,7 @@ impl Finder {
         Ok(Self { detector, verification, tracker, first: None })
     }
 
-    fn find(&mut self, picture: &Arc<image::RgbImage>, captured: SystemTime) -> Result<Vec<Part>> {
+    fn find(&mut self, picture: &Arc<RgbImage>, captured: SystemTime) -> Result<Vec<Part>> {
         self.detector.check_picture(picture)?;
         let Some(tracker) = &mut self.tracker else {
             let found = self.detector.detect(picture, self.verification)?;
@@ -192,7 +194,7 @@ fn write_line(
     seconds: f64,
     parts: &[Part],
 ) -> Result<()> {
-    let shown = || parts.iter().filter(|part| args.all || part.is_seen());
+    let shown = || parts.iter().filter(|part| args.all || part.is_seen(args.min_score));
     if args.json {
         let record = |part: &Part| PartLine {
             found: FoundRecord::new(&part.found, detector.frame()),
@@ -219,9 +221,10 @@ fn write_line(
         if shown().next().is_none() {
             writeln!(out, "frame {}: nothing to grasp ({:.1} ms)", frame.number, 1e3 * seconds)?;
         }
+        let wording = Wording { detector, picture_size: [width, height], min_score: args.min_score };
         for part in shown() {
             let of = part.track.map(|(id, state, _)| format!("part {id} {}, ", state_name(state).replace('_', " ")));
-            let text = in_words(&part.found, detector.frame());
+            let text = wording.line(&part.found);
             writeln!(out, "frame {}: {}{text} ({:.1} ms)", frame.number, of.unwrap_or_default(), 1e3 * seconds)?;
         }
     }

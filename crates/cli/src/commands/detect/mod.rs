@@ -1,26 +1,27 @@
 //! `sdg detect`: planar grasps in images.
 
 mod args;
+mod inputs;
 mod live;
 
+use std::collections::BTreeSet;
 use std::io::Write;
-use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image::{ImageFormat, RgbImage};
-use sdg_calibration::Frame;
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use sdg_report::write_atomically;
 use serde::Serialize;
 
 pub use args::DetectArgs;
+use inputs::{Input, Inputs};
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
-use crate::found_text::in_words;
+use crate::found_text::{DEFAULT_MIN_SCORE, MIN_ADVISED_SCORE, Wording};
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
@@ -33,6 +34,14 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
     if args.from.is_some() && !args.images.is_empty() {
         return Err(Usage("--from: expected live pictures instead of images, found images as well".to_owned()).into());
+    }
+    if args.from.is_some() && args.min_score != DEFAULT_MIN_SCORE && !args.every_frame && !args.no_verify {
+        return Err(Usage(
+            "--min-score: expected images, or live pictures of which each is searched on its own (--every-frame), found live \
+             pictures in which parts are followed"
+                .to_owned(),
+        )
+        .into());
     }
     let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     for lack in model.lacks() {
@@ -51,128 +60,178 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if let Some(folder) = &args.draw {
         files::prepare_folder(folder)?;
     }
-    let mut stdout = std::io::stdout().lock();
-    let (mut found_any, mut failed) = (false, 0);
-    for path in &args.images {
-        match detect(args, &detector, path) {
-            Ok(seen) => {
-                found_any |= seen.detections.iter().any(|found| found.detection.is_accepted());
-                seen.write(&mut stdout, args, &detector, path)?;
-            }
-            Err(error) => {
-                failed += 1;
-                let error = one_line(&error);
-                if args.json {
-                    let line = ErrorLine { image: path.display().to_string(), error };
-                    writeln!(stdout, "{}", serde_json::to_string(&line)?)?;
-                } else {
-                    stdout.flush()?;
-                    eprintln!("error: {error}");
+    inputs::check_standard_input(&args.images)?;
+    let mut batch = Batch {
+        args,
+        detector: &detector,
+        stdout: std::io::stdout().lock(),
+        drawn: BTreeSet::new(),
+        num_used: 0,
+        num_failed: 0,
+        found_any: false,
+    };
+    for argument in &args.images {
+        match inputs::of_argument(argument) {
+            Ok(Inputs { pictures, skipped }) => {
+                if let Some(skipped) = skipped {
+                    eprintln!("{skipped}");
                 }
+                pictures.iter().try_for_each(|input| batch.picture(input))?;
             }
+            Err(error) => batch.failed(&argument.display().to_string(), &error)?,
         }
     }
-    match (failed, found_any) {
+    match (batch.num_failed, batch.found_any) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
-        _ => bail!("{failed} of {} images could not be used", args.images.len()),
+        (failed, _) => bail!("{failed} of {} pictures could not be used", failed + batch.num_used),
     }
+}
+
+/// Pictures one after the other, each with its line.
+struct Batch<'a, W> {
+    args: &'a DetectArgs,
+    detector: &'a PictureDetector,
+    stdout: W,
+    /// Names of the pictures that were drawn.
+    drawn: BTreeSet<String>,
+    num_used: usize,
+    num_failed: usize,
+    found_any: bool,
+}
+
+impl<W: Write> Batch<'_, W> {
+    /// Detects in a picture and writes its line; a picture that cannot be used gets a line with its error.
+    ///
+    /// # Errors
+    /// Standard output that cannot be written.
+    fn picture(&mut self, input: &Input) -> Result<()> {
+        match self.detect(input) {
+            Ok(seen) => {
+                self.num_used += 1;
+                self.found_any |= seen.accepted(self.args.min_score).next().is_some();
+                seen.write(&mut self.stdout, self.args, self.detector, &input.name())
+            }
+            Err(error) => self.failed(&input.name(), &error),
+        }
+    }
+
+    fn failed(&mut self, name: &str, error: &anyhow::Error) -> Result<()> {
+        self.num_failed += 1;
+        let error = one_line(error);
+        if self.args.json {
+            let line = ErrorLine { image: name.to_owned(), error };
+            writeln!(self.stdout, "{}", serde_json::to_string(&line)?)?;
+        } else {
+            self.stdout.flush()?;
+            eprintln!("error: {error}");
+        }
+        Ok(())
+    }
+
+    fn detect(&mut self, input: &Input) -> Result<Seen> {
+        let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
+        let image = input.read()?;
+        let start = Instant::now();
+        let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
+        let seen = Seen { size: image.dimensions().into(), seconds: start.elapsed().as_secs_f64(), detections };
+        if let Some(folder) = &self.args.draw {
+            let wording = seen.wording(self.detector, self.args.min_score);
+            let drawn = drawn(image, &seen.detections, &wording);
+            let mut png = std::io::Cursor::new(Vec::new());
+            drawn.write_to(&mut png, ImageFormat::Png)?;
+            write_atomically(&folder.join(input.drawn_name(&mut self.drawn)), &png.into_inner())?;
+        }
+        Ok(seen)
+    }
+}
+
+/// The picture with its detections, and under the best refused ones where it differs from the demonstration, and why.
+fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImage {
+    /// More of them would cover each other.
+    const MAX_EXPLAINED: usize = 3;
+    let detections = || found.iter().map(|found| &found.detection);
+    let is_worth_it = |(idx, found): &(usize, &GraspDetection)| *idx == 0 || found.score >= MIN_ADVISED_SCORE;
+    let refused = detections().filter(|found| !wording.is_accepted(found)).enumerate().filter(is_worth_it);
+    let refused: Vec<_> = refused.map(|(_, found)| found).take(MAX_EXPLAINED).collect();
+    let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
+    pictures::draw_differences(&mut image, &differences);
+    pictures::draw_detections(&mut image, detections(), wording.min_score);
+    for detection in refused {
+        pictures::draw_reason(&mut image, detection, &wording.reasons(detection, 1));
+    }
+    image
 }
 
 /// An image and everything that was detected in it.
 struct Seen {
-    size: (u32, u32),
+    size: [u32; 2],
     seconds: f64,
     detections: Vec<Found>,
 }
 
-fn detect(args: &DetectArgs, detector: &PictureDetector, path: &Path) -> Result<Seen> {
-    let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
-    let image = files::read_image(path)?;
-    let start = Instant::now();
-    let detections = detector.detect(&image, verification).with_context(|| path.display().to_string())?;
-    let seconds = start.elapsed().as_secs_f64();
-    if let Some(folder) = &args.draw {
-        let drawn: Vec<GraspDetection> = detections.iter().map(|found| found.detection.clone()).collect();
-        draw(folder, path, &image, &drawn)?;
-    }
-    Ok(Seen { size: image.dimensions(), seconds, detections })
-}
-
 impl Seen {
-    fn write(mut self, out: &mut impl Write, args: &DetectArgs, detector: &PictureDetector, path: &Path) -> Result<()> {
-        let best = self.detections.first().map(|best| best.detection.clone());
-        let best_refused = best.filter(|best| !best.is_accepted());
-        if !args.all {
-            self.detections.retain(|found| found.detection.is_accepted());
-        }
+    fn accepted(&self, min_score: f64) -> impl Iterator<Item = &Found> {
+        self.detections.iter().filter(move |found| found.detection.score >= min_score)
+    }
+
+    fn wording<'a>(&self, detector: &'a PictureDetector, min_score: f64) -> Wording<'a> {
+        Wording { detector, picture_size: self.size, min_score }
+    }
+
+    fn write(&self, out: &mut impl Write, args: &DetectArgs, detector: &PictureDetector, name: &str) -> Result<()> {
+        let wording = self.wording(detector, args.min_score);
+        let refused: Vec<&GraspDetection> =
+            self.detections.iter().map(|found| &found.detection).filter(|found| !wording.is_accepted(found)).collect();
+        let listed = self.detections.iter().filter(|found| args.all || wording.is_accepted(&found.detection));
         if args.json {
+            let record = |found: &Found| PictureRecord {
+                found: FoundRecord::new(found, detector.frame()),
+                size: detector.size_of(&found.detection, self.size),
+                advice: found.detection.advice(),
+            };
             let line = ImageLine {
-                image: path.display().to_string(),
-                width: self.size.0,
-                height: self.size.1,
+                image: name,
+                width: self.size[0],
+                height: self.size[1],
                 seconds: self.seconds,
-                detections: self.detections.iter().map(|found| FoundRecord::new(found, detector.frame())).collect(),
+                num_refused: refused.len(),
+                detections: listed.map(record).collect(),
             };
             writeln!(out, "{}", serde_json::to_string(&line)?)?;
             return Ok(());
         }
-        if best_refused.is_some() || self.detections.is_empty() {
-            let almost = best_refused.and_then(|refused| almost(&refused));
-            let advice = almost.or_else(|| of_other_size(detector, self.size)).unwrap_or_default();
-            writeln!(out, "{}: nothing to grasp{advice}", path.display())?;
+        if refused.len() == self.detections.len() {
+            writeln!(out, "{name}: {}", wording.nothing(&refused))?;
         }
-        self.detections.iter().try_for_each(|found| write_text(out, path, found, detector.frame()))
+        for found in listed {
+            writeln!(out, "{name}: {}", wording.line(found))?;
+        }
+        Ok(())
     }
-}
-
-/// What was nearly found, and the photo that would help.
-fn almost(refused: &GraspDetection) -> Option<String> {
-    /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
-    const MIN_SCORE: f64 = 0.1;
-    let why = refused.refused().filter(|_| refused.score >= MIN_SCORE)?;
-    let grasp = refused.grasp;
-    let advice = refused.advice().map(|advice| format!("; {advice}")).unwrap_or_default();
-    Some(format!("; at ({:.0}, {:.0}) something like it, score {:.2}: {why}{advice}", grasp.x, grasp.y, refused.score))
-}
-
-/// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
-fn of_other_size(detector: &PictureDetector, (width, height): (u32, u32)) -> Option<String> {
-    let PictureDetector::AnyCamera(model) = detector else { return None };
-    let photo = model.demonstrations().iter().find_map(|demonstration| demonstration.marks.photo_size)?;
-    (photo != [width, height] && photo != [height, width]).then(|| {
-        let [photo_width, photo_height] = photo;
-        let tolerance = model.size_tolerance();
-        format!(
-            "; it has {width}x{height} pixels and the photo had {photo_width}x{photo_height}: if one of them is cropped and \
-             resized, a wider --size-tolerance than {}-{} may help",
-            tolerance.start(),
-            tolerance.end()
-        )
-    })
-}
-
-fn write_text(out: &mut impl Write, path: &Path, found: &Found, frame: Option<Frame>) -> Result<()> {
-    Ok(writeln!(out, "{}: {}", path.display(), in_words(found, frame))?)
-}
-
-/// Writes the image with its detections as PNG, under its own name.
-fn draw(folder: &Path, path: &Path, image: &RgbImage, detections: &[GraspDetection]) -> Result<()> {
-    let drawn = pictures::with_detections(image, detections);
-    let mut png = std::io::Cursor::new(Vec::new());
-    drawn.write_to(&mut png, ImageFormat::Png)?;
-    let name = Path::new(path.file_name().unwrap_or_default()).with_extension("png");
-    Ok(write_atomically(&folder.join(name), &png.into_inner())?)
 }
 
 /// A line of `--json`; docs/command-line.md describes it.
 #[derive(Serialize)]
-struct ImageLine {
-    image: String,
+struct ImageLine<'a> {
+    image: &'a str,
     width: u32,
     height: u32,
     seconds: f64,
-    detections: Vec<FoundRecord>,
+    num_refused: usize,
+    detections: Vec<PictureRecord>,
+}
+
+/// A detection and what helps to understand it.
+#[derive(Serialize)]
+struct PictureRecord {
+    #[serde(flatten)]
+    found: FoundRecord,
+    /// Over that in the photo.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    size: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    advice: Option<&'static str>,
 }
 
 /// A line of `--json` for an image that cannot be used.

@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use sdg_grasp::ComputeBackend;
 
-use crate::shared_args::backend;
+use crate::shared_args::{backend, share};
 
 /// What `sdg evaluate --pictures` reads and writes.
 const PICTURES_HELP: &str = "\
 Labelled pictures (--pictures DIR):
-  DIR holds PNG or JPEG pictures and their labels: LabelMe (a JSON file of the same name beside each picture) or COCO (one
+  DIR holds pictures (PNG, JPEG, WebP, BMP, TIFF) and their labels: LabelMe (a JSON file of the same name beside each) or COCO (one
   JSON file with `images` and `annotations`). Each instance of the part has a box or an outline and the two points of the
   grasp, grasp_start and grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in
   `flags`; COCO: in `attributes`) is neither missed nor wrong, and may lack the grasp. A picture whose labels mark nothing is one without the part.
@@ -172,11 +172,3 @@ const AXES: &str = "Axes and errors";
 
 /// The heading of the options of `--pictures` in the help.
 const PICTURES: &str = "Labelled pictures";
-
-/// A number from 0 to 1.
-fn share(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        _ => Err("expected a number from 0 to 1".to_owned()),
-    }
-}

@@ -10,7 +10,7 @@ use clap::Args as ClapArgs;
 #[cfg(feature = "simulation")]
 pub use run::{finish, run, show_attempt};
 
-use crate::shared_args::ComputeArgs;
+use crate::shared_args::{ComputeArgs, OwnPartArgs};
 
 /// `sdg rehearse`
 #[derive(Debug, ClapArgs)]
@@ -18,9 +18,12 @@ pub struct RehearseArgs {
     /// A grasp model that `sdg teach` wrote
     #[arg(long, value_name = "FILE")]
     pub grasp_model: PathBuf,
-    /// The object on the table: one of those shipped under datasets/
+    /// The object on the table: one of those shipped under datasets/; without it, your own part
     #[arg(long, value_name = "NAME")]
-    pub object: String,
+    pub object: Option<String>,
+    /// What is known of your own part
+    #[command(flatten)]
+    pub own_part: OwnPartArgs,
     /// Grasp attempts
     #[arg(long, default_value_t = 10, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub attempts: u32,

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
+use sdg_geometry::PinholeCamera;
 use sdg_grasp::{GraspError, Verification};
 use sdg_report::AttemptSummary;
 use serde_json::json;
@@ -13,17 +14,30 @@ use crate::commands::devices;
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::own_part::OwnPart;
 use crate::parts::part_named;
 use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, step_name};
 use crate::run_page::{self, RunPage};
+use crate::shared_args::OwnPartArgs;
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
-    let object = part_named("--object", &args.object)?;
+    let shipped = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
     let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
-    let camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
+    let mut camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
+    let model_file = args.grasp_model.display().to_string();
+    let (object, model) = match shipped {
+        Some(object) => (object, model),
+        None => {
+            let OwnPart { object, model, facts } = args.own_part.make(model, &model_file)?;
+            eprintln!("{facts}");
+            // Sizes are known in metres, so it looks through a calibrated camera in any case.
+            camera = camera.or(Some(PinholeCamera::WRIST));
+            (object, model)
+        }
+    };
     if camera.is_some() && model.facts().lengths.is_none() {
-        return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
+        return Err(GraspError::NoLengths).context(model_file);
     }
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
@@ -38,13 +52,17 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     };
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
-    let mut command = format!(
-        "sdg rehearse --grasp-model {} --object {} --attempts {} --seed {}",
-        args.grasp_model.display(),
-        args.object,
-        args.attempts,
-        args.seed
-    );
+    let mut command = format!("sdg rehearse --grasp-model {model_file}");
+    if let Some(object) = &args.object {
+        command += &format!(" --object {object}");
+    }
+    let OwnPartArgs { height_mm, length_mm, mass_g, friction } = args.own_part;
+    for (option, value) in
+        [("height-mm", height_mm), ("length-mm", length_mm), ("mass-g", mass_g), ("friction", friction)]
+    {
+        command += &value.map(|value| format!(" --{option} {value}")).unwrap_or_default();
+    }
+    command += &format!(" --attempts {} --seed {}", args.attempts, args.seed);
     if let Some(camera) = &args.camera {
         command += &format!(" --camera {}", camera.display());
     }
@@ -77,6 +95,7 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         let mut line = json!({
             "model": model.kind().letter(),
             "object": object.name,
+            "part": object.description,
             "attempts": of,
             "successes": successes,
             "failures": rehearsed.failures(),

@@ -1,0 +1,170 @@
+//! A finished model tried on samples that nothing was taught or calibrated on, counted as `sdg evaluate --pictures` counts.
+
+use std::ops::RangeInclusive;
+
+use anyhow::{Context, Result};
+use sdg_demonstration::{
+    AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
+};
+use sdg_grasp::{GraspModel, Verification};
+use serde_json::{Value, json};
+
+use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
+use crate::picture_detector::PictureDetector;
+use crate::statistics::{Share, wilson_interval};
+
+/// Where held-back samples begin: far beyond those that teaching validates and calibrates with.
+const FIRST: u64 = 1 << 40;
+/// Samples that a model is tried on: three quarters have the part. Model S, which is taught in a second, gets fewer. Chosen for time:
+/// one takes 0.15 s of a core.
+const COUNT: u64 = 40;
+const COUNT_INSTANT: u64 = 24;
+/// Larger samples take longer and show no more: the part has at least a few hundred pixels in them, too.
+const MAX_PIXELS: f64 = 640.0 * 480.0;
+/// How far the size of samples goes for a model that knows its part's size.
+const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
+
+/// Samples of a teaching that it never saw.
+pub struct HeldBackSamples(Augmenter);
+
+impl HeldBackSamples {
+    /// Those of photos and a seed, with the part in sizes between these; no larger than a part is worth.
+    ///
+    /// # Errors
+    /// Photos of which no samples can be made.
+    pub fn new(demonstrations: &[Demonstration], sizes: &RangeInclusive<f64>, seed: u64) -> Result<Self> {
+        let mut style = SceneStyle::default();
+        style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
+        let (width, height) =
+            demonstrations.first().context("expected a demonstration, found none")?.image.dimensions();
+        let shrink = (MAX_PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+        let side = |length: u32| (f64::from(length) * shrink).round() as u32;
+        let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
+        let config = config.with_output_size(side(width), side(height));
+        Ok(Self(Augmenter::new(demonstrations, config, seed)?))
+    }
+
+    /// The sample of a number.
+    pub fn sample(&self, number: u64) -> Sample {
+        self.0.held_out(FIRST + number)
+    }
+}
+
+/// The objects of a sample as labels.
+pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
+    // A part whose grasp the border cuts off need not be found by whoever is tested on the samples.
+    let annotations = sample.objects.iter().map(|object| object.annotation(label, &sample.image));
+    annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
+}
+
+/// What a model made of its held-back samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldBackFigures {
+    samples: u64,
+    /// In pixels of the samples, as an evaluation of them has it.
+    totals: Totals,
+    /// Pixels of the photo for one of a sample's.
+    photo_px: f64,
+}
+
+impl HeldBackFigures {
+    /// Tries a model, as its file has it, on samples of the photos that it was taught from.
+    ///
+    /// # Errors
+    /// Samples that cannot be made, and errors of detection.
+    pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
+        let facts = model.facts();
+        let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
+        let samples = HeldBackSamples::new(demonstrations, &sizes, seed)?;
+        let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
+        let detector = PictureDetector::AnyCamera(Box::new(model.clone()));
+        let count = if model.kind().has_network() { COUNT } else { COUNT_INSTANT };
+        let judged = (0..count).map(|number| {
+            let sample = samples.sample(number);
+            let detections = model.detect(&sample.image, Verification::ByShape)?;
+            let of_label = |labelled: LabelledInstance| {
+                let LabelledInstance { annotation, optional, .. } = labelled;
+                Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional }
+            };
+            let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
+            // Demonstrations of a model that knows lengths are plan views: their pixels are all as large.
+            let metres_per_pixel = facts.lengths.map(|lengths| photo_px / lengths.pixels_per_m);
+            let truth = |instance: &Instance| {
+                let mut truth = Truth::new(instance, &detector);
+                if let Some(grasp) = &mut truth.grasp {
+                    grasp.pixel_m = metres_per_pixel;
+                }
+                truth
+            };
+            let truths = instances.iter().map(truth).collect();
+            let picture = LabelledPicture {
+                path: format!("sample {number}").into(),
+                labels: "augmentation".into(),
+                size: sample.image.dimensions().into(),
+                instances,
+            };
+            let tested = Tested { picture, truths, detections, seconds: 0.0 };
+            Ok(judge(&tested, facts.symmetry, DEFAULT_MIN_SCORE))
+        });
+        let judged = judged.collect::<Result<Vec<_>>>()?;
+        Ok(Self { samples: count, totals: Totals::of(&judged), photo_px })
+    }
+
+    /// The share of parts that it found.
+    pub fn found(&self) -> Share {
+        self.totals.found
+    }
+
+    /// Detections beside the part, in samples that have one.
+    pub fn wrong(&self) -> usize {
+        self.totals.wrong
+    }
+
+    /// Samples without the part in which it found one.
+    pub fn false_alarms(&self) -> Share {
+        self.totals.false_alarms
+    }
+
+    /// The median errors of what it found: in pixels of the photo, and in degrees.
+    pub fn median_errors(&self) -> Option<[f64; 2]> {
+        self.totals.errors.map(|errors| [self.photo_px * errors.median_px, errors.median_deg])
+    }
+
+    /// The first of them with its unit: in millimetres where the model knows lengths.
+    pub fn median_distance(&self) -> Option<(f64, &'static str)> {
+        let millimetres = self.totals.errors?.median_mm.map(|mm| (mm, "mm"));
+        millimetres.or(self.median_errors().map(|[px, _]| (px, "px")))
+    }
+
+    /// One line for people.
+    pub fn in_words(&self) -> String {
+        let interval = |share: Share| {
+            let [low, high] = wilson_interval(share).map(|bound| 100.0 * bound);
+            format!("95 %: {low:.0} to {high:.0} %")
+        };
+        let (found, false_alarms) = (self.found(), self.false_alarms());
+        let errors = self.median_distance().zip(self.median_errors());
+        let errors = errors.map(|((off, unit), [_, deg])| format!("; median {off:.1} {unit} and {deg:.1}°"));
+        format!(
+            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}",
+            self.samples,
+            interval(found),
+            self.wrong(),
+            interval(false_alarms),
+            errors.unwrap_or_default()
+        )
+    }
+
+    /// The same for programs: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    pub fn to_json(&self) -> Value {
+        json!({
+            "samples": self.samples,
+            "found": self.totals.found,
+            "found_interval": wilson_interval(self.totals.found),
+            "wrong": self.totals.wrong,
+            "false_alarms": self.totals.false_alarms,
+            "false_alarms_interval": wilson_interval(self.totals.false_alarms),
+            "errors": self.totals.errors,
+        })
+    }
+}

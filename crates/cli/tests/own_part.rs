@@ -1,0 +1,65 @@
+//! `sdg rehearse` on the part that a model was taught from.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use serde_json::Value;
+use support::{Folder, sdg, shipped, stdout};
+
+/// Model S of the lever, 166 mm long and 16 mm high, which knows neither.
+fn taught(folder: &Folder) -> String {
+    let model = folder.path("model.sdg");
+    let [photo, marks] = ["image.png", "annotation.json"].map(|name| shipped("pendulum", name).display().to_string());
+    stdout(&["teach", "--model", "S", "--demo", &format!("{photo}:{marks}"), "--out", &model]);
+    model
+}
+
+#[test]
+fn the_body_of_the_photo_is_grasped() {
+    let folder = Folder::new();
+    let (model, out) = (taught(&folder), folder.path("report"));
+    let output = sdg(&[
+        "rehearse",
+        "--grasp-model",
+        &model,
+        "--height-mm",
+        "16",
+        "--length-mm",
+        "166",
+        "--attempts",
+        "2",
+        "--out",
+        &out,
+        "--json",
+    ]);
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let line: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((line["object"].as_str(), line["attempts"].as_u64()), (Some("pendulum"), Some(2)));
+    assert_eq!(line["successes"], 2, "{line}: {stderr}");
+    let part = line["part"].as_str().unwrap();
+    assert!(part.contains("pendulum: 166.0 x ") && part.contains(" x 16.0 mm"), "{part}");
+    for assumed in ["1.5 g/cm³ (--mass-g)", "--friction", "upright walls", "a photo from straight above"] {
+        assert!(part.contains(assumed) && stderr.contains(assumed), "{part}\n{stderr}");
+    }
+}
+
+#[test]
+fn what_the_photo_does_not_show_must_be_told() {
+    let folder = Folder::new();
+    let model = taught(&folder);
+    let refused = |arguments: &[&str], code: i32, parts: &[&str]| {
+        let output =
+            sdg(&[&["rehearse", "--grasp-model", &model, "--out", &folder.path("report")], arguments].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        parts.iter().for_each(|part| assert!(stderr.contains(part), "expected \"{part}\" in: {stderr}"));
+    };
+    refused(&[], 2, &["--object NAME", "--length-mm"]);
+    refused(&["--length-mm", "166"], 2, &["--height-mm", "model.sdg"]);
+    refused(&["--length-mm", "166", "--object", "pendulum"], 2, &["cannot be used with"]);
+    refused(&["--length-mm", "0", "--height-mm", "16"], 2, &["positive number"]);
+    // The lever in the size of a table: no hand opens so far.
+    refused(&["--length-mm", "1600", "--height-mm", "16"], 1, &["opening of the jaws in m: expected 0.001 to 0.08"]);
+    refused(&["--length-mm", "166", "--height-mm", "1"], 1, &["height in m: expected 0.003 to 0.12, found 0.0010"]);
+}

@@ -1,0 +1,50 @@
+//! What a person wants to know of a detection, above all of a refused one: its size, and where picture and demonstration differ.
+
+use image::RgbImage;
+use sdg_geometry::PlanarSimilarity;
+use sdg_shape::Differences;
+
+use crate::model::{GraspDetection, GraspModel};
+use crate::sizes::SizeRange;
+use crate::verification::{SearchedImage, differences};
+
+/// How far the corners of a detection's outline may lie from those of the demonstration's laid over them, in pixels. They come
+/// out of the same pose; only a slanted camera's picture of it differs.
+const MAX_OFF_PX: f64 = 0.5;
+
+impl GraspModel {
+    /// The part's size in the picture over its size in the photo, other numbers of pixels allowed for: of the sizes that it may
+    /// have then, over the nearest. `None` for what was not laid over the picture (no verification), or over a plan view of it.
+    pub fn size_of(&self, detection: &GraspDetection, [width, height]: [u32; 2]) -> Option<f64> {
+        let (demonstration_idx, pose) = self.pose_of(detection)?;
+        let demonstration = &self.demonstrations[demonstration_idx];
+        let tolerance = &demonstration.check().search.scales;
+        let ranges = SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance);
+        let nearest = ranges.iter().min_by(|a, b| a.distance(pose.scale).total_cmp(&b.distance(pose.scale)))?;
+        Some(nearest.log_size(pose.scale).exp())
+    }
+
+    /// Where the picture differs from the demonstration under each of its detections; `None` as [`Self::size_of`].
+    pub fn differences(&self, image: &RgbImage, detections: &[&GraspDetection]) -> Vec<Option<Differences>> {
+        let poses: Vec<_> = detections.iter().map(|detection| self.pose_of(detection)).collect();
+        if poses.iter().all(Option::is_none) {
+            return vec![None; detections.len()];
+        }
+        let searched = SearchedImage::new(image, &self.demonstrations);
+        poses.into_iter().map(|pose| pose.and_then(|(idx, pose)| differences(&searched, idx, &pose))).collect()
+    }
+
+    /// Which demonstration's outline the detection has, and where its cut-out lies in the image.
+    fn pose_of(&self, detection: &GraspDetection) -> Option<(usize, PlanarSimilarity)> {
+        let seen = &detection.outline.as_ref()?.vertices;
+        self.demonstrations.iter().enumerate().find_map(|(idx, demonstration)| {
+            let taught = demonstration.outline(&PlanarSimilarity::IDENTITY).vertices;
+            if taught.len() != seen.len() {
+                return None;
+            }
+            let pose = PlanarSimilarity::fit(&taught, seen)?;
+            let is_near = taught.iter().zip(seen).all(|(from, to)| (pose.apply(from) - to).norm() <= MAX_OFF_PX);
+            is_near.then_some((idx, pose))
+        })
+    }
+}

@@ -1,0 +1,322 @@
+//! A part of one's own: its outline in a photo, drawn up to its height, with the photo on top.
+//!
+//! ```text
+//! outline ─┬─ slabs between neighbouring corners ─ triangles, textured by the photo ── what is seen
+//!          └─ strips across the marked line ─ boxes ── what is touched, and what it weighs
+//! ```
+//! Boxes and no convex hull: the jaws close on a waist between two wide ends as well. What the photo does not show is made up: walls
+//! are upright, and as dense everywhere.
+
+mod mesh;
+
+use std::fmt::Write as _;
+use std::io::Cursor;
+
+use image::imageops::{self, FilterType};
+use image::{ImageFormat, RgbImage};
+use nalgebra::{Point2, Point3, Vector2};
+use sdg_geometry::{GraspLine, Polygon, RotationalSymmetry, convex_hull};
+
+use self::mesh::{Strip, mesh, strips};
+use super::{LARGEST_JAW_WIDTH_M, ObjectSpec};
+use crate::error::{Result, SimulationError};
+use crate::model::Asset;
+use crate::panda::FINGERTIP_BEYOND_TCP_M;
+
+/// The lowest tool centre point: the finger tips then keep 2 mm from the table. As the lowest of the shipped parts.
+const MIN_GRASP_HEIGHT_M: f64 = FINGERTIP_BEYOND_TCP_M + 0.002;
+/// What of a part may stand above the tool centre point: more would touch the palm.
+const MAX_ABOVE_TCP_M: f64 = 0.03;
+/// Boxes that the part's length is cut into. Chosen by hand: the jaws' pads, 2 cm wide, meet several of them.
+const NUM_STRIPS: usize = 40;
+/// Narrower boxes give no contact. Chosen by hand.
+const MIN_BOX_M: f64 = 1e-4;
+/// More of the photo is not seen from where the camera looks.
+const MAX_TEXTURE_PX: u32 = 1024;
+/// The walls have the photo's colour so far inside the outline, in pixels: on the line itself it is half the table's.
+const WALL_INSET_PX: f64 = 2.0;
+
+/// What an extruded part is made from; places in pixels of `photo`, which looks straight down.
+#[derive(Debug, Clone)]
+pub struct Extrusion<'a> {
+    /// Name at the command line.
+    pub name: &'a str,
+    /// The photo, or what was cut out of it.
+    pub photo: &'a RgbImage,
+    /// The part's outline.
+    pub outline: &'a Polygon,
+    /// The marked line, across which the jaws close.
+    pub grasp: GraspLine,
+    /// The part's width between the jaws, in pixels.
+    pub jaw_width_px: f64,
+    /// What a pixel covers, in metres.
+    pub metres_per_pixel: f64,
+    /// Height over the table, in metres: from 0.003 to 0.12.
+    pub height_m: f64,
+    /// In kilograms.
+    pub mass_kg: f64,
+    /// Coefficient of sliding friction.
+    pub friction: f64,
+    /// Which turns of the part cannot be seen.
+    pub symmetry: RotationalSymmetry,
+}
+
+impl Extrusion<'_> {
+    /// The volume of the body, in cubic metres.
+    pub fn volume_m3(&self) -> f64 {
+        self.outline.area() * self.metres_per_pixel.powi(2) * self.height_m
+    }
+
+    /// Checks what a simulated hand and table can do with it; the error names the value, what was expected and what was found.
+    fn check(&self) -> std::result::Result<(), String> {
+        let ranges = [
+            ("height in m", self.height_m, 0.003, 0.12),
+            ("mass in kg", self.mass_kg, 1e-4, 3.0),
+            ("friction", self.friction, 0.01, 5.0),
+            ("opening of the jaws in m", self.jaw_width_px * self.metres_per_pixel, 1e-3, LARGEST_JAW_WIDTH_M),
+            ("longest side in m", self.longest_side_m(), 0.005, 0.4),
+            ("marked line in m", self.grasp.length() * self.metres_per_pixel, 1e-3, 0.4),
+        ];
+        for (name, value, low, high) in ranges {
+            if !(low..=high).contains(&value) {
+                return Err(format!("{name}: expected {low} to {high}, found {value:.4}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn longest_side_m(&self) -> f64 {
+        let bounds = self.outline.bounds();
+        bounds.width().max(bounds.height()) * self.metres_per_pixel
+    }
+
+    /// From pixels to the object frame: x along the marked line, y to the left of it seen from above, origin in the area's middle.
+    fn to_object(&self) -> impl Fn(&Point2<f64>) -> Point2<f64> {
+        let center = self.outline.centroid();
+        let along = (self.grasp.end - self.grasp.start).normalize();
+        // Pixels count y downwards.
+        let left = Vector2::new(along.y, -along.x);
+        let scale = self.metres_per_pixel;
+        move |p| Point2::new(scale * along.dot(&(p - center)), scale * left.dot(&(p - center)))
+    }
+}
+
+impl Extrusion<'_> {
+    /// What is seen, as OBJ.
+    fn mesh(&self, corners: &[Point2<f64>]) -> String {
+        let [width, height] = [self.photo.width(), self.photo.height()].map(f64::from);
+        let along = (self.grasp.end - self.grasp.start).normalize();
+        let left = Vector2::new(along.y, -along.x);
+        let center = self.outline.centroid();
+        let texcoord = |p: Point2<f64>| {
+            let pixel = center + (along * p.x + left * p.y) / self.metres_per_pixel;
+            [pixel.x / width, 1.0 - pixel.y / height]
+        };
+        mesh(corners, self.height_m, WALL_INSET_PX * self.metres_per_pixel, texcoord)
+    }
+}
+
+impl ObjectSpec {
+    /// The body over an outline, with the photo on it; see [`Extrusion`] for what it is made from.
+    ///
+    /// # Errors
+    /// [`SimulationError::Asset`] for numbers that no hand or table can do with.
+    pub fn extruded(extrusion: &Extrusion<'_>) -> Result<Self> {
+        let fail = |reason: String| SimulationError::Asset { name: extrusion.name.to_owned(), reason };
+        extrusion.check().map_err(fail)?;
+        let Extrusion { name, height_m, mass_kg, friction, symmetry, .. } = *extrusion;
+        let to_object = extrusion.to_object();
+        let corners: Vec<Point2<f64>> = extrusion.outline.vertices.iter().map(&to_object).collect();
+        let mark = |point: &Point2<f64>| {
+            let on_part = to_object(point);
+            Point3::new(on_part.x, on_part.y, height_m)
+        };
+        let mut texture = Cursor::new(Vec::new());
+        texture_of(extrusion.photo)
+            .write_to(&mut texture, ImageFormat::Png)
+            .map_err(|error| fail(format!("the photo: {error}")))?;
+        Ok(Self {
+            name: name.to_owned(),
+            title: name.to_owned(),
+            description: format!("{name}, its outline in a photo drawn up to {:.1} mm", 1e3 * height_m),
+            mass_kg,
+            friction,
+            grasp_start: mark(&extrusion.grasp.start),
+            grasp_end: mark(&extrusion.grasp.end),
+            jaw_width_m: extrusion.jaw_width_px * extrusion.metres_per_pixel,
+            grasp_height_m: (0.5 * height_m).max(height_m - MAX_ABOVE_TCP_M).max(MIN_GRASP_HEIGHT_M),
+            mark_height_m: height_m,
+            rest_height_m: 0.0,
+            symmetry,
+            footprint: convex_hull(corners.iter().copied()),
+            mjcf: mjcf(extrusion, &corners),
+            files: vec![
+                Asset { name: "object_photo.png".to_owned(), bytes: texture.into_inner() },
+                Asset { name: "object_body.obj".to_owned(), bytes: extrusion.mesh(&corners).into_bytes() },
+            ],
+        })
+    }
+}
+
+fn texture_of(photo: &RgbImage) -> RgbImage {
+    let side = photo.width().max(photo.height());
+    if side <= MAX_TEXTURE_PX {
+        return photo.clone();
+    }
+    let scaled = |length: u32| (u64::from(length) * u64::from(MAX_TEXTURE_PX) / u64::from(side)).max(1) as u32;
+    imageops::resize(photo, scaled(photo.width()), scaled(photo.height()), FilterType::Triangle)
+}
+
+/// What is touched and what it weighs: the boxes of the strips, as dense everywhere.
+fn mjcf(extrusion: &Extrusion<'_>, corners: &[Point2<f64>]) -> String {
+    let Extrusion { height_m, mass_kg, friction, .. } = *extrusion;
+    let ends = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c.x), high.max(c.x)]);
+    let cuts: Vec<f64> =
+        (0..=NUM_STRIPS).map(|k| ends[0] + (ends[1] - ends[0]) * k as f64 / NUM_STRIPS as f64).collect();
+    // Center and size of each box, in the table's plane.
+    let boxes: Vec<(Vector2<f64>, Vector2<f64>)> = strips(corners, &cuts)
+        .into_iter()
+        .map(|Strip { x, low, high }| {
+            let (low, high) = (0.5 * (low[0] + low[1]), 0.5 * (high[0] + high[1]));
+            (Vector2::new(0.5 * (x[0] + x[1]), 0.5 * (low + high)), Vector2::new(x[1] - x[0], high - low))
+        })
+        .filter(|(_, size)| size.min() > MIN_BOX_M)
+        .collect();
+    let area: f64 = boxes.iter().map(|(_, size)| size.x * size.y).sum();
+    let shares: Vec<f64> = boxes.iter().map(|(_, size)| mass_kg * size.x * size.y / area).collect();
+    let middle = boxes.iter().zip(&shares).map(|((at, _), m)| at * *m).sum::<Vector2<f64>>() / mass_kg;
+    let [mut xx, mut yy, mut xy] = [0.0; 3];
+    for ((at, size), m) in boxes.iter().zip(&shares) {
+        let from_middle = at - middle;
+        xx += m * (size.y * size.y / 12.0 + from_middle.y * from_middle.y);
+        yy += m * (size.x * size.x / 12.0 + from_middle.x * from_middle.x);
+        xy -= m * from_middle.x * from_middle.y;
+    }
+    let upright = mass_kg * height_m * height_m / 12.0;
+    let half = 0.5 * height_m;
+    let mut geoms = String::new();
+    for (idx, (at, size)) in boxes.iter().enumerate() {
+        let _ = writeln!(
+            geoms,
+            "<geom name=\"object_collision_{idx}\" type=\"box\" pos=\"{:.6} {:.6} {half:.6}\" size=\"{:.6} {:.6} {half:.6}\" \
+             friction=\"{friction} 0.005 0.0002\" condim=\"4\" group=\"3\"/>",
+            at.x,
+            at.y,
+            0.5 * size.x,
+            0.5 * size.y
+        );
+    }
+    format!(
+        "<asset><texture name=\"object_photo\" type=\"2d\" file=\"object_photo.png\"/>\
+         <material name=\"object_photo\" texture=\"object_photo\" specular=\"0.2\" shininess=\"0.3\"/>\
+         <mesh name=\"object_body\" file=\"object_body.obj\"/></asset>\n\
+         <worldbody><body name=\"object\"><freejoint name=\"object_joint\"/>\
+         <inertial pos=\"{:.6} {:.6} {half:.6}\" mass=\"{mass_kg}\" fullinertia=\"{:e} {:e} {:e} {xy:e} 0 0\"/>\n\
+         <geom name=\"object_visual_0\" type=\"mesh\" mesh=\"object_body\" material=\"object_photo\" contype=\"0\" \
+         conaffinity=\"0\" group=\"1\"/>\n{geoms}</body></worldbody>",
+        middle.x,
+        middle.y,
+        xx + upright,
+        yy + upright,
+        xx + yy,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::CameraView;
+    use crate::data::Data;
+    use crate::model::{Body, Model};
+    use crate::render::{RenderConfig, Renderer};
+    use approx::assert_relative_eq;
+    use image::Rgb;
+    use std::sync::Arc;
+
+    /// An L: 80 by 60 px with the upper right 50 by 40 px missing; red left of x = 50, green right of it.
+    fn photo() -> (RgbImage, Polygon) {
+        let photo = RgbImage::from_fn(120, 100, |x, _| if x < 50 { Rgb([220, 20, 20]) } else { Rgb([20, 200, 20]) });
+        let corners = [(20.0, 20.0), (50.0, 20.0), (50.0, 60.0), (100.0, 60.0), (100.0, 80.0), (20.0, 80.0)];
+        (photo, Polygon { vertices: corners.map(|(x, y)| Point2::new(x, y)).to_vec() })
+    }
+
+    fn extrusion<'a>(photo: &'a RgbImage, outline: &'a Polygon, height_m: f64) -> Extrusion<'a> {
+        Extrusion {
+            name: "bracket",
+            photo,
+            outline,
+            grasp: GraspLine::new(Point2::new(60.0, 70.0), Point2::new(90.0, 70.0)),
+            jaw_width_px: 20.0,
+            metres_per_pixel: 0.001,
+            height_m,
+            mass_kg: 0.05,
+            friction: 0.6,
+            symmetry: RotationalSymmetry::None,
+        }
+    }
+
+    fn model(spec: &ObjectSpec) -> Arc<Model> {
+        let base_from_object = spec.base_from_object(0.0, 0.0, 0.0);
+        let fragment = spec.fragment(&base_from_object);
+        let xml = format!(
+            "<mujoco><worldbody><light pos='0 0 1' dir='0 0 -1' directional='true' diffuse='.9 .9 .9'/>\
+             <geom type='plane' size='1 1 .1' rgba='1 1 1 1'/><camera name='above' pos='0 0 0.3' fovy='47.15'/></worldbody>{}</mujoco>",
+            fragment.sections
+        );
+        Arc::new(Model::from_xml(&xml, &fragment.files).unwrap())
+    }
+
+    #[test]
+    fn the_picture_from_above_is_the_photo() {
+        let (photo, outline) = photo();
+        let spec = ObjectSpec::extruded(&extrusion(&photo, &outline, 0.01)).unwrap();
+        let model = model(&spec);
+        let mut data = Data::new(model.clone()).unwrap();
+        let mut renderer = Renderer::new(&model, RenderConfig::default()).unwrap();
+        let view = CameraView::capture(&mut renderer, &mut data, model.id("above").unwrap()).unwrap();
+        // The object's x is the photo's x, and the camera's too; its centre is that of the outline's area.
+        let center = outline.centroid();
+        let shown = |x: f64, y: f64| {
+            let at = Point3::new(0.001 * (x - center.x), 0.001 * (center.y - y), 0.01);
+            let pixel = view.camera.project(&at).unwrap();
+            view.image.get_pixel(pixel.x as u32, pixel.y as u32).0
+        };
+        let is = |color: [u8; 3], strong: usize| (0..3).all(|c| c == strong || color[strong] > 2 * color[c]);
+        assert!(is(shown(30.0, 30.0), 0), "upper left red: {:?}", shown(30.0, 30.0));
+        assert!(is(shown(30.0, 70.0), 0), "lower left red: {:?}", shown(30.0, 70.0));
+        assert!(is(shown(90.0, 70.0), 1), "lower right green: {:?}", shown(90.0, 70.0));
+        let [r, g, b] = shown(85.0, 40.0);
+        assert!(r.abs_diff(g) < 30 && g.abs_diff(b) < 30, "what is missing shows the table: {r} {g} {b}");
+    }
+
+    #[test]
+    fn it_weighs_what_it_is_told_and_rests_as_it_lies() {
+        let (photo, outline) = photo();
+        let spec = ObjectSpec::extruded(&extrusion(&photo, &outline, 0.02)).unwrap();
+        // 30 · 60 + 50 · 20 mm².
+        assert_relative_eq!(extrusion(&photo, &outline, 0.02).volume_m3(), 2800e-6 * 0.02, epsilon = 1e-12);
+        let model = model(&spec);
+        let body = model.id::<Body>("object").unwrap();
+        let mut data = Data::new(model.clone()).unwrap();
+        for _ in 0..500 {
+            data.step().unwrap();
+        }
+        let pose = data.world_from_body(body);
+        assert!(pose.translation.vector.norm() < 0.001, "{pose}");
+        assert!(pose.rotation.angle() < 0.02, "{pose}");
+    }
+
+    #[test]
+    fn what_no_hand_can_take_is_refused() {
+        let (photo, outline) = photo();
+        let refused = |change: fn(&mut Extrusion<'_>)| {
+            let mut extrusion = extrusion(&photo, &outline, 0.01);
+            change(&mut extrusion);
+            ObjectSpec::extruded(&extrusion).unwrap_err().to_string()
+        };
+        assert!(refused(|e| e.height_m = 0.001).contains("height in m: expected 0.003 to 0.12, found 0.0010"));
+        assert!(refused(|e| e.jaw_width_px = 90.0).contains("opening of the jaws in m: expected 0.001 to 0.08"));
+        assert!(refused(|e| e.metres_per_pixel = 0.01).contains("found 0.2"));
+        assert!(refused(|e| e.mass_kg = f64::NAN).contains("mass in kg"));
+    }
+}
