@@ -4,6 +4,7 @@
 //! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
 //! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
 //! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
+#![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::SELF_PAIRS;
 use super::lanes::{Lane, NUM_LANES};
