@@ -34,13 +34,17 @@ const FORMATS: [(ImageFormat, &str); 5] = [
 ];
 
 /// The formats that this build reads, as a message lists them.
-pub(crate) fn readable_formats() -> String {
+fn readable_formats() -> String {
     let names: Vec<&str> =
         FORMATS.iter().filter(|(format, _)| format.reading_enabled()).map(|(_, name)| *name).collect();
     match names.split_last() {
         Some((last, others)) => format!("{} or {last}", others.join(", ")),
         None => String::new(),
     }
+}
+
+fn not_an_image(found: impl Into<String>) -> Error {
+    Error::NotAnImage { expected: readable_formats(), found: found.into() }
 }
 
 /// Decodes a picture file into upright 8-bit RGB.
@@ -54,13 +58,13 @@ pub(crate) fn readable_formats() -> String {
 /// or height, more than `limits.max_pixels`.
 pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
     if let Some(found) = iso_media(bytes) {
-        return Err(Error::NotAnImage { found: found.to_owned() });
+        return Err(not_an_image(found));
     }
-    let guessed = image::guess_format(bytes).map_err(|_| Error::NotAnImage { found: describe(bytes) })?;
+    let guessed = image::guess_format(bytes).map_err(|_| not_an_image(describe(bytes)))?;
     let (format, name) = match FORMATS.iter().find(|(format, _)| *format == guessed) {
         Some(known) if guessed.reading_enabled() => *known,
-        Some((_, name)) => return Err(Error::NotAnImage { found: (*name).to_owned() }),
-        None => return Err(Error::NotAnImage { found: format!("{guessed:?}") }),
+        Some((_, name)) => return Err(not_an_image(*name)),
+        None => return Err(not_an_image(format!("{guessed:?}"))),
     };
     let damaged = |error: image::ImageError| Error::DamagedImage { format: name, reason: error.to_string() };
     // Ahead of the decoder, which refuses an empty PNG with less to say.

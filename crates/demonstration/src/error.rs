@@ -14,8 +14,10 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
     /// The bytes are of no format that is read.
-    #[error("not a readable image: expected a {} file, found {found}", crate::decode::readable_formats())]
+    #[error("not a readable image: expected a {expected} file, found {found}")]
     NotAnImage {
+        /// The formats that this build reads.
+        expected: String,
         /// What the bytes look like.
         found: String,
     },

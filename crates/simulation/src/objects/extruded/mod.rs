@@ -281,7 +281,9 @@ mod tests {
             let pixel = view.camera.project(&at).unwrap();
             view.image.get_pixel(pixel.x as u32, pixel.y as u32).0
         };
-        let is = |color: [u8; 3], strong: usize| (0..3).all(|c| c == strong || color[strong] > 2 * color[c]);
+        let is = |color: [u8; 3], strong: usize| {
+            (0..3).all(|c| c == strong || u16::from(color[strong]) > 2 * u16::from(color[c]))
+        };
         assert!(is(shown(30.0, 30.0), 0), "upper left red: {:?}", shown(30.0, 30.0));
         assert!(is(shown(30.0, 70.0), 0), "lower left red: {:?}", shown(30.0, 70.0));
         assert!(is(shown(90.0, 70.0), 1), "lower right green: {:?}", shown(90.0, 70.0));
