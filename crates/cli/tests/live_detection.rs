@@ -148,5 +148,5 @@ fn what_cannot_be_is_refused() {
     refused(&["--from", "sim:pendulum", "--draw", "pictures"], 2, "port of 127.0.0.1");
     refused(&["--frames", "3", "a.png"], 2, "expected live pictures (--from)");
     refused(&["--from", "sim:pendulum", "a.png"], 2, "found images as well");
-    refused(&[], 2, "<IMAGE>");
+    refused(&[], 2, "<IMAGE|DIR|->");
 }
