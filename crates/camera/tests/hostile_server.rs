@@ -122,7 +122,10 @@ fn garbage_is_told() {
         stream.write_all(b"--cut\r\n\r\nthis is no picture\r\n--cut\r\n").unwrap();
         sleep(Duration::from_millis(100));
     });
-    assert!(matches!(&faults[0], Fault::Torn { found } if found.contains("no JPEG, PNG, PPM, WebP, BMP or TIFF")), "{faults:?}");
+    assert!(
+        matches!(&faults[0], Fault::Torn { found } if found.contains("no JPEG, PNG, PPM, WebP, BMP or TIFF")),
+        "{faults:?}"
+    );
     // No boundary any more: nothing is kept, and silence is told.
     let faults = faults_of(|stream| while stream.write_all(&[0x55; 1 << 16]).is_ok() {});
     assert!(matches!(faults[0], Fault::Stale { .. }), "{faults:?}");

@@ -259,7 +259,7 @@ mod tests {
         let base_from_object = spec.base_from_object(0.0, 0.0, 0.0);
         let fragment = spec.fragment(&base_from_object);
         let xml = format!(
-            "<mujoco><worldbody><light pos='0 0 1' dir='0 0 -1' directional='true' diffuse='.9 .9 .9'/>\
+            "<mujoco><size njmax='4000' nconmax='1000'/><worldbody><light pos='0 0 1' dir='0 0 -1' directional='true' diffuse='.9 .9 .9'/>\
              <geom type='plane' size='1 1 .1' rgba='1 1 1 1'/><camera name='above' pos='0 0 0.3' fovy='47.15'/></worldbody>{}</mujoco>",
             fragment.sections
         );
