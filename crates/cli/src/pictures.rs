@@ -58,15 +58,14 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     }
     let text_px = (side / 60.0).max(8.0);
     let mut bottom = f64::from(drawn.height());
-    let legend: [(fn(&Differences) -> bool, _, _); 2] = [
-        (|differences| !differences.surface.is_empty(), "surface differs from the photo", SURFACE),
-        (|differences| !differences.edges.is_empty(), "edges differ from the photo", EDGES),
+    let shows = |places: fn(&Differences) -> &[Point2<f64>]| differences.iter().any(|one| !places(one).is_empty());
+    let legend = [
+        (shows(|one| &one.surface), "surface differs from the photo", SURFACE),
+        (shows(|one| &one.edges), "edges differ from the photo", EDGES),
     ];
-    for (is_shown, text, color) in legend {
-        if differences.iter().any(is_shown) {
-            draw_label(drawn, Point2::new(0.0, bottom), text, color, text_px);
-            bottom -= 2.5 * text_px;
-        }
+    for (_, text, color) in legend.into_iter().filter(|(is_shown, ..)| *is_shown) {
+        draw_label(drawn, Point2::new(0.0, bottom), text, color, text_px);
+        bottom -= 2.5 * text_px;
     }
 }
 

@@ -292,7 +292,8 @@ mod tests {
 
     #[test]
     fn the_surface_differs_where_a_hole_is_and_nowhere_else() {
-        let away = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
+        // Farther than the bushing is wide.
+        let away = PlanarSimilarity { tx: 26.0, ..PlanarSimilarity::IDENTITY };
         assert_eq!(surface().differing(&plate(0.6, false), &PlanarSimilarity::IDENTITY), []);
         let hole = surface().differing(&plate(1.0, true), &PlanarSimilarity::IDENTITY);
         let bushing = Point2::new(40.0, 40.0);
