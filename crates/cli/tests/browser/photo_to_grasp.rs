@@ -81,18 +81,18 @@ fn mark(page: &Page) {
     browser.press(&["\u{e009}", "z"]).unwrap();
     page.wait_for("undo", "return !document.getElementById('redo').disabled");
 
-    // The end of the line dragged a quarter around turns the gripper: now it is too narrow for what is between.
+    // The end of the line dragged a quarter around turns the gripper: now it lies along the part.
     let (end, middle) = (page.handle("[data-end='end'] .knob"), page.on_screen([line.center().x, line.center().y]));
     let around = [middle[0] - (end[1] - middle[1]), middle[1] + (end[0] - middle[0])];
     let half = [0.5 * (end[0] + around[0]), 0.5 * (end[1] + around[1])];
     browser.drag(&[end, half, around]).unwrap();
-    page.wait_for("the warning", "return document.querySelector('[data-code=gripper_narrow]') !== null");
+    page.wait_for("the warning", "return document.querySelector('[data-code=gripper_along]') !== null");
     let turned = page.saved().grasp.unwrap().angle().degrees();
     assert!(((turned - line.angle().degrees()).rem_euclid(360.0) - 90.0).abs() < 3.0, "{turned}°");
     page.screenshot("3-warned");
     page.assert_accessible("with marks and a warning");
     browser.press(&["\u{e009}", "z"]).unwrap();
-    page.wait_for("no warning", "return document.querySelector('[data-code=gripper_narrow]') === null");
+    page.wait_for("no warning", "return document.querySelector('[data-code=gripper_along]') === null");
 
     // A point of the outline dragged, and a reload: everything is as it was left.
     page.click("#do-outline h2");

@@ -33,7 +33,7 @@ fn wrong_files_are_told_apart() {
     std::fs::write(&newer, &bytes).unwrap();
     choose(&browser, "#model-file", &[newer]);
     let text = complaint(&browser);
-    assert!(text.contains("newer.sdg: expected a grasp model of format version 2, found version 9"), "{text}");
+    assert!(text.contains("newer.sdg: expected a grasp model of format version 3, found version 9"), "{text}");
 
     choose(&browser, "#model-file", &[demonstration()]);
     let wait = "return document.getElementById('alert').textContent.startsWith('image.png')";
