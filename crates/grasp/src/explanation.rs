@@ -20,8 +20,7 @@ impl GraspModel {
         let demonstration = &self.demonstrations[demonstration_idx];
         let tolerance = &demonstration.check().search.scales;
         let ranges = SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance);
-        let nearest = ranges.iter().min_by(|a, b| a.distance(pose.scale).total_cmp(&b.distance(pose.scale)))?;
-        Some(nearest.log_size(pose.scale).exp())
+        Some(SizeRange::nearest(&ranges, pose.scale)?.log_size(pose.scale).exp())
     }
 
     /// Where the picture differs from the demonstration under each of its detections; `None` as [`Self::size_of`].

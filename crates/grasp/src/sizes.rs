@@ -41,6 +41,11 @@ impl SizeRange {
         vec![same_pixels, Self { scales: about(same_frame), nominal: vec![same_frame] }]
     }
 
+    /// Of several ranges the one that a scale lies in or least far outside of.
+    pub(crate) fn nearest(ranges: &[Self], scale: f64) -> Option<&Self> {
+        ranges.iter().min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))
+    }
+
     /// The middle of the range, by ratio.
     pub(crate) fn middle(&self) -> f64 {
         (self.scales.start() * self.scales.end()).sqrt()

@@ -34,8 +34,7 @@ pub(super) fn filled(
     let tolerance = &demonstration.check().search.scales;
     let ranges = SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance);
     let scale = image_from_cutout.scale;
-    let nearest = ranges.iter().min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)));
-    let factor = nearest.map_or(scale, |range| range.clamp(scale)) / scale;
+    let factor = SizeRange::nearest(&ranges, scale).map_or(scale, |range| range.clamp(scale)) / scale;
     let placed = demonstration.outline(image_from_cutout).bounds();
     let center = placed.center();
     let sized = PlanarSimilarity::about(center, center, Angle::ZERO, factor).compose(image_from_cutout);
