@@ -15,7 +15,7 @@ use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
-use sdg_comparison::{ComparisonConfig, ComparisonNetwork, Reference, View, batch};
+use sdg_comparison::{ComparisonConfig, ComparisonNetwork, Pyramid, Reference, View};
 use sdg_detection::state_dict::{self, StateDict};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_part_generator::{Instance, MixedSample};
@@ -112,8 +112,9 @@ impl Asked<'_> {
         let Some(shown) = self.shown(part_idx, Some(image)) else { return pairs };
         let truth = instance.image_from_demonstration.compose(&shown.photo_from_shown);
         let has_turn = self.task.pictures.has_turn(part_idx);
+        let pyramid = Pyramid::new(image);
         let mut ask = |shown: &Shown, pose: &PlanarSimilarity, is_same: bool| {
-            pairs.push(Pair { view: shown.reference.view(image, pose), is_same });
+            pairs.push(Pair { view: shown.reference.view(&pyramid, pose), is_same });
         };
         let near = self.near(&shown, &truth, 1.0);
         ask(&shown, &near, true);
@@ -168,7 +169,7 @@ impl Asked<'_> {
             outline = Polygon::from_box(&bounds);
         }
         Some(Shown {
-            reference: Reference::new(image, &outline, self.task.config.input_px),
+            reference: Reference::new(image, &outline, &self.task.config),
             photo_from_shown,
             length: bounds.width().max(bounds.height()),
             center: bounds.center(),
@@ -257,7 +258,7 @@ impl Task for ComparisonTask {
         let (views, is_same): (Vec<View>, Vec<bool>) = pairs.into_iter().map(|pair| (pair.view, pair.is_same)).unzip();
         let signs: Vec<f32> = is_same.into_iter().map(|is_same| if is_same { 1.0 } else { -1.0 }).collect();
         let signs = Tensor::<2>::from_data(TensorData::new(signs, [n, 1]), &device);
-        let log_odds = network.forward(batch(&views, &device));
+        let log_odds = network.forward(&views);
         Ok(vec![("same", activation::log_sigmoid(log_odds * signs).mean().neg())])
     }
 }
@@ -265,7 +266,7 @@ impl Task for ComparisonTask {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sdg_comparison::CHANNELS;
+    use sdg_comparison::DIFFERENCES;
     use sdg_detection::state_dict::StateDict;
 
     #[test]
@@ -274,12 +275,12 @@ mod tests {
         let config = ComparisonConfig::edge();
         let task = ComparisonTask::new(&settings, config.clone(), StateDict::new()).unwrap();
         // The mean of what differs in normalised colour on the part.
-        let pixels = config.input_px.pow(2) as usize;
+        let cells = config.trunk_map_px().pow(2);
         let difference = |pair: &Pair| {
             let of = |channels: std::ops::Range<usize>| {
-                pair.view.values()[channels.start * pixels..channels.end * pixels].iter().sum::<f32>()
+                pair.view.differences()[channels.start * cells..channels.end * cells].iter().sum::<f32>()
             };
-            of(CHANNELS - 4..CHANNELS - 1) / of(CHANNELS - 1..CHANNELS)
+            of(3..DIFFERENCES - 1) / of(DIFFERENCES - 1..DIFFERENCES)
         };
         let mut means = [Vec::new(), Vec::new()];
         for step in 0..4 {

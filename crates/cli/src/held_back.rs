@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use anyhow::{Context, Result};
+use rayon::prelude::*;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
 };
@@ -15,10 +16,8 @@ use crate::statistics::{Share, wilson_interval};
 
 /// Where held-back samples begin: far beyond those that teaching validates and calibrates with.
 const FIRST: u64 = 1 << 40;
-/// Samples that a model is tried on: three quarters have the part. Model S, which is taught in a second, gets fewer. Chosen for time:
-/// one takes 0.15 s of a core.
-const COUNT: u64 = 40;
-const COUNT_INSTANT: u64 = 24;
+/// Samples that a model is tried on: three quarters have the part. Chosen for time: one takes 0.15 s of a core.
+const COUNT: u64 = 24;
 /// Larger samples take longer and show no more: the part has at least a few hundred pixels in them, too.
 const MAX_PIXELS: f64 = 640.0 * 480.0;
 /// How far the size of samples goes for a model that knows its part's size.
@@ -78,8 +77,7 @@ impl HeldBackFigures {
         let samples = HeldBackSamples::new(demonstrations, &sizes, seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
         let detector = PictureDetector::AnyCamera(Box::new(model.clone()));
-        let count = if model.kind().has_network() { COUNT } else { COUNT_INSTANT };
-        let judged = (0..count).map(|number| {
+        let judged = (0..COUNT).into_par_iter().map(|number| {
             let sample = samples.sample(number);
             let detections = model.detect(&sample.image, Verification::ByShape)?;
             let of_label = |labelled: LabelledInstance| {
@@ -107,7 +105,7 @@ impl HeldBackFigures {
             Ok(judge(&tested, facts.symmetry, DEFAULT_MIN_SCORE))
         });
         let judged = judged.collect::<Result<Vec<_>>>()?;
-        Ok(Self { samples: count, totals: Totals::of(&judged), photo_px })
+        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px })
     }
 
     /// The share of parts that it found.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! demonstration, outline ─ upright, S×S ───────────────┐
-//!                                                      ├─ 16 channels ─ convolutions ─ log-odds
+//!                                                      ├─ maps, cosines, differences ─ convolutions ─ log-odds
 //! picture, pose ─ turned upright by the pose, S×S ─────┘
 //! ```
 //!
@@ -23,13 +23,14 @@
 //! ```
 //! use burn::tensor::{Device, read_sync};
 //! use image::RgbImage;
-//! use sdg_comparison::{ComparisonConfig, Reference};
+//! use sdg_comparison::{ComparisonConfig, Pyramid, Reference};
 //! use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
 //!
 //! let network = ComparisonConfig::edge().init(&Device::flex(), 7)?;
 //! let outline = Polygon::from_box(&BoundingBox::new(20.0, 20.0, 100.0, 60.0)?);
-//! let reference = Reference::new(&RgbImage::new(120, 80), &outline, network.config().input_px);
-//! let view = reference.view(&RgbImage::new(640, 480), &PlanarSimilarity::IDENTITY);
+//! let reference = Reference::new(&RgbImage::new(120, 80), &outline, network.config());
+//! let picture = RgbImage::new(640, 480);
+//! let view = reference.view(&Pyramid::new(&picture), &PlanarSimilarity::IDENTITY);
 //! let log_odds = read_sync(network.compare(&[view]));
 //! assert!(log_odds[0].is_finite());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -43,4 +44,5 @@ mod view;
 
 pub use config::{ComparisonConfig, ComparisonError};
 pub use network::ComparisonNetwork;
-pub use view::{CHANNELS, Reference, View, batch};
+pub use sdg_orientation::Pyramid;
+pub use view::{DIFFERENCES, Reference, View};

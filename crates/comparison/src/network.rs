@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor, activation};
 use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
 use crate::config::{ComparisonConfig, ComparisonError};
-use crate::view::{DIFFERENCES, View, batch};
+use crate::view::{Batch, DIFFERENCES, View};
 
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
@@ -72,26 +72,20 @@ impl ComparisonNetwork {
         self.output.weight.val().device()
     }
 
-    /// The log-odds that each view of a [`batch`] shows the part in the pose that it was made by.
+    /// The log-odds that each view shows the part in the pose that it was made by, `[N, 1]`.
     ///
-    /// # Shapes
-    /// - `views`: `[N, CHANNELS, S, S]`
-    /// - output: `[N, 1]`
-    pub fn forward(&self, views: Tensor<4>) -> Tensor<2> {
-        let [n, _, side, _] = views.dims();
-        let map = |first: usize| through(&self.trunk, views.clone().narrow(1, first, 3));
-        let [demonstration, picture] = [map(0), map(3)];
-        let cells = self.config.trunk_map_px();
-        let differences = views.clone().narrow(1, 6, DIFFERENCES);
-        let px = side / cells;
-        let averaged = differences.reshape([n, DIFFERENCES, cells, px, cells, px]).mean_dim(5).mean_dim(3);
-        let differences: Tensor<4> = averaged.reshape([n, DIFFERENCES, cells, cells]);
+    /// # Panics
+    /// Without a view, or with views of another network's references.
+    pub fn forward(&self, views: &[View]) -> Tensor<2> {
+        let Batch { demonstrations, demonstration_of_view, pictures, differences } = Batch::new(views, &self.device());
+        let demonstration = through(&self.trunk, demonstrations).select(0, demonstration_of_view);
+        let picture = through(&self.trunk, pictures);
         let inside = differences.clone().narrow(1, DIFFERENCES - 1, 1);
         let correlated = self.correlation(&demonstration, &picture) * inside.clone();
         let differing = (demonstration.clone() - picture).abs() * inside;
         let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
         let map = through(&self.stages, compared);
-        let flat: Tensor<2> = map.reshape([n as i64, -1]);
+        let flat: Tensor<2> = map.reshape([views.len() as i64, -1]);
         self.output.forward(activation::relu(self.hidden.forward(flat)))
     }
 
@@ -114,8 +108,7 @@ impl ComparisonNetwork {
         if views.is_empty() {
             return Vec::new();
         }
-        let outputs = self.forward(batch(views, &self.device()));
-        let read = outputs.into_data_async().await.expect("what the device computes can be read");
+        let read = self.forward(views).into_data_async().await.expect("what the device computes can be read");
         read.iter::<f32>().map(f64::from).collect()
     }
 }
@@ -157,16 +150,17 @@ mod tests {
     use image::{Rgb, RgbImage};
     use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
     use sdg_layers::state_dict;
+    use sdg_orientation::Pyramid;
 
     fn view(reference: &Reference, tx: f64) -> View {
         let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));
-        reference.view(&image, &PlanarSimilarity { tx, ..PlanarSimilarity::IDENTITY })
+        reference.view(&Pyramid::new(&image), &PlanarSimilarity { tx, ..PlanarSimilarity::IDENTITY })
     }
 
     fn reference(network: &ComparisonNetwork) -> Reference {
         let image = RgbImage::from_fn(140, 90, |x, y| Rgb([(x % 50 * 5) as u8, (y % 40 * 6) as u8, 90]));
         let outline = Polygon::from_box(&BoundingBox { x1: 20.0, y1: 30.0, x2: 100.0, y2: 50.0 });
-        Reference::new(&image, &outline, network.config().input_px)
+        Reference::new(&image, &outline, network.config())
     }
 
     #[test]

@@ -1,18 +1,20 @@
 //! Views: what the network looks at.
 
-use burn::tensor::{Device, Tensor, TensorData};
+use std::sync::Arc;
+
+use burn::tensor::{Device, Int, Tensor, TensorData};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_orientation::{CropWindow, OUTSIDE};
+use sdg_orientation::{CropWindow, OUTSIDE, Pyramid};
+
+use crate::config::ComparisonConfig;
 
 /// Channels of one side: the colours, and the same less their mean on the part and over their deviation there.
 const COLOURS: usize = 6;
-/// Channels that say how far the two sides differ on the part, colour by colour, and the share of each pixel inside the
+/// Channels that say how far the two sides differ on the part, colour by colour, and the share of each cell inside the
 /// outline.
 pub const DIFFERENCES: usize = COLOURS + 1;
-/// Channels of a view: the demonstration's colours, the picture's, and [`DIFFERENCES`].
-pub const CHANNELS: usize = 6 + DIFFERENCES;
 
 /// Side of a view over the longer side of the outline's box: room for a pose that is a little off.
 const SIDE_PER_LENGTH: f64 = 1.25;
@@ -23,14 +25,22 @@ const DEVIATION_EPSILON: f32 = 12.0;
 /// Points of a pixel along each axis that are asked whether they lie inside the outline.
 const MASK_SAMPLES: u32 = 2;
 
-/// A view's values, `[CHANNELS, S, S]`.
+/// What the network compares.
 #[derive(Debug, Clone, PartialEq)]
-pub struct View(Vec<f32>);
+pub struct View {
+    /// The demonstration's colours, `[3, S, S]`; all views of one reference share them.
+    demonstration: Arc<[f32]>,
+    /// The picture's, `[3, S, S]`.
+    picture: Vec<f32>,
+    /// Means over the cells of the trunk's map, `[DIFFERENCES, M, M]`.
+    differences: Vec<f32>,
+}
 
 impl View {
-    /// `[CHANNELS, S, S]`.
-    pub fn values(&self) -> &[f32] {
-        &self.0
+    /// How far the two sides differ on the part, `[DIFFERENCES, M, M]`: three colours, the same normalised, and the share of
+    /// each cell inside the outline. M is [`ComparisonConfig::trunk_map_px`].
+    pub fn differences(&self) -> &[f32] {
+        &self.differences
     }
 }
 
@@ -42,12 +52,17 @@ pub struct Reference {
     mask: Vec<f32>,
     /// `[COLOURS, S, S]`.
     own: Vec<f32>,
+    /// The first three of them.
+    shared: Arc<[f32]>,
     input_px: u32,
+    /// Side of a cell in pixels.
+    cell_px: usize,
 }
 
 impl Reference {
-    /// The part inside `outline` of `image`, for views of `input_px` pixels a side. What is outside of the outline is not seen.
-    pub fn new(image: &RgbImage, outline: &Polygon, input_px: u32) -> Self {
+    /// The part inside `outline` of `image`, for the views of a network. What is outside of the outline is not seen.
+    pub fn new(image: &RgbImage, outline: &Polygon, config: &ComparisonConfig) -> Self {
+        let input_px = config.input_px;
         let bounds = outline.bounds();
         let side = (SIDE_PER_LENGTH * bounds.width().max(bounds.height())).max(1.0);
         let window = CropWindow { center: bounds.center(), side, turn: Angle::ZERO };
@@ -66,26 +81,46 @@ impl Reference {
             samples.filter(|&(x, y)| inside.get(x, y)).count() as f32 * share
         };
         let mask: Vec<f32> = (0..input_px * input_px).map(pixel).collect();
-        let own = colours(&window.read(image, input_px), &mask);
-        Self { window, mask, own, input_px }
+        let own = colours(&Pyramid::new(image).read(&window, input_px), &mask);
+        let shared = own[..3 * mask.len()].into();
+        let cell_px = input_px as usize / config.trunk_map_px().max(1);
+        Self { window, mask, own, shared, input_px, cell_px }
     }
 
-    /// The demonstration, and what an image shows where a pose puts it; pixels of the demonstration's image to pixels of `image`.
-    pub fn view(&self, image: &RgbImage, image_from_demonstration: &PlanarSimilarity) -> View {
+    /// The demonstration, and what a picture shows where a pose puts it; pixels of the demonstration's image to pixels of the
+    /// picture.
+    pub fn view(&self, picture: &Pyramid<'_>, image_from_demonstration: &PlanarSimilarity) -> View {
         let window = CropWindow {
             center: image_from_demonstration.apply(&self.window.center),
             side: self.window.side * image_from_demonstration.scale,
             turn: image_from_demonstration.angle,
         };
-        let seen = colours(&window.read(image, self.input_px), &self.mask);
+        let mut seen = colours(&picture.read(&window, self.input_px), &self.mask);
         let num_pixels = self.mask.len();
-        let mut values = Vec::with_capacity(CHANNELS * num_pixels);
-        values.extend_from_slice(&self.own[..3 * num_pixels]);
-        values.extend_from_slice(&seen[..3 * num_pixels]);
-        let pairs = self.own.iter().zip(&seen).zip(self.mask.iter().cycle());
-        values.extend(pairs.map(|((own, seen), inside)| inside * (own - seen).abs()));
-        values.extend_from_slice(&self.mask);
-        View(values)
+        let mut differences = Vec::with_capacity(DIFFERENCES * num_pixels / self.cell_px.pow(2));
+        let mut differing = vec![0f32; num_pixels];
+        for (own, seen) in self.own.chunks_exact(num_pixels).zip(seen.chunks_exact(num_pixels)) {
+            let pixels = own.iter().zip(seen).zip(&self.mask);
+            for (difference, ((own, seen), inside)) in differing.iter_mut().zip(pixels) {
+                *difference = inside * (own - seen).abs();
+            }
+            self.append_means(&differing, &mut differences);
+        }
+        self.append_means(&self.mask, &mut differences);
+        seen.truncate(3 * num_pixels);
+        View { demonstration: self.shared.clone(), picture: seen, differences }
+    }
+
+    /// Appends the mean of each cell of a channel.
+    fn append_means(&self, channel: &[f32], means: &mut Vec<f32>) {
+        let (side, cell) = (self.input_px as usize, self.cell_px);
+        let share = 1.0 / (cell * cell) as f32;
+        for rows in channel.chunks_exact(side * cell) {
+            for first in (0..side).step_by(cell) {
+                let in_row = |row: &[f32]| row[first..first + cell].iter().sum::<f32>();
+                means.push(share * rows.chunks_exact(side).map(in_row).sum::<f32>());
+            }
+        }
     }
 }
 
@@ -113,16 +148,47 @@ fn colours(crop: &RgbImage, mask: &[f32]) -> Vec<f32> {
     values
 }
 
-/// Views as the network's input, `[N, CHANNELS, S, S]`.
-///
-/// # Panics
-/// Without a view, or with views of several sizes.
-pub fn batch(views: &[View], device: &Device) -> Tensor<4> {
-    let len = views.first().expect("a batch has a view at least").0.len();
-    assert!(views.iter().all(|view| view.0.len() == len), "views of one batch have one size");
-    let side = (len / CHANNELS).isqrt();
-    let values = views.iter().flat_map(|view| view.0.iter().copied()).collect();
-    Tensor::from_data(TensorData::new::<f32, _>(values, [views.len(), CHANNELS, side, side]), device)
+/// Views as the network's input.
+pub(crate) struct Batch {
+    /// Each demonstration once, `[D, 3, S, S]`.
+    pub(crate) demonstrations: Tensor<4>,
+    /// Which of them each view has, `[N]`.
+    pub(crate) demonstration_of_view: Tensor<1, Int>,
+    /// `[N, 3, S, S]`.
+    pub(crate) pictures: Tensor<4>,
+    /// `[N, DIFFERENCES, M, M]`.
+    pub(crate) differences: Tensor<4>,
+}
+
+impl Batch {
+    /// # Panics
+    /// Without a view, or with views of several networks.
+    pub(crate) fn new(views: &[View], device: &Device) -> Self {
+        let mut demonstrations: Vec<&Arc<[f32]>> = Vec::new();
+        let demonstration_of_view: Vec<i32> = views
+            .iter()
+            .map(|view| {
+                let known = demonstrations.iter().position(|other| Arc::ptr_eq(other, &view.demonstration));
+                known.unwrap_or_else(|| {
+                    demonstrations.push(&view.demonstration);
+                    demonstrations.len() - 1
+                }) as i32
+            })
+            .collect();
+        let stacked = |channels: usize, parts: Vec<&[f32]>| {
+            let len = parts.first().map_or(0, |part| part.len());
+            assert!(len > 0 && parts.iter().all(|part| part.len() == len), "views of one batch have one size");
+            let (n, side) = (parts.len(), (len / channels).isqrt());
+            Tensor::<4>::from_data(TensorData::new::<f32, _>(parts.concat(), [n, channels, side, side]), device)
+        };
+        let n = views.len();
+        Self {
+            demonstrations: stacked(3, demonstrations.iter().map(|values| &***values).collect()),
+            demonstration_of_view: Tensor::from_data(TensorData::new(demonstration_of_view, [n]), device),
+            pictures: stacked(3, views.iter().map(|view| &*view.picture).collect()),
+            differences: stacked(DIFFERENCES, views.iter().map(|view| &*view.differences).collect()),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -147,19 +213,25 @@ mod tests {
         (image, outline)
     }
 
+    /// Views of 32 pixels, in cells of one.
+    fn config() -> ComparisonConfig {
+        ComparisonConfig { input_px: 32, trunk_channels: Vec::new(), ..ComparisonConfig::edge() }
+    }
+
     /// The greatest difference between the demonstration and the picture inside the outline, over three channels.
     fn difference(reference: &Reference, view: &View, first: usize) -> f32 {
         let n = reference.mask.len();
         let inside = |i: &usize| reference.mask[*i] == 1.0;
-        let of_channel = |channel: usize| (0..n).filter(inside).map(move |i| view.0[(6 + channel) * n + i]);
+        let of_channel = |channel: usize| (0..n).filter(inside).map(move |i| view.differences[channel * n + i]);
         (first..first + 3).flat_map(of_channel).fold(0.0, f32::max)
     }
 
     #[test]
     fn under_its_pose_the_part_looks_as_in_the_demonstration_and_what_lies_around_it_is_not_seen_in_that() {
         let (image, outline) = photo();
-        let reference = Reference::new(&image, &outline, 32);
+        let reference = Reference::new(&image, &outline, &config());
         let turned = image::imageops::rotate90(&image);
+        let turned = Pyramid::new(&turned);
         // A quarter turn clockwise as seen: (x, y) goes to (height - y, x).
         let pose = PlanarSimilarity { scale: 1.0, angle: Angle::from_degrees(90.0), tx: 90.0, ty: 0.0 };
         let seen = reference.view(&turned, &pose);
@@ -170,7 +242,7 @@ mod tests {
         );
         assert!(difference(&reference, &wrong, 0) > 0.5);
         let n = reference.mask.len();
-        assert!((0..n).filter(|i| reference.mask[*i] == 0.0).all(|i| seen.0[6 * n + i] == 0.0));
+        assert!((0..n).filter(|i| reference.mask[*i] == 0.0).all(|i| seen.differences[i] == 0.0));
         // A bar of 80 x 20 pixels in a square of 100.
         let share = reference.mask.iter().sum::<f32>() / n as f32;
         assert!((share - 0.16).abs() < 0.02, "{share}");
@@ -179,11 +251,35 @@ mod tests {
     #[test]
     fn light_and_colour_of_the_light_do_not_change_the_normalised_channels() {
         let (image, outline) = photo();
-        let reference = Reference::new(&image, &outline, 32);
+        let reference = Reference::new(&image, &outline, &config());
         let mut dark = image.clone();
         dark.pixels_mut().for_each(|p| p.0 = [p[0] / 2 + 20, p[1] / 2 + 5, p[2] / 2]);
-        let seen = reference.view(&dark, &PlanarSimilarity::IDENTITY);
+        let seen = reference.view(&Pyramid::new(&dark), &PlanarSimilarity::IDENTITY);
         assert!(difference(&reference, &seen, 0) > 0.5);
         assert!(difference(&reference, &seen, 3) < 0.3);
+    }
+
+    #[test]
+    fn cells_are_means_of_their_pixels_and_a_reference_is_in_a_batch_once() {
+        let (image, outline) = photo();
+        let (one, other) = (Reference::new(&image, &outline, &config()), {
+            let coarse = ComparisonConfig { input_px: 32, ..ComparisonConfig::edge() };
+            Reference::new(&image, &outline, &coarse)
+        });
+        let picture = Pyramid::new(&image);
+        let shifted = PlanarSimilarity { tx: 7.0, ..PlanarSimilarity::IDENTITY };
+        let (fine, coarse) = (one.view(&picture, &shifted), other.view(&picture, &shifted));
+        let cell = |channel: usize, x: usize, y: usize| {
+            let pixels = (0..4).flat_map(|dy| (0..4).map(move |dx| channel * 1024 + (4 * y + dy) * 32 + 4 * x + dx));
+            pixels.map(|i| fine.differences[i]).sum::<f32>() / 16.0
+        };
+        for (channel, x, y) in [(0, 1, 3), (4, 6, 4), (6, 5, 2)] {
+            let found = coarse.differences[channel * 64 + y * 8 + x];
+            assert!((found - cell(channel, x, y)).abs() < 1e-5, "{channel} {x} {y}: {found}");
+        }
+        let views = [coarse.clone(), other.view(&picture, &PlanarSimilarity::IDENTITY), coarse];
+        let batch = Batch::new(&views, &Device::flex());
+        assert_eq!((batch.demonstrations.dims(), batch.pictures.dims()), ([1, 3, 32, 32], [3, 3, 32, 32]));
+        assert_eq!(batch.differences.dims(), [3, DIFFERENCES, 8, 8]);
     }
 }

@@ -2,7 +2,7 @@
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
-use sdg_comparison::Reference;
+use sdg_comparison::{ComparisonConfig, Reference};
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilarity, Polygon};
 use std::sync::{Arc, OnceLock};
@@ -98,9 +98,9 @@ impl TaughtDemonstration {
         Ok((working, prepared))
     }
 
-    /// What the comparison network of a model compares pictures with, in views of `input_px` pixels a side.
-    pub(crate) fn reference(&self, input_px: u32) -> &Reference {
-        self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), input_px))
+    /// What the model's comparison network compares pictures with.
+    pub(crate) fn reference(&self, config: &ComparisonConfig) -> &Reference {
+        self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), config))
     }
 
     /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration

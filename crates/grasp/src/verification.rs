@@ -12,6 +12,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
+use sdg_orientation::halved;
 use sdg_shape::{Differences, Evidence, GradientField};
 
 use crate::models::PoseCandidate;
@@ -75,23 +76,6 @@ impl<'a> SearchedImage<'a> {
         self.views.push(View { halvings, image: view, field });
         self.views.len() - 1
     }
-}
-
-/// The mean of 2×2 pixels; an odd last row or column is left out, so that places are exactly halved.
-pub(crate) fn halved(image: &RgbImage) -> RgbImage {
-    let (width, height) = (image.width() / 2, image.height() / 2);
-    let stride = 3 * image.width() as usize;
-    let mut out = Vec::with_capacity(3 * (width * height) as usize);
-    for rows in image.as_raw().chunks_exact(2 * stride.max(1)).take(height as usize) {
-        let (above, below) = rows.split_at(stride);
-        for (a, b) in above.chunks_exact(6).zip(below.chunks_exact(6)) {
-            out.extend((0..3).map(|c| {
-                let sum = u16::from(a[c]) + u16::from(a[c + 3]) + u16::from(b[c]) + u16::from(b[c + 3]);
-                ((sum + 2) / 4) as u8
-            }));
-        }
-    }
-    RgbImage::from_raw(width, height, out).unwrap_or_default()
 }
 
 /// A demonstration laid over an image.

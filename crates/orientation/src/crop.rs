@@ -67,10 +67,13 @@ impl CropWindow {
         let scale = self.side / f64::from(size_px);
         let taps = (scale.ceil() as usize).clamp(1, MAX_TAPS);
         let step = |axis: Vector2<f64>| axis * (scale / taps as f64);
-        let (right, down) = (step(self.x_axis()), step(self.y_axis()));
+        let (x_axis, y_axis) = (self.x_axis(), self.y_axis());
+        let (right, down) = (step(x_axis), step(y_axis));
         let share = 1.0 / (taps * taps) as f32;
+        let half = f64::from(size_px) / 2.0;
         RgbImage::from_fn(size_px, size_px, |column, row| {
-            let corner = self.image_point(&Point2::new(f64::from(column), f64::from(row)), size_px);
+            let (across, along) = (f64::from(column) - half, f64::from(row) - half);
+            let corner = self.center + x_axis * (scale * across) + y_axis * (scale * along);
             let mut sum = [0f32; 3];
             for tap_y in 0..taps {
                 for tap_x in 0..taps {
@@ -79,7 +82,7 @@ impl CropWindow {
                     (0..3).for_each(|channel| sum[channel] += colour[channel]);
                 }
             }
-            image::Rgb(sum.map(|value| (value * share).round() as u8))
+            image::Rgb(sum.map(|value| rounded(value * share)))
         })
     }
 
@@ -94,26 +97,52 @@ impl CropWindow {
     }
 }
 
+/// `f32::floor`, which is a call into the C library where the target has no instruction for it.
+fn floor(value: f32) -> f32 {
+    // Whole numbers up to here are exact, and fit.
+    if value.abs() > 8e6 {
+        return value.floor();
+    }
+    let whole = value as i32 as f32;
+    if whole > value { whole - 1.0 } else { whole }
+}
+
+/// `f32::round` of a colour, without a call.
+fn rounded(value: f32) -> u8 {
+    let whole = value as u8;
+    if value - f32::from(whole) >= 0.5 { whole.saturating_add(1) } else { whole }
+}
+
 /// The colour between four pixels, whose centres are at halves; [`OUTSIDE`] beyond the image.
 ///
 /// The pretrained weights belong to this order of the sum: `sdg-shape`'s sampling rounds other bits and ends at the border.
 fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (width, height) = (image.width() as i32, image.height() as i32);
-    let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
+    let (left, top) = (floor(x - 0.5), floor(y - 0.5));
     let (fx, fy) = (x - 0.5 - left, y - 0.5 - top);
     let (left, top) = (left as i32, top as i32);
-    let mut sum = [0f32; 3];
-    for (column, row, weight) in [
-        (left, top, (1.0 - fx) * (1.0 - fy)),
-        (left.saturating_add(1), top, fx * (1.0 - fy)),
-        (left, top.saturating_add(1), (1.0 - fx) * fy),
-        (left.saturating_add(1), top.saturating_add(1), fx * fy),
-    ] {
-        let inside = (0..width).contains(&column) && (0..height).contains(&row);
-        let colour = if inside { image.get_pixel(column as u32, row as u32).0 } else { OUTSIDE };
-        (0..3).for_each(|channel| sum[channel] += weight * f32::from(colour[channel]));
+    let weights = [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy];
+    let mean = |colours: [[u8; 3]; 4]| -> [f32; 3] {
+        std::array::from_fn(|c| {
+            let terms: [f32; 4] = std::array::from_fn(|i| weights[i] * f32::from(colours[i][c]));
+            terms[0] + terms[1] + terms[2] + terms[3]
+        })
+    };
+    if left >= 0 && top >= 0 && left < width - 1 && top < height - 1 {
+        let stride = 3 * width as usize;
+        let first = top as usize * stride + 3 * left as usize;
+        let pair = |first: usize| -> [[u8; 3]; 2] {
+            let &[r, g, b, r2, g2, b2] = image.as_raw()[first..].first_chunk().expect("two pixels of a row");
+            [[r, g, b], [r2, g2, b2]]
+        };
+        let ([a, b], [c, d]) = (pair(first), pair(first + stride));
+        return mean([a, b, c, d]);
     }
-    sum
+    mean(std::array::from_fn(|i| {
+        let (column, row) = (left.saturating_add((i % 2) as i32), top.saturating_add((i / 2) as i32));
+        let inside = (0..width).contains(&column) && (0..height).contains(&row);
+        if inside { image.get_pixel(column as u32, row as u32).0 } else { OUTSIDE }
+    }))
 }
 
 /// The crop of a detected box, as [`OrientationCnn::predict`](crate::OrientationCnn::predict) reads it: `size_px` ×
@@ -195,6 +224,16 @@ mod tests {
         let window = CropWindow { center: Point2::new(100.0, 100.0), side: 80.0, turn: Angle::ZERO };
         let crop = window.read(&image, 20);
         assert!(crop.pixels().all(|pixel| (98..=102).contains(&pixel[0])), "{:?}", crop.get_pixel(3, 3));
+    }
+
+    #[test]
+    fn floor_and_rounding_are_those_of_the_standard_library() {
+        for value in [-7.5f32, -1.0, -0.25, 0.0, 0.999_999_94, 3.0, 640.75, 7.999_999e6, -9e9, f32::INFINITY] {
+            assert_eq!(floor(value), value.floor());
+        }
+        for value in [0.0f32, 0.499_999_97, 0.5, 1.5, 2.499_999_8, 254.5, 255.0, 255.4, 300.0] {
+            assert_eq!(rounded(value), value.round() as u8, "{value}");
+        }
     }
 
     #[test]

@@ -36,10 +36,12 @@ mod config;
 mod crop;
 mod error;
 mod network;
+mod pyramid;
 
 pub use angle_classes::{AngleClasses, AngleReading, Labels};
 pub use config::{OrientationConfig, Readout};
 pub use crop::{CropWindow, OUTSIDE, crop_for};
 pub use error::{OrientationError, Result, check_setting};
 pub use network::{OrientationCnn, crop_batch};
+pub use pyramid::{Pyramid, halved};
 pub use sdg_layers::state_dict::{ImportReport, StateDict, WeightTensor};

@@ -5,7 +5,7 @@
 //! and in the opposite one.
 
 use image::RgbImage;
-use sdg_comparison::ComparisonNetwork;
+use sdg_comparison::{ComparisonNetwork, Pyramid};
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
 use super::placing::fill_box;
@@ -25,12 +25,12 @@ pub(super) async fn compared(
     image: &RgbImage,
     detections: impl Iterator<Item = (&TaughtDemonstration, &BoundingBox, Angle, PlanarSimilarity)>,
 ) -> Vec<Vec<Compared>> {
-    let input_px = network.config().input_px;
+    let picture = Pyramid::new(image);
     let (mut views, mut poses) = (Vec::new(), Vec::new());
     for (demonstration, bbox, grasp_angle, pose) in detections {
         let likely = likely_poses(demonstration, bbox, grasp_angle, pose);
-        let reference = demonstration.reference(input_px);
-        views.extend(likely.iter().map(|pose| reference.view(image, pose)));
+        let reference = demonstration.reference(network.config());
+        views.extend(likely.iter().map(|pose| reference.view(&picture, pose)));
         poses.push(likely);
     }
     let mut log_odds = network.compare(&views).await.into_iter();

@@ -4,6 +4,7 @@ use sdg_demonstration::{Sample, SampleObject};
 use sdg_geometry::{Keypoint, PlanarGrasp, median};
 use sdg_training::Outcome;
 
+use super::side_by_side::side_by_side;
 use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
@@ -34,23 +35,32 @@ pub(super) struct Calibrated {
     pub(super) error_degrees: f64,
 }
 
+/// What is seen in one sample.
+struct Seen {
+    /// The network's highest score on the part, where it proposed it, and wherever anything found it.
+    proposed_on_part: Option<f64>,
+    on_part: Option<f64>,
+    /// Its highest score in a sample without the part, and that on what looks most like the part there.
+    without_part: Option<f64>,
+    elsewhere: Option<f64>,
+    /// In pixels of the demonstration and degrees, of what is on the part.
+    errors: Vec<[f64; 2]>,
+}
+
 impl HeldBack<'_> {
     /// What the network alone says of held-back samples.
     ///
     /// # Errors
     /// An image that the network refuses.
     pub(super) fn examine(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Vec<Outcome>> {
-        self.samples
-            .iter()
-            .map(|sample| {
-                let best = network.proposals(&sample.image, demonstrations)?.candidates.into_iter().next();
-                Ok(match (best, sample.objects.first()) {
-                    (Some(candidate), Some(object)) => self.outcome(&candidate.grasp, object, candidate.network_score),
-                    (None, Some(_)) => Outcome::Missed,
-                    (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
-                })
+        side_by_side(self.samples, |sample| {
+            let best = network.proposals(&sample.image, demonstrations)?.candidates.into_iter().next();
+            Ok(match (best, sample.objects.first()) {
+                (Some(candidate), Some(object)) => self.outcome(&candidate.grasp, object, candidate.network_score),
+                (None, Some(_)) => Outcome::Missed,
+                (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
             })
-            .collect()
+        })
     }
 
     /// Tries the network on held-back samples, laid over by the demonstration as in use. `other_parts` are the network's
@@ -66,47 +76,49 @@ impl HeldBack<'_> {
     ) -> Result<Calibrated> {
         /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
-        let (mut right_scores, mut wrong_scores) = (Vec::new(), other_parts.to_vec());
-        let (mut on_part, mut elsewhere) = (Vec::new(), Vec::new());
-        let mut positives = 0;
-        let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
-        for sample in self.samples {
-            let proposals = network.proposals(&sample.image, demonstrations)?;
-            let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, demonstrations));
-            let hit = |sighting: &Sighting| {
-                let grasp = sighting.placed.demonstration.grasp(&sighting.placed.image_from_marks);
-                sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)
-            };
-            let highest = |right: bool, proposed: bool| {
-                let of_kind = sightings
-                    .iter()
-                    .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
-                of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
-            };
-            // What the search finds is no merit of the network, but its errors are the model's.
-            for outcome in sightings.iter().filter_map(hit) {
-                if let Outcome::Found { error_px, error_degrees, .. } = outcome {
-                    errors_px.push(error_px);
-                    errors_degrees.push(error_degrees);
-                }
-            }
-            right_scores.extend(highest(true, true));
-            on_part.extend(highest(true, false));
-            if sample.objects.is_empty() {
-                wrong_scores.push(highest(false, true).unwrap_or(0.0));
-                elsewhere.extend(best_agreement(&sightings).map(|sighting| sighting.network_score));
-            } else {
-                positives += 1;
-            }
-        }
+        let seen = side_by_side(self.samples, |sample| self.see(sample, network, demonstrations))?;
+        let scores = |score: fn(&Seen) -> Option<f64>| seen.iter().filter_map(score).collect::<Vec<_>>();
+        let right_scores = scores(|seen| seen.proposed_on_part);
+        let on_part = scores(|seen| seen.on_part);
+        let elsewhere = scores(|seen| seen.elsewhere);
+        let wrong_scores = [other_parts, &scores(|seen| seen.without_part)].concat();
+        let errors = || seen.iter().flat_map(|seen| &seen.errors);
         Ok(Calibrated {
-            positives,
+            positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
             network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG).unwrap_or(Calibration::NEUTRAL),
             on_part,
             elsewhere,
-            error_px: median(errors_px).unwrap_or(f64::INFINITY),
-            error_degrees: median(errors_degrees).unwrap_or(f64::INFINITY),
+            error_px: median(errors().map(|[px, _]| *px)).unwrap_or(f64::INFINITY),
+            error_degrees: median(errors().map(|[_, degrees]| *degrees)).unwrap_or(f64::INFINITY),
+        })
+    }
+
+    fn see(&self, sample: &Sample, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Seen> {
+        let proposals = network.proposals(&sample.image, demonstrations)?;
+        let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, demonstrations));
+        let hit = |sighting: &Sighting| {
+            let grasp = sighting.placed.demonstration.grasp(&sighting.placed.image_from_marks);
+            sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)
+        };
+        let highest = |right: bool, proposed: bool| {
+            let of_kind = sightings
+                .iter()
+                .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
+            of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
+        };
+        let has_part = !sample.objects.is_empty();
+        // What the search finds is no merit of the network, but its errors are the model's.
+        let errors = sightings.iter().filter_map(hit).filter_map(|outcome| match outcome {
+            Outcome::Found { error_px, error_degrees, .. } => Some([error_px, error_degrees]),
+            _ => None,
+        });
+        Ok(Seen {
+            proposed_on_part: highest(true, true),
+            on_part: highest(true, false),
+            without_part: (!has_part).then(|| highest(false, true).unwrap_or(0.0)),
+            elsewhere: best_agreement(&sightings).filter(|_| !has_part).map(|sighting| sighting.network_score),
+            errors: errors.collect(),
         })
     }
 

@@ -23,6 +23,7 @@ mod paper;
 mod plan;
 mod preset;
 mod r50;
+mod side_by_side;
 mod start;
 pub(crate) mod symmetry;
 #[cfg(test)]

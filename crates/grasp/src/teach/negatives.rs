@@ -8,7 +8,9 @@
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,
 };
+use sdg_orientation::halved;
 
+use super::side_by_side::side_by_side;
 use crate::check_config::{CheckConfig, ScoreConfig};
 use crate::decimal::decimal;
 use crate::error::Result;
@@ -16,7 +18,7 @@ use crate::models::{Network, Proposals};
 use crate::prepared::scaling;
 use crate::sighting::{best_agreement, sightings};
 use crate::taught::TaughtDemonstration;
-use crate::verification::{SearchedImage, halved};
+use crate::verification::SearchedImage;
 
 /// With fewer scenes in which anything agrees at all there is no mean. Chosen by hand, not measured.
 const MIN_SCENES: usize = 3;
@@ -64,14 +66,13 @@ impl NegativeScenes {
     }
 
     fn observe_with(&self, network: Option<&Network>, demonstrations: &[TaughtDemonstration]) -> Result<Resemblances> {
-        let mut highest = Vec::with_capacity(self.scenes.len());
-        for sample in &self.scenes {
+        let highest = side_by_side(&self.scenes, |sample| {
             let searched = SearchedImage::new(&sample.image, demonstrations);
             let proposals = network.map_or(Ok(Proposals::default()), |n| n.proposals(&sample.image, demonstrations))?;
             let sightings = sightings(&proposals, &searched);
-            highest.extend(best_agreement(&sightings).map(|best| (best.placed.agreement, best.network_score)));
-        }
-        Ok(Resemblances { highest })
+            Ok(best_agreement(&sightings).map(|best| (best.placed.agreement, best.network_score)))
+        })?;
+        Ok(Resemblances { highest: highest.into_iter().flatten().collect() })
     }
 }
 

@@ -5,6 +5,7 @@
 use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, SceneStyle};
 use sdg_part_generator::{Part, PhotoConfig, demonstration};
 
+use super::side_by_side::side_by_side;
 use crate::error::Result;
 use crate::models::Network;
 use crate::sighting::{best_agreement, sightings};
@@ -61,11 +62,17 @@ pub(super) fn shown(
     let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
     let augmenter = Augmenter::new(demonstrations, config, seed)?.with_other_parts(others)?;
     let taught = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<Vec<_>>>()?;
-    for sample in (0..NUM_PICTURES).map(|i| augmenter.held_out(i)) {
+    let numbers: Vec<u64> = (0..NUM_PICTURES).collect();
+    let seen = side_by_side(&numbers, |&number| {
+        let sample = augmenter.held_out(number);
         let proposals = network.proposals(&sample.image, &taught)?;
-        shown.highest.push(proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score));
+        let highest = proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score);
         let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, &taught));
-        shown.best_agreement.extend(best_agreement(&sightings).map(|sighting| sighting.network_score));
+        Ok((highest, best_agreement(&sightings).map(|sighting| sighting.network_score)))
+    })?;
+    for (highest, best_agreement) in seen {
+        shown.highest.push(highest);
+        shown.best_agreement.extend(best_agreement);
     }
     Ok(shown)
 }

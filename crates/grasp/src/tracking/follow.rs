@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
+use sdg_orientation::halved;
 use sdg_shape::{Evidence, GradientField, Reach};
 
 use super::detector::PartDetector;
@@ -17,7 +18,6 @@ use crate::plan::PixelRect;
 use crate::prepared::{Prepared, WorkingSize, scaling};
 use crate::sizes::SizeRange;
 use crate::taught::TaughtDemonstration;
-use crate::verification::halved;
 
 /// Pixels of the halved picture about the reach, which the gradients' smoothing and the crests beside an edge need: 3 and 6.
 const BORDER_PX: f64 = 9.0;
