@@ -4,7 +4,7 @@ import { api } from "./api.js";
 import { boundsOf, boxPolygon, clamp, graspOf, gripperOf, placedAt } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
-import { isSmall, showBox } from "./view.js";
+import { showBox } from "./view.js";
 
 /** Pixels are told to a hundredth. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
@@ -13,7 +13,8 @@ const RETRY_MS = 2000;
 
 /** Gives what the server tells of a photo the page's own fields. */
 export function adopt(view) {
-  return { ...view, committed: JSON.stringify(view.marks), past: [], future: [], revision: 0 };
+  const committed = JSON.stringify(view.marks);
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0 };
 }
 
 /** Makes the marks as they are now a step that can be undone, and saves them. */
@@ -45,7 +46,7 @@ export const undo = () => travel((t) => t.past, (t) => t.future);
 export const redo = () => travel((t) => t.future, (t) => t.past);
 
 /** Sends the marks; one request at a time for each photo, and after it what has changed meanwhile. */
-async function save(target) {
+export async function save(target) {
   target.revision += 1;
   if (target.saving) return;
   target.saving = true;
@@ -53,10 +54,11 @@ async function save(target) {
   while (sent !== target.revision) {
     sent = target.revision;
     try {
+      const sending = JSON.stringify(target.marks);
       const view = await api.saveMarks(target.id, target.marks);
-      Object.assign(target, { saved: view.saved, advice: view.advice });
+      Object.assign(target, { saved: view.saved, advice: view.advice, sent: sending });
     } catch (error) {
-      target.saved = { state: "refused", why: error.message };
+      target.saved = { state: "refused", why: error.message, lost: error.lost };
       if (error.lost) {
         sent = -1;
         changed();
@@ -77,7 +79,7 @@ export function nextTool() {
 
 export function setTool(tool) {
   Object.assign(state, { tool, draft: null, vertex: null });
-  if (tool !== "select") state.selected = tool;
+  if (tool !== "select") state.selected = tool === "in" || tool === "out" ? "outline" : tool;
   changed();
 }
 
@@ -97,7 +99,7 @@ export function boxDrawn() {
   state.selected = "box";
   commit();
   state.tool = nextTool();
-  if (isSmall()) showBox(marks().box);
+  showBox(marks().box);
   if (!marks().outline) proposeOutline({ quietly: true });
 }
 
@@ -117,18 +119,33 @@ export function closeOutline(points) {
   state.tool = nextTool();
 }
 
+/** Says that a place belongs to the part or does not; the outline is found anew with all that was said. */
+export function clickOutline(point, isInside) {
+  const target = image();
+  const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
+  if (!box) return toast("Draw a box around the part first: the outline is looked for in it.");
+  target.clicks ??= { inside: [], outside: [] };
+  target.clicks[isInside ? "inside" : "outside"].push(point);
+  // A place outside the box that belongs to the part makes the box larger.
+  if (isInside && (point[0] < box[0] || point[1] < box[1] || point[0] > box[2] || point[1] > box[3])) {
+    setBox(boundsOf([box.slice(0, 2), box.slice(2), point]));
+  }
+  return proposeOutline({ clicks: target.clicks });
+}
+
 /** Asks the server for the outline of what is in the box. `quietly` when nobody asked for it by name. */
-export async function proposeOutline({ quietly = false } = {}) {
+export async function proposeOutline({ quietly = false, clicks = null } = {}) {
   const target = image();
   const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) {
     setTool("box");
     return toast("Draw a box around the part first: the outline is looked for in it.");
   }
+  if (!clicks) target.clicks = null;
   state.proposing = true;
   changed();
   try {
-    const { outline } = await api.proposeOutline(target.id, box);
+    const { outline } = await api.proposeOutline(target.id, box, clicks ?? { inside: [], outside: [] });
     // Whoever has drawn on meanwhile is not overruled.
     const waited = target === image() && !(quietly && target.marks.outline);
     if (waited && !outline) {
@@ -137,7 +154,7 @@ export async function proposeOutline({ quietly = false } = {}) {
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
       commit();
-      toast("Found an outline. Drag it where it is wrong.");
+      if (!clicks) toast("Found an outline. Click “In” or “Out” where it is wrong, or drag it.");
     }
   } catch (error) {
     if (!quietly) toast(error.message);
@@ -209,6 +226,17 @@ export function adjustGripper({ turn = 0, open = 0 }) {
   if (!marks().grasp) return;
   const gripper = gripperOf(marks().grasp);
   setGripper({ ...gripper, angle: gripper.angle + turn, width: gripper.width + open });
+  commit();
+}
+
+/** Turns the gripper about its middle to where it closes over the least of the part, and opens it so far. */
+export function turnToFit() {
+  const { grasp } = marks();
+  const part = region();
+  if (!grasp || !part) return;
+  const gripper = gripperOf(grasp);
+  const { angle, width } = placedAt(gripper.center, part, gripper.length);
+  setGripper({ ...gripper, angle, width });
   commit();
 }
 

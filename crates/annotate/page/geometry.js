@@ -67,9 +67,9 @@ const MIN_ROOM_PX = 2;
 export const withRoom = (width) => width + Math.max(2 * MIN_ROOM_PX, width * ROOM);
 
 /** The gripper at `point` turned so that it closes over the narrowest of the part, with the middle moved between its sides. */
-export function placedAt(point, part) {
+export function placedAt(point, part, jawLength = null) {
   const [x1, y1, x2, y2] = boundsOf(part);
-  const length = Math.max(Math.hypot(x2 - x1, y2 - y1) / 6, 12);
+  const length = jawLength ?? Math.max(Math.hypot(x2 - x1, y2 - y1) / 6, 12);
   let best = null;
   for (const angle of TURNS) {
     const sides = reach({ center: point, angle, length }, part);

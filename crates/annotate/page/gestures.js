@@ -1,7 +1,7 @@
 // What mouse, pen and fingers do on the photo.
 
 import { add, direction, dot, fittedWidth, gripperOf, norm, quarter, sub, times } from "./geometry.js";
-import { boxDrawn, closeOutline, commit, placeGripper, setBox, setGripper, setTool } from "./editing.js";
+import { boxDrawn, clickOutline, closeOutline, commit, placeGripper, setBox, setGripper, setTool } from "./editing.js";
 import { changed, image, isMarking, marks, region, size, state } from "./store.js";
 import { KNOB_PX } from "./overlay.js";
 import { pan, toPhoto, zoom } from "./view.js";
@@ -93,6 +93,19 @@ function addingPoint() {
       const [x, y] = toPhoto(at);
       points.push([Math.min(Math.max(x, 0), w), Math.min(Math.max(y, 0), h)]);
       changed();
+    },
+  };
+}
+
+/** A click that says what belongs to the part. */
+function clicking(isInside) {
+  return {
+    move() {},
+    end(clicked, at) {
+      if (!clicked) return;
+      const [w, h] = size();
+      const [x, y] = toPhoto(at);
+      if (x >= 0 && y >= 0 && x < w && y < h) clickOutline([x, y], isInside);
     },
   };
 }
@@ -191,6 +204,7 @@ function begin(event, at) {
   if (state.tool === "box") return drawingBox(from);
   if (state.tool === "grasp") return drawingGrasp(from);
   if (state.tool === "outline") return addingPoint();
+  if (state.tool === "in" || state.tool === "out") return clicking(state.tool === "in");
   Object.assign(state, { selected: null, vertex: null });
   changed();
   return panning();

@@ -1,6 +1,6 @@
 // Shortcuts. In fields, keys are for writing.
 
-import { adjustGripper, boxDrawn, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
+import { adjustGripper, boxDrawn, clickOutline, closeOutline, deleteSelected, nudge, placeGripper, proposeOutline, redo, setBox, setTool, undo } from "./editing.js";
 import { boundsOf } from "./geometry.js";
 import { holdSpace, letGo } from "./gestures.js";
 import { keepPicture, takePhoto, toggleCamera, toggleLive } from "./live.js";
@@ -30,6 +30,8 @@ function putInTheMiddle() {
     if (!part) return placeGripper(middle());
     const [x1, y1, x2, y2] = boundsOf(part);
     placeGripper([(x1 + x2) / 2, (y1 + y2) / 2]);
+  } else if (state.tool === "in" || state.tool === "out") {
+    clickOutline(middle(), state.tool === "in");
   } else return false;
   return true;
 }
@@ -53,6 +55,8 @@ const MARKING = {
   g: () => choose("grasp"),
   o: () => choose("outline"),
   p: () => proposeOutline(),
+  i: () => choose("in"),
+  u: () => choose("out"),
   "[": () => adjustGripper({ turn: -DEGREE }),
   "]": () => adjustGripper({ turn: DEGREE }),
   "{": () => adjustGripper({ turn: -15 * DEGREE }),

@@ -7,11 +7,14 @@ import { renderLive } from "./live.js";
 import { renderMarkPanel } from "./mark_panel.js";
 import { renderOverlay } from "./overlay.js";
 import { renderSamples } from "./samples.js";
+import { beat, sendKept } from "./server_end.js";
 import { onChange, state } from "./store.js";
 import { openImage, renderStrip, showCurrent, shownName } from "./strip.js";
 import { renderTabs } from "./tabs.js";
 import { renderTeach, watch } from "./teach.js";
+import { toast } from "./toast.js";
 import { renderTry } from "./try.js";
+import { renderVersions } from "./versions.js";
 import { fitOrPart } from "./keyboard.js";
 import { renderView, zoom } from "./view.js";
 
@@ -38,7 +41,7 @@ by("zoom-fit").addEventListener("click", fitOrPart);
 onChange(() => {
   // Until the server has answered there is nothing to show.
   if (!state.images.length && !state.camera) return;
-  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderTry, renderLive]) render();
+  for (const render of [renderTabs, renderView, renderOverlay, renderStrip, renderMarkPanel, renderSamples, renderTeach, renderVersions, renderTry, renderLive]) render();
   document.title = `${shownName()} · Teach a grasp`;
 });
 
@@ -50,6 +53,9 @@ try {
   Object.assign(state, {
     label: session.label,
     modelPath: session.model_path,
+    project: session.project,
+    models: session.models,
+    hasModel: session.models.some((model) => model.is_current),
     images: session.images.map(adopt),
     trialPictures: session.trial_pictures.map((trial) => ({ ...trial, detections: null })),
     teaching,
@@ -58,6 +64,9 @@ try {
   if (state.images.length) openImage(0);
   else showCurrent();
   watch();
+  session.notes.forEach(toast);
+  sendKept(state.project);
+  beat();
 } catch (error) {
   by("hint").textContent = error.message;
 }

@@ -1,9 +1,10 @@
 // The first step's panel: what to mark next, in numbers too, what looks odd, and what it is enough for.
 
 import { api } from "./api.js";
-import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, undo } from "./editing.js";
+import { clear, commit, deleteSelected, proposeOutline, redo, setGripper, setTool, swapEnds, turnToFit, undo } from "./editing.js";
 import { gripperOf } from "./geometry.js";
 import { changed, image, isMarking, marks, state } from "./store.js";
+import { removePhoto } from "./strip.js";
 import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
@@ -45,6 +46,8 @@ for (const kind of ["box", "grasp", "outline"]) {
 }
 by("propose").addEventListener("click", () => proposeOutline());
 by("turn-around").addEventListener("click", swapEnds);
+by("turn-to-fit").addEventListener("click", turnToFit);
+by("remove-photo").addEventListener("click", () => removePhoto(image()));
 by("undo").addEventListener("click", undo);
 by("redo").addEventListener("click", redo);
 by("delete").addEventListener("click", deleteSelected);
@@ -96,7 +99,9 @@ function renderTodo() {
     const draw = item.querySelector(`[data-draw]`);
     if (kind !== "outline") draw.textContent = marks()[kind] ? "Draw anew" : kind === "box" ? "Draw" : "Place";
   }
-  by("turn-around").hidden = !grasp;
+  by("turn-around").hidden = by("turn-to-fit").hidden = by("finger").hidden = !grasp;
+  by("remove-photo").hidden = state.images.length < 2;
+  for (const tool of ["in", "out"]) document.querySelector(`button[data-tool=${tool}]`).disabled = !box && !outline;
   by("grasp-numbers").hidden = !grasp;
   by("propose").disabled = state.proposing;
   by("propose").lastChild.textContent = state.proposing ? "Looking…" : outline ? "Find it anew" : "Find it";
@@ -123,6 +128,12 @@ function renderAdvice({ advice }) {
       const item = document.createElement("li");
       item.dataset.code = remark.code;
       item.append(remark.text);
+      if (remark.code === "gripper_along") {
+        const button = document.createElement("button");
+        button.textContent = "Turn to fit";
+        button.addEventListener("click", turnToFit);
+        item.append(button);
+      }
       if (remark.fix) {
         const button = document.createElement("button");
         button.textContent = remark.fix.box ? "Fit the box" : "Fit the jaws";
@@ -164,6 +175,8 @@ function hint() {
     const count = state.draft?.points?.length ?? 0;
     return count > 2 ? "Click the first point, or press Enter, to close" : "Click around the part, point by point";
   }
+  if (state.tool === "in") return "Click what belongs to the part and is left out";
+  if (state.tool === "out") return "Click what does not belong to the part";
   if (state.selected === "grasp" && grasp) return "Drag between the jaws to move, a jaw to open, an end to turn";
   if (state.selected === "outline" && outline) return "Drag a point, or the line to add one; Del deletes";
   return box || grasp || outline ? "" : "Choose Box to begin";

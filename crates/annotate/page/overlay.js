@@ -11,6 +11,8 @@ const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 /** Between the end of the line and its knob, so that knob and jaws are apart however small the gripper is. */
 export const KNOB_PX = 20;
 const JAW_PX = 12;
+/** Where nothing is accepted, the best refused one is shown if it scores so much. */
+export const MIN_SHOWN = 0.02;
 
 const CORNERS = { nw: [0, 1], n: [0.5, 1], ne: [2, 1], e: [2, 1.5], se: [2, 3], s: [0.5, 3], sw: [0, 3], w: [0, 1.5] };
 const SIDES = { nw: "top left", n: "top", ne: "top right", e: "right", se: "bottom right", s: "bottom", sw: "bottom left", w: "left" };
@@ -148,6 +150,26 @@ function drawDraft(draft) {
   });
 }
 
+/** What was said to belong to the part and what not. */
+function drawClicks(clicks) {
+  const parent = group("clicks", "clicks");
+  for (const kind of ["inside", "outside"]) {
+    (clicks?.[kind] ?? []).forEach((point, i) => {
+      const [cx, cy] = toScreen(point);
+      element(`clicks/${kind}${i}`, "circle", { class: kind, cx, cy, r: 5 }, parent);
+    });
+  }
+}
+
+/** Where picture and photo differ under a refused one: edges red, surface blue. */
+function drawDifferences(refusal, i) {
+  const parent = group(`differs${i}`, "differs");
+  for (const kind of ["surface", "edges"]) {
+    const d = refusal[kind].map((place) => { const [x, y] = toScreen(place); return `M${x.toFixed(1)} ${y.toFixed(1)}h.01`; }).join("");
+    if (d) element(`differs${i}/${kind}`, "path", { class: kind, d }, parent);
+  }
+}
+
 /** A grasp that a model found: drawn alike, but not to be taken hold of. */
 function drawDetection(detection, i) {
   const parent = group(`found${i}`, detection.is_accepted ? "" : "refused");
@@ -173,15 +195,19 @@ export function renderOverlay() {
     // What was found in an old picture is not there now.
     const inLive = state.live.isUsable ? state.live.detections : null;
     const detections = isLive() ? inLive : trialPicture()?.detections;
-    const shown = detections?.filter((d) => d.is_accepted || state.showRefused) ?? [];
+    const shown = detections?.filter((d, i) => d.is_accepted || state.showRefused || (!isLive() && i === 0 && d.score >= MIN_SHOWN)) ?? [];
     // Worst first, so that the best is on top.
-    shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => drawDetection(d, i));
+    shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => {
+      if (d.refusal) drawDifferences(d.refusal, i);
+      drawDetection(d, i);
+    });
   } else if (image() && !isLive()) {
     const correcting = state.tool === "select" && isMarking();
     const { box, outline, grasp } = marks();
     if (outline) drawOutline(outline, correcting);
     if (box) drawBox(box, correcting);
     if (grasp) drawGrasp(grasp, correcting);
+    if (state.tool === "in" || state.tool === "out") drawClicks(image().clicks);
     if (state.draft) drawDraft(state.draft);
   }
   for (const [key, found] of drawn) if (!next.has(key)) found.remove();

@@ -3,6 +3,9 @@
 export const state = {
   label: "",
   modelPath: "",
+  /** The folder, where the session is a project; versions of the model, oldest first. */
+  project: null,
+  models: [],
   /** Photos of the part: what the server tells of each, and `past`, `future` of its marks as JSON. */
   images: [],
   current: 0,

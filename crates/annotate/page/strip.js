@@ -2,6 +2,7 @@
 
 import { api } from "./api.js";
 import { nextTool } from "./editing.js";
+import { toast } from "./toast.js";
 import { changed, image, isLive, marks, state, trialPicture } from "./store.js";
 import { show } from "./view.js";
 
@@ -22,6 +23,26 @@ export function openTrialPicture(index) {
   Object.assign(state, { trial: index, tryingLive: false });
   showCurrent();
 }
+
+/** Takes a photo, or a picture to try, out of the session; its file stays. */
+async function remove(entries, target, ask) {
+  const index = entries.indexOf(target);
+  try {
+    const session = await ask(target.id);
+    entries.splice(index, 1);
+    for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
+    state.models = session.models;
+    toast(`${target.name} is taken out. Its file${entries === state.images ? " and its marks stay" : " stays"} in the folder.`);
+  } catch (error) {
+    toast(error.message);
+  }
+  state.current = Math.min(state.current, Math.max(state.images.length - 1, 0));
+  state.trial = Math.min(state.trial, Math.max(state.trialPictures.length - 1, 0));
+  showCurrent();
+}
+
+export const removePhoto = (target) => remove(state.images, target, api.removeImage);
+export const removeTrialPicture = (target) => remove(state.trialPictures, target, api.removeTrialPicture);
 
 /** What is on the stage: address, size and words; null where there is nothing yet. */
 function onStage() {
@@ -48,6 +69,7 @@ function words(entry, trying) {
     return (box || outline) && grasp ? "✓ marked" : box || outline || grasp ? "half marked" : "not marked";
   }
   if (entry.became !== null) return "✓ added";
+  if (entry.is_absent) return "✓ part not here";
   if (entry.detecting) return "looking…";
   if (!entry.detections) return "not tried";
   const count = entry.detections.filter((d) => d.is_accepted).length;

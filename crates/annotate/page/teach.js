@@ -3,6 +3,7 @@
 import { api } from "./api.js";
 import { changed, image, state } from "./store.js";
 import { toast } from "./toast.js";
+import { figuresText, gradeOf } from "./versions.js";
 
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
@@ -13,6 +14,23 @@ const MODELS = [
   ["B", "Box", "As C, but the gripper goes to the middle of the box. Half a minute."],
   ["D", "Mask", "Texture or outline of what a mask shows. About a minute; needs the outline."],
 ];
+
+/** How often a part looks the same in a whole turn, each with a part that does. */
+const SHAPES = [
+  ["1", "No", '<path d="M3 8h11l5 4-5 4H3z"/>'],
+  ["2", "Half a turn", '<path d="M3 9h5V5h8v4h5v6h-5v4H8v-4H3z" transform="translate(-1 0)"/>'],
+  ["3", "A third", '<path d="m12 3 9 16H3z"/>'],
+  ["4", "A quarter: square", '<path d="M4 4h16v16H4z"/>'],
+  ["6", "A sixth: bolt head", '<path d="M7.5 4h9L21 12l-4.5 8h-9L3 12z"/>'],
+  ["0", "Any turn: washer", '<path d="M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18m0 5a4 4 0 1 1 0 8 4 4 0 0 1 0-8" fill-rule="evenodd"/>'],
+];
+for (const [value, name, shape] of SHAPES) {
+  const item = document.createElement("label");
+  item.innerHTML = `<input type="radio" name="symmetry" value="${value}"><svg viewBox="0 0 24 24" aria-hidden="true">${shape}</svg><span></span>`;
+  item.lastChild.textContent = name;
+  item.firstChild.checked = value === "1";
+  by("symmetry-choice").append(item);
+}
 
 for (const [letter, name, says] of MODELS) {
   const item = document.createElement("label");
@@ -35,7 +53,7 @@ by("teach-form").addEventListener("submit", async (event) => {
     model: new FormData(by("teach-form")).get("model"),
     time_budget_secs: minutes === null ? null : minutes * 60,
     steps: number("steps"),
-    symmetry: Number(by("symmetry").value),
+    symmetry: Number(new FormData(by("teach-form")).get("symmetry")),
     seed: number("seed") ?? 1,
   };
   by("teach-error").hidden = true;
@@ -65,10 +83,16 @@ export async function watch() {
     changed();
   }
   if (state.teaching.status === "done") {
+    state.models = (await api.session().catch(() => state)).models;
     // What another model found is old news.
     for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
     changed();
   }
+}
+
+function negativesText() {
+  const count = state.trialPictures.filter((trial) => trial.is_absent).length;
+  return count ? ` and ${count === 1 ? "a picture" : `${count} pictures`} without it` : "";
 }
 
 function renderCurve(losses) {
@@ -98,11 +122,14 @@ function renderProgress(news) {
     : isRunning() ? "Getting ready…" : "";
   by("teach-form").hidden = isRunning();
   by("teach-stop").hidden = !isRunning();
+  // Before anything was found there is nothing to keep.
+  const keeps = news.validations.some(([, share]) => share >= 0.5);
+  by("teach-stop").textContent = keeps ? "Stop, and keep what there is" : "Stop; nothing is kept yet";
   by("teach-stop").disabled = news.status === "stopping";
   renderCurve(news.losses);
   by("validations").replaceChildren(...news.validations.map(([step, share]) => {
     const item = document.createElement("li");
-    item.textContent = `After ${step} steps it finds ${percent(share)} of new samples`;
+    item.textContent = `After ${step} steps the network alone finds ${percent(share)} of new samples`;
     return item;
   }));
 }
@@ -110,12 +137,11 @@ function renderProgress(news) {
 function renderOutcome(news) {
   const { summary } = news;
   const outcome = by("teach-outcome");
-  outcome.classList.toggle("good", news.status === "done");
+  const grade = news.status === "done" ? gradeOf(summary) : "";
+  for (const name of ["good", "doubtful", "poor"]) outcome.classList.toggle(name, name === grade);
   let text = "";
   if (news.status === "done" && summary) {
-    const off = summary.error_px === null ? "" : `, off by ${summary.error_px.toFixed(1)} px and ${summary.error_degrees.toFixed(1)}°`;
-    const found = summary.hit_rate === null ? "" : ` It finds ${percent(summary.hit_rate)} of new samples${off}.`;
-    text = `Taught “${summary.object}” in ${seconds(summary.seconds)}.${found} Written to ${news.written_to}`;
+    text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;
   by("teach-error").hidden = news.status !== "failed";
@@ -123,11 +149,21 @@ function renderOutcome(news) {
   by("go-try").hidden = news.status !== "done";
 }
 
+/** The model taught last is the one that is chosen. */
+let preselected = false;
+function preselect() {
+  const last = state.models.find((model) => model.is_current) ?? state.models.at(-1);
+  if (preselected || !last) return;
+  preselected = true;
+  document.querySelector(`[name=model][value=${last.summary.model}]`).checked = true;
+}
+
 export function renderTeach() {
+  preselect();
   const news = state.teaching;
   const marked = state.images.filter((i) => (i.marks.box || i.marks.outline) && i.marks.grasp);
   by("teach-from").textContent = marked.length
-    ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”.`
+    ? `From ${marked.length === 1 ? "the marked photo" : `${marked.length} marked photos`} of “${state.label}”${negativesText()}.`
     : `${state.images.length ? "Mark the part on a photo first" : "Take a photo of the part first and mark it"}: box and grasp.`;
   for (const input of document.querySelectorAll("[name=model]")) {
     const lacks = image()?.advice.models.find((m) => m.model === input.value).lacks ?? [];

@@ -3,14 +3,15 @@
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
 import { poseText } from "./live.js";
-import { openImage, openTrialPicture } from "./strip.js";
+import { MIN_SHOWN } from "./overlay.js";
+import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { changed, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
 import { toast } from "./toast.js";
 
 const by = (id) => document.getElementById(id);
 const stage = by("stage");
-const PICTURE = /\.(png|jpe?g)$/i;
+const PICTURE = /\.(png|jpe?g|webp|bmp|tiff?)$/i;
 const isTaught = () => Boolean(state.hasModel);
 
 by("add-pictures").addEventListener("click", () => by("picture-input").click());
@@ -43,9 +44,10 @@ async function addPictures(files) {
   problem.hidden = true;
   if (!pictures.length) {
     problem.hidden = false;
-    problem.textContent = "There was no PNG or JPEG picture among them.";
+    problem.textContent = "There was no picture among them that can be read: PNG, JPEG, WebP, BMP or TIFF.";
     return;
   }
+  if (pictures.length < files.length) toast(`${files.length - pictures.length} files are left out: no pictures that can be read.`);
   const first = state.trialPictures.length;
   for (const file of pictures) {
     try {
@@ -99,6 +101,18 @@ async function accept(marks, { correct }) {
   changed();
 }
 
+/** Says that the part is not in this picture, or takes that back. */
+async function setAbsent(target, absent) {
+  try {
+    Object.assign(target, await api.setAbsent(target.id, absent));
+    state.models = (await api.session()).models;
+    toast(absent ? "Kept as a picture without the part. Teach again to learn from it." : "It is no picture without the part any more.");
+  } catch (error) {
+    toast(error.message);
+  }
+  changed();
+}
+
 function button(text, action, classes = "") {
   const made = document.createElement("button");
   Object.assign(made, { textContent: text, className: classes });
@@ -114,14 +128,26 @@ function card(detection, i, shown) {
   const item = document.createElement("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
-  const title = text("h3", detection.is_accepted ? "Found the part" : "Refused: too unlike the demonstration");
+  const title = text("h3", detection.is_accepted ? "Found the part" : "Refused");
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
   if (shown.became === null) {
-    if (detection.is_accepted) row.append(button("Right: learn from it", () => accept(detection.marks, { correct: false })));
+    const words = detection.is_accepted ? "Right: learn from it" : "Right all the same: learn from it";
+    row.append(button(words, () => accept(detection.marks, { correct: false })));
     row.append(button("Correct it…", () => accept(detection.marks, { correct: true }), "plain"));
   }
   item.append(title);
+  const { refusal } = detection;
+  if (refusal) {
+    item.append(text("p", `Why: ${refusal.reason}.`, "why"));
+    if (refusal.remedy) item.append(text("p", `What would help: ${refusal.remedy}.`));
+    if (refusal.edges.length || refusal.surface.length) {
+      const legend = text("p", "On the picture: ", "legend");
+      if (refusal.edges.length) legend.append(text("span", "edges differ", "edges"), " ");
+      if (refusal.surface.length) legend.append(text("span", "surface differs", "surface"));
+      item.append(legend);
+    }
+  }
   if (detection.pose) item.append(text("p", poseText(detection.pose), "pose"));
   item.append(row);
   return item;
@@ -130,7 +156,7 @@ function card(detection, i, shown) {
 function renderFound() {
   const found = by("found");
   const shown = isLive() ? null : trialPicture();
-  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, state.showRefused, isTaught()]);
+  const wanted = JSON.stringify([shown?.id, shown?.detections, shown?.detecting, shown?.failed, shown?.became, shown?.is_absent, state.showRefused, isTaught()]);
   if (found.dataset.shown === wanted) return;
   found.dataset.shown = wanted;
   found.replaceChildren();
@@ -140,8 +166,12 @@ function renderFound() {
   const accepted = shown.detections.filter((d) => d.is_accepted);
   const refused = shown.detections.length - accepted.length;
   const time = `Looked for ${Math.max(1, Math.round(shown.seconds * 1000))} ms. `;
-  found.append(text("p", time + (accepted.length ? "" : "There is nothing to grasp.")));
-  const listed = shown.detections.filter((d) => d.is_accepted || state.showRefused);
+  found.append(text("p", time + (accepted.length ? "" : "Nothing is accepted.")));
+  if (shown.is_absent) {
+    found.append(text("p", "You said that the part is not here: the next teaching uses this picture.", "note"),
+      button("The part is here after all", () => setAbsent(shown, false), "plain"));
+  }
+  const listed = shown.detections.filter((d) => d.is_accepted || isShown(d, shown));
   listed.forEach((detection, i) => found.append(card(detection, i, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
@@ -149,17 +179,28 @@ function renderFound() {
       openTab("mark");
       openImage(index);
     }), button("Teach again", () => openTab("teach"), "primary"));
-  } else if (!accepted.length) {
+  } else if (!shown.is_absent) {
+    found.append(button("The part is not here", () => setAbsent(shown, true), accepted.length ? "" : "plain"));
+  }
+  if (shown.became === null && !shown.is_absent && !accepted.length) {
     const nothing = { box: null, grasp: null, outline: null };
     found.append(text("p", "If the part is there, mark it: it then learns from this picture, too."), button("Mark it by hand…", () => accept(nothing, { correct: true })));
   }
-  if (refused) {
-    const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${refused})`;
+  found.append(button("Take this picture out", () => removeTrialPicture(shown), "plain"));
+  const more = shown.detections.filter((d) => !d.is_accepted && (state.showRefused || !isShown(d, shown))).length;
+  if (refused && (more || state.showRefused)) {
+    const words = state.showRefused ? "Hide what was refused" : `Show what was refused (${more})`;
     found.append(button(words, () => {
       state.showRefused = !state.showRefused;
       changed();
     }, "plain"));
   }
+}
+
+/** Refused ones that are shown unasked: the best one, where nothing is accepted, that resembles the part at all. */
+export function isShown(detection, { detections }) {
+  if (state.showRefused) return true;
+  return detection === detections[0] && detection.score >= MIN_SHOWN;
 }
 
 export function renderTry() {

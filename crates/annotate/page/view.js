@@ -56,9 +56,6 @@ export function showBox([x1, y1, x2, y2]) {
   move(scale, clientWidth / 2 - (scale * (x1 + x2)) / 2, clientHeight / 2 - (scale * (y1 + y2)) / 2);
 }
 
-/** Whether the stage is so small that a part on the whole photo is no target for a finger. */
-export const isSmall = () => stage.clientWidth < 600;
-
 /** Zooms by `factor` so that the place under `at` (on the screen) stays. */
 export function zoom(factor, at = [stage.clientWidth / 2, stage.clientHeight / 2]) {
   const [px, py] = toPhoto(at);

@@ -96,13 +96,21 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
     if let Some(bbox) = marks.bounding_box() {
         let around = outline.bounds();
         if around.iou(&bbox) < MIN_BOX_AGREEMENT {
-            let text = if around.intersection(&bbox) == 0.0 {
-                "The outline lies outside the box. One of them is on the wrong thing."
+            let is_inside = around.intersection(&bbox) >= 0.99 * around.area();
+            let (text, fix) = if around.intersection(&bbox) == 0.0 {
+                ("The outline lies outside the box. One of them is on the wrong thing.", None)
+            } else if is_inside {
+                // Which of the two is wrong nobody knows: a right box is not shrunk to an outline that misses some of the part.
+                (
+                    "The outline leaves much of the box empty. Click “In” where the part is left out, or draw the box closer.",
+                    None,
+                )
             } else {
-                "Outline and box do not go together: the box should just hold the outline."
+                let both =
+                    [around.x1.min(bbox.x1), around.y1.min(bbox.y1), around.x2.max(bbox.x2), around.y2.max(bbox.y2)];
+                ("The outline reaches out of the box.", Some(Fix::Box(both)))
             };
-            let fix = Fix::Box([around.x1, around.y1, around.x2, around.y2]);
-            remarks.push(remark("outline_misses_box", text, Some(fix)));
+            remarks.push(remark("outline_misses_box", text, fix));
         }
     }
 }
@@ -225,11 +233,16 @@ mod tests {
     }
 
     #[test]
-    fn an_outline_that_misses_the_box_is_told_with_the_box_that_fits() {
-        let apart = Marks { bbox: Some([400.0, 300.0, 500.0, 400.0]), ..good() };
-        let advice = advise(&apart, SIZE);
-        assert_eq!(advice.remarks[0].code, "outline_misses_box");
-        assert_eq!(advice.remarks[0].fix, Some(Fix::Box([100.0, 100.0, 300.0, 160.0])));
+    fn an_outline_that_misses_the_box_is_told_and_a_box_is_never_shrunk() {
+        let remark = |bbox: [f64; 4]| advise(&Marks { bbox: Some(bbox), ..good() }, SIZE).remarks.remove(0);
+        let apart = remark([400.0, 300.0, 500.0, 400.0]);
+        assert_eq!((apart.code, apart.fix), ("outline_misses_box", None));
+        // An outline of half of the part, in the right box.
+        let half = remark([100.0, 100.0, 500.0, 160.0]);
+        assert_eq!((half.code, half.fix), ("outline_misses_box", None));
+        assert!(half.text.contains("Click “In”"), "{half:?}");
+        let beyond = remark([150.0, 100.0, 320.0, 160.0]);
+        assert_eq!(beyond.fix, Some(Fix::Box([100.0, 100.0, 320.0, 160.0])));
     }
 
     #[test]

@@ -41,6 +41,15 @@ pub enum Error {
     /// No picture of that number.
     #[error("expected a picture numbered below {count}, found {id}")]
     NoSuchPicture { id: usize, count: usize },
+    /// No version of that number.
+    #[error("expected a version of the model numbered below {count}, found {id}")]
+    NoSuchVersion { id: usize, count: usize },
+    /// A project's file that is none.
+    #[error("{}: expected a project's file as `sdg annotate` writes it, found {found}", path.display())]
+    Project { path: PathBuf, found: String },
+    /// A project without a photo.
+    #[error("{}: expected a photo of the part in this folder (PNG, JPEG, WebP, BMP, TIFF), or a camera (--from), found neither", path.display())]
+    EmptyProject { path: PathBuf },
     /// More pictures than a session keeps.
     #[error("expected at most {most} pictures to try, found one more")]
     TooManyPictures { most: usize },

@@ -18,6 +18,16 @@ pub struct Guard {
     port: u16,
 }
 
+/// A token that nobody can guess: 32 hexadecimal digits.
+///
+/// # Errors
+/// No random bytes from the operating system.
+pub fn new_token() -> Result<String> {
+    let mut bytes = [0; TOKEN_BYTES];
+    getrandom::fill(&mut bytes).map_err(Error::Random)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
 /// Why a request is turned away.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -43,14 +53,15 @@ impl Refusal {
 }
 
 impl Guard {
-    /// A guard with a new token.
+    /// A guard with this token, or with a new one.
     ///
     /// # Errors
     /// No random bytes from the operating system.
-    pub fn new(port: u16) -> Result<Self> {
-        let mut bytes = [0; TOKEN_BYTES];
-        getrandom::fill(&mut bytes).map_err(Error::Random)?;
-        Ok(Self { token: bytes.iter().map(|byte| format!("{byte:02x}")).collect(), port })
+    pub fn new(port: u16, token: Option<&str>) -> Result<Self> {
+        if let Some(token) = token {
+            return Ok(Self { token: token.to_owned(), port });
+        }
+        Ok(Self { token: new_token()?, port })
     }
 
     /// The address that opens the page.
@@ -150,6 +161,7 @@ mod tests {
 
     #[test]
     fn tokens_differ() {
-        assert_ne!(Guard::new(1).unwrap().token, Guard::new(1).unwrap().token);
+        assert_ne!(Guard::new(1, None).unwrap().token, Guard::new(1, None).unwrap().token);
+        assert_eq!(Guard::new(1, Some("kept")).unwrap().token, "kept");
     }
 }

@@ -33,11 +33,13 @@ mod guard;
 mod http;
 mod live;
 mod marks;
+mod model_versions;
 mod names;
 mod outline;
 mod page;
 mod picture;
 mod preview;
+mod project_file;
 mod routes;
 mod server;
 mod session;
@@ -49,11 +51,15 @@ mod views;
 pub use advice::{Advice, Fix, ModelAdvice, Remark};
 pub use error::{Error, Result, TeacherError};
 pub use gripper::{Gripper, Reach};
+pub use guard::new_token;
 pub use live::{Live, LiveFault, LiveFaultKind, LiveFrame, LiveOptions, LivePictures};
 pub use marks::{GraspMarks, Marks};
 pub use sdg_demonstration::ModelKind;
 pub use server::Server;
 pub use session::{Session, SessionOptions};
-pub use teacher::{FoundGrasp, GraspPose, GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+pub use teacher::{
+    Figures, FoundGrasp, GraspPose, GraspTeacher, NegativesRefused, Refusal, TaughtModel, TaughtSummary, TeachRequest,
+    TeachingMaterial, TeachingStep,
+};
 pub use teaching::{News, Status};
-pub use views::{ImageView, Saved, SessionView, TrialPictureView};
+pub use views::{ComparedPicture, ImageView, ModelView, Saved, SessionView, TrialPictureView};

@@ -5,7 +5,6 @@ use sdg_demonstration::{Annotation, CocoFile, ImageFacts};
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use serde::{Deserialize, Serialize};
 
-use crate::gripper::Gripper;
 use crate::teacher::FoundGrasp;
 
 /// What is marked on one picture so far, in its pixels: x right, y down, centre of the first pixel (0.5, 0.5).
@@ -43,11 +42,11 @@ impl GraspMarks {
 }
 
 impl Marks {
-    /// The marks of an annotation. A grasp without jaw width (other tools know none) gets jaws that just fit.
+    /// The marks of an annotation. A grasp without jaw width (other tools know none) gets the one that is taught without it.
     pub fn of(annotation: &Annotation) -> Self {
         let BoundingBox { x1, y1, x2, y2 } = annotation.bbox;
         let grasp = annotation.grasp.map(|line| {
-            let fitting = || Gripper { line, jaw_width: 0.0 }.min_jaw_width(&annotation.region());
+            let fitting = || line.opening_across(&annotation.region());
             GraspMarks {
                 start: line.start.into(),
                 end: line.end.into(),
@@ -157,11 +156,25 @@ mod tests {
     }
 
     #[test]
-    fn a_line_of_another_tool_gets_jaws_that_fit() {
+    fn a_line_of_another_tool_gets_the_jaws_that_are_taught() {
         let text = marks().to_coco("bar", &IMAGE).unwrap();
         let mut read = Annotation::read(text.as_bytes(), &IMAGE).unwrap().remove(0);
         read.jaw_width = None;
         assert!((Marks::of(&read).grasp.unwrap().jaw_width - 40.0).abs() < 1e-9);
+        // A lug beside the middle, under the jaws' length: it is not where the opening is measured.
+        let lugged = [
+            [10.0, 20.0],
+            [70.0, 20.0],
+            [70.0, 0.0],
+            [75.0, 0.0],
+            [75.0, 20.0],
+            [110.0, 20.0],
+            [110.0, 60.0],
+            [10.0, 60.0],
+        ];
+        read.outline = Some(Polygon { vertices: lugged.map(Point2::from).to_vec() });
+        let opening = Marks::of(&read).grasp.unwrap().jaw_width;
+        assert!((opening - 40.0).abs() < 1e-9, "{opening}");
     }
 
     #[test]
@@ -191,6 +204,7 @@ mod tests {
             grasp: PlanarGrasp { x: 10.0, y: 40.0, angle: Angle::ZERO, width: 30.0 },
             line_length: 40.0,
             pose: None,
+            refusal: None,
         };
         let marks = Marks::of_found(&found, [200, 100]);
         let line = marks.grasp.unwrap().line();

@@ -20,6 +20,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("main.js", SCRIPT, include_str!("../page/main.js")),
     ("mark_panel.js", SCRIPT, include_str!("../page/mark_panel.js")),
     ("overlay.js", SCRIPT, include_str!("../page/overlay.js")),
+    ("server_end.js", SCRIPT, include_str!("../page/server_end.js")),
     ("samples.js", SCRIPT, include_str!("../page/samples.js")),
     ("store.js", SCRIPT, include_str!("../page/store.js")),
     ("strip.js", SCRIPT, include_str!("../page/strip.js")),
@@ -27,6 +28,7 @@ const FILES: &[(&str, &str, &str)] = &[
     ("teach.js", SCRIPT, include_str!("../page/teach.js")),
     ("toast.js", SCRIPT, include_str!("../page/toast.js")),
     ("try.js", SCRIPT, include_str!("../page/try.js")),
+    ("versions.js", SCRIPT, include_str!("../page/versions.js")),
     ("view.js", SCRIPT, include_str!("../page/view.js")),
 ];
 
@@ -39,8 +41,8 @@ pub fn file(name: &str) -> Option<(&'static str, &'static str)> {
 mod tests {
     use super::*;
 
-    /// Issue 6: the page stays under 200 KB.
-    const MAX_BYTES: usize = 200_000;
+    /// Issue 19: the page stays under 250 KB.
+    const MAX_BYTES: usize = 250_000;
 
     #[test]
     fn the_page_is_small() {

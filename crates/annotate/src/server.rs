@@ -42,7 +42,7 @@ impl Server {
         let failed = |source| Error::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
-        Ok(Self { listener, guard: Guard::new(port)?, session: Arc::new(session), port })
+        Ok(Self { listener, guard: Guard::new(port, session.token())?, session: Arc::new(session), port })
     }
 
     /// The address that opens the page; it holds the token, so it gives access.

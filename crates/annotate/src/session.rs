@@ -2,24 +2,25 @@
 //!
 //! Requests name pictures by their index in a list made here. No path comes from the page.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sdg_demonstration::{Demonstration, ModelKind};
 use tempfile::TempDir;
 
 use crate::advice::advise;
-use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
+use crate::model_versions::{ModelVersions, Version, now_secs};
 use crate::names::{file_name, free_name, free_numbered, safe_stem};
 use crate::picture::{Picture, pictures_in, png};
 use crate::preview::{Previews, SampleKey};
+use crate::project_file::{ProjectFile, TRIED_FOLDER};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
-use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest};
+use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
-use crate::views::{ImageView, Saved, SessionView, TrialPictureView};
+use crate::views::{ComparedPicture, ImageView, Saved, SessionView, TrialPictureView};
 
 /// Pictures to try that one session keeps.
 const MAX_TRIAL_PICTURES: usize = 500;
@@ -37,6 +38,14 @@ pub struct SessionOptions {
     pub model_path: Option<PathBuf>,
     /// A camera to take pictures with; with one, `images` may be empty.
     pub live: Option<LiveOptions>,
+    /// The folder of a project, which is opened where it was left; `images` are then empty.
+    pub project: Option<PathBuf>,
+    /// The key to the page, for a server that is to be found again by the same page; a new one without it.
+    pub token: Option<String>,
+}
+
+fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// One session.
@@ -50,9 +59,12 @@ pub struct Session {
     /// What is written for the person at the page stands beside this: the first picture, or the first photo to be taken.
     home: PathBuf,
     live: Option<LiveDesk>,
-    /// Pictures that came from the page, until one is accepted.
-    uploads: TempDir,
-    state: Mutex<State>,
+    /// Pictures that came from the page: in the project, or, without one, until one is accepted.
+    uploads: PathBuf,
+    _temporary: Option<TempDir>,
+    state: Arc<Mutex<State>>,
+    token: Option<String>,
+    notes: Vec<String>,
 }
 
 impl Session {
@@ -61,51 +73,106 @@ impl Session {
     /// # Errors
     /// Neither picture nor camera, a picture that cannot be read, or marks that belong to another.
     pub fn open(options: &SessionOptions, teacher: Arc<dyn GraspTeacher>) -> Result<Self> {
-        let first = options.images.first().map(|(path, _)| path);
-        let home = first.or(options.live.as_ref().map(|live| &live.photo_path)).ok_or(Error::NoImage)?.clone();
-        let mut label = None;
-        let mut images = Vec::new();
-        for (path, annotation) in &options.images {
-            let picture = Picture::open(path)?;
-            let opened = annotation_file::open(&picture.path, annotation.as_deref(), picture.size)?;
-            // Where they stand, not where changes will go: that file may not be there yet.
-            let found = opened.found.filter(|_| opened.marks.has_object());
-            let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
-            label = label.or(opened.label);
-            images.push(MarkedPicture { picture, marks: opened.marks, file: opened.path, note: opened.note, saved });
-        }
+        let (project, mut notes) = match &options.project {
+            Some(folder) => ProjectFile::open(folder)?,
+            None => (ProjectFile::default(), Vec::new()),
+        };
+        notes.iter_mut().for_each(|gone| *gone += " is not there any more.");
+        let mut photos = options.images.clone();
+        let folder = options.project.as_deref();
+        photos.extend(folder.iter().flat_map(|folder| project.photos.iter().map(|name| (folder.join(name), None))));
+        let first = photos.first().map(|(path, _)| path.clone());
+        let of_camera = || options.live.as_ref().map(|live| live.photo_path.clone());
+        let home = match folder {
+            Some(folder) if first.is_none() && options.live.is_none() => {
+                return Err(Error::EmptyProject { path: folder.to_owned() });
+            }
+            Some(folder) => folder.join("photo.png"),
+            None => first.or_else(of_camera).ok_or(Error::NoImage)?,
+        };
+        let mut label = project.label.clone();
+        let images = photos
+            .iter()
+            .map(|(path, annotation)| {
+                let (image, named) = MarkedPicture::open(path, annotation.as_deref())?;
+                label = label.take().or(named);
+                Ok(image)
+            })
+            .collect::<Result<Vec<_>>>()?;
         let mut trial_pictures = Vec::new();
+        for tried in &project.tried {
+            let path = folder.unwrap_or(Path::new("")).join(&tried.file);
+            let picture = Picture { name: tried.name.clone(), ..Picture::open(&path)? };
+            let became = tried.became.as_ref().and_then(|name| project.photos.iter().position(|photo| photo == name));
+            trial_pictures.push(TrialPicture { became, is_absent: tried.absent, ..TrialPicture::new(picture, false) });
+        }
         for path in &options.trial_pictures {
             let paths = if path.is_dir() { pictures_in(path)? } else { vec![path.clone()] };
             for path in paths {
-                let taken = images.iter().any(|image| image.picture.path == path);
+                let taken = images.iter().any(|image| image.picture.path == path)
+                    || trial_pictures.iter().any(|trial| trial.picture.path == path);
                 if !taken {
-                    trial_pictures.push(TrialPicture { picture: Picture::open(&path)?, uploaded: false, became: None });
+                    trial_pictures.push(TrialPicture::new(Picture::open(&path)?, false));
                 }
             }
         }
         if trial_pictures.len() > MAX_TRIAL_PICTURES {
             return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
         }
-        let uploads = tempfile::Builder::new()
-            .prefix("sdg-annotate-")
-            .tempdir()
-            .map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?;
-        let state = State { label: label.unwrap_or_else(|| "part".to_owned()), images, trial_pictures };
+        let temporary = match folder {
+            Some(_) => None,
+            None => {
+                let made = tempfile::Builder::new().prefix("sdg-annotate-").tempdir();
+                Some(made.map_err(Error::file(&std::env::temp_dir(), "cannot make a folder in it"))?)
+            }
+        };
+        let uploads = temporary.as_ref().map_or_else(|| home.with_file_name(TRIED_FOLDER), |dir| dir.path().to_owned());
+        let models = ModelVersions {
+            folder: options.model_path.as_ref().unwrap_or(&home).with_file_name("models"),
+            versions: project.models,
+            current: project.current_model,
+        };
+        let teaching = Arc::new(Teaching::default());
+        if let Some(id) = models.current {
+            let opened = models
+                .read(id)
+                .and_then(|bytes| teacher.open(&bytes, &models.versions[id].summary).map_err(Error::Teacher));
+            match opened {
+                Ok(model) => teaching.set_model(Arc::from(model)),
+                Err(error) => notes.push(format!("The model cannot be read: {error}")),
+            }
+        }
+        let state = State {
+            label: label.unwrap_or_else(|| "part".to_owned()),
+            images,
+            trial_pictures,
+            models,
+            project: options.project.clone(),
+            removed_earlier: project.removed,
+        };
+        state.save_project()?;
         Ok(Self {
             teacher,
-            teaching: Arc::default(),
+            teaching,
             previews: Previews::default(),
             model_path: options.model_path.clone(),
             home,
             live: options.live.clone().map(LiveDesk::new),
             uploads,
-            state: Mutex::new(state),
+            _temporary: temporary,
+            state: Arc::new(Mutex::new(state)),
+            token: options.token.clone(),
+            notes,
         })
     }
 
+    /// The key that the page is to have, where one was given.
+    pub(crate) fn token(&self) -> Option<&str> {
+        self.token.as_deref()
+    }
+
     fn state(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        locked(&self.state)
     }
 
     /// All that the page starts from.
@@ -113,9 +180,12 @@ impl Session {
         let state = self.state();
         SessionView {
             label: state.label.clone(),
-            images: (0..state.images.len()).map(|id| state.image_view(id)).collect(),
-            trial_pictures: (0..state.trial_pictures.len()).map(|id| state.trial_picture_view(id)).collect(),
+            images: state.image_ids().map(|id| state.image_view(id)).collect(),
+            trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),
             model_path: self.model_path(&state).display().to_string(),
+            models: state.model_views(),
+            project: state.project.as_ref().map(|folder| folder.display().to_string()),
+            notes: self.notes.clone(),
             camera: self.live.as_ref().map(|desk| desk.options.address.clone()),
         }
     }
@@ -155,7 +225,8 @@ impl Session {
         }
         let mut state = self.state();
         label.clone_into(&mut state.label);
-        for id in 0..state.images.len() {
+        state.save_project()?;
+        for id in state.image_ids().collect::<Vec<_>>() {
             if matches!(state.images[id].saved, Saved::Written { .. }) {
                 state.save(id);
             }
@@ -200,28 +271,106 @@ impl Session {
         // The name is for people; the file's own is ours.
         let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
         let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
-        let file = tempfile::Builder::new()
-            .suffix(&format!(".{extension}"))
-            .tempfile_in(self.uploads.path())
-            .map_err(Error::file(self.uploads.path(), "cannot make a file in it"))?;
-        std::fs::write(file.path(), bytes).map_err(Error::file(file.path(), "cannot write"))?;
-        let picture = Picture::open(file.path()).map_err(|error| match error {
-            Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
-            other => other,
-        })?;
-        let kept = file.into_temp_path().keep().map_err(|error| Error::File {
-            path: self.uploads.path().to_owned(),
-            action: "cannot keep a file in it",
-            source: error.error,
-        })?;
+        std::fs::create_dir_all(&self.uploads).map_err(Error::file(&self.uploads, "cannot make this folder"))?;
+        // Held until the picture is written: the next one finds its name taken.
         let mut state = self.state();
-        state.trial_pictures.push(TrialPicture {
-            picture: Picture { path: kept, name: shown, ..picture },
-            uploaded: true,
-            became: None,
-        });
+        let path = free_name(&self.uploads.join("picture"), &shown, extension);
+        sdg_report::write_atomically(&path, bytes)?;
+        let picture = Picture::open(&path).map_err(|error| {
+            // What is no picture is not kept.
+            let _ = std::fs::remove_file(&path);
+            match error {
+                Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
+                other => other,
+            }
+        })?;
+        state.trial_pictures.push(TrialPicture::new(Picture { name: shown, ..picture }, true));
+        state.save_project()?;
         let id = state.trial_pictures.len() - 1;
         Ok(state.trial_picture_view(id))
+    }
+
+    /// Says that the part is not in a tried picture, which then is a negative of the next teaching; or takes that back.
+    ///
+    /// # Errors
+    /// No such picture, one that is a demonstration, a project that cannot be written.
+    pub fn set_absent(&self, trial_id: usize, is_absent: bool) -> Result<TrialPictureView> {
+        let mut state = self.state();
+        if state.trial_picture(trial_id)?.became.is_some() {
+            return Err(Error::Busy("this picture is a demonstration: remove that first"));
+        }
+        state.trial_pictures[trial_id].is_absent = is_absent;
+        state.save_project()?;
+        Ok(state.trial_picture_view(trial_id))
+    }
+
+    /// Takes a photo out of the session. Its file and its marks stay where they are.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn remove_image(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        state.image(id)?;
+        state.images[id].is_removed = true;
+        state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|trial| trial.became = None);
+        state.save_project()
+    }
+
+    /// Takes a picture to try out of the session. Its file stays.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn remove_trial_picture(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        state.trial_picture(id)?;
+        state.trial_pictures[id].is_removed = true;
+        state.save_project()
+    }
+
+    /// Uses a version of the model: for the pictures to try, and as the file under the model's own name.
+    ///
+    /// # Errors
+    /// No such version, one that cannot be read, a teaching that goes on.
+    pub fn use_version(&self, id: usize) -> Result<()> {
+        self.teaching.check_idle()?;
+        let mut state = self.state();
+        let path = self.model_path(&state);
+        let summary = state.models.get(id)?.summary.clone();
+        let model = self.teacher.open(&state.models.read(id)?, &summary).map_err(Error::Teacher)?;
+        state.models.use_version(&path, id)?;
+        self.teaching.set_model(Arc::from(model));
+        state.save_project()
+    }
+
+    /// What two versions of the model find in every picture to try.
+    ///
+    /// # Errors
+    /// No such version, files that cannot be read.
+    pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
+        let (models, pictures) = {
+            let state = self.state();
+            let read = |id: usize| Ok::<_, Error>((state.models.read(id)?, state.models.get(id)?.summary.clone()));
+            let pictures: Vec<_> = state.trial_ids().map(|id| (id, state.trial_pictures[id].clone())).collect();
+            ([read(one)?, read(other)?], pictures)
+        };
+        let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
+        let models = [one?, other?];
+        let compared = pictures.into_iter().map(|(id, trial)| {
+            let pixels = trial.picture.pixels()?;
+            let found = |model: &dyn TaughtModel| {
+                let found = model.detect(&pixels).map_err(Error::Teacher)?;
+                let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
+                Ok::<_, Error>((found.iter().filter(|one| one.is_accepted).count(), best))
+            };
+            let is_there = if trial.is_absent { Some(false) } else { trial.became.map(|_| true) };
+            Ok(ComparedPicture {
+                id,
+                name: trial.picture.name,
+                is_there,
+                found: [found(&*models[0])?, found(&*models[1])?],
+            })
+        });
+        compared.collect()
     }
 
     /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
@@ -235,8 +384,9 @@ impl Session {
         if trial.became.is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
+        let is_in_project = state.project.is_some();
         let mut picture = trial.picture;
-        if trial.uploaded {
+        if trial.uploaded || (is_in_project && picture.path.parent() == Some(&self.uploads)) {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
@@ -246,7 +396,9 @@ impl Session {
         }
         let id = state.add_image(picture, marks)?;
         state.trial_pictures[trial_id].became = Some(id);
+        state.trial_pictures[trial_id].is_absent = false;
         state.save(id);
+        state.save_project()?;
         Ok(state.image_view(id))
     }
 
@@ -280,6 +432,7 @@ impl Session {
         sdg_report::write_atomically(&path, &bytes)?;
         let picture = Picture { name: file_name(&path), path, size: [frame.width(), frame.height()] };
         let id = state.add_image(picture, Marks::default())?;
+        state.save_project()?;
         Ok(state.image_view(id))
     }
 
@@ -325,8 +478,30 @@ impl Session {
         request.check()?;
         self.teaching.check_idle()?;
         let demonstrations = self.demonstrations(request.model)?;
-        let model_path = self.model_path(&self.state());
-        self.teaching.start(Arc::clone(&self.teacher), request, demonstrations, model_path)
+        let (model_path, negatives, fingerprint) = {
+            let state = self.state();
+            (self.model_path(&state), state.negatives().cloned().collect::<Vec<_>>(), state.material())
+        };
+        let negatives = negatives.iter().map(Picture::pixels).collect::<Result<Vec<_>>>()?;
+        let [photos, num_negatives] = [demonstrations.len(), negatives.len()];
+        let material = TeachingMaterial { demonstrations, negatives };
+        let state = Arc::clone(&self.state);
+        let keep = move |model: &dyn TaughtModel| {
+            let bytes = model.to_bytes().map_err(Error::Teacher)?;
+            let version = Version {
+                file: String::new(),
+                taught_secs: now_secs(),
+                summary: model.summary(),
+                photos,
+                negatives: num_negatives,
+                material: fingerprint,
+            };
+            let mut state = locked(&state);
+            state.models.keep(&model_path, &bytes, version)?;
+            state.save_project()?;
+            Ok(model_path)
+        };
+        self.teaching.start(Arc::clone(&self.teacher), request, material, keep)
     }
 
     /// State of the teaching, for the page.
@@ -354,7 +529,7 @@ impl Session {
     pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
         let (label, marked) = {
             let state = self.state();
-            (state.label.clone(), state.images.clone())
+            (state.label.clone(), state.image_ids().map(|id| state.images[id].clone()).collect::<Vec<_>>())
         };
         let begun: Vec<_> = marked.iter().filter(|image| image.marks != Marks::default()).collect();
         if begun.is_empty() {

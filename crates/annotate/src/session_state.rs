@@ -1,6 +1,7 @@
 //! What a session holds: the object's name, its pictures with their marks, and the pictures to try.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
 
@@ -8,15 +9,23 @@ use crate::advice::advise;
 use crate::annotation_file;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
+use crate::model_versions::{ModelVersions, Version, fingerprint};
 use crate::names::file_name;
 use crate::picture::Picture;
-use crate::views::{ImageView, Saved, TrialPictureView};
+use crate::project_file::{ProjectFile, Tried, relative};
+use crate::views::{ImageView, ModelView, Saved, TrialPictureView};
 
-/// The present label, the pictures of the object and the pictures to try, each numbered by its place.
+/// The present label, the pictures of the object and the pictures to try, each numbered by its place; what is removed keeps its
+/// number. The versions of the model.
 pub struct State {
     pub label: String,
     pub images: Vec<MarkedPicture>,
     pub trial_pictures: Vec<TrialPicture>,
+    pub models: ModelVersions,
+    /// The folder of a session that is a project.
+    pub project: Option<PathBuf>,
+    /// Names of pictures of that folder that were removed earlier.
+    pub removed_earlier: BTreeSet<String>,
 }
 
 /// A picture of the object and what is marked on it.
@@ -27,6 +36,7 @@ pub struct MarkedPicture {
     pub file: PathBuf,
     pub note: Option<String>,
     pub saved: Saved,
+    pub is_removed: bool,
 }
 
 /// A picture that a taught model is tried on.
@@ -36,22 +46,34 @@ pub struct TrialPicture {
     pub uploaded: bool,
     /// The number of the marked picture that it became.
     pub became: Option<usize>,
+    /// The person said that the part is not there.
+    pub is_absent: bool,
+    pub is_removed: bool,
+}
+
+impl TrialPicture {
+    /// One that nothing was said of.
+    pub fn new(picture: Picture, uploaded: bool) -> Self {
+        Self { picture, uploaded, became: None, is_absent: false, is_removed: false }
+    }
 }
 
 impl State {
     pub fn image(&self, id: usize) -> Result<&MarkedPicture> {
-        self.images.get(id).ok_or(Error::NoSuchPicture { id, count: self.images.len() })
+        let there = self.images.get(id).filter(|image| !image.is_removed);
+        there.ok_or(Error::NoSuchPicture { id, count: self.images.len() })
     }
 
     pub fn trial_picture(&self, id: usize) -> Result<&TrialPicture> {
-        self.trial_pictures.get(id).ok_or(Error::NoSuchPicture { id, count: self.trial_pictures.len() })
+        let there = self.trial_pictures.get(id).filter(|trial| !trial.is_removed);
+        there.ok_or(Error::NoSuchPicture { id, count: self.trial_pictures.len() })
     }
 
     /// Adds a picture with marks that are not saved yet, and says its number.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let opened = annotation_file::open(&picture.path, None, picture.size)?;
         let (file, note) = (opened.path, opened.note);
-        self.images.push(MarkedPicture { picture, marks, file, note, saved: Saved::Nothing });
+        self.images.push(MarkedPicture { picture, marks, file, note, saved: Saved::Nothing, is_removed: false });
         Ok(self.images.len() - 1)
     }
 
@@ -73,13 +95,102 @@ impl State {
     }
 
     pub fn trial_picture_view(&self, id: usize) -> TrialPictureView {
-        let TrialPicture { picture, became, .. } = &self.trial_pictures[id];
+        let TrialPicture { picture, became, is_absent, .. } = &self.trial_pictures[id];
         let Picture { name, size: [width, height], .. } = picture.clone();
-        TrialPictureView { id, name, width, height, became: *became }
+        TrialPictureView { id, name, width, height, became: *became, is_absent: *is_absent }
+    }
+
+    /// Numbers of the pictures that are there.
+    pub fn image_ids(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.images.len()).filter(|&id| !self.images[id].is_removed)
+    }
+
+    /// Likewise of those to try.
+    pub fn trial_ids(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.trial_pictures.len()).filter(|&id| !self.trial_pictures[id].is_removed)
+    }
+
+    /// Pictures that the part is not in.
+    pub fn negatives(&self) -> impl Iterator<Item = &Picture> + '_ {
+        self.trial_ids().map(|id| &self.trial_pictures[id]).filter(|trial| trial.is_absent).map(|trial| &trial.picture)
+    }
+
+    /// [`fingerprint`] of what a teaching would start from now.
+    pub fn material(&self) -> String {
+        let marked = self.image_ids().map(|id| &self.images[id]).filter(|image| image.marks != Marks::default());
+        let marked: Vec<_> = marked.map(|image| (&image.picture.path, &image.marks)).collect();
+        let negatives: Vec<_> = self.negatives().map(|picture| &picture.path).collect();
+        // Paths that are no text count by what of them is.
+        let text = |path: &PathBuf| path.to_string_lossy().into_owned();
+        let marked: Vec<_> = marked.into_iter().map(|(path, marks)| (text(path), marks)).collect();
+        let negatives: Vec<_> = negatives.into_iter().map(text).collect();
+        fingerprint(&serde_json::to_string(&(marked, negatives)).unwrap_or_default())
+    }
+
+    pub fn model_views(&self) -> Vec<ModelView> {
+        let material = self.material();
+        let view = |(id, version): (usize, &Version)| ModelView {
+            id,
+            file: version.file.clone(),
+            taught_secs: version.taught_secs,
+            summary: version.summary.clone(),
+            photos: version.photos,
+            negatives: version.negatives,
+            is_current: self.models.current == Some(id),
+            is_stale: version.material != material,
+        };
+        self.models.versions.iter().enumerate().map(view).collect()
+    }
+
+    /// Writes the project's file, where the session is a project.
+    ///
+    /// # Errors
+    /// A folder that cannot be written to.
+    pub fn save_project(&self) -> Result<()> {
+        let Some(folder) = &self.project else { return Ok(()) };
+        let name = |picture: &Picture| relative(folder, &picture.path);
+        let mut file = ProjectFile {
+            label: Some(self.label.clone()),
+            photos: self.image_ids().map(|id| name(&self.images[id].picture)).collect(),
+            removed: self.removed_earlier.clone(),
+            models: self.models.versions.clone(),
+            current_model: self.models.current,
+            ..ProjectFile::default()
+        };
+        for trial in self.trial_ids().map(|id| &self.trial_pictures[id]) {
+            file.tried.push(Tried {
+                file: name(&trial.picture),
+                name: trial.picture.name.clone(),
+                absent: trial.is_absent,
+                became: trial.became.map(|id| name(&self.images[id].picture)),
+            });
+        }
+        file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));
+        file.removed.extend(self.trial_pictures.iter().filter(|t| t.is_removed).map(|t| name(&t.picture)));
+        // Taken out once and put in again under the same name.
+        for there in file.photos.iter().chain(file.tried.iter().map(|tried| &tried.file)) {
+            file.removed.remove(there);
+        }
+        file.write(folder)
     }
 }
 
 impl MarkedPicture {
+    /// A picture with the marks that stand beside it, and the object's name there.
+    ///
+    /// # Errors
+    /// A picture that cannot be read, marks that belong to another.
+    pub fn open(path: &Path, annotation: Option<&Path>) -> Result<(Self, Option<String>)> {
+        let picture = Picture::open(path)?;
+        let opened = annotation_file::open(&picture.path, annotation, picture.size)?;
+        // Where they stand, not where changes will go: that file may not be there yet.
+        let found = opened.found.filter(|_| opened.marks.has_object());
+        let saved = found.map_or(Saved::Nothing, |path| Saved::Written { file: file_name(&path) });
+        let marked =
+            Self { picture, marks: opened.marks, file: opened.path, note: opened.note, saved, is_removed: false };
+        Ok((marked, opened.label))
+    }
+
     /// The picture with its marks, as teaching takes it.
     ///
     /// # Errors

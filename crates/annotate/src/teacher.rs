@@ -22,10 +22,25 @@ pub trait GraspTeacher: Send + Sync + 'static {
     /// Whatever teaching complains of, in one line for the person at the page.
     fn teach(
         &self,
-        demonstrations: &[Demonstration],
+        material: &TeachingMaterial,
         request: &TeachRequest,
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError>;
+
+    /// Reads a model that was taught before; `summary` is what was said of it then.
+    ///
+    /// # Errors
+    /// Bytes that are no model file.
+    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError>;
+}
+
+/// What a model is taught from.
+#[derive(Debug, Clone, Default)]
+pub struct TeachingMaterial {
+    /// Photos of the part with their marks.
+    pub demonstrations: Vec<Demonstration>,
+    /// Pictures without it.
+    pub negatives: Vec<RgbImage>,
 }
 
 /// A model, ready to look for the part.
@@ -44,6 +59,14 @@ pub trait TaughtModel: Send + Sync {
     /// # Errors
     /// An image that cannot be looked at.
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError>;
+
+    /// The same, with the places where picture and demonstration differ under the best refused ones, which takes longer.
+    ///
+    /// # Errors
+    /// As [`Self::detect`].
+    fn detect_explained(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
+        self.detect(image)
+    }
 }
 
 /// How to teach, as asked on the page.
@@ -127,8 +150,8 @@ pub enum TeachingStep {
     },
 }
 
-/// Measured quality of a taught model.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A taught model and its measured quality.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtSummary {
     /// The grasp model.
     pub model: ModelKind,
@@ -136,12 +159,51 @@ pub struct TaughtSummary {
     pub object: String,
     /// Wall-clock time of the teaching.
     pub seconds: f64,
-    /// Share of held-back samples in which the part was found; `None` for a model without a network.
-    pub hit_rate: Option<f64>,
-    /// Median error on them in pixels.
-    pub error_px: Option<f64>,
-    /// Median error on them in degrees.
+    /// What the finished model made of held-back samples; `None` where it was not tried on any.
+    pub figures: Option<Figures>,
+    /// What came of the pictures without the part.
+    pub negatives: Option<NegativesRefused>,
+}
+
+/// What a finished model made of held-back samples.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// Parts found, and out of how many.
+    pub found: [usize; 2],
+    /// Between which shares the true one lies, with 95 % confidence.
+    pub found_interval: [f64; 2],
+    /// Detections beside the part.
+    pub wrong: usize,
+    /// Samples without the part in which something was accepted, and out of how many.
+    pub false_alarms: [usize; 2],
+    /// Their share, likewise.
+    pub false_alarms_interval: [f64; 2],
+    /// Median error of the place, and its unit: px of the photo, or mm.
+    pub error: Option<(f64, String)>,
+    /// Median error of the turn.
     pub error_degrees: Option<f64>,
+}
+
+/// How many of the person's pictures without the part are refused.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NegativesRefused {
+    /// Pictures in which nothing is accepted.
+    pub refused: usize,
+    /// All of them.
+    pub pictures: usize,
+}
+
+/// Why a grasp is refused, for the person at the page.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Refusal {
+    /// The strongest reasons.
+    pub reason: String,
+    /// What would help.
+    pub remedy: Option<String>,
+    /// Places of the picture where edges differ from the photo's, in pixels.
+    pub edges: Vec<[f64; 2]>,
+    /// Places where the surface differs.
+    pub surface: Vec<[f64; 2]>,
 }
 
 /// One grasp that a model found, in pixels of the image.
@@ -161,6 +223,8 @@ pub struct FoundGrasp {
     pub line_length: f64,
     /// Where that is over the table, if the camera is calibrated.
     pub pose: Option<GraspPose>,
+    /// Why it is not accepted; `None` for what is.
+    pub refusal: Option<Refusal>,
 }
 
 /// A grasp in millimetres and degrees, for people.

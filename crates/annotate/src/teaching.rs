@@ -2,17 +2,16 @@
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use sdg_demonstration::{Demonstration, ModelKind};
-use sdg_report::write_atomically;
+use sdg_demonstration::ModelKind;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingStep};
+use crate::teacher::{GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeachingMaterial, TeachingStep};
 
 /// Points of the loss curve that the page gets; a longer run keeps every second, fourth … of its own.
 const MAX_POINTS: usize = 240;
@@ -146,7 +145,7 @@ impl Teaching {
         idle(&locked(&self.news))
     }
 
-    /// Starts to teach on a thread; the model is written to `model_path`. The news tell how it goes.
+    /// Starts to teach on a thread; `keep` writes the model down and says where. The news tell how it goes.
     ///
     /// # Errors
     /// [`Error::Busy`] while a teaching goes on.
@@ -154,8 +153,8 @@ impl Teaching {
         self: &Arc<Self>,
         teacher: Arc<dyn GraspTeacher>,
         request: TeachRequest,
-        demonstrations: Vec<Demonstration>,
-        model_path: PathBuf,
+        material: TeachingMaterial,
+        keep: impl FnOnce(&dyn TaughtModel) -> Result<PathBuf> + Send + 'static,
     ) -> Result<News> {
         let mut news = locked(&self.news);
         idle(&news)?;
@@ -169,17 +168,22 @@ impl Teaching {
             let start = Instant::now();
             let mut pace = Pace { stride: 1, since_secs: 0.0, since_done: 0 };
             let mut observe = |step| teaching.record(step, start, &mut pace);
-            let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&demonstrations, &request, &mut observe)));
+            let taught = catch_unwind(AssertUnwindSafe(|| teacher.teach(&material, &request, &mut observe)));
             // A page that waited for a teaching which broke off would wait for ever.
             let taught = taught.unwrap_or_else(|_| Err("teaching broke off inside; the terminal says more".into()));
-            let outcome = taught.map_err(Error::Teacher).and_then(|model| teaching.keep(model, &model_path));
+            let outcome = taught.map_err(Error::Teacher).and_then(|model| {
+                let written_to = keep(&*model)?;
+                let summary = model.summary();
+                teaching.set_model(Arc::from(model));
+                Ok((summary, written_to))
+            });
             let mut news = locked(&teaching.news);
             news.elapsed_secs = start.elapsed().as_secs_f64();
             match outcome {
-                Ok(summary) => {
+                Ok((summary, written_to)) => {
                     news.status = Status::Done;
                     news.summary = Some(summary);
-                    news.written_to = Some(model_path.display().to_string());
+                    news.written_to = Some(written_to.display().to_string());
                 }
                 Err(error) => {
                     news.status = Status::Failed;
@@ -190,12 +194,9 @@ impl Teaching {
         Ok(begun)
     }
 
-    /// Writes the model down and keeps it for the pictures to try.
-    fn keep(&self, model: Box<dyn TaughtModel>, path: &Path) -> Result<TaughtSummary> {
-        write_atomically(path, &model.to_bytes().map_err(Error::Teacher)?)?;
-        let summary = model.summary();
-        *locked(&self.model) = Some(Arc::from(model));
-        Ok(summary)
+    /// Keeps a model for the pictures to try.
+    pub fn set_model(&self, model: Arc<dyn TaughtModel>) {
+        *locked(&self.model) = Some(model);
     }
 }
 

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::advice::Advice;
 use crate::marks::Marks;
+use crate::teacher::TaughtSummary;
 
 /// Whether the marks stand on the disk.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -57,6 +58,42 @@ pub struct TrialPictureView {
     pub height: u32,
     /// The number of the marked picture that it became.
     pub became: Option<usize>,
+    /// The person said that the part is not there.
+    pub is_absent: bool,
+}
+
+/// A version of the model, as the page sees it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModelView {
+    /// Its index in the session.
+    pub id: usize,
+    /// Its file's name.
+    pub file: String,
+    /// When it was taught: seconds since 1970.
+    pub taught_secs: u64,
+    /// What it is and how good it was found to be.
+    pub summary: TaughtSummary,
+    /// Photos that it was taught from.
+    pub photos: usize,
+    /// Pictures without the part that it was taught from.
+    pub negatives: usize,
+    /// Whether it is the one in use.
+    pub is_current: bool,
+    /// Whether marks, photos or negatives have changed since.
+    pub is_stale: bool,
+}
+
+/// What two versions found in one picture to try.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparedPicture {
+    /// The picture's index.
+    pub id: usize,
+    /// Its name.
+    pub name: String,
+    /// Whether the part is there, as far as the person said so.
+    pub is_there: Option<bool>,
+    /// For each version the number of accepted detections and the best score of all.
+    pub found: [(usize, f64); 2],
 }
 
 /// All that the page starts from.
@@ -70,6 +107,12 @@ pub struct SessionView {
     pub trial_pictures: Vec<TrialPictureView>,
     /// Where a taught model is written.
     pub model_path: String,
+    /// Versions of the model, oldest first.
+    pub models: Vec<ModelView>,
+    /// The folder, where the session is a project.
+    pub project: Option<String>,
+    /// What the person should know of the project; pictures that are gone.
+    pub notes: Vec<String>,
     /// The camera's address, if there is one.
     pub camera: Option<String>,
 }

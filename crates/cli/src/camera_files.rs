@@ -7,7 +7,7 @@ use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame};
 use sdg_demonstration::Demonstration;
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{CameraOverTable, Lengths, seen_from_above};
+use sdg_grasp::{CameraOverTable, Lengths, pictures_from_above, seen_from_above};
 
 use crate::files;
 
@@ -69,6 +69,15 @@ impl CameraFile {
     ) -> Result<(Vec<Demonstration>, Lengths)> {
         photos.iter().try_for_each(|photo| self.check_picture(&photo.image))?;
         Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
+    }
+
+    /// Pictures of this camera without the part in the same plan view.
+    ///
+    /// # Errors
+    /// A picture of another size than the camera's.
+    pub fn pictures_from_above(&self, pictures: &[RgbImage], lengths: &Lengths) -> Result<Vec<RgbImage>> {
+        pictures.iter().try_for_each(|picture| self.check_picture(picture))?;
+        Ok(pictures_from_above(pictures, &self.over_table, lengths)?)
     }
 }
 

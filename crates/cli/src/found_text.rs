@@ -66,6 +66,16 @@ impl Wording<'_> {
         [network, agreement].into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
+    /// Indices of the refused detections, best first, that are worth a picture's dots and words: the best one, and further ones
+    /// that resemble the part.
+    pub fn explained<'d>(&self, detections: impl Iterator<Item = &'d GraspDetection>) -> Vec<usize> {
+        /// More of them would cover each other.
+        const MAX_EXPLAINED: usize = 3;
+        let refused = detections.enumerate().filter(|(_, found)| !self.is_accepted(found)).enumerate();
+        let worth_it = refused.filter(|(rank, (_, found))| *rank == 0 || found.score >= MIN_ADVISED_SCORE);
+        worth_it.map(|(_, (idx, _))| idx).take(MAX_EXPLAINED).collect()
+    }
+
     /// Why a detection is refused, the strongest reason first, and what would help; `None` for what is accepted.
     pub fn refusal(&self, detection: &GraspDetection) -> Option<String> {
         if self.is_accepted(detection) {
@@ -99,19 +109,21 @@ impl Wording<'_> {
         if reasons.is_empty() { "all evidence together is too weak".to_owned() } else { reasons.join("; also ") }
     }
 
-    /// The line of a picture in which nothing is accepted; `best_refused` and how many were refused.
-    pub fn nothing(&self, refused: &[&GraspDetection]) -> String {
+    /// The line of a picture in which nothing is accepted: how many were refused, and the best of them; `are_listed` where a line of
+    /// each follows.
+    pub fn nothing(&self, refused: &[&GraspDetection], are_listed: bool) -> String {
         let Some(best) = refused.iter().max_by(|a, b| a.score.total_cmp(&b.score)) else {
             return format!("nothing to grasp{}", self.of_other_size().unwrap_or_default());
         };
         let which = if refused.len() == 1 { "" } else { ", the best of them" };
+        let see_all = if are_listed { "" } else { " (see --all)" };
         let (x, y) = (best.grasp.x, best.grasp.y);
         let why = self.refusal(best).unwrap_or_default();
         // Where advice was given, another one would only compete with it.
         let other_size =
             best.advice().filter(|_| best.score >= MIN_ADVISED_SCORE).map_or_else(|| self.of_other_size(), |_| None);
         format!(
-            "nothing accepted; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2} (see --all): {why}{}",
+            "nothing accepted; {} refused{which} at ({x:.0}, {y:.0}): {}, score {:.2}{see_all}: {why}{}",
             refused.len(),
             self.measured(best),
             best.score,

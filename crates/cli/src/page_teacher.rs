@@ -1,20 +1,23 @@
 //! Grasp models for the annotation page, which does not see them.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use image::RgbImage;
 use sdg_annotate::{
-    FoundGrasp, GraspPose, GraspTeacher, TaughtModel, TaughtSummary, TeachRequest, TeacherError, TeachingStep,
+    Figures, FoundGrasp, GraspPose, GraspTeacher, NegativesRefused, Refusal, TaughtModel, TaughtSummary, TeachRequest,
+    TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_calibration::Frame;
-use sdg_demonstration::Demonstration;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification, teach};
 
 use crate::camera_files::CameraFile;
+use crate::found_text::{DEFAULT_MIN_SCORE, MIN_ADVISED_SCORE, Wording};
 use crate::held_back::HeldBackFigures;
 use crate::picture_detector::{Found, PictureDetector};
+use crate::statistics::{Share, wilson_interval};
 
 /// Teaches with one preset.
 pub struct PageTeacher {
@@ -27,7 +30,7 @@ pub struct PageTeacher {
 impl GraspTeacher for PageTeacher {
     fn teach(
         &self,
-        demonstrations: &[Demonstration],
+        material: &TeachingMaterial,
         request: &TeachRequest,
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
@@ -41,29 +44,56 @@ impl GraspTeacher for PageTeacher {
         };
         options.time_budget = request.time_budget();
         options.steps = request.steps;
-        let mut taught_with = |demonstrations: &[Demonstration], options: &TeachOptions| {
-            teach(demonstrations, options, &mut |event| observe(step(event)))
-        };
-        // Model S is to be there at once, and tells no figures on the page.
-        let figures_of = |model: &GraspModel, demonstrations: &[Demonstration]| {
-            let figures = || HeldBackFigures::of(model, demonstrations, request.seed);
-            model.kind().has_network().then(figures).transpose()
-        };
-        let (detector, figures) = match &self.camera {
-            None => {
-                let model = taught_with(demonstrations, &options)?.model;
-                let figures = figures_of(&model, demonstrations)?;
-                (PictureDetector::AnyCamera(Box::new(model)), figures)
-            }
-            Some((camera, [mark, grasp])) => {
-                let (seen, lengths) = camera.seen_from_above(demonstrations, *mark, *grasp)?;
-                options.lengths = Some(lengths);
-                let model = taught_with(&seen, &options)?.model;
-                let figures = figures_of(&model, &seen)?;
-                (PictureDetector::calibrated(model, camera.clone())?, figures)
-            }
-        };
-        Ok(Box::new(PageModel { detector: Mutex::new(detector), figures }))
+        options.negatives.clone_from(&material.negatives);
+        let mut demonstrations = Cow::Borrowed(material.demonstrations.as_slice());
+        if let Some((camera, [mark, grasp])) = &self.camera {
+            let (seen, lengths) = camera.seen_from_above(&demonstrations, *mark, *grasp)?;
+            demonstrations = Cow::Owned(seen);
+            options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
+            options.lengths = Some(lengths);
+        }
+        let model = teach(&demonstrations, &options, &mut |event| observe(step(event)))?.model;
+        // What is written, and not what is in memory, is what will be used.
+        let bytes = model.to_bytes()?;
+        let model = GraspModel::from_bytes(&bytes, &options.device)?;
+        let figures = HeldBackFigures::of(&model, &demonstrations, request.seed)?;
+        let summary = summary(&model, Some(page_figures(&figures)));
+        Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
+    }
+
+    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let model = GraspModel::from_bytes(bytes, &TeachOptions::new(0).device)?;
+        let detector = Mutex::new(self.detector(model)?);
+        Ok(Box::new(PageModel { detector, summary: summary.clone(), bytes: bytes.to_vec() }))
+    }
+}
+
+impl PageTeacher {
+    fn detector(&self, model: GraspModel) -> anyhow::Result<PictureDetector> {
+        match &self.camera {
+            None => Ok(PictureDetector::AnyCamera(Box::new(model))),
+            Some((camera, _)) => PictureDetector::calibrated(model, camera.clone()),
+        }
+    }
+}
+
+fn summary(model: &GraspModel, figures: Option<Figures>) -> TaughtSummary {
+    let facts = model.facts();
+    let negatives = facts.negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
+    TaughtSummary { model: model.kind(), object: model.object().to_owned(), seconds: facts.seconds, figures, negatives }
+}
+
+fn page_figures(figures: &HeldBackFigures) -> Figures {
+    let counts = |share: Share| [share.count, share.of];
+    let (found, false_alarms) = (figures.found(), figures.false_alarms());
+    Figures {
+        found: counts(found),
+        found_interval: wilson_interval(found),
+        wrong: figures.wrong(),
+        false_alarms: counts(false_alarms),
+        false_alarms_interval: wilson_interval(false_alarms),
+        error: figures.median_distance().map(|(error, unit)| (error, unit.to_owned())),
+        error_degrees: figures.median_errors().map(|[_, degrees]| degrees),
     }
 }
 
@@ -88,47 +118,66 @@ fn step(event: &TeachingEvent) -> TeachingStep {
 /// One look at a time: each uses every core.
 struct PageModel {
     detector: Mutex<PictureDetector>,
-    figures: Option<HeldBackFigures>,
+    summary: TaughtSummary,
+    /// Its file.
+    bytes: Vec<u8>,
 }
 
 impl PageModel {
-    fn detector(&self) -> MutexGuard<'_, PictureDetector> {
-        self.detector.lock().unwrap_or_else(PoisonError::into_inner)
+    fn find(&self, image: &RgbImage, with_places: bool) -> Result<Vec<FoundGrasp>, TeacherError> {
+        let detector = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = detector.detect(image, Verification::ByShape)?;
+        let wording =
+            Wording { detector: &detector, picture_size: image.dimensions().into(), min_score: DEFAULT_MIN_SCORE };
+        let mut grasps: Vec<FoundGrasp> = found.iter().map(|found| found_grasp(&detector, found, &wording)).collect();
+        if with_places {
+            let explained: Vec<usize> = wording.explained(found.iter().map(|found| &found.detection));
+            let detections: Vec<_> = explained.iter().map(|&idx| &found[idx].detection).collect();
+            for (idx, differences) in explained.into_iter().zip(detector.differences(image, &detections)) {
+                if let Some((refusal, differences)) = grasps[idx].refusal.as_mut().zip(differences) {
+                    refusal.edges = differences.edges.iter().map(|place| [place.x, place.y]).collect();
+                    refusal.surface = differences.surface.iter().map(|place| [place.x, place.y]).collect();
+                }
+            }
+        }
+        Ok(grasps)
     }
 }
 
 impl TaughtModel for PageModel {
     fn summary(&self) -> TaughtSummary {
-        let detector = self.detector();
-        let model = detector.model();
-        let figures = self.figures.as_ref();
-        let [error_px, error_degrees] = match figures.and_then(HeldBackFigures::median_errors) {
-            Some(errors) => errors.map(Some),
-            None => [None; 2],
-        };
-        TaughtSummary {
-            model: model.kind(),
-            object: model.object().to_owned(),
-            seconds: model.facts().seconds,
-            hit_rate: figures.and_then(|figures| figures.found().percent()).map(|percent| percent / 100.0),
-            error_px,
-            error_degrees,
-        }
+        self.summary.clone()
     }
 
     fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
-        Ok(self.detector().model().to_bytes()?)
+        Ok(self.bytes.clone())
     }
 
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
-        let detector = self.detector();
-        let found = detector.detect(image, Verification::ByShape)?;
-        Ok(found.iter().map(|found| found_grasp(&detector, found)).collect())
+        self.find(image, false)
+    }
+
+    fn detect_explained(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
+        self.find(image, true)
     }
 }
 
+/// Options of `sdg teach` in the page's words.
+const PAGE_REMEDIES: [(&str, &str); 2] = [
+    (
+        "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm",
+        "if it is the part, learn from it: it is taught at this size, too",
+    ),
+    ("--demo", "demonstration"),
+];
+
+/// What would help, for a person who has buttons instead of options.
+fn remedy(advice: &str) -> String {
+    PAGE_REMEDIES.iter().fold(advice.to_owned(), |text, (option, words)| text.replace(option, words))
+}
+
 /// The marked line is as long, against the part, as the first demonstration's: detections tell its middle only.
-fn found_grasp(detector: &PictureDetector, found: &Found) -> FoundGrasp {
+fn found_grasp(detector: &PictureDetector, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
     let taught = &detector.model().demonstrations()[0].marks;
     let detection = &found.detection;
     let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
@@ -140,6 +189,11 @@ fn found_grasp(detector: &PictureDetector, found: &Found) -> FoundGrasp {
         grasp: detection.grasp,
         line_length: taught.grasp.length() * scale,
         pose: found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| grasp_pose(pose, frame)),
+        refusal: (!detection.is_accepted()).then(|| Refusal {
+            reason: wording.reasons(detection, 2),
+            remedy: detection.advice().filter(|_| detection.score >= MIN_ADVISED_SCORE).map(remedy),
+            ..Refusal::default()
+        }),
     }
 }
 
@@ -151,5 +205,43 @@ fn grasp_pose(pose: &PlanarPose, frame: Frame) -> GraspPose {
         opening_mm: 1e3 * pose.opening_m,
         sigma_mm: 1e3 * pose.uncertainty.position_m,
         sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_annotate::{Session, SessionOptions};
+    use std::sync::Arc;
+
+    #[test]
+    fn remedies_name_no_options_of_the_command_line() {
+        let size = remedy(PAGE_REMEDIES[0].0);
+        let side = remedy("if it is the part, uncover it, or add a --demo taken from this side");
+        assert!(!size.contains("--") && size.contains("learn from it"), "{size}");
+        assert_eq!(side, "if it is the part, uncover it, or add a demonstration taken from this side");
+    }
+
+    #[test]
+    fn the_page_shows_the_opening_that_is_taught_where_a_file_states_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("photo.png");
+        RgbImage::from_fn(200, 120, |x, y| image::Rgb([(x * 5 % 251) as u8, (y * 7 % 241) as u8, 90]))
+            .save(&photo)
+            .unwrap();
+        // The outline is twice as wide beside the middle of the line, under its ends.
+        let labelme = r#"{"imageWidth": 200, "imageHeight": 120, "shapes": [
+            {"label": "bar", "shape_type": "polygon", "group_id": 1, "points": [[20, 40], [60, 40], [60, 20], [80, 20], [80, 40],
+                [180, 40], [180, 80], [80, 80], [80, 100], [60, 100], [60, 80], [20, 80]]},
+            {"label": "grasp_start", "shape_type": "point", "group_id": 1, "points": [[70, 60]]},
+            {"label": "grasp_end", "shape_type": "point", "group_id": 1, "points": [[130, 60]]}]}"#;
+        std::fs::write(photo.with_extension("json"), labelme).unwrap();
+        let options = SessionOptions { images: vec![(photo.clone(), None)], ..SessionOptions::default() };
+        let session =
+            Session::open(&options, Arc::new(PageTeacher { preset: Preset::default(), camera: None })).unwrap();
+        let on_the_page = session.marks(0).unwrap().grasp.unwrap().jaw_width;
+        let demonstrations = crate::demonstrations::read_all(&[photo.display().to_string()]).unwrap();
+        let taught = sdg_grasp::TaughtDemonstration::new(&demonstrations[0]).unwrap().marks.width_px;
+        assert_eq!((on_the_page, taught), (40.0, 40.0));
     }
 }

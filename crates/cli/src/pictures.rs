@@ -2,27 +2,42 @@
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
-use sdg_geometry::Keypoint;
+use sdg_geometry::{BoundingBox, Keypoint};
 use sdg_grasp::{Differences, GraspDetection};
-use sdg_report::{Color, DetectionMark, Verdict, draw_detection, draw_label};
+use sdg_report::{
+    Color, DetectionMark, Pen, Verdict, draw_box, draw_detection, draw_label, draw_polygon, label_bounds, line_width,
+};
 
 use crate::found_text::DEFAULT_MIN_SCORE;
 
 /// The image with every detection drawn on it.
 pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {
     let mut drawn = image.clone();
-    draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE);
+    draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[]);
     drawn
 }
 
-/// Draws detections, the best first in their order; those that score at least `min_score` as accepted.
+/// Draws detections, the best first in their order; those that score at least `min_score` as accepted. Where reasons are given, the
+/// refused ones among them have a tag with score and reason, which no other tag covers, and further refused ones a box alone.
 pub fn draw_detections<'a>(
     drawn: &mut RgbImage,
     detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,
     min_score: f64,
+    reasons: &[(&GraspDetection, String)],
 ) {
     // Worst first, so that the best is on top.
     for detection in detections.rev() {
+        if detection.score < min_score && !reasons.is_empty() {
+            let width = line_width(drawn);
+            let explained = reasons.iter().any(|(known, _)| *known == detection);
+            let share = if explained { 1.0 } else { 0.5 };
+            let pen = Pen::new(Color::REFUSED).width(share * width).dashed(4.0 * width, 3.0 * width);
+            draw_box(drawn, &detection.bbox, &pen);
+            if let Some(outline) = detection.outline.as_ref().filter(|_| explained) {
+                draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
+            }
+            continue;
+        }
         let keypoints: Vec<Keypoint> = detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
         let verdict = match (detection.score >= min_score, detection.agreement) {
             (false, _) => Verdict::Refused,
@@ -38,6 +53,10 @@ pub fn draw_detections<'a>(
             verdict,
         };
         draw_detection(drawn, &mark);
+    }
+    let mut taken = Vec::new();
+    for (detection, reason) in reasons {
+        draw_reason(drawn, detection, reason, &mut taken);
     }
 }
 
@@ -69,11 +88,25 @@ pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     }
 }
 
-/// Writes a reason below a detection's box.
-pub fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str) {
+/// Writes score and reason below a detection's box, farther down where another such tag is.
+fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
     let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
-    let below = Point2::new(detection.bbox.x1, detection.bbox.y2 + 3.0 * text_px);
-    draw_label(drawn, below, reason, Color::REFUSED, text_px);
+    let text = format!("{:.2} refused: {reason}", detection.score);
+    let step = 2.4 * text_px;
+    let height = f64::from(drawn.height());
+    let below = |row: usize| {
+        // From the foot of the picture it goes on at its head.
+        let y = (detection.bbox.y2 + 3.0 * text_px + row as f64 * step) % (height + step);
+        Point2::new(detection.bbox.x1, y)
+    };
+    let is_free = |at: &Point2<f64>| {
+        let bounds = label_bounds(drawn, *at, &text, text_px);
+        taken.iter().all(|other| other.intersection(&bounds) == 0.0)
+    };
+    let rows = (height / step).ceil() as usize;
+    let at = (0..rows).map(below).find(is_free).unwrap_or_else(|| below(0));
+    taken.push(label_bounds(drawn, at, &text, text_px));
+    draw_label(drawn, at, &text, Color::REFUSED, text_px);
 }
 
 /// A filled square of side 2 · `radius`, clipped to the picture.
@@ -95,6 +128,32 @@ fn dot(drawn: &mut RgbImage, at: &Point2<f64>, radius: f64, color: Color) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tags_of_refused_ones_do_not_cover_each_other() {
+        let detection = |x: f64, score: f64| GraspDetection {
+            score,
+            network_score: 0.0,
+            agreement: Some(0.4),
+            evidence: None,
+            bbox: BoundingBox { x1: x, y1: 250.0, x2: x + 60.0, y2: 290.0 },
+            keypoints: Vec::new(),
+            outline: None,
+            grasp: sdg_geometry::PlanarGrasp { x: x + 30.0, y: 270.0, angle: sdg_geometry::Angle::ZERO, width: 30.0 },
+            turn_source: sdg_grasp::TurnSource::Search,
+            light: 1.0,
+        };
+        let found = [detection(40.0, 0.4), detection(50.0, 0.3), detection(60.0, 0.2)];
+        let mut taken = Vec::new();
+        let mut drawn = RgbImage::new(400, 300);
+        for one in &found {
+            draw_reason(&mut drawn, one, "too little of it is visible", &mut taken);
+        }
+        for (i, one) in taken.iter().enumerate() {
+            assert!(taken[..i].iter().all(|other| other.intersection(one) == 0.0), "{taken:?}");
+            assert!(one.y2 <= 300.0 && one.y1 >= 0.0);
+        }
+    }
 
     #[test]
     fn differences_are_dots_at_their_places_with_a_legend() {

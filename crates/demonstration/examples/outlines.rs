@@ -1,36 +1,59 @@
-//! Proposed outlines beside drawn ones: overlap and time for each demonstration.
+//! Proposed outlines beside drawn ones, without clicks and after one and two clicks of a simulated person: overlap, share of the
+//! true outline within 3 px or 1 % of the part's diagonal, time; medians at the end.
 //!
 //! ```sh
-//! cargo run --release -p sdg-demonstration --example outlines -- datasets/demonstrations/*/
+//! cargo run --release -p sdg-demonstration --example outlines -- PICTURE[:ANNOTATION] …
 //! ```
+//! The annotation stands beside the picture as .json where none is named; every outline in it counts.
+
+#[path = "../tests/outlines/simulated_person.rs"]
+mod simulated_person;
 
 use std::error::Error;
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Instant;
 
-use sdg_demonstration::{Demonstration, propose_outline};
-use sdg_geometry::BoundingBox;
+use sdg_demonstration::{Annotation, ImageFacts, ImageLimits, decode_image};
+use simulated_person::{agreement, outlines};
+
+const NUM_CLICKS: usize = 2;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    for folder in std::env::args().skip(1) {
-        let folder = Path::new(&folder);
-        let read = |name: &str| std::fs::read(folder.join(name));
-        let demonstration = Demonstration::decode(&read("image.png")?, &read("annotation.json")?, None)?;
-        let (width, height) = demonstration.image.dimensions();
-        let drawn = demonstration.annotation.require_outline()?.rasterize(width, height);
-        print!("{:44}", folder.display());
-        // As drawn, and as loosely as people draw boxes.
-        for looseness in [0.0, 0.05, 0.1, 0.2] {
-            let b = demonstration.annotation.bbox;
-            let (dx, dy) = (looseness * b.width(), looseness * b.height());
-            let bbox = BoundingBox { x1: b.x1 - dx, y1: b.y1 - dy, x2: b.x2 + dx, y2: b.y2 + dy };
+    let mut all: Vec<Vec<simulated_person::Agreement>> = vec![Vec::new(); NUM_CLICKS + 1];
+    for argument in std::env::args().skip(1) {
+        let (picture, annotation) = match argument.split_once(':') {
+            Some((picture, annotation)) => (PathBuf::from(picture), PathBuf::from(annotation)),
+            None => (PathBuf::from(&argument), PathBuf::from(&argument).with_extension("json")),
+        };
+        let image = decode_image(&std::fs::read(&picture)?, &ImageLimits::default())?;
+        let file_name = picture.file_name().and_then(|name| name.to_str());
+        let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
+        for object in Annotation::read(&std::fs::read(annotation)?, &facts)? {
+            let Some(truth) = object.outline else { continue };
             let start = Instant::now();
-            let proposed = propose_outline(&demonstration.image, &bbox);
+            let proposed = outlines(&image, &object.bbox, &truth, NUM_CLICKS);
             let millis = start.elapsed().as_secs_f64() * 1e3;
-            let overlap = proposed.rasterize(width, height).iou(&drawn);
-            print!("  {overlap:.3} ({} vertices, {millis:.0} ms)", proposed.vertices.len());
+            print!("{:60}", picture.display());
+            for (clicks, all) in all.iter_mut().enumerate() {
+                let outline = proposed.get(clicks).or(proposed.last()).ok_or("no outline")?;
+                let agreement = agreement(outline, &truth, &image);
+                print!("  {:.3} {:3.0} %", agreement.iou, 100.0 * agreement.near);
+                all.push(agreement);
+            }
+            println!("  {millis:.0} ms");
         }
-        println!();
+    }
+    for (clicks, all) in all.iter().enumerate() {
+        let median = |value: fn(&simulated_person::Agreement) -> f64| {
+            sdg_geometry::median(all.iter().map(value)).unwrap_or(f64::NAN)
+        };
+        let reached = all.iter().filter(|one| one.near >= 0.9).count();
+        println!(
+            "{clicks} clicks: median overlap {:.3}, median share near {:.0} %; {reached} of {} have 90 % near",
+            median(|one| one.iou),
+            100.0 * median(|one| one.near),
+            all.len()
+        );
     }
     Ok(())
 }

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "outlines/simulated_person.rs"]
+mod simulated_person;
+
 use std::path::Path;
 
 use sdg_demonstration::{Demonstration, propose_outline};
@@ -57,4 +60,30 @@ fn proposals_overlap_the_drawn_outlines_of_all_parts() {
 fn same_photo_same_outline() {
     let (_, Demonstration { image, annotation }) = shipped().remove(0);
     assert_eq!(propose_outline(&image, &annotation.bbox), propose_outline(&image, &annotation.bbox));
+}
+
+/// Issue 19: median overlap without a click, and of the true outline within 3 px or 1 % of the diagonal after two.
+const MIN_MEDIAN_OVERLAP: f64 = 0.9;
+const MIN_NEAR: f64 = 0.9;
+
+/// Pictures of generated parts (crates/part-generator/examples/outline_pictures.rs), whose outlines are true to the pixel.
+#[test]
+fn two_clicks_correct_an_outline() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/outlines");
+    let (mut overlaps, mut near) = (Vec::new(), Vec::new());
+    for number in 0..15 {
+        let read = |extension: &str| std::fs::read(folder.join(format!("generated-{number:02}.{extension}"))).unwrap();
+        let Demonstration { image, annotation } = Demonstration::decode(&read("jpg"), &read("json"), None).unwrap();
+        let truth = annotation.outline.as_ref().unwrap();
+        let outlines = simulated_person::outlines(&image, &annotation.bbox, truth, 2);
+        let first = simulated_person::agreement(&outlines[0], truth, &image);
+        let last = simulated_person::agreement(outlines.last().unwrap(), truth, &image);
+        println!("{number}: {first:?}, after two clicks {last:?}");
+        overlaps.push(first.iou);
+        near.push(last.near);
+    }
+    let [overlap, near] = [overlaps, near].map(|values| sdg_geometry::median(values).unwrap());
+    println!("median overlap {overlap:.3}, median share near after two clicks {near:.3}");
+    assert!(overlap >= MIN_MEDIAN_OVERLAP, "{overlap}");
+    assert!(near >= MIN_NEAR, "{near}");
 }

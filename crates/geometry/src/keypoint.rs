@@ -1,9 +1,9 @@
 //! Keypoints and the line along which a grasp is taught.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-use crate::{Angle, PlanarSimilarity};
+use crate::{Angle, PlanarSimilarity, Polygon};
 
 /// What is known of a keypoint; COCO's `v`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,6 +90,27 @@ impl GraspLine {
             .collect()
     }
 
+    /// How far the jaws must open to close on `part` across the middle of the line, in pixels: by the outermost crossings of its
+    /// outline there. The gripper closes symmetrically about the middle, so the wider half counts twice.
+    ///
+    /// What is taught and what the annotation page shows of marks that state no opening, which other tools do not.
+    pub fn opening_across(&self, part: &Polygon) -> f64 {
+        let center = self.center();
+        let along = (self.end - self.start).normalize();
+        let across = Vector2::new(-along.y, along.x);
+        let (mut least, mut most) = (0.0f64, 0.0f64);
+        for (a, b) in part.edges() {
+            let (side_a, side_b) = (along.dot(&(a - center)), along.dot(&(b - center)));
+            if (side_a > 0.0) != (side_b > 0.0) {
+                let crossing = a + (b - a) * (side_a / (side_a - side_b));
+                let offset = across.dot(&(crossing - center));
+                least = least.min(offset);
+                most = most.max(offset);
+            }
+        }
+        2.0 * most.max(-least)
+    }
+
     /// The line moved with its part.
     pub fn transformed(&self, image_from_demonstration: &PlanarSimilarity) -> Self {
         Self { start: image_from_demonstration.apply(&self.start), end: image_from_demonstration.apply(&self.end) }
@@ -99,6 +120,7 @@ impl GraspLine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::BoundingBox;
 
     #[test]
     fn twelve_keypoints_are_eleven_equal_steps() {
@@ -108,6 +130,15 @@ mod tests {
         for (k, keypoint) in keypoints.iter().enumerate() {
             assert!((keypoint.x - k as f64).abs() < 1e-12 && (keypoint.y - 2.0 * k as f64).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn jaws_open_as_far_as_the_part_is_wide_across_the_middle() {
+        let bar = Polygon::from_box(&BoundingBox { x1: 10.0, y1: 20.0, x2: 110.0, y2: 40.0 });
+        let opening = |start: [f64; 2], end: [f64; 2]| GraspLine::new(start.into(), end.into()).opening_across(&bar);
+        assert!((opening([40.0, 30.0], [60.0, 30.0]) - 20.0).abs() < 1e-12);
+        assert!((opening([60.0, 25.0], [60.0, 35.0]) - 100.0).abs() < 1e-12, "along the bar");
+        assert!((opening([40.0, 25.0], [60.0, 25.0]) - 30.0).abs() < 1e-12, "5 to one side, 15 to the other");
     }
 
     #[test]

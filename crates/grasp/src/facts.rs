@@ -62,12 +62,26 @@ pub struct TeachingFacts {
     /// How the orientation CNN came to be; `None` for models without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<OrientationFacts>,
+    /// What pictures without the part said; `None` where none were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub negatives: Option<NegativeFacts>,
     /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.
     pub base_weights_sha256: Option<String>,
 }
 
 fn is_without_symmetry(symmetry: &RotationalSymmetry) -> bool {
     *symmetry == RotationalSymmetry::None
+}
+
+/// How the score was calibrated on the user's pictures without the part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct NegativeFacts {
+    /// Number of pictures.
+    pub pictures: usize,
+    /// Those in which the calibrated model accepts nothing.
+    pub refused: usize,
+    /// What every score has in log-odds for them; at most 0.
+    pub log_odds: f64,
 }
 
 /// How good a model was found to be on held-back samples.

@@ -92,12 +92,12 @@ pub use calibration::Calibration;
 pub use check_config::{CheckConfig, ScoreConfig, Term};
 pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
-pub use facts::{ModelKind, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
+pub use facts::{ModelKind, NegativeFacts, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use plan::{
     CameraOverTable, Circumstances, ErrorLength, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
-    seen_from_above,
+    pictures_from_above, seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};
 pub use record::{DetectionRecord, GraspRecord};

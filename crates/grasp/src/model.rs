@@ -182,7 +182,7 @@ impl GraspModel {
         self.demonstrations[0].check().search.scales.clone()
     }
 
-    fn with_check(self, change: impl Fn(&mut CheckConfig)) -> Result<Self> {
+    pub(crate) fn with_check(self, change: impl Fn(&mut CheckConfig)) -> Result<Self> {
         let changed = |demonstration: TaughtDemonstration| {
             let mut check = demonstration.check().clone();
             change(&mut check);

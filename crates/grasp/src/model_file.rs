@@ -192,6 +192,9 @@ impl GraspModel {
                 if let Some([low, high]) = facts.size_tolerance {
                     check.search.scales = low..=high;
                 }
+                if let Some(negatives) = facts.negatives {
+                    check.score.bias += negatives.log_odds;
+                }
                 TaughtDemonstration::with_config(cutout, marks, check)
             })
             .collect::<Result<Vec<_>>>()?;
@@ -416,6 +419,7 @@ mod tests {
                 seconds: 0.5,
                 validation: None,
                 orientation: None,
+                negatives: None,
                 base_weights_sha256: None,
             },
         }

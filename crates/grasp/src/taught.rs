@@ -63,7 +63,10 @@ impl TaughtDemonstration {
         let bbox = BoundingBox { x1: upper_left.x, y1: upper_left.y, x2: lower_right.x, y2: lower_right.y };
         let outline = outline.as_ref().map(|o| Polygon { vertices: o.vertices.iter().map(moved).collect() });
         let grasp = GraspLine::new(moved(&grasp.start), moved(&grasp.end));
-        let width_px = decimal(jaw_width.unwrap_or_else(|| width_across(&grasp, outline.as_ref(), &bbox)));
+        let width_px = decimal(jaw_width.unwrap_or_else(|| {
+            // Without an outline, across the box, which overestimates: the gripper then opens wider than it must.
+            grasp.opening_across(&outline.clone().unwrap_or_else(|| Polygon::from_box(&bbox)))
+        }));
         Self::from_parts(
             cutout,
             TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px, photo_size: Some([width, height]) },
@@ -131,50 +134,5 @@ impl TaughtDemonstration {
     /// The outline, where the cut-out lies in an image; the box's corners when no outline was drawn.
     pub fn outline(&self, image_from_cutout: &PlanarSimilarity) -> Polygon {
         self.marks.region().transformed(image_from_cutout)
-    }
-}
-
-/// How wide the part is across the grasp line, at its middle: from the outermost crossings of the outline. Without an
-/// outline, across the box, which overestimates: the gripper then opens wider than it must.
-fn width_across(grasp: &GraspLine, outline: Option<&Polygon>, bbox: &BoundingBox) -> f64 {
-    let from_box = Polygon::from_box(bbox);
-    let polygon = outline.unwrap_or(&from_box);
-    let center = grasp.center();
-    let along = (grasp.end - grasp.start).normalize();
-    let across = Vector2::new(-along.y, along.x);
-    let (mut least, mut most) = (0.0f64, 0.0f64);
-    for (a, b) in polygon.edges() {
-        let (side_a, side_b) = (along.dot(&(a - center)), along.dot(&(b - center)));
-        if (side_a > 0.0) != (side_b > 0.0) {
-            let crossing = a + (b - a) * (side_a / (side_a - side_b));
-            let offset = across.dot(&(crossing - center));
-            least = least.min(offset);
-            most = most.max(offset);
-        }
-    }
-    // The gripper closes symmetrically about the marked middle, so the wider half counts twice.
-    2.0 * most.max(-least)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn bar() -> Polygon {
-        Polygon::from_box(&BoundingBox { x1: 10.0, y1: 20.0, x2: 110.0, y2: 40.0 })
-    }
-
-    #[test]
-    fn a_bar_grasped_across_its_middle_is_as_wide_as_it_is() {
-        let line = GraspLine::new(Point2::new(40.0, 30.0), Point2::new(60.0, 30.0));
-        assert!((width_across(&line, Some(&bar()), &bar().bounds()) - 20.0).abs() < 1e-12);
-        let lengthwise = GraspLine::new(Point2::new(60.0, 25.0), Point2::new(60.0, 35.0));
-        assert!((width_across(&lengthwise, Some(&bar()), &bar().bounds()) - 100.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn off_the_middle_the_wider_half_counts_twice() {
-        let line = GraspLine::new(Point2::new(40.0, 25.0), Point2::new(60.0, 25.0));
-        assert!((width_across(&line, Some(&bar()), &bar().bounds()) - 30.0).abs() < 1e-12);
     }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::marks::Marks;
 use crate::session::Session;
-use crate::teacher::{FoundGrasp, GraspPose};
+use crate::teacher::{FoundGrasp, GraspPose, Refusal};
 
 /// One detection; `marks` are what accepting it would mark.
 #[derive(Serialize)]
@@ -17,6 +17,7 @@ struct DetectionView {
     is_accepted: bool,
     marks: Marks,
     pose: Option<GraspPose>,
+    refusal: Option<Refusal>,
 }
 
 /// All of a picture, and how long they took.
@@ -26,18 +27,32 @@ pub struct DetectionsView {
     detections: Vec<DetectionView>,
 }
 
-/// Finds the part with the model taught last.
-pub fn detect(session: &Session, picture: &RgbImage) -> Result<DetectionsView> {
+/// How much is asked of a detection.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Explained {
+    /// Every frame of a camera counts: reasons in words only.
+    InWords,
+    /// With the places where picture and demonstration differ.
+    WithPlaces,
+}
+
+/// Finds the part with the model in use.
+pub fn detect(session: &Session, picture: &RgbImage, explained: Explained) -> Result<DetectionsView> {
     let model = session.taught_model()?;
     let size = [picture.width(), picture.height()];
     let start = Instant::now();
-    let found = model.detect(picture).map_err(Error::Teacher)?;
+    let found = match explained {
+        Explained::InWords => model.detect(picture),
+        Explained::WithPlaces => model.detect_explained(picture),
+    };
+    let found = found.map_err(Error::Teacher)?;
     let seconds = start.elapsed().as_secs_f64();
     let view = |found: FoundGrasp| DetectionView {
         score: found.score,
         is_accepted: found.is_accepted,
         marks: Marks::of_found(&found, size),
         pose: found.pose,
+        refusal: found.refusal,
     };
     Ok(DetectionsView { seconds, detections: found.into_iter().map(view).collect() })
 }

@@ -1,5 +1,6 @@
 //! Requests about marked pictures.
 
+use sdg_demonstration::OutlineClicks;
 use sdg_geometry::BoundingBox;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,7 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
     Some(match (method, rest) {
         ("GET", ["picture"]) => picture_of(session.picture(id).and_then(|picture| picture.for_browser())),
         ("PUT", ["marks"]) => json_of(read("marks", body).and_then(|marks| session.set_marks(id, marks))),
+        ("DELETE", []) => json_of(session.remove_image(id).map(|()| session.view())),
         ("POST", ["outline"]) => json_of(propose_outline(session, id, body)),
         ("GET", ["samples", index]) => {
             let seed = request.head.query_value("seed").and_then(|seed| seed.parse().ok()).unwrap_or(1);
@@ -29,7 +31,16 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 struct BoxRequest {
     #[serde(rename = "box")]
     bbox: [f64; 4],
+    /// Places that belong to the part.
+    #[serde(default)]
+    inside: Vec<[f64; 2]>,
+    /// Places that do not.
+    #[serde(default)]
+    outside: Vec<[f64; 2]>,
 }
+
+/// More clicks than any hand makes for one outline; each costs some milliseconds.
+const MAX_CLICKS: usize = 200;
 
 #[derive(Serialize)]
 struct Proposal {
@@ -37,13 +48,23 @@ struct Proposal {
 }
 
 fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal> {
-    let BoxRequest { bbox: [x1, y1, x2, y2] } = read("box", body)?;
+    let BoxRequest { bbox: [x1, y1, x2, y2], inside, outside } = read("box", body)?;
+    let found = inside.len() + outside.len();
+    if found > MAX_CLICKS {
+        return Err(Error::Request {
+            what: "clicks",
+            expected: format!("at most {MAX_CLICKS}"),
+            found: found.to_string(),
+        });
+    }
     let picture = session.picture(id)?;
     let bbox = BoundingBox::new(x1, y1, x2, y2).map_err(|error| Error::Request {
         what: "box",
         expected: "two corners".into(),
         found: error.to_string(),
     })?;
-    let outline = outline::propose(&picture.pixels()?, &bbox);
+    let places = |places: Vec<[f64; 2]>| places.into_iter().map(Into::into).collect();
+    let clicks = OutlineClicks { inside: places(inside), outside: places(outside) };
+    let outline = outline::propose(&picture.pixels()?, &bbox, &clicks);
     Ok(Proposal { outline: outline.map(|outline| outline.vertices.into_iter().map(Into::into).collect()) })
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::answers::{json_of, picture_of};
-use super::detections::detect;
+use super::detections::{Explained, detect};
 use crate::error::Result;
 use crate::http::Response;
 use crate::live::{Live, LiveFault};
@@ -23,7 +23,10 @@ pub fn answer(session: &Session, method: &str, rest: &[&str]) -> Option<Response
             session.live_desk().and_then(|desk| desk.frame(number)).map(|picture| (jpeg(&picture), "image/jpeg")),
         ),
         ("POST", "detect") => json_of(
-            session.live_desk().and_then(|desk| desk.frame(number)).and_then(|picture| detect(session, &picture)),
+            session
+                .live_desk()
+                .and_then(|desk| desk.frame(number))
+                .and_then(|picture| detect(session, &picture, Explained::InWords)),
         ),
         ("POST", "photo") => json_of(session.take_photo(number)),
         ("POST", "keep") => json_of(session.keep_frame(number)),

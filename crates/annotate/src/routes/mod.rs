@@ -7,13 +7,17 @@
 //! | `PUT /api/label` | renames the object |
 //! | `GET /api/images/{id}/picture` | a marked picture |
 //! | `PUT /api/images/{id}/marks` | takes marks, writes them, says what they suffice for |
-//! | `POST /api/images/{id}/outline` | proposes an outline from a box; null where nothing stands out |
+//! | `DELETE /api/images/{id}`, `/api/trial-pictures/{id}` | takes the picture out of the session; its file stays |
+//! | `POST /api/images/{id}/outline` | proposes an outline from a box and places that belong to the part or do not; null where nothing stands out |
 //! | `GET /api/images/{id}/samples/{n}?seed=` | a sample of the marks, as JPEG |
 //! | `GET`, `POST`, `DELETE /api/teaching` | news of the teaching; starts it; ends it with what there is |
 //! | `POST /api/trial-pictures?name=` | takes a picture to try |
 //! | `GET /api/trial-pictures/{id}/picture` | that picture |
 //! | `POST /api/trial-pictures/{id}/detect` | grasps in it |
 //! | `POST /api/trial-pictures/{id}/accept` | makes it a demonstration with the marks given |
+//! | `PUT /api/trial-pictures/{id}/absent` | says that the part is not there, or takes that back |
+//! | `PUT /api/models/{id}/current` | uses a version of the model, of those in `GET /api/session` |
+//! | `POST /api/models/{id}/compare/{other}` | what two versions find in the pictures to try |
 //! | `GET /api/live` | the number of the camera's newest frame, and what is wrong with the camera |
 //! | `GET /api/live/{number}/picture` | that frame, as JPEG |
 //! | `POST /api/live/{number}/detect` | grasps in it |
@@ -24,6 +28,7 @@ mod answers;
 mod detections;
 mod images;
 mod live;
+mod models;
 mod trial_pictures;
 
 use serde::Deserialize;
@@ -69,6 +74,9 @@ pub fn answer(session: &Session, request: &Request) -> Response {
             json_of(Ok(session.teaching_news()))
         }
         ("POST", ["api", "trial-pictures"]) => json_of(trial_pictures::add(session, request)),
+        (method, ["api", "models", id, rest @ ..]) => {
+            models::answer(session, method, id, rest).unwrap_or_else(no_such_address)
+        }
         (method, ["api", "live", rest @ ..]) => live::answer(session, method, rest).unwrap_or_else(no_such_address),
         (method, ["api", kind @ ("images" | "trial-pictures"), id, rest @ ..]) => {
             let Ok(id) = id.parse::<usize>() else { return no_such_address() };

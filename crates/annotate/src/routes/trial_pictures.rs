@@ -1,7 +1,9 @@
 //! Requests about pictures that a taught model is tried on.
 
+use serde::Deserialize;
+
 use super::answers::{json_of, picture_of, read};
-use super::detections::detect;
+use super::detections::{Explained, detect};
 use crate::error::Result;
 use crate::http::{Request, Response};
 use crate::session::Session;
@@ -13,11 +15,21 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
         ("GET", ["picture"]) => picture_of(session.trial_picture(id).and_then(|trial| trial.picture.for_browser())),
         ("POST", ["detect"]) => {
             let pixels = session.trial_picture(id).and_then(|trial| trial.picture.pixels());
-            json_of(pixels.and_then(|pixels| detect(session, &pixels)))
+            json_of(pixels.and_then(|pixels| detect(session, &pixels, Explained::WithPlaces)))
         }
         ("POST", ["accept"]) => json_of(read("marks", &request.body).and_then(|marks| session.accept(id, marks))),
+        ("PUT", ["absent"]) => {
+            json_of(read("absent", &request.body).and_then(|Absent { absent }| session.set_absent(id, absent)))
+        }
+        ("DELETE", []) => json_of(session.remove_trial_picture(id).map(|()| session.view())),
         _ => return None,
     })
+}
+
+/// Whether the person says that the part is not in the picture.
+#[derive(Deserialize)]
+struct Absent {
+    absent: bool,
 }
 
 /// Takes a picture from the page.

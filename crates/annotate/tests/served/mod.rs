@@ -12,7 +12,7 @@ use std::time::Duration;
 use image::{Rgb, RgbImage};
 use sdg_annotate::{
     FoundGrasp, GraspTeacher, LiveOptions, LivePictures, Server, Session, SessionOptions, TaughtModel, TaughtSummary,
-    TeachRequest, TeacherError, TeachingStep,
+    TeachRequest, TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{GraspLine, PlanarGrasp};
@@ -21,12 +21,29 @@ use serde_json::Value;
 /// A teacher whose model finds its demonstration where it was photographed; quick, for the page's own sake.
 struct InPlace;
 
-struct InPlaceModel(Demonstration);
+struct InPlaceModel(Demonstration, Vec<RgbImage>);
+
+/// What is read from the file of one, which keeps nothing of it: it finds nothing.
+struct ReadModel(TaughtSummary);
+
+impl TaughtModel for ReadModel {
+    fn summary(&self) -> TaughtSummary {
+        self.0.clone()
+    }
+
+    fn to_bytes(&self) -> Result<Vec<u8>, TeacherError> {
+        Ok(b"a model".to_vec())
+    }
+
+    fn detect(&self, _: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
+        Ok(Vec::new())
+    }
+}
 
 impl GraspTeacher for InPlace {
     fn teach(
         &self,
-        demonstrations: &[Demonstration],
+        material: &TeachingMaterial,
         request: &TeachRequest,
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
@@ -40,7 +57,11 @@ impl GraspTeacher for InPlace {
             }
         }
         let _ = observe(TeachingStep::Validated { done: planned, hit_rate: 1.0 });
-        Ok(Box::new(InPlaceModel(demonstrations[0].clone())))
+        Ok(Box::new(InPlaceModel(material.demonstrations[0].clone(), material.negatives.clone())))
+    }
+
+    fn open(&self, bytes: &[u8], summary: &TaughtSummary) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        if bytes == b"a model" { Ok(Box::new(ReadModel(summary.clone()))) } else { Err("no model".into()) }
     }
 }
 
@@ -50,9 +71,8 @@ impl TaughtModel for InPlaceModel {
             model: sdg_annotate::ModelKind::S,
             object: self.0.annotation.label.clone(),
             seconds: 0.1,
-            hit_rate: None,
-            error_px: None,
-            error_degrees: None,
+            figures: None,
+            negatives: None,
         }
     }
 
@@ -63,7 +83,8 @@ impl TaughtModel for InPlaceModel {
     fn detect(&self, image: &RgbImage) -> Result<Vec<FoundGrasp>, TeacherError> {
         let bbox = self.0.annotation.bbox;
         let place = bbox.center().map(|v| v as u32);
-        let same = image.get_pixel(place.x, place.y) == self.0.image.get_pixel(place.x, place.y);
+        let same =
+            !self.1.contains(image) && image.get_pixel(place.x, place.y) == self.0.image.get_pixel(place.x, place.y);
         let line: GraspLine = *self.0.annotation.require_grasp()?;
         Ok(vec![FoundGrasp {
             score: if same { 0.9 } else { 0.1 },
@@ -73,6 +94,7 @@ impl TaughtModel for InPlaceModel {
             grasp: PlanarGrasp::from_line(&line, self.0.annotation.jaw_width.unwrap_or(30.0)),
             line_length: line.length(),
             pose: None,
+            refusal: None,
         }])
     }
 }
@@ -89,6 +111,7 @@ pub struct Served {
 /// An answer, taken apart.
 pub struct Answer {
     pub status: u16,
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub head: String,
     pub body: Vec<u8>,
 }
@@ -120,12 +143,28 @@ pub fn photo_png() -> Vec<u8> {
 }
 
 impl Served {
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn start() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image: PathBuf = folder.path().join("photo.png");
         std::fs::write(&image, photo_png()).unwrap();
         std::fs::write(folder.path().join("secret.txt"), "not for the page").unwrap();
         Self::open(folder, SessionOptions { images: vec![(image, None)], ..SessionOptions::default() })
+    }
+
+    /// A server on a project's folder.
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
+    pub fn of_project(folder: tempfile::TempDir) -> Self {
+        let options = SessionOptions { project: Some(folder.path().to_owned()), ..SessionOptions::default() };
+        Self::open(folder, options)
+    }
+
+    /// Ends the server and gives its folder back.
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
+    pub fn end(mut self) -> tempfile::TempDir {
+        let folder = std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap());
+        drop(self);
+        folder
     }
 
     /// A server with a camera and no photo, in an empty folder.

@@ -9,7 +9,9 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, Preset, Start, Taught, TeachOptions, teach};
+use sdg_grasp::{
+    CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
+};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
@@ -39,6 +41,10 @@ pub struct TeachArgs {
     /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
     #[arg(long = "demo", required = true, value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
+    /// A picture without the part, above all one in which a model found it: used in teaching, and the score is set so that nothing
+    /// is accepted there, as far as nine in ten parts stay accepted; repeat for several
+    #[arg(long = "negative", value_name = "IMAGE")]
+    pub negatives: Vec<PathBuf>,
     /// The file to write
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -111,6 +117,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     options.steps = args.steps.map(|steps| steps as usize);
     options.device = devices::open(&args.compute)?;
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
+    options.negatives = args.negatives.iter().map(|path| files::read_image(path)).collect::<Result<_>>()?;
     if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;
         for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
@@ -119,6 +126,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         let [mark, grasp] = args.camera.heights_m();
         let (seen, lengths) = camera.seen_from_above(&demonstrations, mark, grasp)?;
         demonstrations = seen;
+        options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
         options.lengths = Some(lengths);
     }
     files::check_writable(&args.out)?;
@@ -177,6 +185,12 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
+        if let Some(NegativeFacts { pictures, refused, log_odds }) = facts.negatives {
+            println!(
+                "refuses {refused} of {pictures} pictures without the part; every score has {:.1} log-odds less for them",
+                -log_odds
+            );
+        }
         if let Some(lengths) = facts.lengths {
             println!(
                 "knows its size: marks {:.1} mm above the table, {:.3} mm a pixel; grasped {:.1} mm above the table",
@@ -225,6 +239,7 @@ fn command(args: &TeachArgs) -> String {
     }
     args.reinitialized.iter().for_each(|part| option("reinit", part.clone()));
     args.demonstrations.iter().for_each(|demonstration| option("demo", demonstration.clone()));
+    args.negatives.iter().for_each(|negative| option("negative", negative.display().to_string()));
     option("out", args.out.display().to_string());
     command
 }

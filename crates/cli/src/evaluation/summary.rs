@@ -309,6 +309,7 @@ mod tests {
             seconds: 60.0,
             validation: None,
             orientation: None,
+            negatives: None,
             base_weights_sha256: None,
         };
         let taught =

@@ -8,4 +8,5 @@ mod keyboard;
 mod live;
 mod page;
 mod photo_to_grasp;
+mod project;
 mod small_screen;

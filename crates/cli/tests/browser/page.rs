@@ -18,6 +18,7 @@ pub struct Page {
     pub browser: Browser,
     pub folder: TempDir,
     server: Child,
+    arguments: Vec<String>,
     pub url: String,
 }
 
@@ -41,24 +42,24 @@ impl Page {
 
     /// Opens the page with these arguments, which name files in the folder.
     pub fn open_in(folder: TempDir, arguments: &[&str]) -> Self {
-        let mut server = Command::new(env!("CARGO_BIN_EXE_sdg"))
-            .args(["annotate", "--no-browser", "--json"])
-            .args(arguments)
-            .current_dir(folder.path())
-            // It is ended without a word, and what it keeps for the session goes with the folder.
-            .env("TMPDIR", folder.path())
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let told: Value = serde_json::from_str(&line).unwrap();
-        let url = told["url"].as_str().unwrap().to_owned();
+        let arguments: Vec<String> = arguments.iter().map(|&argument| argument.to_owned()).collect();
+        let (server, url) = serve(&folder, &arguments);
         let browser = Browser::start(&BrowserOptions::default()).unwrap();
         browser.emulate(1280, 800, false).unwrap();
-        let page = Self { browser, folder, server, url };
+        let page = Self { browser, folder, server, arguments, url };
         page.browser.open(&page.url).unwrap();
         page
+    }
+
+    /// Ends the server without a word.
+    pub fn stop_server(&mut self) {
+        self.server.kill().unwrap();
+        self.server.wait().unwrap();
+    }
+
+    /// Starts it again with the same arguments.
+    pub fn start_server(&mut self) {
+        (self.server, self.url) = serve(&self.folder, &self.arguments);
     }
 
     pub fn wait_for(&self, what: &str, script: &str) -> Value {
@@ -142,6 +143,22 @@ impl Page {
     pub fn assert_quiet(&self) {
         assert_eq!(self.browser.console_errors().unwrap(), [""; 0]);
     }
+}
+
+fn serve(folder: &TempDir, arguments: &[String]) -> (Child, String) {
+    let mut server = Command::new(env!("CARGO_BIN_EXE_sdg"))
+        .args(["annotate", "--no-browser", "--json"])
+        .args(arguments)
+        .current_dir(folder.path())
+        // It is ended without a word, and what it keeps for the session goes with the folder.
+        .env("TMPDIR", folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(server.stdout.take().unwrap()).read_line(&mut line).unwrap();
+    let told: Value = serde_json::from_str(&line).unwrap();
+    (server, told["url"].as_str().unwrap().to_owned())
 }
 
 fn numbers(value: &Value) -> [f64; 2] {

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use crate::page::{BOX, HOLD, Page, shipped_photo};
 
-/// Issue 6: the page loads in under a second and stays under 200 KB, its photo apart.
+/// Issue 19: the page loads in under a second and stays under 250 KB, its photo apart.
 const MAX_LOAD_MS: f64 = 1000.0;
-const MAX_PAGE_BYTES: f64 = 200_000.0;
+const MAX_PAGE_BYTES: f64 = 250_000.0;
 
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
@@ -131,13 +131,14 @@ fn teach(page: &Page) {
     let written = "return document.getElementById('teach-outcome').innerText.includes('Written to')";
     patiently(page, "a model of the network", written);
     let outcome = page.text("#teach-outcome");
-    assert!(outcome.contains("of new samples"), "{outcome}");
+    assert!(outcome.contains("On new samples it finds") && outcome.contains("95"), "{outcome}");
 
     page.click("[name=model][value=S]");
     page.click("#teach-start");
-    // Nothing is trained, so nothing is said of new samples.
-    let instant = "const text = document.getElementById('teach-outcome').innerText;
-        return text.includes('Written to') && !text.includes('of new samples')";
+    // Both are kept, and the figures are those of the finished model, without a network as well.
+    let instant = "const models = [...document.querySelectorAll('#version-list li')].map((li) => li.innerText);
+        return models.length === 2 && models[1].includes('2: S') && models[1].includes('On new samples')
+            && models[1].includes('in use')";
     patiently(page, "a model without a network", instant);
     assert!(page.folder.path().join("pendulum.sdg").exists());
     page.screenshot("7-taught");

@@ -8,6 +8,7 @@
 //!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds
 //!         └───────────────────────────◀─────────────────────────────────┤
 //!                                     largest piece ─ outer_outline ────┴─ Polygon
+//! clicks ─ the pieces of the picture that they mean stay on their side while the rest is cut again
 //! ```
 //!
 //! The energy is that of GrabCut (Rother, Kolmogorov, Blake 2004): how badly each pixel's colour suits its side, and the
@@ -18,6 +19,7 @@
 //!
 //! Absent: any knowledge of parts, and randomness. The same photo and box give the same outline.
 
+mod clicks;
 mod color_mixture;
 mod lab;
 mod minimal_cut;
@@ -26,6 +28,7 @@ use image::{RgbImage, imageops};
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Mask, Polygon, outer_outline};
 
+use clicks::Click;
 use color_mixture::ColorMixture;
 use lab::Lab;
 use minimal_cut::{Edges, minimal_cut};
@@ -38,6 +41,8 @@ const MARGIN_SHARE: f64 = 0.2;
 const MIN_MARGIN_PX: f64 = 12.0;
 /// How often colours are learnt again from the last cut.
 const ROUNDS: usize = 6;
+/// The same after clicks.
+const ROUNDS_AFTER_CLICKS: usize = 3;
 /// A piece smaller than this share of the box is no part.
 const MIN_AREA_SHARE: f64 = 0.02;
 /// Where less of the box than this is left when shadows are taken out, the part itself has a shadow's colour.
@@ -52,10 +57,24 @@ const MAX_EVIDENCE: f32 = 10.0;
 /// # Units and frames
 /// Pixels of the photo; the centre of the first pixel is (0.5, 0.5).
 pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
+    propose_outline_with(image, bbox, &OutlineClicks::default())
+}
+
+/// Places of the photo that a person clicked, in pixels: what belongs to the part, and what does not.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct OutlineClicks {
+    /// On the part.
+    pub inside: Vec<Point2<f64>>,
+    /// Beside it.
+    pub outside: Vec<Point2<f64>>,
+}
+
+/// The same, corrected by clicks: each means the piece of the picture that it lies on. Clicks outside the box count for nothing.
+pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, clicks: &OutlineClicks) -> Polygon {
     let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
     let Some(frame) = Frame::cut_out(image, &inside) else { return nothing_found() };
-    let Some(mask) = frame.segment() else { return nothing_found() };
+    let Some(mask) = frame.segment(&frame.clicks(clicks)) else { return nothing_found() };
     let Some(outline) = outer_outline(&mask) else { return nothing_found() };
     // Pieces of the mask reach the edges of whole pixels, the box may lie within one.
     let outline = frame.in_photo(&outline, &inside);
@@ -144,14 +163,60 @@ impl Frame {
         candidates
     }
 
+    /// The clicks that lie in the box, those on the part first.
+    fn clicks(&self, clicks: &OutlineClicks) -> Vec<Click> {
+        let all =
+            clicks.inside.iter().map(|place| (place, true)).chain(clicks.outside.iter().map(|place| (place, false)));
+        let in_frame = all.filter_map(|(place, is_inside)| {
+            let x = (place.x - self.origin[0]) / self.scale[0];
+            let y = (place.y - self.origin[1]) / self.scale[1];
+            let lies_in = (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y);
+            lies_in.then_some(Click { x: x as usize, y: y as usize, is_inside })
+        });
+        in_frame.filter(|click| self.in_box[click.y * self.width + click.x]).collect()
+    }
+
     /// The part's pixels; `None` where nothing stands out.
-    fn segment(&self) -> Option<Mask> {
+    fn segment(&self, clicks: &[Click]) -> Option<Mask> {
         let candidates = self.candidates();
-        let mut in_part = self.first_guess(&candidates)?;
+        let unclicked = vec![None; self.colors.len()];
+        // Without anything that stands out, what was clicked does.
+        let first = match self.first_guess(&candidates) {
+            Some(guess) => self.cut(guess, &candidates, &unclicked, ROUNDS),
+            None => None,
+        };
+        if clicks.is_empty() {
+            return first.map(|in_part| self.mask(&in_part));
+        }
+        let mut in_part = first.unwrap_or_else(|| vec![false; self.colors.len()]);
+        let mut pinned = unclicked;
+        for click in clicks {
+            clicks::pin(click, &self.colors, self.width, &in_part, &mut pinned);
+        }
+        for (in_part, pinned) in in_part.iter_mut().zip(&pinned) {
+            *in_part = pinned.unwrap_or(*in_part);
+        }
+        let corrected = self.cut(in_part.clone(), &candidates, &pinned, ROUNDS_AFTER_CLICKS);
+        Some(self.mask(&corrected.unwrap_or(in_part)))
+    }
+
+    fn mask(&self, in_part: &[bool]) -> Mask {
+        Mask::from_fn(self.width as u32, self.height as u32, |x, y| in_part[y as usize * self.width + x as usize])
+    }
+
+    /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side. `None`
+    /// for too few colours.
+    fn cut(
+        &self,
+        mut in_part: Vec<bool>,
+        candidates: &[bool],
+        pinned: &[Option<bool>],
+        rounds: usize,
+    ) -> Option<Vec<bool>> {
         let edges = Edges::new(&self.colors, self.width);
         let mut share: Vec<f32> = candidates.iter().map(|&candidate| if candidate { 0.5 } else { 0.0 }).collect();
         let mut mixtures: Option<[ColorMixture; 2]> = None;
-        for _ in 0..ROUNDS {
+        for _ in 0..rounds {
             let (part, mut surroundings) = self.colors_of(&in_part);
             surroundings.extend_from_slice(&self.elsewhere);
             let [part, surroundings] = match &mixtures {
@@ -161,20 +226,23 @@ impl Frame {
             let evidence: Vec<f32> = self
                 .colors
                 .iter()
-                .zip(&candidates)
-                .map(|(color, &candidate)| {
-                    if !candidate {
-                        return minimal_cut::SURELY_OUTSIDE;
+                .zip(candidates)
+                .zip(pinned)
+                .map(|((color, &candidate), pinned)| match pinned {
+                    _ if !candidate => minimal_cut::SURELY_OUTSIDE,
+                    Some(true) => -minimal_cut::SURELY_OUTSIDE,
+                    Some(false) => minimal_cut::SURELY_OUTSIDE,
+                    None => {
+                        let evidence = surroundings.log_density(color) - part.log_density(color);
+                        evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE)
                     }
-                    let evidence = surroundings.log_density(color) - part.log_density(color);
-                    evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE)
                 })
                 .collect();
             minimal_cut(&evidence, &edges, &mut share);
-            in_part = share.iter().zip(&candidates).map(|(&share, &candidate)| candidate && share > 0.5).collect();
+            in_part = share.iter().zip(candidates).map(|(&share, &candidate)| candidate && share > 0.5).collect();
             mixtures = Some([part, surroundings]);
         }
-        Some(Mask::from_fn(self.width as u32, self.height as u32, |x, y| in_part[y as usize * self.width + x as usize]))
+        Some(in_part)
     }
 
     /// The candidates whose colours the surroundings do not have, neither in the light nor in a shadow; `None` where

@@ -1,5 +1,6 @@
 //! A demonstration as the plan view shows it.
 
+use image::RgbImage;
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, Demonstration};
 use sdg_geometry::{BoundingBox, GraspLine, PlanView, Polygon, PosedCamera};
@@ -40,6 +41,19 @@ pub fn seen_from_above(
         })
         .collect::<Result<_>>()?;
     Ok((made, lengths))
+}
+
+/// Pictures without the part as the same plan view shows them.
+///
+/// # Errors
+/// A camera that does not see the plane.
+pub fn pictures_from_above(
+    pictures: &[RgbImage],
+    over_table: &CameraOverTable,
+    lengths: &Lengths,
+) -> Result<Vec<RgbImage>> {
+    let map = PlanMap::new(&over_table.camera, &plan_view(over_table, lengths)?);
+    Ok(pictures.iter().map(|picture| map.resample(picture)).collect())
 }
 
 fn annotation(marked: &Annotation, camera: &PosedCamera, view: &PlanView) -> Result<Annotation> {

@@ -17,7 +17,7 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Vector3};
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 
-pub use self::demonstration::seen_from_above;
+pub use self::demonstration::{pictures_from_above, seen_from_above};
 pub use self::lengths::Lengths;
 pub(crate) use self::picture::PixelRect;
 use self::picture::PlanMap;

@@ -6,9 +6,11 @@
 //!        ├─ Augmenter ─ frames, windows ─ train ─ detector ─┐
 //!        │      ├─ held-back samples ── validation ─────────┴─ calibrate ─ GraspModel
 //!        │      └─ scenes without the part ────────────────────────┘│
+//! pictures without the part ─ some of the samples, and the score of what is found in them ─┘
 //!        └─ (model S: nothing to train) ──────────────────────────────────────┘
 //! ```
 
+mod absent;
 mod detector_plan;
 #[cfg(all(test, any(feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 mod device_parity;
@@ -48,6 +50,7 @@ use crate::models::{Network, Reading};
 use crate::network_evidence::NetworkEvidence;
 use crate::taught::TaughtDemonstration;
 
+use absent::AbsentSamples;
 pub use event::TeachingEvent;
 pub use fine_tuning::FineTuning;
 use held_back::HeldBack;
@@ -81,10 +84,15 @@ pub fn teach(
     let start = Instant::now();
     check_marks(demonstrations, options.kind)?;
     let options = options.with_start_read()?;
-    match Plan::new(&options) {
-        Some(plan) => teach_network(demonstrations, &plan, &options, observe, start),
-        None => instant(demonstrations, &options, start),
+    let mut taught = match Plan::new(&options) {
+        Some(plan) => teach_network(demonstrations, &plan, &options, observe, start)?,
+        None => instant(demonstrations, &options, start)?,
+    };
+    if !options.negatives.is_empty() {
+        taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
+        taught.model.facts.seconds = decimal(start.elapsed().as_secs_f64());
     }
+    Ok(taught)
 }
 
 /// Smallest extent of a part in its photo: with less, whatever has two edges looks like it. Chosen by hand, not measured.
@@ -171,6 +179,7 @@ fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Inst
             seconds: decimal(start.elapsed().as_secs_f64()),
             validation: None,
             orientation: None,
+            negatives: None,
             base_weights_sha256: None,
         },
     };
@@ -221,9 +230,16 @@ pub(crate) fn teach_network(
 
     let recurring = |i: u64| plan.distinct_samples.map_or(i, |distinct| i % distinct);
     let windows = augmenter.windows(plan.detector.network.input.size_divisibility as u32);
+    let absent = AbsentSamples::new(&options.negatives, augmenter.output_size(), options.seed);
     let source = SampleSource {
-        frames: &|i| turns.canonical(augmenter.sample(recurring(i))),
-        windows: &|i| turns.canonical(windows.sample(recurring(i))),
+        frames: &|i| {
+            let whole = || absent.sample(i, augmenter.output_size());
+            whole().unwrap_or_else(|| turns.canonical(augmenter.sample(recurring(i))))
+        },
+        windows: &|i| {
+            let window = || absent.sample(i, windows.output_size());
+            window().unwrap_or_else(|| turns.canonical(windows.sample(recurring(i))))
+        },
     };
     let detector = match options.start.weights() {
         Some(base_weights) if base_weights.is_ours() => {
@@ -251,7 +267,8 @@ pub(crate) fn teach_network(
     // The samples show the part at other sizes than those that may be looked for later.
     let of_any_size: Vec<TaughtDemonstration> =
         demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
-    let on_other_parts = other_parts::shown(demonstrations, &to_hold_back, &network, options.seed)?;
+    let mut on_other_parts = other_parts::shown(demonstrations, &to_hold_back, &network, options.seed)?;
+    on_other_parts.highest.extend(absent::highest_scores(&network, &of_any_size, &options.negatives)?);
     let calibrated = held_back.calibrate(&network, &of_any_size, &on_other_parts.highest)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.min_hit_rate * positives as f64 {
@@ -281,6 +298,7 @@ pub(crate) fn teach_network(
             error_degrees: decimal(calibrated.error_degrees),
         }),
         orientation: orientation_facts,
+        negatives: None,
         base_weights_sha256: options.start.weights().map(|base_weights| base_weights.sha256.clone()),
     };
     let model = GraspModel {

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use burn::tensor::Device;
+use image::RgbImage;
 use sdg_detection::RcnnConfig;
 use sdg_geometry::RotationalSymmetry;
 
@@ -37,6 +38,9 @@ pub struct TeachOptions {
     pub size_tolerance: RangeInclusive<f64>,
     /// What [`crate::seen_from_above`] says where the demonstrations come from there.
     pub lengths: Option<Lengths>,
+    /// The user's pictures without the part: some of the samples of a network, and what the score is calibrated on. Each counts
+    /// once; none is a background of other samples.
+    pub negatives: Vec<RgbImage>,
     /// What the networks start from.
     pub start: Start,
     /// Where to compute; without gradients.
@@ -56,6 +60,7 @@ impl TeachOptions {
             symmetry: RotationalSymmetry::None,
             size_tolerance: CheckConfig::DEFAULT_SIZE_TOLERANCE,
             lengths: None,
+            negatives: Vec::new(),
             start: Start::default(),
             device: Device::flex(),
         }

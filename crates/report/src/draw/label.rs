@@ -2,6 +2,7 @@
 
 use image::RgbImage;
 use nalgebra::Point2;
+use sdg_geometry::BoundingBox;
 
 use tiny_skia::FillRule;
 
@@ -17,14 +18,9 @@ pub fn draw_label(image: &mut RgbImage, at: Point2<f64>, text: &str, color: Colo
     if !(at.x.is_finite() && at.y.is_finite() && height_px.is_finite() && height_px > 0.0) || text.is_empty() {
         return;
     }
-    let padding = (0.45 * height_px).max(2.0);
-    let tag_width = text_width(text, height_px) + 2.0 * padding;
-    let tag_height = (1.0 + 0.4 * DESCENT) * height_px + 2.0 * padding;
-    let left = at.x.min(f64::from(image.width()) - tag_width).max(0.0);
-    let top = (at.y - tag_height).min(f64::from(image.height()) - tag_height).max(0.0);
-
+    let padding = padding(height_px);
+    let BoundingBox { x1: left, y1: top, x2: right, y2: bottom } = label_bounds(image, at, text, height_px);
     let p = Point2::new;
-    let (right, bottom) = (left + tag_width, top + tag_height);
     let corners = [p(left, top), p(right, top), p(right, bottom), p(left, bottom)];
     if let Some(tag) = inside_of(image, &corners) {
         fill(image, tag, FillRule::Winding, color, 1.0);
@@ -33,6 +29,20 @@ pub fn draw_label(image: &mut RgbImage, at: Point2<f64>, text: &str, color: Colo
     if let Some(letters) = text_path(text, left + padding, top + padding + height_px, height_px) {
         fill(image, letters, FillRule::Winding, ink, 1.0);
     }
+}
+
+fn padding(height_px: f64) -> f64 {
+    (0.45 * height_px).max(2.0)
+}
+
+/// Where [`draw_label`] draws the tag, for whoever keeps tags apart.
+pub fn label_bounds(image: &RgbImage, at: Point2<f64>, text: &str, height_px: f64) -> BoundingBox {
+    let padding = padding(height_px);
+    let width = text_width(text, height_px) + 2.0 * padding;
+    let height = (1.0 + 0.4 * DESCENT) * height_px + 2.0 * padding;
+    let left = at.x.min(f64::from(image.width()) - width).max(0.0);
+    let top = (at.y - height).min(f64::from(image.height()) - height).max(0.0);
+    BoundingBox { x1: left, y1: top, x2: left + width, y2: top + height }
 }
 
 #[cfg(test)]

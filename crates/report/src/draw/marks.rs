@@ -59,7 +59,7 @@ pub struct DetectionMark<'a> {
 
 /// Line width that suits a picture's size: 3 pixels at 640 columns, so that marks and tags can still be read
 /// when three pictures share a row of the page.
-fn line_width(image: &RgbImage) -> f64 {
+pub fn line_width(image: &RgbImage) -> f64 {
     (f64::from(image.width().max(image.height())) / 213.0).clamp(1.0, 8.0)
 }
 

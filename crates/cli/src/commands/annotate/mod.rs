@@ -20,7 +20,11 @@ pub struct AnnotateArgs {
     /// Photos of one part (PNG, JPEG, WebP, BMP, TIFF). Marks are read from and written to the file of the same name with .json, or
     /// to ANNOTATION; another tool's file is read and left as it is. With --from, one that is not there yet is the name
     /// of the photo that is taken
-    #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION]")]
+    ///
+    /// Or one folder, DIR: a project, which is opened again where it was left, with its photos, versions of the model and tried
+    /// pictures (sdg-project.json in it says what is what). In a new one the pictures that have marks beside them are photos of the
+    /// part, the others pictures to try
+    #[arg(required_unless_present = "from", value_name = "IMAGE[:ANNOTATION] | DIR")]
     pub images: Vec<String>,
     /// Live pictures, to take photos on the page and to try the model on: v4l:, v4l:/dev/video2, http://HOST/PATH,
     /// 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:PART. Photos are written as photo.png, photo-2.png … into the current
@@ -36,6 +40,10 @@ pub struct AnnotateArgs {
     /// Port on 127.0.0.1; without it, any that is free
     #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
     pub port: u16,
+    /// File with the key to the page, which is made where there is none, readable by you alone; with the same --port, a page that was
+    /// left open goes on when the program is started again
+    #[arg(long, value_name = "FILE", requires = "port")]
+    pub token_file: Option<PathBuf>,
     /// Network, training and augmentation
     #[arg(long, default_value = "edge", value_name = "NAME")]
     pub preset: String,

@@ -1,10 +1,11 @@
 //! `sdg annotate`: the annotation page.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
 use sdg_camera::{Address, OpenOptions};
 use serde_json::json;
@@ -23,8 +24,15 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let preset = args.preset.parse().map_err(|error| Usage(format!("--preset: {error}")))?;
     let camera = args.camera.file.as_deref().map(CameraFile::read).transpose()?;
     let camera = camera.map(|camera| (camera, args.camera.heights_m()));
-    let mut images: Vec<(PathBuf, Option<PathBuf>)> = args.images.iter().map(|argument| split(argument)).collect();
-    let photo_path = args.from.is_some().then(|| photo_path(&mut images)).transpose()?;
+    let project = project(&args.images)?;
+    let arguments = args.images.iter().filter(|_| project.is_none());
+    let mut images: Vec<(PathBuf, Option<PathBuf>)> = arguments.map(|argument| split(argument)).collect();
+    let photo_path = match (&args.from, &project) {
+        (None, _) => None,
+        (Some(_), Some(folder)) => Some(folder.join("photo.png")),
+        (Some(_), None) => Some(photo_path(&mut images)?),
+    };
+    let token = args.token_file.as_deref().map(token).transpose()?;
     // Marks are made for minutes before the first is written.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
         files::check_writable(&written.with_extension("json"))?;
@@ -44,8 +52,14 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;
-    let options =
-        SessionOptions { images, trial_pictures: args.trial_pictures.clone(), model_path: args.out.clone(), live };
+    let options = SessionOptions {
+        images,
+        trial_pictures: args.trial_pictures.clone(),
+        model_path: args.out.clone(),
+        live,
+        project,
+        token,
+    };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;
     let url = server.url();
@@ -71,6 +85,46 @@ fn open_camera(
 ) -> Result<LiveOptions> {
     let (camera, address) = PageCamera::open(from, options, calibration)?;
     Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
+}
+
+/// The folder, where the arguments are one.
+fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
+    let mut folders = arguments.iter().map(Path::new).filter(|path| path.is_dir());
+    let Some(folder) = folders.next() else { return Ok(None) };
+    if arguments.len() > 1 {
+        let found = arguments.len();
+        let folder = folder.display();
+        return Err(Usage(format!(
+            "{folder}: expected one project's folder alone, or photos, found {found} arguments"
+        ))
+        .into());
+    }
+    files::check_writable(&folder.join("sdg-project.json"))?;
+    Ok(Some(folder.to_owned()))
+}
+
+/// Reads the key to the page, or makes one that only its owner can read.
+fn token(path: &Path) -> Result<String> {
+    const MAX_BYTES: u64 = 4096;
+    if !path.exists() {
+        let token = sdg_annotate::new_token()?;
+        let mut options = std::fs::OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
+        written.with_context(|| format!("{}: cannot write the key to the page", path.display()))?;
+        return Ok(token);
+    }
+    let text = String::from_utf8_lossy(&files::read(path, MAX_BYTES)?).trim().to_owned();
+    if text.len() < 16 || !text.chars().all(|c| c.is_ascii_alphanumeric()) {
+        bail!(
+            "{}: expected a key of 16 letters and digits or more, found {} characters (delete the file for a new key)",
+            path.display(),
+            text.chars().count()
+        );
+    }
+    Ok(text)
 }
 
 /// Takes the one image that is not there yet, which is to be taken with the camera, out of those that are; without one it is
@@ -118,6 +172,27 @@ fn open_browser(url: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_is_made_once_and_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("key");
+        let made = token(&path).unwrap();
+        assert_eq!((made.len(), token(&path).unwrap()), (32, made));
+        #[cfg(unix)]
+        assert_eq!(std::os::unix::fs::PermissionsExt::mode(&path.metadata().unwrap().permissions()) & 0o777, 0o600);
+        std::fs::write(&path, "short").unwrap();
+        assert!(token(&path).unwrap_err().to_string().contains("16 letters"));
+    }
+
+    #[test]
+    fn a_folder_is_a_project_and_stands_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = folder.path().display().to_string();
+        assert_eq!(project(&[name.clone()]).unwrap(), Some(folder.path().to_owned()));
+        assert_eq!(project(&["photo.png".to_owned()]).unwrap(), None);
+        assert!(project(&[name, "photo.png".to_owned()]).unwrap_err().is::<Usage>());
+    }
 
     #[test]
     fn the_image_that_is_not_there_is_the_photo_to_be_taken() {

@@ -69,7 +69,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         if let Some(server) = &server {
             let seen = parts.iter().filter(|part| part.is_seen(args.min_score)).map(|part| &part.found.detection);
             let mut drawn = RgbImage::clone(&picture);
-            pictures::draw_detections(&mut drawn, seen, args.min_score);
+            pictures::draw_detections(&mut drawn, seen, args.min_score, &[]);
             server.publish(drawn);
         }
     }

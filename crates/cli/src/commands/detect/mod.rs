@@ -21,7 +21,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
-use crate::found_text::{DEFAULT_MIN_SCORE, MIN_ADVISED_SCORE, Wording};
+use crate::found_text::{DEFAULT_MIN_SCORE, Wording};
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
@@ -148,18 +148,12 @@ impl<W: Write> Batch<'_, W> {
 
 /// The picture with its detections, and under the best refused ones where it differs from the demonstration, and why.
 fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImage {
-    /// More of them would cover each other.
-    const MAX_EXPLAINED: usize = 3;
     let detections = || found.iter().map(|found| &found.detection);
-    let is_worth_it = |(idx, found): &(usize, &GraspDetection)| *idx == 0 || found.score >= MIN_ADVISED_SCORE;
-    let refused = detections().filter(|found| !wording.is_accepted(found)).enumerate().filter(is_worth_it);
-    let refused: Vec<_> = refused.map(|(_, found)| found).take(MAX_EXPLAINED).collect();
+    let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
     let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
     pictures::draw_differences(&mut image, &differences);
-    pictures::draw_detections(&mut image, detections(), wording.min_score);
-    for detection in refused {
-        pictures::draw_reason(&mut image, detection, &wording.reasons(detection, 1));
-    }
+    let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
+    pictures::draw_detections(&mut image, detections(), wording.min_score, &reasons);
     image
 }
 
@@ -202,7 +196,7 @@ impl Seen {
             return Ok(());
         }
         if refused.len() == self.detections.len() {
-            writeln!(out, "{name}: {}", wording.nothing(&refused))?;
+            writeln!(out, "{name}: {}", wording.nothing(&refused, args.all))?;
         }
         for found in listed {
             writeln!(out, "{name}: {}", wording.line(found))?;

@@ -1,0 +1,109 @@
+// The models taught so far: what each is worth, which one is in use, two of them compared.
+
+import { api } from "./api.js";
+import { changed, state } from "./store.js";
+import { toast } from "./toast.js";
+
+const by = (id) => document.getElementById(id);
+const list = by("version-list");
+const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
+/** Chosen to be compared. */
+let chosen = [];
+
+/** What the finished model made of held-back samples, in words. */
+export function figuresText({ figures, negatives }) {
+  if (!figures) return "";
+  const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees } = figures;
+  const off = error ? `, off by ${error[0].toFixed(1)}\u00a0${error[1]} and ${degrees.toFixed(1)}° (median)` : "";
+  const said = negatives ? ` It refuses ${negatives.refused} of your ${negatives.pictures} pictures without the part.` : "";
+  return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0%: ${percent(low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]} without the part.${said}`;
+}
+
+/** Whether that is good, to be doubted, or poor. Chosen by hand: nine of ten, and seven of ten. */
+export function gradeOf({ figures }) {
+  if (!figures) return "good";
+  const found = figures.found[0] / Math.max(figures.found[1], 1);
+  const alarms = (figures.false_alarms[0] + figures.wrong) / Math.max(figures.false_alarms[1] + figures.found[1], 1);
+  if (found < 0.7 || alarms > 0.2) return "poor";
+  return found < 0.9 || alarms > 0.05 ? "doubtful" : "good";
+}
+
+function button(text, action) {
+  const made = Object.assign(document.createElement("button"), { type: "button", textContent: text });
+  made.addEventListener("click", action);
+  return made;
+}
+
+async function use(id) {
+  try {
+    const session = await api.useModel(id);
+    state.models = session.models;
+    state.hasModel = true;
+    for (const trial of [...state.trialPictures, state.live]) trial.detections = null;
+    toast("This version is used now, and stands under the model’s name.");
+  } catch (error) {
+    toast(error.message);
+  }
+  changed();
+}
+
+async function compare() {
+  const [one, other] = chosen;
+  const out = by("compared");
+  out.textContent = "Looking at all pictures with both…";
+  try {
+    const rows = await api.compareModels(one, other);
+    out.replaceChildren(rows.length ? table(rows) : "There is no picture to try yet: add some in the last step.");
+  } catch (error) {
+    out.textContent = error.message;
+  }
+}
+
+function table(rows) {
+  const made = document.createElement("table");
+  const line = (cells, tag) => {
+    const row = made.insertRow();
+    for (const cell of cells) row.append(Object.assign(document.createElement(tag), { textContent: cell }));
+  };
+  const number = (id) => `Model ${id + 1}`;
+  line(["Picture", ...chosen.map(number)], "th");
+  const words = ([count, best], there) => {
+    const right = there === null ? "" : (count > 0) === there ? " ✓" : " ✗";
+    return `${count ? `${count} found` : "nothing"}, ${best.toFixed(2)}${right}`;
+  };
+  for (const row of rows) line([row.name, ...row.found.map((found) => words(found, row.is_there))], "td");
+  return made;
+}
+
+export function renderVersions() {
+  const { models } = state;
+  by("versions").hidden = !models.length;
+  const wanted = JSON.stringify([models, chosen]);
+  if (list.dataset.shown === wanted) return;
+  list.dataset.shown = wanted;
+  list.replaceChildren(...models.map((model) => {
+    const item = document.createElement("li");
+    item.className = gradeOf(model.summary);
+    const when = new Date(model.taught_secs * 1000).toLocaleString();
+    const title = Object.assign(document.createElement("b"), { textContent: `${model.id + 1}: ${model.summary.model}, ${when}` });
+    const marks = [model.is_current && "in use", model.is_stale && "stale: photos, marks or negatives have changed since"].filter(Boolean);
+    const note = Object.assign(document.createElement("span"), { className: "stale", textContent: marks.join("; ") });
+    const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
+    const figures = Object.assign(document.createElement("small"), { textContent: of + figuresText(model.summary) });
+    const row = Object.assign(document.createElement("div"), { className: "row" });
+    if (!model.is_current) row.append(button("Use this one", () => use(model.id)));
+    if (models.length > 1) {
+      const label = document.createElement("label");
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.includes(model.id) });
+      box.addEventListener("change", () => {
+        chosen = box.checked ? [...chosen, model.id].slice(-2) : chosen.filter((id) => id !== model.id);
+        changed();
+      });
+      label.append(box, " Compare");
+      row.append(label);
+      if (chosen.length === 2 && chosen[1] === model.id) row.append(button("Compare the two", compare));
+    }
+    item.append(title, note, figures, row);
+    return item;
+  }));
+}

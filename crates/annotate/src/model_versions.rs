@@ -1,0 +1,188 @@
+//! The versions of a model: each teaching's file stays, under the name and time of its teaching, and the one in use stands under the
+//! model's own name as well.
+//!
+//! ```text
+//! pendulum.sdg                           the version in use
+//! models/pendulum-C-20261123-203107.sdg  a teaching's file
+//! models/pendulum-20261120-081500.sdg    what stood under the name before, when it came from elsewhere
+//! ```
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use sdg_report::write_atomically;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::names::{file_name, free_numbered};
+use crate::teacher::TaughtSummary;
+
+/// Larger model files than any teaching writes.
+const MAX_MODEL_BYTES: u64 = 1 << 30;
+
+/// One teaching's model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Version {
+    /// Its file's name in the folder of versions.
+    pub file: String,
+    /// When it was taught: seconds since 1970.
+    pub taught_secs: u64,
+    /// What it is and how good it was found to be.
+    pub summary: TaughtSummary,
+    /// Photos and pictures without the part that it was taught from.
+    pub photos: usize,
+    pub negatives: usize,
+    /// [`fingerprint`] of what it was taught from.
+    pub material: String,
+}
+
+/// All versions, oldest first.
+#[derive(Debug, Clone, Default)]
+pub struct ModelVersions {
+    pub folder: PathBuf,
+    pub versions: Vec<Version>,
+    pub current: Option<usize>,
+}
+
+impl ModelVersions {
+    /// # Errors
+    /// No such version.
+    pub fn get(&self, id: usize) -> Result<&Version> {
+        self.versions.get(id).ok_or(Error::NoSuchVersion { id, count: self.versions.len() })
+    }
+
+    /// Reads a version's file.
+    ///
+    /// # Errors
+    /// No such version, a file that cannot be read.
+    pub fn read(&self, id: usize) -> Result<Vec<u8>> {
+        let path = self.folder.join(&self.get(id)?.file);
+        let failed = || Error::file(&path, "cannot read");
+        let found = fs::metadata(&path).map_err(failed())?.len();
+        if found > MAX_MODEL_BYTES {
+            return Err(Error::TooLarge { path, most: MAX_MODEL_BYTES, found });
+        }
+        fs::read(&path).map_err(failed())
+    }
+
+    /// Writes a new version under a name of its own and makes it the one in use, which stands at `path`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn keep(&mut self, path: &Path, bytes: &[u8], version: Version) -> Result<()> {
+        fs::create_dir_all(&self.folder).map_err(Error::file(&self.folder, "cannot make this folder"))?;
+        self.keep_foreign(path)?;
+        let name = format!("{}-{}-{}.sdg", stem(path), version.summary.model, stamp(version.taught_secs));
+        let file = free_numbered(&self.folder.join(name));
+        write_atomically(&file, bytes)?;
+        write_atomically(path, bytes)?;
+        self.versions.push(Version { file: file_name(&file), ..version });
+        self.current = Some(self.versions.len() - 1);
+        Ok(())
+    }
+
+    /// Makes a version the one in use.
+    ///
+    /// # Errors
+    /// No such version, files that cannot be read or written.
+    pub fn use_version(&mut self, path: &Path, id: usize) -> Result<Vec<u8>> {
+        let bytes = self.read(id)?;
+        self.keep_foreign(path)?;
+        write_atomically(path, &bytes)?;
+        self.current = Some(id);
+        Ok(bytes)
+    }
+
+    /// What stands at `path` is not lost, unless it is a version that is kept anyway.
+    fn keep_foreign(&self, path: &Path) -> Result<()> {
+        let Ok(metadata) = fs::metadata(path) else { return Ok(()) };
+        let standing = fs::read(path).map_err(Error::file(path, "cannot read"))?;
+        let is_kept = (0..self.versions.len()).rev().any(|id| self.read(id).is_ok_and(|bytes| bytes == standing));
+        if is_kept {
+            return Ok(());
+        }
+        let written = metadata.modified().unwrap_or(UNIX_EPOCH).duration_since(UNIX_EPOCH).unwrap_or_default();
+        let name = format!("{}-{}.sdg", stem(path), stamp(written.as_secs()));
+        write_atomically(&free_numbered(&self.folder.join(name)), &standing)?;
+        Ok(())
+    }
+}
+
+/// Now, in seconds since 1970.
+pub fn now_secs() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since: Duration| since.as_secs())
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Date and time of day in UTC, fit for names: 20261123-203107.
+///
+/// # Source
+/// Hinnant, "chrono-Compatible Low-Level Date Algorithms", `civil_from_days`.
+fn stamp(secs: u64) -> String {
+    let (days, of_day) = (secs / 86_400, secs % 86_400);
+    let z = days + 719_468;
+    let (era, of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (of_era - of_era / 1460 + of_era / 36_524 - of_era / 146_096) / 365;
+    let of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = year_of_era + 400 * era + u64::from(month <= 2);
+    format!("{year:04}{month:02}{day:02}-{:02}{:02}{:02}", of_day / 3600, of_day / 60 % 60, of_day % 60)
+}
+
+/// A number of what a model was taught from, by which changes show: FNV-1a, 64 bits.
+pub fn fingerprint(text: &str) -> String {
+    let hash = text
+        .bytes()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_demonstration::ModelKind;
+
+    fn version(taught_secs: u64) -> Version {
+        let summary =
+            TaughtSummary { model: ModelKind::S, object: "rod".into(), seconds: 1.0, figures: None, negatives: None };
+        Version { file: String::new(), taught_secs, summary, photos: 1, negatives: 0, material: fingerprint("marks") }
+    }
+
+    #[test]
+    fn times_are_those_of_the_calendar() {
+        assert_eq!(stamp(0), "19700101-000000");
+        assert_eq!(stamp(951_782_400), "20000229-000000");
+        assert_eq!(stamp(1_795_466_263), "20261123-203743");
+    }
+
+    #[test]
+    fn no_model_is_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rod.sdg");
+        fs::write(&path, "from elsewhere").unwrap();
+        let mut versions = ModelVersions { folder: folder.path().join("models"), ..ModelVersions::default() };
+        versions.keep(&path, b"first", version(60)).unwrap();
+        versions.keep(&path, b"second", version(60)).unwrap();
+        let texts = || -> Vec<String> {
+            let mut texts: Vec<String> = fs::read_dir(folder.path().join("models"))
+                .unwrap()
+                .map(|entry| fs::read_to_string(entry.unwrap().path()).unwrap())
+                .collect();
+            texts.sort();
+            texts
+        };
+        assert_eq!(texts(), ["first", "from elsewhere", "second"]);
+        assert_eq!(versions.versions[0].file, "rod-S-19700101-000100.sdg");
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), versions.current), ("second", Some(1)));
+        assert_eq!(versions.use_version(&path, 0).unwrap(), b"first");
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), versions.current), ("first", Some(0)));
+        assert_eq!(texts().len(), 3, "what is kept is not kept twice");
+        assert!(versions.use_version(&path, 2).unwrap_err().to_string().contains("below 2, found 2"));
+    }
+}

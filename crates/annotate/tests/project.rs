@@ -1,0 +1,147 @@
+//! A project's folder: left and opened again, versions of the model, pictures without the part, pictures taken out.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod served;
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use served::{Served, photo_png};
+
+const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
+
+fn project() -> Served {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("photo.png"), photo_png()).unwrap();
+    Served::of_project(folder)
+}
+
+fn get(served: &Served) -> Value {
+    served.ask("GET", "/api/session", b"").json()
+}
+
+fn teach(served: &Served) {
+    served.ask("POST", "/api/teaching", b"{\"model\": \"S\"}").json();
+    let start = Instant::now();
+    while served.ask("GET", "/api/teaching", b"").json()["status"] != "done" {
+        assert!(start.elapsed() < Duration::from_secs(30));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+fn try_photo(served: &Served, name: &str) -> Value {
+    served.ask("POST", &format!("/api/trial-pictures?name={name}"), &photo_png()).json()
+}
+
+#[test]
+fn a_project_is_opened_again_where_it_was_left() {
+    let served = project();
+    served.ask("PUT", "/api/label", b"{\"label\": \"rod\"}").json();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    for name in ["table.png", "empty.png", "other.png"] {
+        try_photo(&served, name);
+    }
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    let absent = served.ask("PUT", "/api/trial-pictures/1/absent", b"{\"absent\": true}").json();
+    assert_eq!((&absent["name"], &absent["is_absent"]), (&json!("empty.png"), &json!(true)));
+    let left = get(&served);
+    let served = Served::of_project(served.end());
+    let again = get(&served);
+    for what in ["label", "images", "trial_pictures", "models"] {
+        let mut left = left[what].clone();
+        // What the page calls a model path and a saved file stays; nothing else may differ.
+        if what == "images" {
+            left.as_array_mut().unwrap().iter_mut().for_each(|image| image["note"] = again[what][0]["note"].clone());
+        }
+        assert_eq!(again[what], left, "{what}");
+    }
+    assert_eq!(again["images"][1]["name"], "table.png");
+    assert_eq!(again["trial_pictures"][0]["became"], 1);
+    // The model is there, too: it was read from its file.
+    let found = served.ask("POST", "/api/trial-pictures/2/detect", b"").json();
+    assert_eq!(found["detections"], json!([]));
+    assert!(served.folder.path().join("tried/other.png").exists() && served.folder.path().join("rod.sdg").exists());
+}
+
+#[test]
+fn models_are_versions_and_marks_that_changed_make_them_stale() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    teach(&served);
+    let models = get(&served)["models"].clone();
+    assert_eq!(models.as_array().unwrap().len(), 2);
+    let is = |what: &str, model: &Value| model[what].as_bool().unwrap();
+    assert!(!is("is_current", &models[0]) && is("is_current", &models[1]));
+    assert!(!is("is_stale", &models[0]) && !is("is_stale", &models[1]));
+    assert_ne!(models[0]["file"], models[1]["file"]);
+    for model in models.as_array().unwrap() {
+        assert!(served.folder.path().join("models").join(model["file"].as_str().unwrap()).exists());
+    }
+
+    let moved = MARKS.replace("[80, 50]", "[82, 50]");
+    served.ask("PUT", "/api/images/0/marks", moved.as_bytes()).json();
+    assert!(is("is_stale", &get(&served)["models"][1]));
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    assert!(!is("is_stale", &get(&served)["models"][1]), "marks put back are the marks that were taught");
+
+    let used = served.ask("PUT", "/api/models/0/current", b"").json();
+    assert!(is("is_current", &used["models"][0]));
+    assert_eq!(served.ask("PUT", "/api/models/7/current", b"").status, 404);
+    try_photo(&served, "table.png");
+    let compared = served.ask("POST", "/api/models/0/compare/1", b"").json();
+    assert_eq!((&compared[0]["name"], &compared[0]["is_there"]), (&json!("table.png"), &Value::Null));
+    assert_eq!(compared[0]["found"], json!([[0, 0.0], [0, 0.0]]));
+}
+
+#[test]
+fn a_picture_without_the_part_is_taught_as_such() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    try_photo(&served, "empty.png");
+    let is_accepted =
+        || served.ask("POST", "/api/trial-pictures/0/detect", b"").json()["detections"][0]["is_accepted"].clone();
+    assert_eq!(is_accepted(), true);
+    served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").json();
+    assert_eq!(get(&served)["models"][0]["is_stale"], true);
+    teach(&served);
+    assert_eq!(is_accepted(), false);
+    assert_eq!(get(&served)["models"][1]["negatives"], 1);
+    // Taken back, it is one no more; a demonstration cannot be one.
+    served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": false}").json();
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    assert_eq!(served.ask("PUT", "/api/trial-pictures/0/absent", b"{\"absent\": true}").status, 409);
+}
+
+#[test]
+fn what_is_taken_out_stays_out_and_its_file_stays() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    teach(&served);
+    try_photo(&served, "table.png");
+    try_photo(&served, "other.png");
+    served.ask("POST", "/api/trial-pictures/0/accept", MARKS.as_bytes()).json();
+    let view = served.ask("DELETE", "/api/images/1", b"").json();
+    assert_eq!((view["images"].as_array().unwrap().len(), &view["trial_pictures"][0]["became"]), (1, &Value::Null));
+    assert_eq!(served.ask("GET", "/api/images/1/picture", b"").status, 404);
+    served.ask("DELETE", "/api/trial-pictures/1", b"").json();
+    let served = Served::of_project(served.end());
+    let again = get(&served);
+    assert_eq!(again["images"].as_array().unwrap().len(), 1);
+    assert_eq!(again["trial_pictures"].as_array().unwrap().len(), 1);
+    assert!(served.folder.path().join("table.png").exists() && served.folder.path().join("tried/other.png").exists());
+}
+
+#[test]
+fn a_picture_that_is_gone_is_told_and_the_rest_opens() {
+    let served = project();
+    served.ask("PUT", "/api/images/0/marks", MARKS.as_bytes()).json();
+    try_photo(&served, "table.png");
+    let folder = served.end();
+    std::fs::remove_file(folder.path().join("tried/table.png")).unwrap();
+    let again = get(&Served::of_project(folder));
+    assert_eq!(again["notes"], json!(["tried/table.png is not there any more."]));
+    assert_eq!(again["images"].as_array().unwrap().len(), 1);
+}

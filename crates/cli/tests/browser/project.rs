@@ -1,0 +1,214 @@
+//! A project: opened again, its versions, pictures without the part, refused ones that are right, the server's end.
+
+use std::net::TcpListener;
+
+use image::{Rgb, RgbImage};
+use sdg_demonstration::Annotation;
+use serde_json::json;
+
+use crate::page::{HOLD, Page, repository, shipped_photo};
+use crate::photo_to_grasp::patiently;
+
+/// Opens a project that holds the pendulum's photo with its marks, which are those that are shipped.
+fn open(further: &[&str]) -> Page {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("project");
+    std::fs::create_dir(&project).unwrap();
+    std::fs::copy(shipped_photo(), project.join("photo.png")).unwrap();
+    let marks = std::fs::read_to_string(repository().join("datasets/demonstrations/pendulum/annotation.json")).unwrap();
+    std::fs::write(project.join("photo.json"), marks.replace("image.png", "photo.png")).unwrap();
+    let page = Page::open_in(folder, &[&["project"], further].concat());
+    shown(&page);
+    page
+}
+
+fn shown(page: &Page) {
+    page.wait_for("the photo", "const p = document.getElementById('photo'); return p.complete && p.naturalWidth");
+    page.wait_for("the marks", "return document.querySelectorAll('.todo li.done').length === 3");
+}
+
+fn teach_s(page: &Page, count: usize) {
+    page.click("#tab-teach");
+    page.click("[name=model][value=S]");
+    page.click("#teach-start");
+    let taught = format!("return document.querySelectorAll('#version-list li').length === {count}");
+    patiently(page, "a version", &taught);
+}
+
+fn try_picture(page: &Page, name: &str, picture: &RgbImage) {
+    let path = page.folder.path().join(name);
+    picture.save(&path).unwrap();
+    page.click("#tab-try");
+    page.browser.find("#picture-input").unwrap().type_text(path.to_str().unwrap()).unwrap();
+    page.wait_for(name, &format!("return document.getElementById('photo').alt === 'Photo {name}'"));
+    patiently(
+        page,
+        "an answer",
+        "return /Nothing is accepted|Found the part/.test(document.getElementById('found').innerText)",
+    );
+}
+
+fn photo() -> RgbImage {
+    image::open(shipped_photo()).unwrap().into_rgb8()
+}
+
+/// The part with half of it under something.
+fn half_covered() -> RgbImage {
+    let mut picture = photo();
+    for y in 150..300 {
+        for x in 318..400 {
+            picture.put_pixel(x, y, Rgb([120, 130, 70]));
+        }
+    }
+    picture
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_refused_one_says_why_and_is_learnt_from() {
+    let page = open(&[]);
+    teach_s(&page, 1);
+    try_picture(&page, "covered.png", &half_covered());
+    page.settle_frames();
+    let found = page.text("#found");
+    assert!(found.contains("Refused") && found.contains("Why:"), "{found}");
+    assert!(found.contains("Right all the same: learn from it") && found.contains("The part is not here"), "{found}");
+    let dots = "return document.querySelectorAll('#overlay .differs path').length";
+    assert!(page.browser.run(dots, &[]).unwrap().as_u64().unwrap() > 0, "where it differs is shown");
+    page.screenshot("project-1-refused");
+    page.assert_accessible("a refused detection");
+    page.click(".found button");
+    page.wait_for(
+        "a demonstration",
+        "return document.getElementById('found').innerText.includes('A demonstration now')",
+    );
+    let marks = page.folder.path().join("project/covered.json");
+    let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: Some("covered.png") };
+    let read = Annotation::read(&std::fs::read(marks).unwrap(), &facts).unwrap().remove(0);
+    let grasp = read.grasp.unwrap().center();
+    assert!((grasp.x - HOLD[0]).hypot(grasp.y - HOLD[1]) < 40.0, "{grasp:?}");
+    page.click("#tab-teach");
+    page.settle_frames();
+    assert!(page.text("#version-list").contains("stale"), "{}", page.text("#version-list"));
+    page.screenshot("project-2-stale");
+    page.assert_accessible("versions");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_again() {
+    let mut page = open(&[]);
+    teach_s(&page, 1);
+    try_picture(&page, "other.png", &image::imageops::rotate180(&photo()));
+    try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
+    let not_here =
+        "[...document.querySelectorAll('#found button')].find((b) => b.innerText === 'The part is not here')";
+    page.browser.run(&format!("{not_here}.click()"), &[]).unwrap();
+    page.wait_for(
+        "its word",
+        "return document.getElementById('found').innerText.includes('You said that the part is not here')",
+    );
+    page.settle_frames();
+    page.screenshot("project-3-not-here");
+    page.assert_accessible("a picture without the part");
+    teach_s(&page, 2);
+    assert!(page.text("#version-list").contains("1 without the part"), "{}", page.text("#version-list"));
+
+    // Left and opened again: everything is there.
+    page.stop_server();
+    page.start_server();
+    page.browser.open(&page.url.clone()).unwrap();
+    shown(&page);
+    page.click("#tab-teach");
+    page.wait_for("both versions", "return document.querySelectorAll('#version-list li').length === 2");
+    let preselected = "return document.querySelector('[name=model]:checked').value";
+    assert_eq!(page.browser.run(preselected, &[]).unwrap(), json!("S"));
+    for number in [1, 2] {
+        page.click(&format!("#version-list li:nth-child({number}) input"));
+        page.settle_frames();
+    }
+    page.click("#version-list li:nth-child(2) button");
+    let compared = "const text = document.getElementById('compared').innerText;
+        return text.includes('other.png') && text.includes('empty.png') && text";
+    patiently(&page, "the table", compared);
+    page.screenshot("project-4-compared");
+    page.assert_accessible("two versions compared");
+    page.click("#version-list li:nth-child(1) button");
+    page.wait_for("the first in use", "return document.querySelector('#version-list li').innerText.includes('in use')");
+    page.click("#tab-try");
+    page.wait_for("what was said", "return document.getElementById('strip').innerText.includes('part not here')");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn marks_made_while_the_server_is_gone_are_saved_when_it_is_back() {
+    // A port that was free a moment ago.
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
+    let mut page = open(&["--port", &port, "--token-file", "key"]);
+    page.stop_server();
+    page.wait_for("the banner", "return !document.getElementById('lost').hidden");
+    page.settle_frames();
+    page.screenshot("project-5-lost");
+    page.assert_accessible("without its server");
+    assert_eq!(page.browser.run("return document.getElementById('photo').naturalWidth", &[]).unwrap(), json!(640));
+    for _ in 0..5 {
+        page.browser.press(&["]"]).unwrap();
+    }
+    page.wait_for("kept here", "return (localStorage.getItem('kept-marks') ?? '').includes('photo.png')");
+    let path = page.folder.path().join("project/photo.json");
+    let before = std::fs::read_to_string(&path).unwrap();
+    page.start_server();
+    page.wait_for("no banner", "return document.getElementById('lost').hidden");
+    page.wait_for("saved", "return document.getElementById('saved').innerText.startsWith('Saved in')");
+    assert_ne!(std::fs::read_to_string(&path).unwrap(), before);
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn clicks_in_and_out_correct_the_outline() {
+    let page = Page::open();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    let area = |page: &Page| page.saved().outline.unwrap().area();
+    let before = area(&page);
+    // The handle's middle is said to be no part of it, and then to be one.
+    page.click("[data-tool=out]");
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.settle();
+    let without = area(&page);
+    assert!(without < before - 200.0, "{before} {without}");
+    page.screenshot("project-6-clicked");
+    page.browser.press(&["\u{e009}", "z"]).unwrap();
+    page.settle();
+    assert_eq!(area(&page), before);
+    page.assert_accessible("clicking the outline");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn at_360_px_nothing_lies_on_the_part_or_the_tools() {
+    let page = Page::open();
+    page.browser.emulate(360, 740, false).unwrap();
+    page.settle_frames();
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    page.browser.drag(&[page.on_screen(HOLD)]).unwrap();
+    page.wait_for("the gripper", "return document.querySelector('#do-grasp.done') !== null");
+    page.settle();
+    let overlap = "const rect = (css) => document.querySelector(css).getBoundingClientRect();
+        const meets = (a, b) => a.width && b.width && a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        const hint = rect('#hint'), part = rect('#overlay .outline .line'), tools = rect('#tools');
+        return [meets(hint, part), [...document.querySelectorAll('#toasts p')].some((p) => meets(p.getBoundingClientRect(), tools)),
+            Math.max(part.width, part.height)]";
+    let told = page.browser.run(overlap, &[]).unwrap();
+    assert_eq!((&told[0], &told[1]), (&json!(false), &json!(false)));
+    // Zoomed to after the box, the part is large enough beside its handles.
+    assert!(told[2].as_f64().unwrap() > 120.0, "{told}");
+    page.screenshot("project-7-360");
+    page.assert_quiet();
+}

@@ -1,0 +1,213 @@
+//! The user's pictures without the part: samples of a network, and what the score is calibrated on.
+//!
+//! ```text
+//! pictures ─┬─ AbsentSamples: every 12th sample is a window of one of them, without objects
+//!           ├─ highest_scores: what the network alone says there ─ calibration of its score
+//!           └─ calibrated: what the finished model accepts there, against what it accepts on held-back samples of the part
+//!                          ─ log-odds that every score has less
+//! ```
+
+use image::{RgbImage, imageops};
+use sdg_demonstration::random::scramble;
+use sdg_demonstration::{AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle};
+use sdg_geometry::{BoundingBox, percentile};
+
+use super::options::TeachOptions;
+use crate::decimal::decimal;
+use crate::error::Result;
+use crate::facts::NegativeFacts;
+use crate::model::{GraspModel, Verification};
+use crate::models::Network;
+use crate::taught::TaughtDemonstration;
+
+/// One sample in so many shows a picture without the part. Chosen by hand, not measured: fewer than the composed ones without it.
+const ONE_IN: u64 = 12;
+/// Held-back samples with the part that the score is held against. Chosen for time: one takes some 50 ms.
+const NUM_POSITIVES: u64 = 12;
+/// The samples begin far beyond those that networks are validated on, and apart from those that figures are told of.
+const FIRST_POSITIVE: u64 = 1 << 36;
+/// What is found without the part is to score below 0.5 by so much, in log-odds. Chosen by hand.
+const MARGIN: f64 = 0.2;
+/// So many percent of the parts may be refused for pictures without it.
+const REFUSED_PERCENT: f64 = 10.0;
+/// A detection on a held-back part overlaps it by at least this IoU.
+const MIN_IOU: f64 = 0.5;
+
+/// Samples made of pictures without the part.
+pub(super) struct AbsentSamples {
+    pictures: Vec<RgbImage>,
+    seed: u64,
+}
+
+impl AbsentSamples {
+    /// The pictures, resized to cover frames of the samples' size.
+    pub(super) fn new(pictures: &[RgbImage], [width, height]: [u32; 2], seed: u64) -> Self {
+        let covering = |picture: &RgbImage| {
+            let across = f64::from(width) / f64::from(picture.width());
+            let down = f64::from(height) / f64::from(picture.height());
+            let scale = across.max(down);
+            let side = |length: u32, least: u32| ((f64::from(length) * scale).round() as u32).max(least);
+            let [wide, high] = [side(picture.width(), width), side(picture.height(), height)];
+            if (wide, high) == picture.dimensions() {
+                return picture.clone();
+            }
+            imageops::resize(picture, wide, high, imageops::FilterType::Triangle)
+        };
+        Self { pictures: pictures.iter().map(covering).collect(), seed }
+    }
+
+    /// Sample `index`, if it is one of these: a window of one picture at a place that seed and index decide.
+    pub(super) fn sample(&self, index: u64, [width, height]: [u32; 2]) -> Option<Sample> {
+        if self.pictures.is_empty() || index % ONE_IN != ONE_IN - 1 {
+            return None;
+        }
+        let turn = index / ONE_IN;
+        let picture = &self.pictures[(turn % self.pictures.len() as u64) as usize];
+        let random = scramble(self.seed ^ scramble(turn));
+        let place = |random: u64, room: u32| (random % u64::from(room + 1)) as u32;
+        let left = place(random >> 32, picture.width() - width);
+        let top = place(random & 0xffff_ffff, picture.height() - height);
+        let image = imageops::crop_imm(picture, left, top, width, height).to_image();
+        Some(Sample { image, objects: Vec::new() })
+    }
+}
+
+/// The network's highest score in each picture; 0 where it proposes nothing.
+///
+/// # Errors
+/// A picture that the network refuses.
+pub(super) fn highest_scores(
+    network: &Network,
+    demonstrations: &[TaughtDemonstration],
+    pictures: &[RgbImage],
+) -> Result<Vec<f64>> {
+    let highest = |picture| {
+        let proposals = network.proposals(picture, demonstrations)?;
+        Ok(proposals.candidates.first().map_or(0.0, |candidate| candidate.network_score))
+    };
+    pictures.iter().map(highest).collect()
+}
+
+/// The model with scores so much lower that the pictures without the part are refused, as far as nine in ten held-back samples of
+/// the part are accepted still.
+///
+/// # Errors
+/// A picture that the model cannot look at.
+pub(super) fn calibrated(
+    model: GraspModel,
+    demonstrations: &[Demonstration],
+    options: &TeachOptions,
+) -> Result<GraspModel> {
+    // Pictures of a model that knows lengths are plan views.
+    let as_used = if options.lengths.is_some() { model.clone().of_known_size()? } else { model.clone() };
+    let absent = options
+        .negatives
+        .iter()
+        .map(|picture| best_log_odds(&as_used, picture, |_| true))
+        .collect::<Result<Vec<Option<f64>>>>()?;
+    let highest = absent.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    let log_odds = if highest + MARGIN > 0.0 {
+        let present = on_parts(&as_used, demonstrations, options)?;
+        less_for(highest, &present)
+    } else {
+        0.0
+    };
+    let refused = absent.iter().filter(|found| found.is_none_or(|found| found + log_odds < 0.0)).count();
+    let facts = NegativeFacts { pictures: absent.len(), refused, log_odds };
+    let mut model = model.with_check(|check| check.score.bias += log_odds)?;
+    model.facts.negatives = Some(facts);
+    Ok(model)
+}
+
+/// The log-odds that take the highest score without the part below 0.5, and no more than leave the lowest but a tenth of the
+/// scores on the part above.
+fn less_for(highest: f64, present: &[f64]) -> f64 {
+    let room = percentile(present.iter().copied(), REFUSED_PERCENT).unwrap_or(0.0).max(0.0);
+    decimal(-(highest + MARGIN).clamp(0.0, room))
+}
+
+/// The best score on the part in each held-back sample, in log-odds; nothing of those in which it is not found.
+fn on_parts(model: &GraspModel, demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<f64>> {
+    let sizes = model.size_tolerance();
+    let mut style = SceneStyle { positive_share: 1.0, ..SceneStyle::default() };
+    style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
+    let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
+    let augmenter = Augmenter::new(demonstrations, config, options.seed)?;
+    let mut found = Vec::new();
+    for sample in (0..NUM_POSITIVES).map(|i| augmenter.held_out(FIRST_POSITIVE + i)) {
+        let is_part = |bbox: &BoundingBox| sample.objects.iter().any(|object| object.bbox.iou(bbox) >= MIN_IOU);
+        found.extend(best_log_odds(model, &sample.image, is_part)?);
+    }
+    Ok(found)
+}
+
+/// The best score of what is found in a picture and counts, in log-odds.
+fn best_log_odds(model: &GraspModel, picture: &RgbImage, counts: impl Fn(&BoundingBox) -> bool) -> Result<Option<f64>> {
+    let detections = model.detect(picture, Verification::ByShape)?;
+    let best = detections.iter().filter(|found| counts(&found.bbox)).map(|found| found.score).reduce(f64::max);
+    Ok(best.map(|score| (score / (1.0 - score)).ln()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::facts::ModelKind;
+    use crate::teach::teach;
+    use crate::teach::tests::demonstration;
+    use burn::tensor::Device;
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn scores_are_lowered_below_a_half_but_not_at_the_cost_of_the_part() {
+        let present = [3.0, 3.1, 3.2, 3.3, 3.4, 3.5, 3.6, 3.7, 3.8, 3.9, 4.0];
+        assert!((less_for(1.0, &present) + 1.2).abs() < 1e-9);
+        // As like the part as the part itself: nine in ten stay.
+        assert!((less_for(9.0, &present) + 3.1).abs() < 1e-9);
+        assert_eq!(less_for(1.0, &[]), 0.0, "nothing is known of the part");
+    }
+
+    #[test]
+    fn each_picture_has_its_turn_and_covers_the_window() {
+        let pictures = [
+            RgbImage::from_pixel(40, 30, image::Rgb([9, 9, 9])),
+            RgbImage::from_pixel(640, 480, image::Rgb([200, 0, 0])),
+        ];
+        let absent = AbsentSamples::new(&pictures, [160, 120], 5);
+        let drawn: Vec<(u64, Sample)> = (0..48).filter_map(|i| Some((i, absent.sample(i, [64, 48])?))).collect();
+        assert_eq!(drawn.iter().map(|(i, _)| *i).collect::<Vec<_>>(), [11, 23, 35, 47]);
+        for (i, (_, sample)) in drawn.iter().enumerate() {
+            assert_eq!(sample.image.dimensions(), (64, 48));
+            assert_eq!(sample.image.get_pixel(3, 3)[0], [9, 200][i % 2]);
+            assert!(sample.objects.is_empty());
+        }
+        assert_eq!(AbsentSamples::new(&[], [160, 120], 5).sample(11, [64, 48]), None);
+    }
+
+    #[test]
+    fn a_picture_without_the_part_lowers_the_score_and_the_file_keeps_it() {
+        let demonstrations = [demonstration()];
+        let mut options = TeachOptions::new(1);
+        options.kind = ModelKind::S;
+        let teach_s =
+            |options: &TeachOptions| teach(&demonstrations, options, &mut |_| ControlFlow::Continue(())).unwrap().model;
+        let before = teach_s(&options);
+        let photo = &demonstrations[0].image;
+        let score = |model: &GraspModel| model.detect(photo, Verification::ByShape).unwrap()[0].score;
+        assert!(score(&before) > 0.9);
+        // The very photo said to be without the part is as like it as anything: scores go down as far as they may, no farther.
+        options.negatives =
+            vec![photo.clone(), RgbImage::from_pixel(photo.width(), photo.height(), image::Rgb([90, 90, 90]))];
+        let after = teach_s(&options);
+        let facts = after.facts().negatives.unwrap();
+        assert!(facts.log_odds < -0.5 && facts.pictures == 2 && (1..=2).contains(&facts.refused), "{facts:?}");
+        assert!(score(&after) < score(&before));
+        let read = GraspModel::from_bytes(&after.to_bytes().unwrap(), &Device::flex()).unwrap();
+        assert_eq!(score(&read), score(&after));
+        // What is refused anyway changes nothing.
+        options.negatives.remove(0);
+        assert_eq!(
+            teach_s(&options).facts().negatives.unwrap(),
+            NegativeFacts { pictures: 1, refused: 1, log_odds: 0.0 }
+        );
+    }
+}
