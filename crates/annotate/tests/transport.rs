@@ -1,6 +1,7 @@
 //! What the server makes of bytes that are no good request, and of clients that are slow.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[allow(dead_code, reason = "each test binary uses its share of this module")]
 mod served;
 
 use std::time::{Duration, Instant};
