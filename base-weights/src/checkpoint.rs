@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
-use sdg_detection::state_dict::{StateDict, WeightTensor};
+use sdg_layers::state_dict::{StateDict, WeightTensor};
 use sdg_report::write_atomically;
 use sdg_training::AdamWState;
 use serde::Serialize;

@@ -16,8 +16,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use sdg_comparison::{ComparisonConfig, ComparisonNetwork, Pyramid, Reference, View};
-use sdg_detection::state_dict::{self, StateDict};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
+use sdg_layers::state_dict::{self, StateDict};
 use sdg_part_generator::{Instance, MixedSample};
 use sdg_training::step_seed;
 
@@ -267,7 +267,7 @@ impl Task for ComparisonTask {
 mod tests {
     use super::*;
     use sdg_comparison::DIFFERENCES;
-    use sdg_detection::state_dict::StateDict;
+    use sdg_layers::state_dict::StateDict;
 
     #[test]
     fn pairs_are_drawn_by_their_step_and_the_same_part_differs_less() {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context, Result, bail};
 use burn::tensor::Device;
 use sdg_comparison::ComparisonConfig;
-use sdg_detection::state_dict::{self, StateDict};
 use sdg_grasp::BaseWeightsFile;
+use sdg_layers::state_dict::{self, StateDict};
 
 use crate::checkpoint::Checkpoint;
 use crate::network::pretrain_config;

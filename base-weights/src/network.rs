@@ -23,8 +23,6 @@ use sdg_detection::ResizedTarget;
 use sdg_detection::config::{BoxDeltas, RcnnConfig};
 use sdg_detection::image_transform::pad_batch;
 use sdg_detection::imprint::{Imprint, reading_weights};
-use sdg_detection::initialization::Initializer;
-use sdg_detection::layers::upsample_bilinear_2x;
 use sdg_detection::presets::{RcnnKind, edge_of};
 use sdg_detection::roi_heads::heatmap::encode;
 use sdg_detection::roi_heads::roi::{RoiClass, SampledRoi};
@@ -32,6 +30,8 @@ use sdg_detection::roi_pooler::Roi;
 use sdg_detection::rpn::{ImageSize, Mode};
 use sdg_detection::sampler::draw;
 use sdg_detection::{DetectionError, GeneralizedRcnn, Losses, TransformedImage, losses};
+use sdg_layers::initialization::Initializer;
+use sdg_layers::upsample_bilinear_2x;
 
 /// ROIs of an image that go through the keypoint head, and as many through the mask head.
 const MAX_ROIS_PER_IMAGE: usize = 6;

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
-use sdg_detection::state_dict;
+use sdg_layers::state_dict;
 use sdg_training::{AdamW, OneCycle};
 use serde::{Deserialize, Serialize};
 

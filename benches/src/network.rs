@@ -8,8 +8,8 @@ use clap::ValueEnum;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sdg_detection::config::*;
 use sdg_detection::presets::{self, RcnnKind};
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
 /// Keypoints of a part for R50: COCO's number.
 pub const NUM_KEYPOINTS: usize = 17;

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use sdg_report::write_atomically;
 
 /// Puts `new` between the marks `<!-- NAME: begin -->` and `<!-- NAME: end -->` of a file.
 pub fn rewrite(results: &Path, name: &str, new: &str) -> Result<()> {
     let text = std::fs::read_to_string(results).with_context(|| results.display().to_string())?;
     let text = between_marks(&text, name, new)
         .with_context(|| format!("{}: expected the marks \"{name}: begin\" and \"{name}: end\"", results.display()))?;
-    write_whole(results, &text)
+    Ok(write_atomically(results, text.as_bytes())?)
 }
 
 /// `text` with what stands between the marks replaced.
@@ -18,13 +19,6 @@ fn between_marks(text: &str, name: &str, new: &str) -> Option<String> {
     let (before, rest) = text.split_once(&begin)?;
     let (_, after) = rest.split_once(&end)?;
     Some(format!("{before}{begin}\n{}\n{end}{after}", new.trim_end()))
-}
-
-/// Writes a file whole or not at all.
-pub fn write_whole(path: &Path, text: &str) -> Result<()> {
-    let unfinished = path.with_extension("unfinished");
-    std::fs::write(&unfinished, text).with_context(|| unfinished.display().to_string())?;
-    std::fs::rename(&unfinished, path).with_context(|| path.display().to_string())
 }
 
 /// Three significant digits, in milliseconds below a second.

@@ -289,6 +289,19 @@ mod tests {
     }
 
     #[test]
+    fn more_entries_than_any_checkpoint_has_are_refused_before_they_are_read() {
+        let mut file = END_RECORD_64.to_le_bytes().to_vec();
+        file.extend([0; 28]);
+        file.extend([MAX_ENTRIES + 1, 0, 0].map(u64::to_le_bytes).concat());
+        file.extend(END_LOCATOR_64.to_le_bytes());
+        file.extend([0; 16]);
+        file.extend(END_RECORD.to_le_bytes());
+        file.extend([0; 18]);
+        let error = ZipArchive::read(&mut Source::from_bytes(file)).err().unwrap().to_string();
+        assert!(error.contains("at most 100000, found 100001"), "{error}");
+    }
+
+    #[test]
     fn an_archive_cut_anywhere_is_an_error() {
         let bytes = archive("archive/data/0", b"weights");
         for len in 0..bytes.len() {

@@ -5,12 +5,13 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use sdg_geometry::median;
+use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::compare::contestant::Contestant;
 use crate::compare::machine::Machine;
 use crate::registry::{Peer, Side, WorkSpec};
-use crate::results::{duration, rewrite, write_whole};
+use crate::results::{duration, rewrite};
 
 /// One side of a work, measured.
 #[derive(Debug, Clone)]
@@ -151,8 +152,8 @@ impl Report {
                 })
             })
             .collect();
-        write_whole(&folder.join("peers.json"), &serde_json::to_string_pretty(&self.rows())?)?;
-        write_whole(&folder.join("details.json"), &serde_json::to_string_pretty(&details)?)
+        write_atomically(&folder.join("peers.json"), &serde_json::to_vec_pretty(&self.rows())?)?;
+        Ok(write_atomically(&folder.join("details.json"), &serde_json::to_vec_pretty(&details)?)?)
     }
 
     /// The last work as lines to read while a run goes on.

@@ -1,36 +1,60 @@
-//! The server: this computer only, one port, one session, a thread for each connection.
+//! The server: this computer only, one port, one session, connections read and written by hyper.
 //!
-//! A browser keeps six connections at most, and what they ask for reads files and computes: threads do that more simply
-//! than tasks would, and teaching has its own.
+//! ```text
+//! TcpStream ─ hyper (head bounded, timed) ─ admit (length, Guard) ─ body (bounded, timed) ─ routes, on a thread ─ hyper
+//! ```
+//!
+//! One thread reads and writes all connections. What a request asks for reads files and computes, so it is answered on
+//! a thread of the runtime's pool.
 
-use std::io::Read;
-use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::io;
+use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use http_body_util::{BodyExt, Full};
+use hyper::body::{Body, Bytes, Incoming};
+use hyper::http::request::Parts;
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use tokio::net::TcpStream;
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
+use tokio_io_timeout::TimeoutStream;
 
 use crate::error::{Error, Result};
 use crate::guard::Guard;
-use crate::http::{Head, Request, Response, Unreadable, read_body};
+use crate::http::{Head, Request, Response};
 use crate::routes;
 use crate::session::Session;
 
 /// Between looks at whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// A connection on which nothing comes for so long is closed.
+/// A connection on which nothing comes, or takes nothing, for so long is closed.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// How long what is refused is still read, so that the refusal arrives before the connection closes.
+/// How long the body of what is refused is read and dropped: a connection that is closed on unread bytes is reset, and
+/// the refusal may be lost.
 const LINGER: Duration = Duration::from_secs(2);
-/// More connections than the page's browsers keep.
+/// Longer heads than any browser sends to a page of ours.
+const MAX_HEAD_BYTES: usize = 16 << 10;
+const MAX_HEADERS: usize = 64;
+/// More connections than the page's browsers keep, and more requests than are answered at a time.
 const MAX_CONNECTIONS: usize = 64;
 
 /// A bound port and the session behind it.
 pub struct Server {
     listener: TcpListener,
-    guard: Guard,
-    session: Arc<Session>,
     port: u16,
+    patience: Duration,
+    service: Service,
+}
+
+/// What every request is checked against and answered from.
+#[derive(Clone)]
+struct Service {
+    guard: Arc<Guard>,
+    session: Arc<Session>,
 }
 
 impl Server {
@@ -42,12 +66,19 @@ impl Server {
         let failed = |source| Error::Port { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
-        Ok(Self { listener, guard: Guard::new(port, session.token())?, session: Arc::new(session), port })
+        let service = Service { guard: Arc::new(Guard::new(port, session.token())?), session: Arc::new(session) };
+        Ok(Self { listener, port, patience: PATIENCE, service })
+    }
+
+    /// Closes connections after so long a silence, instead of half a minute.
+    pub fn with_patience(mut self, patience: Duration) -> Self {
+        self.patience = patience;
+        self
     }
 
     /// The address that opens the page; it holds the token, so it gives access.
     pub fn url(&self) -> String {
-        self.guard.url()
+        self.service.guard.url()
     }
 
     /// Answers until `stop` says so.
@@ -55,87 +86,111 @@ impl Server {
     /// # Errors
     /// The port failed.
     pub fn run(self, stop: impl Fn() -> bool + Send + 'static) -> Result<()> {
-        let Self { listener, guard, session, port } = self;
-        let guard = Arc::new(guard);
-        let stopped = Arc::new(AtomicBool::new(false));
-        let stopping = Arc::clone(&stopped);
-        std::thread::spawn(move || {
-            while !stop() {
-                std::thread::sleep(LOOK_EVERY);
-            }
-            stopping.store(true, Ordering::SeqCst);
-            // Wakes the server, which waits for a connection.
-            let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, port));
-        });
-        let connections = Arc::new(AtomicUsize::new(0));
-        loop {
-            let accepted = listener.accept();
-            if stopped.load(Ordering::SeqCst) {
-                return Ok(());
-            }
-            let (stream, _) = match accepted {
-                Ok(accepted) => accepted,
+        let port = self.port;
+        let failed = |source| Error::Port { port, source };
+        let mut builder = tokio::runtime::Builder::new_current_thread();
+        let runtime = builder.enable_all().max_blocking_threads(MAX_CONNECTIONS).build().map_err(failed)?;
+        let outcome = runtime.block_on(self.accept(stop)).map_err(failed);
+        // What is still being computed is not waited for.
+        runtime.shutdown_background();
+        outcome
+    }
+
+    async fn accept(self, stop: impl Fn() -> bool) -> io::Result<()> {
+        self.listener.set_nonblocking(true)?;
+        let listener = tokio::net::TcpListener::from_std(self.listener)?;
+        let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+        while !stop() {
+            let Ok(accepted) = timeout(LOOK_EVERY, listener.accept()).await else { continue };
+            let stream = match accepted {
+                Ok((stream, _)) => stream,
                 // One connection that broke before it was taken is no reason to close the page.
-                Err(error) if error.kind() == std::io::ErrorKind::ConnectionAborted => continue,
-                Err(source) => return Err(Error::Port { port, source }),
+                Err(error) if error.kind() == io::ErrorKind::ConnectionAborted => continue,
+                Err(error) => return Err(error),
             };
-            if connections.fetch_add(1, Ordering::SeqCst) >= MAX_CONNECTIONS {
-                connections.fetch_sub(1, Ordering::SeqCst);
-                continue;
-            }
-            let (guard, session, connections) = (Arc::clone(&guard), Arc::clone(&session), Arc::clone(&connections));
-            std::thread::spawn(move || {
-                serve(stream, &guard, &session);
-                connections.fetch_sub(1, Ordering::SeqCst);
+            let Ok(permit) = Arc::clone(&connections).try_acquire_owned() else { continue };
+            let (service, patience) = (self.service.clone(), self.patience);
+            tokio::spawn(async move {
+                serve(stream, service, patience).await;
+                drop(permit);
             });
         }
+        Ok(())
     }
 }
 
 /// Answers the requests of one connection, until either side has enough.
-fn serve(mut stream: TcpStream, guard: &Guard, session: &Session) {
-    let ready = stream
-        .set_nodelay(true)
-        .and_then(|()| stream.set_read_timeout(Some(PATIENCE)))
-        .and_then(|()| stream.set_write_timeout(Some(PATIENCE)));
-    let mut buffer = Vec::new();
-    while ready.is_ok() {
-        let (response, keeps_open) = match next_answer(&mut stream, &mut buffer, guard, session) {
-            Ok(answer) => answer,
-            Err(Unreadable::Closed) => return,
-            Err(Unreadable::Refused(status, why)) => (with_policy(Response::plain(status, why)), false),
+async fn serve(stream: TcpStream, service: Service, patience: Duration) {
+    if stream.set_nodelay(true).is_err() {
+        return;
+    }
+    // hyper bounds the time of a head, `Service::answer` that of a body, and this the time of an answer.
+    let mut stream = TimeoutStream::new(stream);
+    stream.set_write_timeout(Some(patience));
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(patience)
+        .max_headers(MAX_HEADERS)
+        .max_header_size(MAX_HEAD_BYTES)
+        .serve_connection(
+            TokioIo::new(Box::pin(stream)),
+            service_fn(move |request| service.clone().answer(request, patience)),
+        );
+    // A connection that breaks off or speaks no HTTP has ended; nobody else is concerned.
+    let _ = connection.await;
+}
+
+impl Service {
+    /// Answers a request. An error, a body that breaks off or does not come, ends the connection.
+    async fn answer(
+        self,
+        request: hyper::Request<Incoming>,
+        patience: Duration,
+    ) -> io::Result<hyper::Response<Full<Bytes>>> {
+        let (parts, mut body) = request.into_parts();
+        let head = match self.admit(&parts, &body) {
+            Ok(head) => head,
+            Err(mut refusal) => {
+                let _ = timeout(LINGER, async { while let Some(Ok(_)) = body.frame().await {} }).await;
+                refusal.headers.push(("Connection", "close".into()));
+                return Ok(with_policy(refusal).into_hyper());
+            }
         };
-        if response.write(&mut stream, keeps_open).is_err() {
-            return;
+        let is_page = head.path == "/";
+        let request = Request { head, body: read_body(body, patience).await? };
+        let session = self.session;
+        // What breaks in one request is told to the page, and the terminal has said more.
+        let answered = tokio::task::spawn_blocking(move || routes::answer(&session, &request)).await;
+        let mut response = answered.unwrap_or_else(|_| routes::broken());
+        if is_page {
+            response.headers.push(self.guard.cookie());
         }
-        if !keeps_open {
-            return linger(&mut stream);
+        Ok(with_policy(response).into_hyper())
+    }
+
+    /// The head of a request that may be answered. Nothing of a body is kept before its sender is known to be the page.
+    fn admit(&self, parts: &Parts, body: &Incoming) -> std::result::Result<Head, Response> {
+        let head = Head::of(parts).ok_or_else(|| Response::plain(400, "expected an HTTP/1.1 request\n"))?;
+        let Some(length) = body.size_hint().exact() else {
+            return Err(Response::plain(411, "expected a body with Content-Length\n"));
+        };
+        self.guard.check(&head).map_err(|refusal| refusal.answer())?;
+        if length > routes::max_body_bytes(&head.path) as u64 {
+            return Err(Response::plain(413, "that is more than is taken here\n"));
         }
+        Ok(head)
     }
 }
 
-/// Reads a request and answers it, and says whether the connection stays. Nothing of a body is read before its sender is
-/// known to be the page.
-fn next_answer(
-    stream: &mut TcpStream,
-    buffer: &mut Vec<u8>,
-    guard: &Guard,
-    session: &Session,
-) -> std::result::Result<(Response, bool), Unreadable> {
-    let head = Head::read(stream, buffer)?;
-    if let Err(refusal) = guard.check(&head) {
-        return Ok((with_policy(refusal.answer()), false));
+/// Reads a body whose length was found in order, waiting for each piece no longer than `patience`.
+async fn read_body(mut body: Incoming, patience: Duration) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    while let Some(frame) = timeout(patience, body.frame()).await? {
+        if let Ok(piece) = frame.map_err(io::Error::other)?.into_data() {
+            bytes.extend_from_slice(&piece);
+        }
     }
-    let body = read_body(stream, buffer, &head, routes::max_body_bytes(&head.path))?;
-    let (keeps_open, is_page) = (head.keeps_open, head.path == "/");
-    let request = Request { head, body };
-    // What breaks in one request is told to the page, and the terminal has said more.
-    let answered = catch_unwind(AssertUnwindSafe(|| routes::answer(session, &request)));
-    let mut response = answered.unwrap_or_else(|_| routes::broken());
-    if is_page {
-        response.headers.push(guard.cookie());
-    }
-    Ok((with_policy(response), keeps_open))
+    Ok(bytes)
 }
 
 /// Puts on an answer what browsers should know of it.
@@ -154,14 +209,4 @@ fn with_policy(mut response: Response) -> Response {
     ];
     response.headers.extend(POLICY.map(|(name, value)| (name, value.to_owned())));
     response
-}
-
-/// Closes so that the answer arrives: a connection closed on unread bytes is reset, and the answer may be lost.
-fn linger(stream: &mut TcpStream) {
-    if stream.shutdown(Shutdown::Write).is_err() || stream.set_read_timeout(Some(LINGER)).is_err() {
-        return;
-    }
-    let start = Instant::now();
-    let mut piece = [0; 1 << 14];
-    while start.elapsed() < LINGER && stream.read(&mut piece).is_ok_and(|count| count > 0) {}
 }

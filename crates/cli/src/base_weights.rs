@@ -6,8 +6,8 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use sdg_detection::RcnnConfig;
 use sdg_detection::config::ImageTransformConfig;
-use sdg_detection::state_dict::{StateDict, WeightTensor};
 use sdg_grasp::{BaseWeights, BaseWeightsFile, TeachOptions};
+use sdg_layers::state_dict::{StateDict, WeightTensor};
 use sdg_weights_conversion::{Checkpoint, Conversion, Naming, Report, Source, naming_of, sha256_of};
 
 use crate::detector_config::{architecture_of, kind_of, preset_for, preset_of_kind};

@@ -135,8 +135,8 @@ pub fn architecture_of(config: &RcnnConfig) -> Architecture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sdg_detection::state_dict;
     use sdg_grasp::Device;
+    use sdg_layers::state_dict;
 
     /// Names and shapes are listed without building the network; a built one says whether the list is right.
     #[test]

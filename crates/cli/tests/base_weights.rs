@@ -15,8 +15,8 @@ use rand_pcg::Pcg64Mcg;
 use sdg_cli::base_weights;
 use sdg_detection::config::{BlockKind, RcnnConfig};
 use sdg_detection::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchvision};
-use sdg_detection::state_dict;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS};
+use sdg_layers::state_dict;
 use serde_json::{Map, Value, json};
 use support::sdg;
 

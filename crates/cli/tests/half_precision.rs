@@ -16,8 +16,9 @@ use safetensors::{Dtype, tensor::TensorView};
 use sdg_cli::{base_weights, shipped};
 use sdg_demonstration::{AugmentationConfig, Augmenter};
 use sdg_detection::config::{KeypointReadout, RcnnConfig};
-use sdg_detection::{Detections, GeneralizedRcnn, presets, state_dict};
+use sdg_detection::{Detections, GeneralizedRcnn, presets};
 use sdg_grasp::{Device, NUM_KEYPOINTS};
+use sdg_layers::state_dict;
 use sdg_training::{Outcome, SampleSource, TrainingConfig, ValidationConfig, train};
 
 /// What boxes and keypoints may differ, in pixels of the image as given.

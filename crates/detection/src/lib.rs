@@ -64,5 +64,4 @@ pub use generalized_rcnn::{Backbone, Detections, GeneralizedRcnn, ScoredKeypoint
 pub use image_transform::{ImageTransform, TransformedImage};
 pub use losses::Losses;
 pub use sdg_kernels::keep_freed_memory;
-pub use sdg_layers::{self as layers, initialization, state_dict};
 pub use target::{ObjectMask, ResizedTarget, Target};

@@ -10,8 +10,8 @@ use std::process::Command;
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::golden::{GoldenReport, StageComparison, record, verify};
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
 use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
 fn golden(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/golden").join(path)

@@ -7,9 +7,9 @@ use burn::tensor::Device;
 use sdg_comparison::{ComparisonConfig, ComparisonNetwork};
 use sdg_detection::config::NormKind;
 use sdg_detection::imprint::Imprint;
-use sdg_detection::initialization::Initializer;
-use sdg_detection::state_dict::{self, ImportReport, StateDict, WeightTensor};
 use sdg_detection::{GeneralizedRcnn, Target, TransformedImage};
+use sdg_layers::initialization::Initializer;
+use sdg_layers::state_dict::{self, ImportReport, StateDict, WeightTensor};
 
 use sdg_training::orientation::OrientationStart;
 

@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use burn::tensor::Device;
 use safetensors::{Dtype, SafeTensors};
 use sdg_detection::RcnnConfig;
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_training::orientation::OrientationStart;
 
 use crate::base_weights::BaseWeights;

@@ -23,7 +23,7 @@ use safetensors::{Dtype, SafeTensors};
 use sdg_comparison::ComparisonConfig;
 use sdg_demonstration::{ImageLimits, decode_image};
 use sdg_detection::RcnnConfig;
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_orientation::OrientationConfig;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -30,6 +30,19 @@ fn assert_stands_still(arm: &mut FrankaArm, positions: &SharedPositions) {
     assert!(moved < 2e-3, "{moved}");
 }
 
+/// A motion is refused, and nothing moves.
+fn assert_latched(robot: &mut Robot<FrankaArm>, motion: Trajectory, positions: &SharedPositions) {
+    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
+    assert_stands_still(robot.arm(), positions);
+}
+
+/// After a recovery that was asked for, the arm moves again.
+fn assert_recovers(robot: &mut Robot<FrankaArm>) {
+    robot.recover().unwrap();
+    let motion = some_motion(robot.arm());
+    robot.follow(motion).unwrap();
+}
+
 /// Waits in the watch of a moving arm, so that the robot misses commands.
 fn stalling(stalls: Vec<(u32, Duration)>) -> Watch {
     let mut cycles = 0;
@@ -81,11 +94,8 @@ fn a_program_that_stalls_for_longer_is_stopped_by_the_robot() {
     assert!(matches!(error, RobotError::Reflex(_)), "{error}");
     let line = error.to_string();
     assert!(line.contains("communication_constraints_violation") && !line.contains('\n'), "{line}");
-    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
-    assert_stands_still(robot.arm(), &positions);
-    robot.recover().unwrap();
-    let motion = some_motion(robot.arm());
-    robot.follow(motion).unwrap();
+    assert_latched(&mut robot, motion, &positions);
+    assert_recovers(&mut robot);
 }
 
 #[test]
@@ -109,8 +119,7 @@ fn a_table_that_is_higher_than_its_file_says_stops_the_arm() {
     assert!(line.contains("_reflex") && !line.contains('\n'), "{line}");
     assert_eq!(robot.arm().state().unwrap().mode, ArmMode::Reflex);
     let motion = some_motion(robot.arm());
-    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
-    assert_stands_still(robot.arm(), &positions);
+    assert_latched(&mut robot, motion, &positions);
 }
 
 /// Finds the part in a picture that is so old.
@@ -209,11 +218,8 @@ fn a_person_stops_the_arm_on_the_network() {
     // It ended by itself, at rest and without an error of the robot.
     let state = robot.arm().state().unwrap();
     assert_eq!(state.mode, ArmMode::Idle);
-    assert!(matches!(robot.follow(motion), Err(RobotError::Latched(_))));
-    assert_stands_still(robot.arm(), &positions);
-    robot.recover().unwrap();
-    let motion = some_motion(robot.arm());
-    robot.follow(motion).unwrap();
+    assert_latched(&mut robot, motion, &positions);
+    assert_recovers(&mut robot);
 }
 
 #[test]

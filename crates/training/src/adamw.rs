@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param, ParamId};
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use sdg_detection::state_dict::{StateDict, WeightTensor};
 use sdg_kernels::{AdamWParams, adamw};
+use sdg_layers::state_dict::{StateDict, WeightTensor};
 
 /// The optimiser and its state for every parameter.
 ///
@@ -133,9 +133,9 @@ mod tests {
     use burn::grad_clipping::GradientClippingConfig;
     use burn::optim::AdamWConfig;
     use burn::tensor::Device;
-    use sdg_detection::initialization::{Distribution, Initializer};
-    use sdg_detection::layers::Linear;
-    use sdg_detection::state_dict;
+    use sdg_layers::Linear;
+    use sdg_layers::initialization::{Distribution, Initializer};
+    use sdg_layers::state_dict;
 
     use super::*;
 

@@ -1,7 +1,7 @@
 //! A real server on a real port, and a client that sends what it is told.
 
 use std::io::{Read, Write};
-use std::net::{Ipv4Addr, TcpStream};
+use std::net::{Ipv4Addr, Shutdown, TcpStream};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -108,6 +108,14 @@ pub struct Served {
     thread: Option<JoinHandle<()>>,
 }
 
+/// What a client does after it has sent.
+#[allow(dead_code, reason = "each test binary uses its share of this module")]
+#[derive(PartialEq)]
+pub enum Then {
+    Close,
+    StaySilent,
+}
+
 /// An answer, taken apart.
 pub struct Answer {
     pub status: u16,
@@ -145,11 +153,16 @@ pub fn photo_png() -> Vec<u8> {
 impl Served {
     #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn start() -> Self {
+        Self::with_patience(Duration::from_secs(30))
+    }
+
+    /// The same, closing connections after so long a silence.
+    pub fn with_patience(patience: Duration) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let image: PathBuf = folder.path().join("photo.png");
         std::fs::write(&image, photo_png()).unwrap();
         std::fs::write(folder.path().join("secret.txt"), "not for the page").unwrap();
-        Self::open(folder, SessionOptions { images: vec![(image, None)], ..SessionOptions::default() })
+        Self::open(folder, SessionOptions { images: vec![(image, None)], ..SessionOptions::default() }, patience)
     }
 
     /// A server on a project's folder.
@@ -172,11 +185,13 @@ impl Served {
     pub fn with_camera(pictures: Arc<dyn LivePictures>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
-        Self::open(folder, SessionOptions { live: Some(live), ..SessionOptions::default() })
+        let options = SessionOptions { live: Some(live), ..SessionOptions::default() };
+        Self::open(folder, options, Duration::from_secs(30))
     }
 
-    fn open(folder: tempfile::TempDir, options: SessionOptions) -> Self {
-        let server = Server::bind(Session::open(&options, Arc::new(InPlace)).unwrap(), 0).unwrap();
+    fn open(folder: tempfile::TempDir, options: SessionOptions, patience: Duration) -> Self {
+        let session = Session::open(&options, Arc::new(InPlace)).unwrap();
+        let server = Server::bind(session, 0).unwrap().with_patience(patience);
         let url = server.url();
         let (address, token) = url.split_once("/?token=").unwrap();
         let (port, token) = (address.rsplit(':').next().unwrap().parse().unwrap(), token.to_owned());
@@ -184,6 +199,23 @@ impl Served {
         let asked = Arc::clone(&stop);
         let thread = std::thread::spawn(move || server.run(move || asked.load(Ordering::SeqCst)).unwrap());
         Self { folder, port, token, stop, thread: Some(thread) }
+    }
+
+    /// Sends exactly these bytes, closes that direction unless told to stay silent, and reads to the end.
+    #[allow(dead_code, reason = "each test binary uses its share of this module")]
+    pub fn exchange(&self, bytes: &[u8], then: Then) -> String {
+        let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream.write_all(bytes).unwrap();
+        if then == Then::Close {
+            stream.shutdown(Shutdown::Write).unwrap();
+        }
+        let mut answer = Vec::new();
+        match stream.read_to_end(&mut answer) {
+            // What a server has not read when it closes is answered with a reset.
+            Err(error) if error.kind() != std::io::ErrorKind::ConnectionReset => panic!("{error}"),
+            _ => String::from_utf8_lossy(&answer).into_owned(),
+        }
     }
 
     /// Sends exactly these headers.

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use sdg_detection::RcnnConfig;
 use sdg_detection::golden;
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};

@@ -38,6 +38,12 @@ pub(super) fn go_on(
     Ok(Some(record.attempts))
 }
 
+/// How often the part was held, as a line.
+pub(super) fn held_of(attempts: &[AttemptRecord]) -> String {
+    let held = attempts.iter().filter(|attempt| attempt.success).count();
+    format!("held in {held} of {}", attempts.len())
+}
+
 /// Whether the physics gave up, as against files, OpenGL or settings: that is one attempt's misfortune.
 fn is_of_physics(error: &anyhow::Error) -> bool {
     matches!(

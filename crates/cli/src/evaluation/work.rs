@@ -7,7 +7,7 @@ use sdg_grasp::Verification;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
-use super::attempting::go_on;
+use super::attempting::{go_on, held_of};
 use super::cell::{Cell, Marks, attempts_of};
 use super::looking::{observe_picture, part_seed, picture_seed, scene_without};
 use super::one_unit::{NO_MODEL, do_unit};
@@ -131,10 +131,7 @@ impl Evaluation<'_> {
             camera: None,
         };
         let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
-        Ok(attempts.map(|attempts| {
-            let held = attempts.iter().filter(|attempt| attempt.success).count();
-            format!("held in {held} of {}", attempts.len())
-        }))
+        Ok(attempts.map(|attempts| held_of(&attempts)))
     }
 
     /// Times detections with nothing of ours beside them, on all cores.

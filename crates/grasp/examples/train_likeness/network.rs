@@ -11,9 +11,9 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use safetensors::tensor::{Dtype, TensorView};
-use sdg_detection::initialization::{Distribution, Initializer};
-use sdg_detection::layers::Linear;
 use sdg_kernels::{Conv2dParams, conv2d};
+use sdg_layers::Linear;
+use sdg_layers::initialization::{Distribution, Initializer};
 use sdg_shape::{LAYERS, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, SIDE};
 use sdg_training::{AdamW, OneCycle};
 

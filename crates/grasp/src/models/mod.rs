@@ -24,10 +24,10 @@ use image::RgbImage;
 use sdg_comparison::ComparisonNetwork;
 #[cfg(any(feature = "teach", test))]
 use sdg_detection::presets::RcnnKind;
-#[cfg(feature = "teach")]
-use sdg_detection::state_dict;
 use sdg_detection::{Detections, GeneralizedRcnn, RcnnConfig};
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
+#[cfg(feature = "teach")]
+use sdg_layers::state_dict;
 use sdg_orientation::OrientationCnn;
 
 pub(crate) use self::candidate::{PoseCandidate, Proposals};

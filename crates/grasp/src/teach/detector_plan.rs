@@ -2,7 +2,8 @@
 
 use burn::tensor::Device;
 use sdg_detection::config::KeypointHeadConfig;
-use sdg_detection::{GeneralizedRcnn, RcnnConfig, state_dict};
+use sdg_detection::{GeneralizedRcnn, RcnnConfig};
+use sdg_layers::state_dict;
 
 use crate::base_weights::BaseWeights;
 use crate::error::Result;

@@ -5,7 +5,7 @@
 
 use burn::tensor::Device;
 use sdg_detection::golden::{record, verify};
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 
 use super::tests::{demonstration, small_plan, taught};
 use super::*;

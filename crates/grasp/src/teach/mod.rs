@@ -35,8 +35,9 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use sdg_demonstration::{Augmenter, Demonstration, Sample};
-use sdg_detection::{GeneralizedRcnn, state_dict};
+use sdg_detection::GeneralizedRcnn;
 use sdg_geometry::GraspLine;
+use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
 use crate::calibration::Calibration;

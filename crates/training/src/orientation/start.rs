@@ -7,8 +7,8 @@ use burn::module::Module;
 use burn::tensor::{Tensor, TensorData};
 use image::RgbImage;
 use sdg_detection::imprint::ClassImprint;
-use sdg_detection::initialization::Initializer;
-use sdg_detection::state_dict::{self, StateDict, WeightTensor};
+use sdg_layers::initialization::Initializer;
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_orientation::{Labels, OrientationCnn, crop_batch};
 
 use super::labelled_crop::LabelledCrop;

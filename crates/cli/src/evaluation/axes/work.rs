@@ -16,7 +16,7 @@ use super::records::{AxisPicture, AxisRecord, LookAlike};
 use super::selection::GraspCondition;
 use super::units::{AxesEvaluation, Unit, axis_file, grasps_file, marks_of};
 use crate::evaluation::EvaluationProgress;
-use crate::evaluation::attempting::go_on;
+use crate::evaluation::attempting::{go_on, held_of};
 use crate::evaluation::cell::{Cell, Marks, attempts_of};
 use crate::evaluation::looking::part_seed;
 use crate::evaluation::one_unit::{NO_MODEL, do_unit};
@@ -156,10 +156,7 @@ impl AxesEvaluation<'_> {
         } else {
             go_on(&rehearsal, self.store, &grasps_file(cell, condition), &self.grasp_settings(), is_interrupted)?
         };
-        Ok(attempts.map(|attempts| {
-            let held = attempts.iter().filter(|attempt| attempt.success).count();
-            format!("held in {held} of {}", attempts.len())
-        }))
+        Ok(attempts.map(|attempts| held_of(&attempts)))
     }
 }
 
