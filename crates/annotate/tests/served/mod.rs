@@ -150,10 +150,13 @@ pub fn photo_png() -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// How long connections may be silent unless a test is about that.
+const PATIENCE: Duration = Duration::from_secs(30);
+
 impl Served {
     #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn start() -> Self {
-        Self::with_patience(Duration::from_secs(30))
+        Self::with_patience(PATIENCE)
     }
 
     /// The same, closing connections after so long a silence.
@@ -169,7 +172,7 @@ impl Served {
     #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn of_project(folder: tempfile::TempDir) -> Self {
         let options = SessionOptions { project: Some(folder.path().to_owned()), ..SessionOptions::default() };
-        Self::open(folder, options)
+        Self::open(folder, options, PATIENCE)
     }
 
     /// Ends the server and gives its folder back.
@@ -186,7 +189,7 @@ impl Served {
         let folder = tempfile::tempdir().unwrap();
         let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
         let options = SessionOptions { live: Some(live), ..SessionOptions::default() };
-        Self::open(folder, options, Duration::from_secs(30))
+        Self::open(folder, options, PATIENCE)
     }
 
     fn open(folder: tempfile::TempDir, options: SessionOptions, patience: Duration) -> Self {
