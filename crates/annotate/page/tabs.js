@@ -1,7 +1,7 @@
 // The four steps, as tabs.
 
-import { showCurrent } from "./strip.js";
-import { isMarked } from "./strip.js";
+import { api } from "./api.js";
+import { isMarked, showCurrent } from "./strip.js";
 import { changed, isLive, state } from "./store.js";
 
 const NAMES = ["mark", "samples", "teach", "try"];
@@ -15,6 +15,17 @@ export function openTab(name) {
   if (String(before) !== String([name === "try", isLive()])) showCurrent();
   changed();
   document.querySelector(".panel").scrollTop = 0;
+  if (name === "teach") refreshVersions();
+}
+
+/** Which versions are stale depends on marks that were changed since. */
+async function refreshVersions() {
+  try {
+    state.models = (await api.session()).models;
+    changed();
+  } catch {
+    // The banner says that the server is gone.
+  }
 }
 
 for (const name of NAMES) {
