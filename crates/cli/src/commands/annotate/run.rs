@@ -189,7 +189,7 @@ mod tests {
     fn a_folder_is_a_project_and_stands_alone() {
         let folder = tempfile::tempdir().unwrap();
         let name = folder.path().display().to_string();
-        assert_eq!(project(&[name.clone()]).unwrap(), Some(folder.path().to_owned()));
+        assert_eq!(project(std::slice::from_ref(&name)).unwrap(), Some(folder.path().to_owned()));
         assert_eq!(project(&["photo.png".to_owned()]).unwrap(), None);
         assert!(project(&[name, "photo.png".to_owned()]).unwrap_err().is::<Usage>());
     }
