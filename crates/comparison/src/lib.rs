@@ -38,6 +38,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod alignment;
 mod config;
 mod network;
 mod view;

@@ -3,8 +3,10 @@
 use burn::module::Module;
 use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, activation};
+use sdg_geometry::PlanarSimilarity;
 use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
+use crate::alignment::CellCosines;
 use crate::config::{ComparisonConfig, ComparisonError};
 use crate::view::{Batch, DIFFERENCES, View};
 
@@ -77,16 +79,38 @@ impl ComparisonNetwork {
     /// # Panics
     /// Without a view, or with views of another network's references.
     pub fn forward(&self, views: &[View]) -> Tensor<2> {
-        let Batch { demonstrations, demonstration_of_view, pictures, differences } = Batch::new(views, &self.device());
-        let demonstration = through(&self.trunk, demonstrations).select(0, demonstration_of_view);
-        let picture = through(&self.trunk, pictures);
-        let inside = differences.clone().narrow(1, DIFFERENCES - 1, 1);
-        let correlated = self.correlation(&demonstration, &picture) * inside.clone();
+        let Maps { demonstration, picture, differences, inside, cosines } = self.maps(views);
+        let correlated = cosines * inside.clone();
         let differing = (demonstration.clone() - picture).abs() * inside;
         let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
         let map = through(&self.stages, compared);
         let flat: Tensor<2> = map.reshape([views.len() as i64, -1]);
         self.output.forward(activation::relu(self.hidden.forward(flat)))
+    }
+
+    fn maps(&self, views: &[View]) -> Maps {
+        let Batch { demonstrations, demonstration_of_view, pictures, differences } = Batch::new(views, &self.device());
+        let demonstration = through(&self.trunk, demonstrations).select(0, demonstration_of_view);
+        let picture = through(&self.trunk, pictures);
+        let inside = differences.clone().narrow(1, DIFFERENCES - 1, 1);
+        let cosines = self.correlation(&demonstration, &picture);
+        Maps { demonstration, picture, differences, inside, cosines }
+    }
+
+    /// By how much the pose of each view is off, in cells of the trunk's map: for [`crate::Reference::corrected`].
+    pub async fn offsets(&self, views: &[View]) -> Vec<PlanarSimilarity> {
+        if views.is_empty() {
+            return Vec::new();
+        }
+        let Maps { cosines, inside, .. } = self.maps(views);
+        let read = Tensor::cat(vec![cosines, inside], 1).into_data_async().await;
+        let values: Vec<f32> = read.expect("what the device computes can be read").iter::<f32>().collect();
+        let (reach, map_px) = (self.config.reach, self.config.trunk_map_px());
+        let of_view = |values: &[f32]| {
+            let (cosines, inside) = values.split_at(values.len() - map_px * map_px);
+            CellCosines { cosines, inside, reach, map_px }.offset()
+        };
+        values.chunks_exact(values.len() / views.len()).map(of_view).collect()
     }
 
     /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
@@ -111,6 +135,19 @@ impl ComparisonNetwork {
         let read = self.forward(views).into_data_async().await.expect("what the device computes can be read");
         read.iter::<f32>().map(f64::from).collect()
     }
+}
+
+/// What is compared, of N views.
+struct Maps {
+    /// `[N, C, M, M]`.
+    demonstration: Tensor<4>,
+    /// `[N, C, M, M]`.
+    picture: Tensor<4>,
+    /// `[N, DIFFERENCES, M, M]`, and the last of them.
+    differences: Tensor<4>,
+    inside: Tensor<4>,
+    /// `[N, (2 reach + 1)², M, M]`.
+    cosines: Tensor<4>,
 }
 
 /// Stages that halve their maps each; the first convolution's kernel has a side of its own.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use image::RgbImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::{CropWindow, OUTSIDE, Pyramid};
 
@@ -109,6 +109,14 @@ impl Reference {
         self.append_means(&self.mask, &mut differences);
         seen.truncate(3 * num_pixels);
         View { demonstration: self.shared.clone(), picture: seen, differences }
+    }
+
+    /// A pose of this demonstration, corrected by what [`crate::ComparisonNetwork::offsets`] says of its view.
+    pub fn corrected(&self, pose: &PlanarSimilarity, offset: &PlanarSimilarity) -> PlanarSimilarity {
+        let px_per_cell = self.window.side / f64::from(self.input_px) * self.cell_px as f64;
+        let center = self.window.center;
+        let target = center + px_per_cell * Vector2::new(offset.tx, offset.ty);
+        pose.compose(&PlanarSimilarity::about(center, target, offset.angle, offset.scale))
     }
 
     /// Appends the mean of each cell of a channel.

@@ -27,6 +27,7 @@
 mod angle;
 mod bounding_box;
 mod camera;
+mod compass_search;
 mod convex_hull;
 mod error;
 mod keypoint;
@@ -41,6 +42,7 @@ mod statistics;
 pub use angle::Angle;
 pub use bounding_box::BoundingBox;
 pub use camera::{PinholeCamera, PlanView, PlanViewError, PlumbBob, PosedCamera, Ray, Workspace};
+pub use compass_search::CompassSearch;
 pub use convex_hull::convex_hull;
 pub use error::GeometryError;
 pub use keypoint::{GraspLine, Keypoint, Visibility};

@@ -17,9 +17,8 @@ use std::ops::RangeInclusive;
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
-use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
-use crate::compass_search::CompassSearch;
 use crate::config::{AgreementConfig, RefinementConfig};
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;

@@ -73,7 +73,6 @@
 
 mod capture_range;
 mod comparison;
-mod compass_search;
 mod config;
 mod consensus;
 mod edge_points;

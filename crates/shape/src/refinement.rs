@@ -10,10 +10,9 @@
 //! robust but not exact. Snapping measures how far each edge point is from the crest of the image's
 //! gradient along its normal and solves for the pose by weighted least squares: exact, but only near.
 
-use sdg_geometry::PlanarSimilarity;
+use sdg_geometry::{CompassSearch, PlanarSimilarity};
 
 use crate::capture_range::{CaptureRange, step_units};
-use crate::compass_search::CompassSearch;
 use crate::consensus::{Snapped, snap};
 use crate::gradient_field::GradientField;
 use crate::pose::Pose;

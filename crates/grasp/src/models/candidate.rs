@@ -29,7 +29,9 @@ impl Proposals {
 /// A detection with the model's reading of it, not yet verified.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseCandidate {
-    /// The class's probability; of proposals, less where the heads contradict each other and where the place does not look
+    /// The class's probability.
+    pub(crate) class_probability: f64,
+    /// The same; of proposals, less where the heads contradict each other and where the place does not look
     /// like the demonstration.
     pub(crate) network_score: f64,
     pub(crate) bbox: BoundingBox,
@@ -51,7 +53,7 @@ impl PoseCandidate {
         picture: (u32, u32),
         compared: Option<&Vec<Compared>>,
     ) -> Self {
-        let class = self.network_score;
+        let class = self.class_probability;
         let score = |pose: &PlanarSimilarity, log_odds: Option<f64>| {
             consistency::score(class, consistency::filled(demonstration, pose, &self.bbox, picture), log_odds)
         };

@@ -8,6 +8,7 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
 //! | S | none | the demonstration looked for in the whole image | likewise |
 
+mod alignment;
 mod candidate;
 mod comparison;
 mod consistency;
@@ -169,13 +170,18 @@ impl Network {
         let mut proposals = Proposals::default();
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
         proposals.boxes.extend(proposed.map(unread));
-        for (place, candidate) in read.into_iter().enumerate() {
+        let scored = read.into_iter().enumerate().map(|(place, candidate)| {
             let demonstration = &demonstrations[candidate.demonstration_idx];
-            let candidate = candidate.scored(demonstration, image.dimensions(), compared.get(place));
-            proposals.boxes.push((candidate.bbox, candidate.network_score));
-            proposals.candidates.push(candidate);
+            candidate.scored(demonstration, image.dimensions(), compared.get(place))
+        });
+        let mut candidates: Vec<PoseCandidate> = scored.collect();
+        candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
+        if let Some(network) = &self.comparison {
+            alignment::align(network, image, demonstrations, &mut candidates).await;
+            candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
         }
-        proposals.candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
+        proposals.boxes.extend(candidates.iter().map(|candidate| (candidate.bbox, candidate.network_score)));
+        proposals.candidates = candidates;
         Ok(proposals)
     }
 
@@ -203,6 +209,7 @@ impl Network {
                 _ => demonstration.grasp(&image_from_cutout),
             };
             Some(PoseCandidate {
+                class_probability: detections.scores[i],
                 network_score: detections.scores[i],
                 bbox: *bbox,
                 keypoints,

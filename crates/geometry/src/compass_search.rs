@@ -2,22 +2,22 @@
 
 /// When a search ends.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct CompassSearch {
+pub struct CompassSearch {
     /// First and last step, in units of the caller's neighbours.
-    pub(crate) steps: (f64, f64),
+    pub steps: (f64, f64),
     /// A neighbour must be better by more than this.
-    pub(crate) min_gain: f64,
+    pub min_gain: f64,
     /// Rounds of at most eight evaluations each.
-    pub(crate) max_rounds: usize,
+    pub max_rounds: usize,
     /// No round begins after so many evaluations.
-    pub(crate) max_evaluations: usize,
+    pub max_evaluations: usize,
 }
 
 impl CompassSearch {
     /// The best point found from `start` along four coordinates, and its score.
     ///
     /// `neighbour` moves a point along a coordinate by a step with its sign; `None` where it may not go.
-    pub(crate) fn climb<P: Copy>(
+    pub fn climb<P: Copy>(
         &self,
         start: P,
         neighbour: impl Fn(&P, usize, f64) -> Option<P>,
