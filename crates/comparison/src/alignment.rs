@@ -22,11 +22,12 @@ const SEARCH: CompassSearch =
     CompassSearch { steps: (1.0, 0.03), min_gain: 1e-6, max_rounds: 48, max_evaluations: usize::MAX };
 
 /// How alike the cells of one view's maps are.
-pub(crate) struct CellCosines<'a> {
+#[derive(Debug, Clone)]
+pub(crate) struct CellCosines {
     /// `[(2 reach + 1)², M, M]`, shifts row by row.
-    pub(crate) cosines: &'a [f32],
+    pub(crate) cosines: Vec<f32>,
     /// Share of each cell inside the outline, `[M, M]`.
-    pub(crate) inside: &'a [f32],
+    pub(crate) inside: Vec<f32>,
     pub(crate) reach: usize,
     /// M.
     pub(crate) map_px: usize,
@@ -35,7 +36,7 @@ pub(crate) struct CellCosines<'a> {
 /// Shift in cells, turn in radians, ln of size.
 type Offset = [f64; 4];
 
-impl CellCosines<'_> {
+impl CellCosines {
     /// Moves each place of the demonstration's map to where the picture's map shows it, in cells from the middle.
     pub(crate) fn offset(&self) -> PlanarSimilarity {
         let reach = self.reach as f64;
@@ -106,7 +107,7 @@ mod tests {
     fn a_shift_a_turn_and_a_size_are_found_and_the_penalty_makes_them_smaller() {
         let inside: Vec<f32> = (0..256).map(|i| if (4..12).contains(&(i / 16)) { 1.0 } else { 0.0 }).collect();
         let of = |offset: &PlanarSimilarity| {
-            CellCosines { cosines: &cosines(offset, 16, 2), inside: &inside, reach: 2, map_px: 16 }.offset()
+            CellCosines { cosines: cosines(offset, 16, 2), inside: inside.clone(), reach: 2, map_px: 16 }.offset()
         };
         let middle = Point2::origin();
         let none = of(&PlanarSimilarity::IDENTITY);
@@ -120,8 +121,7 @@ mod tests {
 
     #[test]
     fn a_part_that_is_outside_everywhere_stays() {
-        let cosines = vec![0.5; 25 * 256];
-        let outside = CellCosines { cosines: &cosines, inside: &[0.0; 256], reach: 2, map_px: 16 };
+        let outside = CellCosines { cosines: vec![0.5; 25 * 256], inside: vec![0.0; 256], reach: 2, map_px: 16 };
         assert_eq!(outside.offset(), PlanarSimilarity::IDENTITY);
     }
 }

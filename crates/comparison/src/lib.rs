@@ -31,8 +31,8 @@
 //! let reference = Reference::new(&RgbImage::new(120, 80), &outline, network.config());
 //! let picture = RgbImage::new(640, 480);
 //! let view = reference.view(&Pyramid::new(&picture), &PlanarSimilarity::IDENTITY);
-//! let log_odds = read_sync(network.compare(&[view]));
-//! assert!(log_odds[0].is_finite());
+//! let compared = read_sync(network.compare(&[view]));
+//! assert!(compared[0].log_odds.is_finite());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
@@ -44,6 +44,6 @@ mod network;
 mod view;
 
 pub use config::{ComparisonConfig, ComparisonError};
-pub use network::ComparisonNetwork;
+pub use network::{Comparison, ComparisonNetwork};
 pub use sdg_orientation::Pyramid;
 pub use view::{DIFFERENCES, Reference, View};

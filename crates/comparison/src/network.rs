@@ -79,13 +79,31 @@ impl ComparisonNetwork {
     /// # Panics
     /// Without a view, or with views of another network's references.
     pub fn forward(&self, views: &[View]) -> Tensor<2> {
-        let Maps { demonstration, picture, differences, inside, cosines } = self.maps(views);
-        let correlated = cosines * inside.clone();
-        let differing = (demonstration.clone() - picture).abs() * inside;
-        let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
-        let map = through(&self.stages, compared);
-        let flat: Tensor<2> = map.reshape([views.len() as i64, -1]);
-        self.output.forward(activation::relu(self.hidden.forward(flat)))
+        let maps = self.maps(views);
+        self.log_odds(&maps)
+    }
+
+    /// What the network says of each view.
+    ///
+    /// # Panics
+    /// With views of another network's references.
+    pub async fn compare(&self, views: &[View]) -> Vec<Comparison> {
+        if views.is_empty() {
+            return Vec::new();
+        }
+        let maps = self.maps(views);
+        // One tensor, because a device is waited for once for each that is read.
+        let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
+        let read = Tensor::cat(vec![self.log_odds(&maps), flat(&maps.inside), flat(&maps.cosines)], 1);
+        let values: Vec<f32> = read.into_data_async().await.expect("what the device computes can be read").iter().collect();
+        let (reach, map_px) = (self.config.reach, self.config.trunk_map_px());
+        let of_view = |values: &[f32]| {
+            let (log_odds, values) = values.split_at(1);
+            let (inside, cosines) = values.split_at(map_px * map_px);
+            let cells = CellCosines { cosines: cosines.to_vec(), inside: inside.to_vec(), reach, map_px };
+            Comparison { log_odds: log_odds[0].into(), cells }
+        };
+        values.chunks_exact(values.len() / views.len()).map(of_view).collect()
     }
 
     fn maps(&self, views: &[View]) -> Maps {
@@ -97,20 +115,13 @@ impl ComparisonNetwork {
         Maps { demonstration, picture, differences, inside, cosines }
     }
 
-    /// By how much the pose of each view is off, in cells of the trunk's map: for [`crate::Reference::corrected`].
-    pub async fn offsets(&self, views: &[View]) -> Vec<PlanarSimilarity> {
-        if views.is_empty() {
-            return Vec::new();
-        }
-        let Maps { cosines, inside, .. } = self.maps(views);
-        let read = Tensor::cat(vec![cosines, inside], 1).into_data_async().await;
-        let values: Vec<f32> = read.expect("what the device computes can be read").iter::<f32>().collect();
-        let (reach, map_px) = (self.config.reach, self.config.trunk_map_px());
-        let of_view = |values: &[f32]| {
-            let (cosines, inside) = values.split_at(values.len() - map_px * map_px);
-            CellCosines { cosines, inside, reach, map_px }.offset()
-        };
-        values.chunks_exact(values.len() / views.len()).map(of_view).collect()
+    fn log_odds(&self, maps: &Maps) -> Tensor<2> {
+        let Maps { demonstration, picture, differences, inside, cosines } = maps.clone();
+        let correlated = cosines * inside.clone();
+        let differing = (demonstration.clone() - picture).abs() * inside;
+        let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
+        let map = through(&self.stages, compared);
+        self.output.forward(activation::relu(self.hidden.forward(map.flatten(1, 3))))
     }
 
     /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
@@ -126,18 +137,25 @@ impl ComparisonNetwork {
             .collect();
         Tensor::cat(products, 1)
     }
+}
 
-    /// The log-odds that each view shows the part in the pose that it was made by.
-    pub async fn compare(&self, views: &[View]) -> Vec<f64> {
-        if views.is_empty() {
-            return Vec::new();
-        }
-        let read = self.forward(views).into_data_async().await.expect("what the device computes can be read");
-        read.iter::<f32>().map(f64::from).collect()
+/// What the network says of a view.
+#[derive(Debug, Clone)]
+pub struct Comparison {
+    /// The log-odds that the view shows the part in the pose that it was made by.
+    pub log_odds: f64,
+    cells: CellCosines,
+}
+
+impl Comparison {
+    /// By how much the pose is off, in cells of the trunk's map: for [`crate::Reference::corrected`].
+    pub fn offset(&self) -> PlanarSimilarity {
+        self.cells.offset()
     }
 }
 
 /// What is compared, of N views.
+#[derive(Clone)]
 struct Maps {
     /// `[N, C, M, M]`.
     demonstration: Tensor<4>,
@@ -206,10 +224,13 @@ mod tests {
         let reference = reference(&network);
         let views = [view(&reference, 0.0), view(&reference, 25.0)];
         let together = read_sync(network.compare(&views));
-        assert_ne!(together[0], together[1]);
-        for (view, log_odds) in views.into_iter().zip(&together) {
-            let alone = read_sync(network.compare(&[view]))[0];
-            assert!((alone - log_odds).abs() < 1e-4, "{alone} {log_odds}");
+        assert_ne!(together[0].log_odds, together[1].log_odds);
+        let forward: Vec<f32> = network.forward(&views).into_data().iter().collect();
+        for ((view, found), forward) in views.into_iter().zip(&together).zip(forward) {
+            let alone = &read_sync(network.compare(&[view]))[0];
+            assert!((alone.log_odds - found.log_odds).abs() < 1e-4, "{alone:?} {found:?}");
+            assert_eq!(found.log_odds, f64::from(forward));
+            assert!((alone.offset().tx - found.offset().tx).abs() < 1e-3);
         }
         assert!(read_sync(network.compare(&[])).is_empty());
     }

@@ -111,7 +111,7 @@ impl Reference {
         View { demonstration: self.shared.clone(), picture: seen, differences }
     }
 
-    /// A pose of this demonstration, corrected by what [`crate::ComparisonNetwork::offsets`] says of its view.
+    /// A pose of this demonstration, corrected by the offset of its view's [`crate::Comparison`].
     pub fn corrected(&self, pose: &PlanarSimilarity, offset: &PlanarSimilarity) -> PlanarSimilarity {
         let px_per_cell = self.window.side / f64::from(self.input_px) * self.cell_px as f64;
         let center = self.window.center;

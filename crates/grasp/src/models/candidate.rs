@@ -3,7 +3,6 @@
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
 
-use super::comparison::Compared;
 use super::consistency;
 use crate::facts::TurnSource;
 use crate::sighting::SAME_PART_IOU;
@@ -46,30 +45,20 @@ pub(crate) struct PoseCandidate {
 }
 
 impl PoseCandidate {
-    /// With its score instead of the class's probability, in the likeliest of the poses that were compared.
-    pub(super) fn scored(
-        mut self,
+    /// The same detection with the demonstration in this pose, and its score there; `log_odds` are those of the comparison
+    /// network.
+    pub(super) fn in_pose(
+        self,
         demonstration: &TaughtDemonstration,
-        picture: (u32, u32),
-        compared: Option<&Vec<Compared>>,
+        image_from_cutout: PlanarSimilarity,
+        picture_size: (u32, u32),
+        log_odds: Option<f64>,
     ) -> Self {
-        let class = self.class_probability;
-        let score = |pose: &PlanarSimilarity, log_odds: Option<f64>| {
-            consistency::score(class, consistency::filled(demonstration, pose, &self.bbox, picture), log_odds)
-        };
-        let scores = compared.into_iter().flatten().map(|one| (score(&one.image_from_cutout, Some(one.log_odds)), one));
-        // The first of equal ones: what was read.
-        let best = scores.reduce(|best, other| if other.0 > best.0 { other } else { best });
-        let Some((network_score, Compared { image_from_cutout, .. })) = best else {
-            self.network_score = score(&self.image_from_cutout, None);
-            return self;
-        };
-        self.network_score = network_score;
-        if *image_from_cutout == self.image_from_cutout {
-            self
-        } else {
-            self.moved_to(demonstration, *image_from_cutout)
-        }
+        let filled = consistency::filled(demonstration, &image_from_cutout, &self.bbox, picture_size);
+        let network_score = consistency::score(self.class_probability, filled, log_odds);
+        let is_there = image_from_cutout == self.image_from_cutout;
+        let placed = if is_there { self } else { self.moved_to(demonstration, image_from_cutout) };
+        Self { network_score, ..placed }
     }
 
     /// The same detection with the demonstration lying elsewhere; its keypoints' scores stay.

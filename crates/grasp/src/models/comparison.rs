@@ -2,71 +2,119 @@
 //!
 //! A part whose two ends are alike is often read the wrong way round, and keypoints on a short grasp line say little of where
 //! a long part ends. So the pose that a model read is compared as it is, and laid into the detected box in its direction
-//! and in the opposite one.
+//! and in the opposite one. The likeliest poses are then corrected by where the network finds the demonstration's features.
 
 use image::RgbImage;
-use sdg_comparison::{ComparisonNetwork, Pyramid};
-use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
+use sdg_comparison::{Comparison, ComparisonNetwork, Pyramid, Reference, View};
+use sdg_geometry::{Angle, PlanarSimilarity};
 
+use super::candidate::PoseCandidate;
 use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// A pose and the log-odds that the part lies so.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Compared {
-    pub(super) image_from_cutout: PlanarSimilarity,
-    pub(super) log_odds: f64,
+/// Candidates of an image that are compared: those for which class and box say most. Each takes two or three views.
+const MAX_COMPARED: usize = 16;
+/// Candidates of an image whose poses are corrected: the likeliest. Each takes one more view.
+const MAX_CORRECTED: usize = 4;
+
+/// Asks the network about one picture.
+pub(super) struct Comparer<'a> {
+    network: &'a ComparisonNetwork,
+    picture: Pyramid<'a>,
+    picture_size: (u32, u32),
+    demonstrations: &'a [TaughtDemonstration],
 }
 
-/// Compares the poses that each detection may have, given with its demonstration, its box, its grasp's angle and its pose; the
-/// one that was read first.
-pub(super) async fn compared(
-    network: &ComparisonNetwork,
-    image: &RgbImage,
-    detections: impl Iterator<Item = (&TaughtDemonstration, &BoundingBox, Angle, PlanarSimilarity)>,
-) -> Vec<Vec<Compared>> {
-    let picture = Pyramid::new(image);
-    let (mut views, mut poses) = (Vec::new(), Vec::new());
-    for (demonstration, bbox, grasp_angle, pose) in detections {
-        let likely = likely_poses(demonstration, bbox, grasp_angle, pose);
-        let reference = demonstration.reference(network.config());
-        views.extend(likely.iter().map(|pose| reference.view(&picture, pose)));
-        poses.push(likely);
+/// A candidate and what the network says of its pose.
+type Compared = (PoseCandidate, Comparison);
+
+impl<'a> Comparer<'a> {
+    pub(super) fn new(
+        network: &'a ComparisonNetwork,
+        image: &'a RgbImage,
+        demonstrations: &'a [TaughtDemonstration],
+    ) -> Self {
+        Self { network, picture: Pyramid::new(image), picture_size: image.dimensions(), demonstrations }
     }
-    let mut log_odds = network.compare(&views).await.into_iter();
-    let mut with_odds = |likely: Vec<PlanarSimilarity>| {
-        likely
-            .into_iter()
-            .zip(log_odds.by_ref())
-            .map(|(image_from_cutout, log_odds)| Compared { image_from_cutout, log_odds })
-            .collect()
-    };
-    poses.into_iter().map(&mut with_odds).collect()
+
+    /// The most promising of these candidates, each in the likeliest of the poses that it may have, with its score, best
+    /// first. They come best first.
+    pub(super) async fn compare(&self, mut candidates: Vec<PoseCandidate>) -> Vec<PoseCandidate> {
+        candidates.truncate(MAX_COMPARED);
+        let likely = candidates.into_iter().map(|one| {
+            let poses = likely_poses(self.demonstration(&one), &one);
+            (one, poses)
+        });
+        let mut compared = self.likeliest(likely.collect()).await;
+        best_first(&mut compared, |(one, _)| one);
+
+        let corrected = compared.iter().take(MAX_CORRECTED).map(|(one, comparison)| {
+            let pose = self.reference(one).corrected(&one.image_from_cutout, &comparison.offset());
+            (one.clone(), vec![pose])
+        });
+        let corrected = self.likeliest(corrected.collect()).await;
+        for (one, corrected) in compared.iter_mut().zip(corrected) {
+            if corrected.0.network_score >= one.0.network_score {
+                *one = corrected;
+            }
+        }
+        best_first(&mut compared, |(one, _)| one);
+        compared.into_iter().map(|(one, _)| one).collect()
+    }
+
+    /// Each candidate in the likeliest of its poses; of equally likely ones, in the first.
+    async fn likeliest(&self, candidates: Vec<(PoseCandidate, Vec<PlanarSimilarity>)>) -> Vec<Compared> {
+        let of_candidate = |(one, poses): &(PoseCandidate, Vec<PlanarSimilarity>)| -> Vec<View> {
+            poses.iter().map(|pose| self.reference(one).view(&self.picture, pose)).collect()
+        };
+        let views: Vec<View> = candidates.iter().flat_map(of_candidate).collect();
+        let mut comparisons = self.network.compare(&views).await.into_iter();
+        let likeliest = |(one, poses): (PoseCandidate, Vec<PlanarSimilarity>)| {
+            let demonstration = self.demonstration(&one);
+            let in_pose = |(pose, comparison): (PlanarSimilarity, Comparison)| {
+                let log_odds = Some(comparison.log_odds);
+                (one.clone().in_pose(demonstration, pose, self.picture_size, log_odds), comparison)
+            };
+            let in_poses = poses.into_iter().zip(comparisons.by_ref()).map(in_pose);
+            in_poses.reduce(|best, other| if other.0.network_score > best.0.network_score { other } else { best })
+        };
+        candidates.into_iter().filter_map(likeliest).collect()
+    }
+
+    fn demonstration(&self, candidate: &PoseCandidate) -> &'a TaughtDemonstration {
+        &self.demonstrations[candidate.demonstration_idx]
+    }
+
+    fn reference(&self, candidate: &PoseCandidate) -> &'a Reference {
+        self.demonstration(candidate).reference(self.network.config())
+    }
+}
+
+/// Sorts by score; equal ones stay as they are.
+pub(super) fn best_first<T>(candidates: &mut [T], candidate: impl Fn(&T) -> &PoseCandidate) {
+    candidates.sort_by(|a, b| candidate(b).network_score.total_cmp(&candidate(a).network_score));
 }
 
 /// The pose that was read; laid into the box where that is another; laid into it the other way round.
-fn likely_poses(
-    demonstration: &TaughtDemonstration,
-    bbox: &BoundingBox,
-    grasp_angle: Angle,
-    image_from_cutout: PlanarSimilarity,
-) -> Vec<PlanarSimilarity> {
+fn likely_poses(demonstration: &TaughtDemonstration, read: &PoseCandidate) -> Vec<PlanarSimilarity> {
     /// Share of the box's diagonal by which the same point may be apart in two poses that are taken for one.
     const MAX_DISTANCE: f64 = 0.01;
-    let laid = fill_box(demonstration, bbox, grasp_angle);
-    let opposite = fill_box(demonstration, bbox, grasp_angle + Angle::from_degrees(180.0));
+    let PoseCandidate { bbox, grasp, image_from_cutout, .. } = read;
+    let laid = fill_box(demonstration, bbox, grasp.angle);
+    let opposite = fill_box(demonstration, bbox, grasp.angle + Angle::from_degrees(180.0));
     let marked = demonstration.marks.bbox;
     let is_read = [(marked.x1, marked.y1), (marked.x2, marked.y2)].into_iter().all(|(x, y)| {
         let corner = nalgebra::Point2::new(x, y);
         let apart = (laid.apply(&corner) - image_from_cutout.apply(&corner)).norm();
         apart <= MAX_DISTANCE * bbox.width().hypot(bbox.height())
     });
-    if is_read { vec![image_from_cutout, opposite] } else { vec![image_from_cutout, laid, opposite] }
+    if is_read { vec![*image_from_cutout, opposite] } else { vec![*image_from_cutout, laid, opposite] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::facts::TurnSource;
     use crate::teach::tests::demonstration;
     use nalgebra::Point2;
 
@@ -76,14 +124,23 @@ mod tests {
         let (from, to) = (taught.marks.bbox.center(), Point2::new(200.0, 140.0));
         let pose = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 1.1);
         let bbox = taught.outline(&pose).bounds();
-        let grasp_angle = taught.grasp(&pose).angle;
-        let likely = likely_poses(&taught, &bbox, grasp_angle, pose);
+        let read = |image_from_cutout: PlanarSimilarity| PoseCandidate {
+            class_probability: 0.9,
+            network_score: 0.9,
+            bbox,
+            keypoints: Vec::new(),
+            grasp: taught.grasp(&image_from_cutout),
+            demonstration_idx: 0,
+            image_from_cutout,
+            turn_source: TurnSource::Keypoints,
+        };
+        let likely = likely_poses(&taught, &read(pose));
         assert_eq!((likely.len(), likely[0]), (2, pose));
         assert!(taught.outline(&likely[1]).bounds().iou(&bbox) > 0.999);
         assert!((likely[1].angle.distance(pose.angle).to_degrees() - 180.0).abs() < 1e-9);
         // Read too small, it is laid into its box as well.
         let small = PlanarSimilarity::about(from, to, Angle::from_degrees(33.0), 0.8);
-        let likely = likely_poses(&taught, &bbox, grasp_angle, small);
+        let likely = likely_poses(&taught, &read(small));
         assert_eq!((likely.len(), likely[0]), (3, small));
         assert!((likely[1].apply(&from) - pose.apply(&from)).norm() < 1e-6 && (likely[1].scale - 1.1).abs() < 1e-9);
     }

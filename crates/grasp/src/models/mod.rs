@@ -8,7 +8,6 @@
 //! | D ([`mask`]) | Mask R-CNN | texture or outline of what the mask shows | likewise |
 //! | S | none | the demonstration looked for in the whole image | likewise |
 
-mod alignment;
 mod candidate;
 mod comparison;
 mod consistency;
@@ -32,6 +31,7 @@ use sdg_layers::state_dict;
 use sdg_orientation::OrientationCnn;
 
 pub(crate) use self::candidate::{PoseCandidate, Proposals};
+use self::comparison::Comparer;
 use self::mask::MaskMatcher;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
@@ -158,28 +158,19 @@ impl Network {
         for i in proposed.clone().take(MAX_CANDIDATES) {
             read.extend(self.read(image, &detections, i, demonstrations).await?);
         }
-        let compared = match &self.comparison {
-            Some(network) => {
-                let detections = read.iter().map(|one| {
-                    (&demonstrations[one.demonstration_idx], &one.bbox, one.grasp.angle, one.image_from_cutout)
-                });
-                comparison::compared(network, image, detections).await
-            }
-            None => Vec::new(),
-        };
+        let scored = read.into_iter().map(|one| {
+            let demonstration = &demonstrations[one.demonstration_idx];
+            let pose = one.image_from_cutout;
+            one.in_pose(demonstration, pose, image.dimensions(), None)
+        });
+        let mut candidates: Vec<PoseCandidate> = scored.collect();
+        comparison::best_first(&mut candidates, |one| one);
+        if let Some(network) = &self.comparison {
+            candidates = Comparer::new(network, image, demonstrations).compare(candidates).await;
+        }
         let mut proposals = Proposals::default();
         let unread = |i: usize| (detections.boxes[i], consistency::score(detections.scores[i], 0.0, None));
         proposals.boxes.extend(proposed.map(unread));
-        let scored = read.into_iter().enumerate().map(|(place, candidate)| {
-            let demonstration = &demonstrations[candidate.demonstration_idx];
-            candidate.scored(demonstration, image.dimensions(), compared.get(place))
-        });
-        let mut candidates: Vec<PoseCandidate> = scored.collect();
-        candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
-        if let Some(network) = &self.comparison {
-            alignment::align(network, image, demonstrations, &mut candidates).await;
-            candidates.sort_by(|a, b| b.network_score.total_cmp(&a.network_score));
-        }
         proposals.boxes.extend(candidates.iter().map(|candidate| (candidate.bbox, candidate.network_score)));
         proposals.candidates = candidates;
         Ok(proposals)
