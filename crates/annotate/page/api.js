@@ -8,21 +8,36 @@ export class RequestError extends Error {
   }
 }
 
-/** Whether the server is gone: false, true, or "key" where it came back with another key. */
+/**
+ * Whether the server is gone: false, true, or "key" where it came back with another key. An answer alone does not end
+ * that: a server that was started anew has numbered its pictures anew, and nothing is sent before the numbers are known.
+ */
 let lost = false;
 const lossListeners = [];
+/** Requests that wait for the server. */
+let waiting = [];
 export const onLoss = (listener) => lossListeners.push(listener);
 export const isLost = () => lost;
-function setLost(now) {
+export function setLost(now) {
   if (lost === now) return;
   lost = now;
+  if (!lost) waiting.splice(0).forEach((resolve) => resolve());
   for (const listener of lossListeners) listener(now);
+}
+/** Waits until the server is there and its numbers of pictures are known. */
+export const present = () => new Promise((resolve) => (lost ? waiting.push(resolve) : resolve()));
+
+/** The session that the numbers of pictures belong to; the server refuses those of another one. */
+let sessionId = null;
+export function belongTo(session) {
+  sessionId = session.id;
 }
 
 async function send(method, path, body, options = {}) {
   let response;
   try {
-    response = await fetch(path, { method, body, ...options });
+    const headers = sessionId && !options.ofAnySession ? { "Sdg-Session": sessionId } : {};
+    response = await fetch(path, { method, body, headers, keepalive: options.keepalive });
   } catch {
     setLost(true);
     throw new RequestError("No answer from sdg annotate. Is it still running in the terminal?", true);
@@ -32,7 +47,10 @@ async function send(method, path, body, options = {}) {
     setLost("key");
     throw new RequestError("sdg annotate was started again with another key: open the address that it printed.", true);
   }
-  setLost(false);
+  if (response.status === 412) {
+    setLost(true);
+    throw new RequestError("sdg annotate was started again.", true);
+  }
   if (response.ok) return options.isPicture ? response.blob() : response.json();
   if (response.status === 413) throw new RequestError("That is too large to be taken.");
   const text = await response.text();
@@ -51,11 +69,14 @@ const inTurn = (work) => (lastDetection = lastDetection.then(work, work));
 
 const json = (method, path, value, options) => send(method, path, JSON.stringify(value), options);
 
+/** Browsers refuse to keep longer requests alive after their page. */
+const MAX_KEEPALIVE_CHARS = 20000;
+
 export const api = {
-  session: () => send("GET", "/api/session"),
+  session: (options) => send("GET", "/api/session", undefined, options),
   rename: (label) => json("PUT", "/api/label", { label }),
   // `keepalive`: marks made just before the page is closed are saved, too.
-  saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: true }),
+  saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
   proposeOutline: (id, box, clicks) => json("POST", `/api/images/${id}/outline`, { box, ...clicks }),
   removeImage: (id) => send("DELETE", `/api/images/${id}`),
   removeTrialPicture: (id) => send("DELETE", `/api/trial-pictures/${id}`),

@@ -1,6 +1,6 @@
 // Changes of marks: committed with a way back, saved at once.
 
-import { api } from "./api.js";
+import { api, isLost, present } from "./api.js";
 import { boundsOf, boxPolygon, clamp, graspOf, gripperOf, placedAt } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
@@ -8,9 +8,6 @@ import { showBox } from "./view.js";
 
 /** Pixels are told to a hundredth. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** After a failed save, the next try. */
-const RETRY_MS = 2000;
-
 /** Gives what the server tells of a photo the page's own fields. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
@@ -51,7 +48,14 @@ export async function save(target) {
   if (target.saving) return;
   target.saving = true;
   let sent = 0;
-  while (sent !== target.revision) {
+  // A photo that the server has no more, after it was started anew, has no number to be saved under.
+  while (sent !== target.revision && !target.isGone) {
+    if (isLost()) {
+      target.saved = { state: "refused", why: "sdg annotate does not answer; the marks are kept in this browser", lost: true };
+      changed();
+      await present();
+      continue;
+    }
     sent = target.revision;
     try {
       const sending = JSON.stringify(target.marks);
@@ -59,11 +63,7 @@ export async function save(target) {
       Object.assign(target, { saved: view.saved, advice: view.advice, sent: sending });
     } catch (error) {
       target.saved = { state: "refused", why: error.message, lost: error.lost };
-      if (error.lost) {
-        sent = -1;
-        changed();
-        await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
-      }
+      if (error.lost) sent = -1;
     }
     changed();
   }

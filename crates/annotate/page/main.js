@@ -1,6 +1,6 @@
 // The page: asks the server what there is, then shows what `state` says, again after every change.
 
-import { api } from "./api.js";
+import { api, belongTo } from "./api.js";
 import { adopt } from "./editing.js";
 import "./gestures.js";
 import { renderLive } from "./live.js";
@@ -50,6 +50,7 @@ history.replaceState(null, "", "/");
 
 try {
   const [session, teaching] = await Promise.all([api.session(), api.teaching()]);
+  belongTo(session);
   Object.assign(state, {
     label: session.label,
     modelPath: session.model_path,

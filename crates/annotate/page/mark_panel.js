@@ -56,7 +56,7 @@ label.addEventListener("change", async () => {
   try {
     const session = await api.rename(label.value);
     Object.assign(state, { label: session.label, modelPath: session.model_path });
-    session.images.forEach((view, i) => Object.assign(state.images[i], { saved: view.saved }));
+    for (const { id, saved } of session.images) Object.assign(state.images.find((known) => known.id === id) ?? {}, { saved });
   } catch (error) {
     toast(error.message);
   }

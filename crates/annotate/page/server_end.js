@@ -1,8 +1,9 @@
 // The server's end: a banner says so, the picture stays, and marks wait in the browser until the server is back.
 
-import { api, onLoss } from "./api.js";
+import { api, belongTo, isLost, onLoss, setLost } from "./api.js";
 import { adopt, save } from "./editing.js";
 import { changed, state } from "./store.js";
+import { showCurrent } from "./strip.js";
 import { toast } from "./toast.js";
 
 const banner = document.getElementById("lost");
@@ -11,12 +12,12 @@ const BEAT_MS = 3000;
 const RETRY_MS = 1500;
 const KEPT = "kept-marks";
 
-/** Marks that the server has not got, by the photo's name. */
+const isUnsaved = (target) => target.saving || target.saved.lost;
+
+/** Keeps marks that the server has not got, by the photo's name. */
 function keep() {
   const kept = {};
-  for (const target of state.images) {
-    if (target.saving || target.saved.lost) kept[target.name] = { was: target.sent, marks: target.marks };
-  }
+  for (const target of state.images.filter(isUnsaved)) kept[target.name] = { was: target.sent, marks: target.marks };
   if (Object.keys(kept).length) localStorage.setItem(KEPT, JSON.stringify({ project: state.project, kept }));
 }
 
@@ -26,58 +27,95 @@ onLoss((lost) => {
     ? "sdg annotate was started again with another key. Open the address that it printed; the marks made since are kept in this browser. (--token-file FILE with --port keeps the key.)"
     : "sdg annotate has ended, or does not answer. The photo stays and you can go on marking: marks are kept in this browser and sent when it is back.";
   document.documentElement.toggleAttribute("data-lost", Boolean(lost));
-  if (lost) keep();
-  else if (state.images.length) meetAgain();
+  if (lost) {
+    keep();
+    meetAgain();
+  } else toast("sdg annotate answers again.");
 });
 
-/** A server that was started anew has numbered its pictures anew. */
+/** Pairs each of `known` with the one in `views` of its name; of equal names the first with the first. */
+function pairsByName(known, views) {
+  const left = [...views];
+  const pairs = known.map((entry) => {
+    const at = left.findIndex((view) => view.name === entry.name);
+    return [entry, at < 0 ? null : left.splice(at, 1)[0]];
+  });
+  return { pairs, further: left };
+}
+
+/** Takes over the numbers of a server that was started anew, if there is one; then what waits for it is sent. */
 async function meetAgain() {
+  let session;
   try {
-    const session = await api.session();
-    for (const view of session.images) {
-      const known = state.images.find((image) => image.name === view.name);
-      if (known) Object.assign(known, { id: view.id, advice: view.advice });
-      else state.images.push(adopt(view));
-    }
-    for (const trial of state.trialPictures) {
-      const view = session.trial_pictures.find((other) => other.name === trial.name);
-      if (view) Object.assign(trial, view);
-    }
-    state.models = session.models;
-    toast("sdg annotate answers again.");
+    session = await api.session({ ofAnySession: true });
   } catch {
     // The next beat asks again.
+    return;
   }
+  // Another call of this was quicker.
+  if (!isLost()) return;
+  const gone = [];
+  const adoptNumbers = (entries, views, take) => {
+    const { pairs, further } = pairsByName(entries, views);
+    for (const [entry, view] of pairs) {
+      if (view) take(entry, view);
+      else gone.push(Object.assign(entry, { isGone: true }).name);
+    }
+    return [pairs.filter(([, view]) => view).map(([entry]) => entry), further];
+  };
+  const [images, newImages] = adoptNumbers(state.images, session.images, (known, { id, advice, saved }) => {
+    Object.assign(known, isUnsaved(known) ? { id } : { id, advice, saved });
+  });
+  const [trials, newTrials] = adoptNumbers(state.trialPictures, session.trial_pictures, Object.assign);
+  const [shown, tried] = [state.images[state.current], state.trialPictures[state.trial]];
+  Object.assign(state, {
+    images: [...images, ...newImages.map(adopt)],
+    trialPictures: [...trials, ...newTrials.map((view) => ({ ...view, detections: null }))],
+    models: session.models,
+    hasModel: session.models.some((model) => model.is_current),
+  });
+  state.current = Math.max(state.images.indexOf(shown), 0);
+  state.trial = Math.max(state.trialPictures.indexOf(tried), 0);
+  belongTo(session);
+  setLost(false);
+  api.teaching().then((teaching) => Object.assign(state, { teaching }), () => null).then(changed);
+  if (gone.length) toast(`Not there any more: ${gone.join(", ")}.`);
+  if (state.images[state.current] !== shown || state.trialPictures[state.trial] !== tried) showCurrent();
   changed();
 }
 
 /** Marks that were kept when the page was closed or loaded again without a server. */
-export function sendKept(project) {
+export async function sendKept(project) {
   const text = localStorage.getItem(KEPT);
   localStorage.removeItem(KEPT);
   if (!text) return;
   const { project: of, kept } = JSON.parse(text);
   if (of !== project) return;
-  let count = 0;
+  const sent = [];
   for (const [name, { was, marks }] of Object.entries(kept)) {
     const target = state.images.find((image) => image.name === name);
     // What was changed elsewhere since is not overwritten.
     if (!target || target.committed !== was || JSON.stringify(marks) === was) continue;
     target.past.push(target.committed);
     Object.assign(target, { marks, committed: JSON.stringify(marks) });
-    save(target);
-    count += 1;
+    sent.push(save(target).then(() => target.saved.state === "written"));
   }
+  const count = (await Promise.all(sent)).filter(Boolean).length;
   if (count) toast(`Marks on ${count === 1 ? "a photo" : `${count} photos`} that were kept in this browser are saved now.`);
 }
 
-window.addEventListener("pagehide", () => document.documentElement.hasAttribute("data-lost") && keep());
+window.addEventListener("pagehide", () => isLost() && keep());
 
+/** Asks again and again whether the server is there. */
 export async function beat() {
   for (;;) {
-    const lost = document.documentElement.hasAttribute("data-lost");
-    await new Promise((resolve) => setTimeout(resolve, lost ? RETRY_MS : BEAT_MS));
-    if (!document.hidden || lost) await api.teaching().catch(() => null);
-    if (lost && document.documentElement.hasAttribute("data-lost")) keep();
+    await new Promise((resolve) => setTimeout(resolve, isLost() ? RETRY_MS : BEAT_MS));
+    if (isLost()) {
+      keep();
+      await meetAgain();
+    } else {
+      if (!state.images.some(isUnsaved)) localStorage.removeItem(KEPT);
+      if (!document.hidden) await api.teaching().catch(() => null);
+    }
   }
 }

@@ -10,6 +10,7 @@ use tempfile::TempDir;
 
 use crate::advice::advise;
 use crate::error::{Error, Result};
+use crate::guard::new_token;
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, now_secs};
@@ -63,6 +64,7 @@ pub struct Session {
     uploads: PathBuf,
     _temporary: Option<TempDir>,
     state: Arc<Mutex<State>>,
+    id: String,
     token: Option<String>,
     notes: Vec<String>,
 }
@@ -161,6 +163,7 @@ impl Session {
             uploads,
             _temporary: temporary,
             state: Arc::new(Mutex::new(state)),
+            id: new_token()?,
             token: options.token.clone(),
             notes,
         })
@@ -171,6 +174,11 @@ impl Session {
         self.token.as_deref()
     }
 
+    /// What the numbers of pictures hold for.
+    pub(crate) fn id(&self) -> &str {
+        &self.id
+    }
+
     fn state(&self) -> MutexGuard<'_, State> {
         locked(&self.state)
     }
@@ -179,6 +187,7 @@ impl Session {
     pub fn view(&self) -> SessionView {
         let state = self.state();
         SessionView {
+            id: self.id.clone(),
             label: state.label.clone(),
             images: state.image_ids().map(|id| state.image_view(id)).collect(),
             trial_pictures: state.trial_ids().map(|id| state.trial_picture_view(id)).collect(),

@@ -99,6 +99,8 @@ pub struct ComparedPicture {
 /// All that the page starts from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SessionView {
+    /// What the numbers of its pictures hold for: a session that is opened again has another id.
+    pub id: String,
     /// The object's name.
     pub label: String,
     /// The pictures of it.

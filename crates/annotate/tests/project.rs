@@ -145,3 +145,21 @@ fn a_picture_that_is_gone_is_told_and_the_rest_opens() {
     assert_eq!(again["notes"], json!(["tried/table.png is not there any more."]));
     assert_eq!(again["images"].as_array().unwrap().len(), 1);
 }
+
+#[test]
+fn numbers_of_an_earlier_session_are_refused() {
+    let served = project();
+    let id = get(&served)["id"].as_str().unwrap().to_owned();
+    let put = |served: &Served, id: &str| {
+        let host = format!("127.0.0.1:{}", served.port);
+        let key = format!("Bearer {}", served.token);
+        let headers = [("Host", host.as_str()), ("Authorization", key.as_str()), ("Sdg-Session", id)];
+        served.send("PUT", "/api/images/0/marks", &headers, MARKS.as_bytes()).status
+    };
+    let served = Served::of_project(served.end());
+    assert_eq!(put(&served, &id), 412);
+    assert!(!served.folder.path().join("photo.json").exists(), "nothing was written");
+    let id = get(&served)["id"].as_str().unwrap().to_owned();
+    assert_eq!(put(&served, &id), 200);
+    assert!(served.folder.path().join("photo.json").exists());
+}

@@ -1,5 +1,8 @@
 //! Requests and their answers: JSON in, JSON out, errors as `{"error": "one line"}`.
 //!
+//! Pictures are known by numbers, which hold for one session. A request with the header `Sdg-Session` is answered only where that
+//! is the id in `GET /api/session`, with 412 otherwise: a page that outlived its server must not change another picture.
+//!
 //! | request | does |
 //! |---|---|
 //! | `GET /`, `/page/{file}` | the page |
@@ -46,6 +49,9 @@ use crate::views::SessionView;
 /// More than the marks of any hand; bounds what a request may make the server hold.
 const MAX_JSON_BYTES: usize = 1 << 20;
 
+/// Names the session that the numbers in a request belong to.
+const SESSION_HEADER: &str = "sdg-session";
+
 /// How long the body of a request to `path` may be.
 pub fn max_body_bytes(path: &str) -> usize {
     if path == "/api/trial-pictures" { MAX_PICTURE_BYTES as usize } else { MAX_JSON_BYTES }
@@ -55,6 +61,9 @@ pub fn max_body_bytes(path: &str) -> usize {
 pub fn answer(session: &Session, request: &Request) -> Response {
     let head = &request.head;
     let no_such_address = || Response::plain(404, "there is nothing at this address\n");
+    if head.all(SESSION_HEADER).any(|id| id != session.id()) {
+        return Response::plain(412, "the pictures' numbers are those of another session\n");
+    }
     let Some(path) = head.path.strip_prefix('/') else { return no_such_address() };
     let path: Vec<&str> = path.split('/').collect();
     match (head.method.as_str(), path.as_slice()) {

@@ -1,6 +1,7 @@
 //! A project: opened again, its versions, pictures without the part, refused ones that are right, the server's end.
 
 use std::net::TcpListener;
+use std::path::Path;
 
 use image::{Rgb, RgbImage};
 use sdg_demonstration::Annotation;
@@ -9,14 +10,17 @@ use serde_json::json;
 use crate::page::{HOLD, Page, repository, shipped_photo};
 use crate::photo_to_grasp::patiently;
 
-/// Opens a project that holds the pendulum's photo with its marks, which are those that are shipped.
-fn open(further: &[&str]) -> Page {
+/// Opens a project that holds the pendulum's photo under these names, each with the marks that are shipped.
+fn open(further: &[&str], photos: &[&str]) -> Page {
     let folder = tempfile::tempdir().unwrap();
     let project = folder.path().join("project");
     std::fs::create_dir(&project).unwrap();
-    std::fs::copy(shipped_photo(), project.join("photo.png")).unwrap();
     let marks = std::fs::read_to_string(repository().join("datasets/demonstrations/pendulum/annotation.json")).unwrap();
-    std::fs::write(project.join("photo.json"), marks.replace("image.png", "photo.png")).unwrap();
+    for name in photos {
+        std::fs::copy(shipped_photo(), project.join(format!("{name}.png"))).unwrap();
+        let marks = marks.replace("image.png", &format!("{name}.png"));
+        std::fs::write(project.join(format!("{name}.json")), marks).unwrap();
+    }
     let page = Page::open_in(folder, &[&["project"], further].concat());
     shown(&page);
     page
@@ -66,7 +70,7 @@ fn half_covered() -> RgbImage {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn a_refused_one_says_why_and_is_learnt_from() {
-    let page = open(&[]);
+    let page = open(&[], &["photo"]);
     teach_s(&page, 1);
     try_picture(&page, "covered.png", &half_covered());
     page.settle_frames();
@@ -100,7 +104,7 @@ fn a_refused_one_says_why_and_is_learnt_from() {
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_again() {
-    let mut page = open(&[]);
+    let mut page = open(&[], &["photo"]);
     teach_s(&page, 1);
     try_picture(&page, "other.png", &image::imageops::rotate180(&photo()));
     try_picture(&page, "empty.png", &RgbImage::from_pixel(640, 480, Rgb([140, 140, 135])));
@@ -148,7 +152,10 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
 fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
-    let mut page = open(&["--port", &port, "--token-file", "key"]);
+    let mut page = open(&["--port", &port, "--token-file", "key"], &["earlier", "photo"]);
+    // Taken out: the server that is started anew gives the other photo its number.
+    page.click("#remove-photo");
+    page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
     page.stop_server();
     page.wait_for("the banner", "return !document.getElementById('lost').hidden");
     page.settle_frames();
@@ -159,8 +166,25 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
         page.browser.press(&["]"]).unwrap();
     }
     page.wait_for("kept here", "return (localStorage.getItem('kept-marks') ?? '').includes('photo.png')");
+    assert!(page.text("#saved").starts_with("Not saved"), "{}", page.text("#saved"));
+    // photo.json is LabelMe's, which stays as it is: changes are written beside it.
+    let saved = page.folder.path().join("project/photo.coco.json");
+    assert!(!saved.exists());
     page.start_server();
     page.wait_for("no banner", "return document.getElementById('lost').hidden");
+    let line = page.wait_for(
+        "saved",
+        "const line = document.getElementById('saved').innerText; return line.startsWith('Saved in') && line",
+    );
+    assert_eq!(line, json!("Saved in photo.coco.json"));
+    let turned = |path: &Path| {
+        let facts = sdg_demonstration::ImageFacts { width: 640, height: 480, file_name: None };
+        Annotation::read(&std::fs::read(path).unwrap(), &facts).unwrap().remove(0).grasp.unwrap().angle()
+    };
+    let by = turned(&saved).degrees() - turned(&saved.with_file_name("photo.json")).degrees();
+    assert!((by - 5.0).abs() < 0.1, "five keys turn by five degrees: {by}");
+    assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
+    page.wait_for("nothing kept any more", "return localStorage.getItem('kept-marks') === null");
 }
 
 #[test]
