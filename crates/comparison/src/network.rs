@@ -95,7 +95,8 @@ impl ComparisonNetwork {
         // One tensor, because a device is waited for once for each that is read.
         let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
         let read = Tensor::cat(vec![self.log_odds(&maps), flat(&maps.inside), flat(&maps.cosines)], 1);
-        let values: Vec<f32> = read.into_data_async().await.expect("what the device computes can be read").iter().collect();
+        let values: Vec<f32> =
+            read.into_data_async().await.expect("what the device computes can be read").iter().collect();
         let (reach, map_px) = (self.config.reach, self.config.trunk_map_px());
         let of_view = |values: &[f32]| {
             let (log_odds, values) = values.split_at(1);

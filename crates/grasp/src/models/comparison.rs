@@ -12,10 +12,11 @@ use super::candidate::PoseCandidate;
 use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// Candidates of an image that are compared: those for which class and box say most. Each takes two or three views.
-const MAX_COMPARED: usize = 16;
-/// Candidates of an image whose poses are corrected: the likeliest. Each takes one more view.
-const MAX_CORRECTED: usize = 4;
+/// Candidates of an image that are compared: those for which class and box say most. Each takes two or three views. In the
+/// protocol's pictures 16 of them found not one part more, and 616 of the 3200 pictures had five or more.
+const MAX_COMPARED: usize = 5;
+/// Candidates of an image whose poses are corrected: the likeliest. Each takes one more view. Four found not one more.
+const MAX_CORRECTED: usize = 2;
 
 /// Asks the network about one picture.
 pub(super) struct Comparer<'a> {
