@@ -43,6 +43,7 @@ mod config;
 mod network;
 mod view;
 
+pub use alignment::Alignment;
 pub use config::{ComparisonConfig, ComparisonError};
 pub use network::{Comparison, ComparisonNetwork};
 pub use sdg_orientation::Pyramid;

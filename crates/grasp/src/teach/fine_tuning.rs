@@ -28,9 +28,9 @@ impl FineTuning {
         Self {
             training: TrainingConfig {
                 steps: STEPS,
-                validation: ValidationConfig { every: 40, first: 80, samples: 48 },
+                validation: ValidationConfig { every: 20, first: 40, samples: 48 },
                 early_stop: Some(EarlyStop {
-                    hit_rate: 0.9,
+                    hit_rate: 0.85,
                     median_error_px: 3.0,
                     median_error_degrees: 2.0,
                     false_alarm_rate: 0.1,

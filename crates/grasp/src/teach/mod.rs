@@ -146,7 +146,7 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
 
 /// Scenes of other things that the agreement is calibrated on: for a network, and for model S, which is to be there in
 /// less than a second. Chosen by hand for time, not measured.
-const NUM_NEGATIVE_SCENES: u64 = 24;
+const NUM_NEGATIVE_SCENES: u64 = 12;
 pub(crate) const NUM_NEGATIVE_SCENES_INSTANT: u64 = 8;
 
 /// The demonstrations as the model keeps them.
