@@ -19,9 +19,16 @@ const WEIGHT: f64 = 3.0;
 /// many were placed: 35, with 2 and 3 34. What the network says of one part differs more than these four tell.
 const COMPARISON_WEIGHT: f64 = 2.0;
 
-/// Weight of how alike the part's features are in the finer views, and the mean cosine that says nothing. FITTED
+/// Weight of how alike the part's features are in the finer views, and the mean cosine that says nothing: between those of other
+/// things and of the part, which are 0.35 to 0.6 and 0.6 to 0.9. Of the generated parts 9001 to 9003, 49 pictures with the part
+/// placed right after 60 or 120 steps, so many were above every picture without it: 16 with a weight of 0, 34 with 5, 36 with 10,
+/// 37 with 20, 38 with 30 and 50.
 const COSINE_WEIGHT: f64 = 20.0;
 const NEUTRAL_COSINE: f64 = 0.62;
+
+/// The threshold of the score that generated parts have, in log-odds. On the parts 9001 to 9004 it accepts 30 of 37 places and 2
+/// of 40 pictures without the part; 1.5 accepts 33 and 4.
+pub(crate) const USUAL_THRESHOLD: f64 = 2.0;
 
 /// Least share that is filled and most that the odds are, so that both logarithms are finite.
 const MIN_FILLED: f64 = 0.01;

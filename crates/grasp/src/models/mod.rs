@@ -96,6 +96,12 @@ impl Network {
         }
     }
 
+    /// The threshold, in log-odds, that scores of networks of this kind have; `None` without a comparison network.
+    #[cfg(feature = "teach")]
+    pub(crate) fn usual_threshold(&self) -> Option<f64> {
+        self.comparison.as_ref().map(|_| consistency::USUAL_THRESHOLD)
+    }
+
     /// The same detector read as another model does that is taught alike.
     pub(crate) fn read_as(self, kind: ModelKind) -> Option<Self> {
         let reading = match (self.reading, kind) {

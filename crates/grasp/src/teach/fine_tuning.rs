@@ -28,7 +28,7 @@ impl FineTuning {
         Self {
             training: TrainingConfig {
                 steps: STEPS,
-                validation: ValidationConfig { every: 20, first: 40, samples: 48 },
+                validation: ValidationConfig { every: 20, first: 40, samples: 40 },
                 early_stop: Some(EarlyStop {
                     hit_rate: 0.85,
                     median_error_px: 3.0,

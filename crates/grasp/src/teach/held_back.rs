@@ -86,7 +86,8 @@ impl HeldBack<'_> {
         Ok(Calibrated {
             positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
-            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG).unwrap_or(Calibration::NEUTRAL),
+            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG, network.usual_threshold())
+                .unwrap_or(Calibration::NEUTRAL),
             on_part,
             elsewhere,
             error_px: median(errors().map(|[px, _]| *px)).unwrap_or(f64::INFINITY),
