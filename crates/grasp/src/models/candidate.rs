@@ -5,7 +5,7 @@ use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
 
 use super::consistency;
 use crate::facts::TurnSource;
-use crate::sighting::SAME_PART_IOU;
+use crate::same_part::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
 /// What a network says of an image.

@@ -41,11 +41,11 @@ use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
 use crate::calibration::Calibration;
+use crate::calibrations::Calibrations;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
-use crate::model_file::Calibrations;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Reading};
 use crate::network_evidence::NetworkEvidence;
