@@ -1,4 +1,4 @@
-//! A checkpoint of any format: what it says of itself, and its tensors by name.
+//! A checkpoint of any format: its metadata, and its tensors by name.
 
 use std::collections::BTreeMap;
 use std::fmt;

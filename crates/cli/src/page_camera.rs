@@ -19,7 +19,7 @@ use crate::live_pictures;
 /// core, before anybody has seen it.
 const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// A torn frame is a fault only when no whole one has come for so long: single ones are common with cheap cameras.
-const TORN_PATIENCE: Duration = Duration::from_secs(1);
+const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
 /// The newest picture of a camera that a thread reads for as long as the process runs.
 #[derive(Debug)]
@@ -99,7 +99,7 @@ impl Newest {
                 true
             }
             Err(error) => {
-                let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < TORN_PATIENCE);
+                let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < MAX_TORN_AGE);
                 match error.fault() {
                     Some(Fault::Torn { .. }) if is_recent => {}
                     Some(passing) => self.fault = live_fault(passing),

@@ -1,4 +1,4 @@
-//! What an arm and its hand tell of themselves, and what they are asked: plain values.
+//! States of an arm and its hand, and commands to them, as plain values.
 
 use sdg_kinematics::JointVector;
 

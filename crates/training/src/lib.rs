@@ -6,7 +6,7 @@
 //! held-back samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! Both are taught by one loop (run.rs), which asks what differs of a `Task`: batches, loss, validation.
+//! Both are taught by one loop (run.rs), and what differs is a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: which samples, in which order, every random choice of the losses. Only a time
 //! budget that cuts a run short makes it depend on the machine.

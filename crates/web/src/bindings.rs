@@ -1,4 +1,4 @@
-//! What JavaScript sees: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
+//! The interface of JavaScript: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
 
 use sdg_grasp::{Device, Verification};
 use wasm_bindgen::prelude::*;

@@ -1,4 +1,4 @@
-//! Pictures with the part and without it, and what models say of them.
+//! Pictures with the part and without it, and the detections of the models in them.
 
 use anyhow::{Context, Result};
 use sdg_grasp::{GraspModel, Verification};

@@ -19,7 +19,7 @@ use super::heatmap::{decode, encode};
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// The keypoint head.
+/// Convolutions, a transposed convolution and an upsampling: heatmap logits of each keypoint.
 #[derive(Module, Debug)]
 pub struct KeypointHead {
     /// 3×3 convolutions; Detectron2's `conv_fcn1` is number 0.

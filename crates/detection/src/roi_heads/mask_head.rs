@@ -24,7 +24,7 @@ use crate::target::ResizedTarget;
 /// Standard deviation of the predictor's first weights: small, so that training starts undecided.
 const PREDICTOR_STD: f64 = 0.001;
 
-/// The mask head.
+/// Convolutions, a transposed and a 1×1 convolution: mask logits of each class.
 #[derive(Module, Debug)]
 pub struct MaskHead {
     /// 3×3 convolutions; Detectron2's `mask_fcn1` is number 0.

@@ -65,9 +65,9 @@ pub fn constant_names() -> Vec<&'static str> {
 pub enum FitEvent<'a> {
     /// All pictures are searched with a constant's value.
     Searching {
-        /// The constant.
+        /// Name of the constant.
         constant: &'static str,
-        /// The value.
+        /// The value that is tried.
         value: f64,
     },
     /// The score's weights are fitted.

@@ -8,7 +8,7 @@ use crate::check_config::ScoreConfig;
 /// A value that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// The value.
+    /// The value that was tried.
     pub value: f64,
     /// The loss on the training half.
     pub loss: f64,

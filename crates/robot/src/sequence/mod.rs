@@ -44,7 +44,7 @@ pub enum GraspOutcome {
     },
 }
 
-/// Report of a grasp.
+/// How a grasp ended, with the targets of each look and the measurements of the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspReport {
     /// How it ended.
@@ -144,7 +144,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             CameraMount::Base => first,
         };
         let approach = self.go_above(&target)?;
-        self.come_down(approach)?;
+        self.descend(approach)?;
         self.close(&target)?;
         self.lift()?;
         self.hold()

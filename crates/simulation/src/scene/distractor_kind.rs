@@ -1,6 +1,6 @@
-//! The kinds of distractors.
+//! Which distractors there are.
 
-/// What a distractor is.
+/// Common workshop parts, some of which resemble shipped parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DistractorKind {
     /// Hexagon head bolt on its side.

@@ -12,12 +12,12 @@ use super::solids::{
     box_solid, circle, cylinder, extrude, hex_prism, hexagon, lever_outline, lying_along_x, ring, rounded_path,
     rounded_rectangle, sweep, thread,
 };
-use super::texture::{Colour, Texture};
+use super::texture::{Color, Texture};
 
 /// What a piece of a distractor is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Finish {
-    colour: Colour,
+    color: Color,
     look: Look,
     /// In kg/m³.
     pub density: f64,
@@ -35,7 +35,7 @@ enum Look {
 
 impl Finish {
     fn metal(rng: &mut Pcg64Mcg) -> Self {
-        let colours = [
+        let colors = [
             ([0.62, 0.63, 0.65], 7850.0),
             ([0.50, 0.51, 0.53], 7850.0),
             ([0.30, 0.30, 0.31], 7850.0),
@@ -44,13 +44,13 @@ impl Finish {
             ([0.78, 0.60, 0.30], 8500.0),
             ([0.70, 0.44, 0.30], 8900.0),
         ];
-        let (colour, density) = colours[rng.random_range(0..colours.len())];
+        let (color, density) = colors[rng.random_range(0..colors.len())];
         let looks = [Look::Brushed, Look::Turned, Look::Cast];
-        Self { colour: varied(colour, rng), look: looks[rng.random_range(0..looks.len())], density }
+        Self { color: varied(color, rng), look: looks[rng.random_range(0..looks.len())], density }
     }
 
     fn plastic(rng: &mut Pcg64Mcg) -> Self {
-        let colours = [
+        let colors = [
             [0.86, 0.40, 0.13],
             [0.80, 0.20, 0.14],
             [0.14, 0.30, 0.62],
@@ -61,7 +61,7 @@ impl Finish {
             [0.45, 0.46, 0.48],
         ];
         let look = if rng.random_bool(0.6) { Look::Printed } else { Look::Plastic };
-        Self { colour: varied(colours[rng.random_range(0..colours.len())], rng), look, density: 1000.0 }
+        Self { color: varied(colors[rng.random_range(0..colors.len())], rng), look, density: 1000.0 }
     }
 
     fn any(rng: &mut Pcg64Mcg) -> Self {
@@ -74,18 +74,18 @@ impl Finish {
 
     pub fn texture(&self, seed: u64) -> Texture {
         match self.look {
-            Look::Plastic => Texture::grained(64, self.colour, 0.04, seed),
-            Look::Printed => Texture::printed(128, self.colour, 20.0, seed),
-            Look::Brushed => Texture::brushed(96, self.colour, 0.12, seed),
-            Look::Turned => Texture::turned(96, self.colour, 0.15, seed),
-            Look::Cast => Texture::cast(96, self.colour, 0.08, seed),
-            Look::RoundBar => Texture::round_bar(64, self.colour, 0.7, seed),
+            Look::Plastic => Texture::grained(64, self.color, 0.04, seed),
+            Look::Printed => Texture::printed(128, self.color, 20.0, seed),
+            Look::Brushed => Texture::brushed(96, self.color, 0.12, seed),
+            Look::Turned => Texture::turned(96, self.color, 0.15, seed),
+            Look::Cast => Texture::cast(96, self.color, 0.08, seed),
+            Look::RoundBar => Texture::round_bar(64, self.color, 0.7, seed),
         }
     }
 }
 
-fn varied(colour: Colour, rng: &mut Pcg64Mcg) -> Colour {
-    colour.map(|channel| (channel * rng.random_range(0.88..1.12)).clamp(0.02, 0.98))
+fn varied(color: Color, rng: &mut Pcg64Mcg) -> Color {
+    color.map(|channel| (channel * rng.random_range(0.88..1.12)).clamp(0.02, 0.98))
 }
 
 /// A closed solid of one material.
@@ -185,8 +185,8 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
             let mut races = ring(outer - gap, outer, height, 0.0006, 48);
             races.append(&ring(bore, bore + gap, height, 0.0006, 40));
             let seal = raised(ring(bore + gap * 0.95, outer - gap * 0.95, height * 0.86, 0.0002, 40), height * 0.07);
-            let seal_finish = Finish { colour: [0.12, 0.12, 0.13], look: Look::Plastic, density: 1500.0 };
-            let steel = Finish { colour: varied([0.68, 0.69, 0.71], rng), look: Look::Turned, density: 7850.0 };
+            let seal_finish = Finish { color: [0.12, 0.12, 0.13], look: Look::Plastic, density: 1500.0 };
+            let steel = Finish { color: varied([0.68, 0.69, 0.71], rng), look: Look::Turned, density: 7850.0 };
             vec![
                 Piece { mesh: races.textured_from_above(0.06), finish: steel },
                 Piece { mesh: seal.textured_from_above(0.04), finish: seal_finish },
@@ -255,7 +255,7 @@ fn pieces(kind: DistractorKind, seed: u64) -> Vec<Piece> {
                     Point3::new(length * (part - 0.5), coil * angle.cos(), coil * angle.sin())
                 })
                 .collect();
-            let finish = Finish { colour: varied([0.55, 0.56, 0.58], rng), look: Look::RoundBar, density: 7850.0 };
+            let finish = Finish { color: varied([0.55, 0.56, 0.58], rng), look: Look::RoundBar, density: 7850.0 };
             vec![Piece { mesh: sweep(&path, wire, 8), finish }]
         }
         DistractorKind::Shaft => {

@@ -1,4 +1,4 @@
-//! `sdg plan`: a motion around the obstacles of a workcell, told and drawn; nothing moves.
+//! `sdg plan`: a motion around the obstacles of a workcell, described and drawn; nothing moves.
 
 mod arguments;
 #[cfg(feature = "simulation")]

@@ -150,7 +150,7 @@ impl AxesEvaluation<'_> {
             errors: errors_of(condition),
             camera: None,
         };
-        let attempts = if self.is_the_protocol_s(condition) {
+        let attempts = if self.is_in_protocol(condition) {
             let file = cell.file(&attempts_of(Verification::ByShape));
             go_on(&rehearsal, self.store, &file, settings, is_interrupted)?
         } else {
