@@ -50,7 +50,7 @@ pub struct Request {
 pub struct Work {
     pub run: Box<dyn FnMut() -> Result<()>>,
     pub facts: Facts,
-    /// How many pieces one run makes; times are told for one.
+    /// How many pieces one run makes; times are reported for one.
     pub pieces: usize,
     /// Whether one run goes before that does not count.
     pub warm_up: bool,

@@ -80,7 +80,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             Ok(measured) => {
                 report.add(work, measured);
                 eprint!("{}", report.last_lines());
-                // After each work, so that a run that is cut short has told something.
+                // After each work, so that a run that is cut short has written something.
                 report.write_json(&paths.out)?;
             }
             Err(error) => {

@@ -159,7 +159,7 @@ impl Service {
         let is_page = head.path == "/";
         let request = Request { head, body: read_body(body, patience).await? };
         let session = self.session;
-        // What breaks in one request is told to the page, and the terminal has said more.
+        // A panic in one request is an error of that request alone; the terminal has its message.
         let answered = tokio::task::spawn_blocking(move || routes::answer(&session, &request)).await;
         let mut response = answered.unwrap_or_else(|_| routes::broken());
         if is_page {

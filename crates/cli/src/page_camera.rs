@@ -111,7 +111,7 @@ impl Newest {
     }
 }
 
-/// What the page tells of a fault; `None` for what does not matter on it.
+/// The page's text for a fault; `None` for what does not matter on it.
 fn live_fault(fault: &Fault) -> Option<LiveFault> {
     let kind = match fault {
         Fault::Stale { .. } => LiveFaultKind::Stale,

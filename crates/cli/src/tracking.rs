@@ -126,7 +126,7 @@ impl Drop for LiveTracker {
         if let Searches::Threaded { due, thread, .. } = &mut self.searches {
             due.take();
             if let Some(thread) = thread.take() {
-                // A search that panicked has said so itself.
+                // The message of a panic in a search was printed already.
                 let _ = thread.join();
             }
         }

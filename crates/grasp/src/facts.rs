@@ -62,7 +62,7 @@ pub struct TeachingFacts {
     /// How the orientation CNN came to be; `None` for models without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<OrientationFacts>,
-    /// What pictures without the part said; `None` where none were given.
+    /// The result on pictures without the part; `None` where none were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub negatives: Option<NegativeFacts>,
     /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.

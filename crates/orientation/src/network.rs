@@ -96,7 +96,7 @@ impl OrientationCnn {
         self.classes.forward(self.features(crops))
     }
 
-    /// Gives the values that the classes are told from, `[N, H]` of the hidden layer.
+    /// Gives the features that the classes are computed from, `[N, H]` of the hidden layer.
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`

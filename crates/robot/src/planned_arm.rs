@@ -18,7 +18,7 @@ pub enum PlannedAction {
     Hand(HandCommand),
 }
 
-/// Follows every motion exactly and grasps whatever it is told to; keeps what it was asked.
+/// Follows every motion exactly and holds after every grasp; records the commands.
 #[derive(Debug, Clone)]
 pub struct PlannedArm {
     state: ArmState,

@@ -197,7 +197,7 @@ fn attempt<A: Arm, P: Pictures<A>>(
     print_report(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
 }
 
-/// Plans from where the arm stands, draws, tells.
+/// Plans from where the arm stands, draws and prints the plan.
 fn dry_run<A: Arm>(
     args: &GraspArgs,
     prepared: &Prepared,

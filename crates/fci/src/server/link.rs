@@ -160,7 +160,7 @@ impl Link {
             match self.udp.recv_from(buffer) {
                 Ok((length, from)) if from == peer => return Some(length),
                 Ok(_) => {}
-                // An error of an earlier datagram (port unreachable) is told here; the next call reads on.
+                // An error of an earlier datagram (port unreachable) arrives here; the next call reads on.
                 Err(_) => return None,
             }
         }

@@ -32,7 +32,7 @@ pub struct MoveRequest {
     pub max_goal_deviation: Deviation,
 }
 
-/// When contacts and collisions are told and stop the robot; lower thresholds for contacts, upper ones for collisions.
+/// From when on contacts and collisions are reported and stop the robot; lower thresholds for contacts, upper ones for collisions.
 /// Torques in N·m, forces in N and N·m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollisionBehavior {

@@ -83,7 +83,7 @@ fn examples(parts: &[&PartObservations], config: &ScoreConfig) -> Vec<Example> {
 /// The terms' values of every pose of a picture.
 fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f64, NUM_TERMS>> {
     let clues = picture.clues();
-    // Its size is told by what it contributes.
+    // Its size follows from its contributions.
     let judged = judge_picture(&clues, config);
     clues
         .iter()

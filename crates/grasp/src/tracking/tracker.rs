@@ -59,7 +59,7 @@ pub struct Tracker {
     searched_at: Option<Duration>,
 }
 
-/// A track and what was last said of it.
+/// A track and its last score.
 #[derive(Debug)]
 struct Tracked {
     track: Track,

@@ -53,9 +53,9 @@ pub struct GraspReport {
     pub targets: Vec<Option<GraspTarget>>,
     /// How many looks there were from afar, and how many from above what they found.
     pub looks: [usize; 2],
-    /// What the hand said when it had closed.
+    /// The hand's state when it had closed.
     pub closed: Option<HandState>,
-    /// What the hand's width and force said after closing, lifting and holding: `None` where the part is held, otherwise why not.
+    /// The verdict of the hand's width and force after closing, lifting and holding: `None` where the part is held, otherwise why not.
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
 }
 

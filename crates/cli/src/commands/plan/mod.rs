@@ -64,7 +64,7 @@ pub struct PlanArgs {
     pub json: bool,
 }
 
-/// Plans, tells and draws.
+/// Plans, prints the plan and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = robots::read_workcell(&args.workcell)?;

@@ -10,7 +10,7 @@ use crate::evaluation::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// All tables, group by group, then what the robot is told.
+/// All tables, group by group, then the quantities that the robot is given.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     let mut tables = Vec::new();
     for group in &summary.groups {

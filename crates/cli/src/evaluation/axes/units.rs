@@ -70,7 +70,7 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// What a model said of a part's pictures of an axis, if it was shown them.
+    /// A model's detections in a part's pictures of an axis, if it was run on them.
     pub fn axis_record(&self, cell: Cell, axis: Axis) -> Result<Option<AxisRecord>> {
         self.store.read_made_with(&axis_file(cell, axis), &self.axis_settings())
     }
@@ -184,7 +184,7 @@ impl std::fmt::Display for Unit<'_> {
     }
 }
 
-/// Where it stands what a model said of an axis' pictures.
+/// The file of a model's detections in the pictures of an axis.
 pub(super) fn axis_file(cell: Cell, axis: Axis) -> String {
     format!("axes/{cell}.{}.json", axis.name())
 }
