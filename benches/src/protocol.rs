@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers that identify what was computed: equal where the same work was done.
 pub type Facts = BTreeMap<String, f64>;
 
-/// What a worker says first.
+/// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
     /// Seconds of the run that does not count, all its pieces; `None` where there was none.

@@ -80,7 +80,7 @@ fn lock(newest: &Mutex<Newest>) -> MutexGuard<'_, Newest> {
 }
 
 impl Newest {
-    /// Takes what the camera gave, and says whether there will be nothing more.
+    /// Takes what the camera gave; true where nothing more will come.
     fn has_ended_with(&mut self, next: Result<Option<sdg_camera::Frame>, CameraError>) -> bool {
         let fault = |kind, text: String| Some(LiveFault { kind, text });
         match next {

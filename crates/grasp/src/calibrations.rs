@@ -32,7 +32,7 @@ impl Calibrations {
         Self { network: self.network.of_older_file(), ..self }
     }
 
-    /// What the network's score says of a place, 0 where it proposes nothing; `None` where that is not known.
+    /// The log-likelihood ratio of a place by the network's score there, 0 where it proposes nothing; `None` where that is not known.
     pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {
         Some(self.evidence?.log_likelihood_ratio(network_score, &self.network))
     }

@@ -1,4 +1,4 @@
-//! What a model file tells about itself.
+//! The facts that a model file has about its teaching.
 
 pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;

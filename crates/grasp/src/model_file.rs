@@ -48,7 +48,7 @@ const OLDEST_VERSION: u32 = 1;
 /// More demonstrations than anybody takes; bounds the work on a forged file.
 const MAX_DEMONSTRATIONS: usize = 1000;
 
-/// What a file says of itself, without its weights.
+/// The metadata of a file, without its weights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
     /// The grasp model's kind.
@@ -315,7 +315,7 @@ fn to_json<T: Serialize>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// What a file says of itself; reads the header alone.
+/// The metadata of a file; reads the header alone.
 ///
 /// # Errors
 /// As [`GraspModel::from_bytes`].

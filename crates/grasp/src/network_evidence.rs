@@ -20,7 +20,7 @@ pub(crate) struct NetworkEvidence {
     elsewhere: [u32; 3],
 }
 
-/// What the network says of a place: nothing, something below its threshold, or something above it.
+/// The network's output at a place: nothing, something below its threshold, or something above it.
 fn class(score: f64, calibration: &Calibration) -> usize {
     match score {
         0.0 => 0,

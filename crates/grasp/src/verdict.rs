@@ -36,7 +36,7 @@ pub struct Contributions {
     pub outside: f64,
     /// How much other things resemble this part.
     pub resemblance: f64,
-    /// What the small network says that sees photo and picture laid over each other; its least where edges and surface agree
+    /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
     /// too little for it to be asked.
     pub likeness: f64,
 }

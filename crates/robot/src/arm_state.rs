@@ -53,14 +53,14 @@ pub struct ArmState {
     pub mode: ArmMode,
 }
 
-/// What the hand says of itself.
+/// The state of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandState {
     /// Distance between the fingers, m.
     pub opening_m: f64,
     /// Whether the hand presses on something with the commanded force, at a width near the commanded one.
     pub is_grasping: bool,
-    /// Force of each finger, N, where the hand tells it.
+    /// Force of each finger, N, where the hand measures it.
     pub force_n: Option<f64>,
 }
 

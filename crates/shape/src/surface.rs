@@ -27,7 +27,7 @@ use crate::pixel_cell::PixelCell;
 /// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
 /// before there were cells.
 const POINTS: f64 = 900.0;
-/// A cell of fewer points tells nothing. Chosen by hand, not measured.
+/// A cell of fewer points is not compared. Chosen by hand, not measured.
 const MIN_IN_CELL: usize = 4;
 /// Points this near to the outline show the background when the pose is a pixel off. Chosen by that reasoning, not
 /// measured.

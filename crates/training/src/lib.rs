@@ -12,7 +12,7 @@
 //! budget that cuts a run short makes it depend on the machine.
 //!
 //! What is deliberately absent: how a grasp is read off detections (the `grasp` crate passes that in), files, and any
-//! printing: a run tells what happens through [`TrainingEvent`]s.
+//! printing: a run reports its progress by [`TrainingEvent`]s.
 //!
 //! ```
 //! use sdg_training::{OneCycle, TrainingConfig};

@@ -32,7 +32,7 @@ impl Model {
         Ok(Self(Detector::open(&bytes, &device().await?)?))
     }
 
-    /// What the file says of itself, as JSON; see [`Detector::summary`].
+    /// The metadata of the file, as JSON; see [`Detector::summary`].
     pub fn summary(&self) -> String {
         self.0.summary()
     }

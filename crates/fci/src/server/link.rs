@@ -18,7 +18,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// disconnected may connect again at once. Shorter than clients wait for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 
-/// What a listening thread or a reading one tells the loop.
+/// Messages of the listening thread and of the reading one to the loop.
 #[derive(Debug)]
 enum LinkEvent {
     Connected(TcpStream, SocketAddr),

@@ -1,4 +1,4 @@
-//! What a client asks of the robot over TCP.
+//! The requests of a client to the robot, over TCP.
 
 use super::codec::{Codec, Decoder, Encoder, Real};
 use super::commands::Command;

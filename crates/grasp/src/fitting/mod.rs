@@ -76,7 +76,7 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` is called with the progress.
+/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
 ///
 /// # Errors
 /// A name that no constant has, fewer than two parts on either side, and a part that cannot be taught.

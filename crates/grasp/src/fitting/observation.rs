@@ -1,4 +1,4 @@
-//! What the search sees of a part: evidence for right poses, for wrong ones, and how much other things resemble it.
+//! The results of the search on a part's pictures: evidence for right poses, for wrong ones, and how much other things resemble it.
 
 use sdg_geometry::{Angle, PlanarGrasp};
 

@@ -164,7 +164,7 @@ fn change(f: &mut fmt::Formatter<'_>, before: &Loss, after: &Loss, difference: &
     )
 }
 
-/// What the fit says of a constant.
+/// The conclusion of the fit for a constant.
 fn verdict(is_other: bool, difference: &Difference) -> &'static str {
     match (is_other, difference.is_improvement()) {
         (false, _) => "no",

@@ -8,7 +8,7 @@ use crate::facts::TurnSource;
 use crate::same_part::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
-/// What a network says of an image.
+/// The output of a network for an image, read by the model.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
     /// Best first, those that cannot be read as a pose left out.

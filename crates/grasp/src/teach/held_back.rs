@@ -48,7 +48,7 @@ struct Seen {
 }
 
 impl HeldBack<'_> {
-    /// What the network alone says of held-back samples.
+    /// The detections of the network alone in held-back samples.
     ///
     /// # Errors
     /// An image that the network refuses.

@@ -97,7 +97,7 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
 /// Steps of detector and orientation CNN.
 const STEPS: usize = 12;
 
-/// What a model says of its own photo is what a file of it says, to the bit.
+/// A model and the same model read from its file give the same detections in its own photo, to the bit.
 fn assert_same_after_a_file(model: &GraspModel) {
     let bytes = model.to_bytes().unwrap();
     let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();

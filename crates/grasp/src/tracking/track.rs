@@ -209,7 +209,7 @@ impl Track {
         Some(followed)
     }
 
-    /// What the comparing network says of the part where it was refined to; it is asked only where that may have changed.
+    /// The output of the comparing network for the refined pose; it is computed only where that may have changed.
     pub(super) fn likeness(
         &mut self,
         detector: &PartDetector,

@@ -181,7 +181,7 @@ impl DirectConv<'_> {
         Prefetch { runs: [run, &[]] }
     }
 
-    /// What the window sees from the grid rows `rows` of an image, zeros outside the map.
+    /// The input of the window for the grid rows `rows` of an image, zeros outside the map.
     fn copy_band(&self, image: usize, rows: std::ops::Range<usize>) -> Scratch {
         let Maps { values, size: [height, width], channels, .. } = self.source;
         let band_width = (self.grid[1] - 1) * self.stride[1] + self.window[1];

@@ -31,7 +31,7 @@ impl Likeness {
         Self { photo: Photo::new(cutout, outline) }
     }
 
-    /// What the network sees at a pose.
+    /// The input of the network at a pose.
     pub fn pair(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Pair {
         self.photo.beside(image, image_from_cutout)
     }

@@ -92,7 +92,7 @@ pub struct Match {
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
-    /// Everything that the image says of that place.
+    /// All measurements in the image at that place.
     pub evidence: Evidence,
 }
 

@@ -3,6 +3,7 @@
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table, Tone};
 
+use super::known_from_simulator::known_from_simulator;
 use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, lowest};
 use super::way::Way;
 use crate::evaluation::records::AttemptRecord;
