@@ -1,4 +1,4 @@
-//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and who is asked before anything moves.
+//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and the question before anything moves.
 #![allow(clippy::unwrap_used)]
 
 mod support;

@@ -2,7 +2,7 @@
 //!
 //! Every cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach. What
 //! is looked for is the shift, turn and size under which the cosines of the part's cells are greatest in the mean, less a
-//! penalty for moving. A cell on an edge says nothing of the direction along it; its cosines are alike there, and others decide.
+//! penalty for moving. A cell on an edge does not fix the shift along the edge, since its cosines are alike there; other cells do.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};

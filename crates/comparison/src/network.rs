@@ -82,7 +82,7 @@ impl ComparisonNetwork {
         self.log_odds(&maps)
     }
 
-    /// What the network says of each view.
+    /// The log-odds of each view.
     ///
     /// # Panics
     /// With views of another network's references.
@@ -156,7 +156,7 @@ impl ComparisonNetwork {
     }
 }
 
-/// What the network says of a view.
+/// The output of the network for a view.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     /// The log-odds that the view shows the part in the pose that it was made by.

@@ -9,7 +9,7 @@ use crate::watch::Watch;
 ///
 /// Calls block until what they ask for is done. An error leaves the arm at rest, or coming to rest by the robot's own means.
 pub trait Arm {
-    /// What the arm says of itself now.
+    /// The present state of the arm.
     ///
     /// # Errors
     /// [`RobotError::Lost`] where it does not answer.
@@ -27,7 +27,7 @@ pub trait Arm {
     /// As [`Arm::follow`].
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<(), RobotError>;
 
-    /// What the hand says of itself now.
+    /// The present state of the hand.
     ///
     /// # Errors
     /// [`RobotError::Lost`] where it does not answer.

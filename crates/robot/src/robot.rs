@@ -58,7 +58,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.latched.as_deref()
     }
 
-    /// What the arm says of itself.
+    /// The present state of the arm.
     ///
     /// # Errors
     /// As [`Arm::state`].
@@ -164,7 +164,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.note(finished)
     }
 
-    /// What the hand says of itself.
+    /// The present state of the hand.
     ///
     /// # Errors
     /// As [`Arm::hand`].

@@ -194,10 +194,10 @@ fn attempt<A: Arm, P: Pictures<A>>(
         write_states(&args.states, robot.watch())?;
     }
     let report = ended?;
-    tell(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
+    print_report(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
 }
 
-/// Plans from where the arm stands, draws, tells.
+/// Plans from where the arm stands, draws and prints the plan.
 fn dry_run<A: Arm>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -210,7 +210,7 @@ fn dry_run<A: Arm>(
     let mount = prepared.camera.mount();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config)?;
     eprintln!("what would be done:");
-    plan.tell(target.is_some())?;
+    plan.print(target.is_some())?;
     for file in plan.draw(&args.out, seen.filter(|_| target.is_some()))? {
         eprintln!("  {}", file.display());
     }
@@ -218,7 +218,13 @@ fn dry_run<A: Arm>(
 }
 
 /// The closing lines, or the one object.
-fn tell(args: &GraspArgs, prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Result<Outcome> {
+fn print_report(
+    args: &GraspArgs,
+    prepared: &Prepared,
+    report: &GraspReport,
+    secs: f64,
+    robot: &str,
+) -> Result<Outcome> {
     if args.json {
         println!("{}", to_json(prepared, report, secs, robot));
     }

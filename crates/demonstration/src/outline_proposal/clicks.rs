@@ -1,4 +1,4 @@
-//! What a person said of single places: the region that a click means.
+//! Clicks on places that belong to the part or do not: the region that a click stands for.
 //!
 //! A click on a place that the cut has on the wrong side means the whole piece of the picture there: what is reached from the click
 //! over small steps of colour, without leaving the wrong side.

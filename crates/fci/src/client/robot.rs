@@ -147,7 +147,7 @@ impl Robot {
         self.execute(&Request::StopMove, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Clears the errors after a reflex, as a person has said; nothing moves by it.
+    /// Clears the errors after a reflex, at a person's request; nothing moves by it.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -155,7 +155,7 @@ impl Robot {
         self.execute(&Request::AutomaticErrorRecovery, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Sets when contacts are told and collisions stop the robot; not during a motion.
+    /// Sets from when on contacts are reported and collisions stop the robot; not during a motion.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -195,7 +195,7 @@ impl Robot {
         self.set(&Request::SetNeToEe(*ne_from_ee))
     }
 
-    /// Sets the frame that external forces and Cartesian stiffness are told in, on the end effector.
+    /// Sets the frame of external forces and Cartesian stiffness, on the end effector.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.

@@ -5,10 +5,10 @@ use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
 
 use super::consistency::{self, ComparisonEvidence};
 use crate::facts::TurnSource;
-use crate::sighting::SAME_PART_IOU;
+use crate::same_part::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
-/// What a network says of an image.
+/// The output of a network for an image, read by the model.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
     /// Best first, those that cannot be read as a pose left out.

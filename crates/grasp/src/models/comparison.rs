@@ -29,7 +29,7 @@ pub(super) struct Comparer<'a> {
     demonstrations: &'a [TaughtDemonstration],
 }
 
-/// A candidate and what the network says of its pose.
+/// A candidate and the network's output for its pose.
 type Compared = (PoseCandidate, Comparison);
 
 impl<'a> Comparer<'a> {

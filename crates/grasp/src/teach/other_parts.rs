@@ -35,7 +35,7 @@ pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
 /// as with it. Chosen by that reasoning, not measured.
 const NUM_PICTURES: u64 = 16;
 
-/// What a network says in pictures of other parts without the part.
+/// The scores of a network in pictures of other parts without the part.
 #[derive(Default)]
 pub(super) struct OnOtherParts {
     /// Its highest score in each.

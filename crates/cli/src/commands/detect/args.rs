@@ -1,4 +1,4 @@
-//! What `sdg detect` takes.
+//! The arguments of `sdg detect`.
 
 use std::path::PathBuf;
 
