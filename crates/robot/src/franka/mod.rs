@@ -158,7 +158,7 @@ impl Arm for FrankaArm {
     }
 
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
-        match self.scheduling {
+        let ended = match self.scheduling {
             Scheduling::Ordinary => self.play(motion, watch),
             Scheduling::RealTime => std::thread::scope(|scope| {
                 let played = scope.spawn(|| {
@@ -167,7 +167,12 @@ impl Arm for FrankaArm {
                 });
                 played.join().unwrap_or_else(|_| Err(RobotError::Device("the control loop panicked".into())))
             }),
+        };
+        if ended.is_err() {
+            // The fingers may have been opening on the way.
+            self.hand.stop_motion();
         }
+        ended
     }
 
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
@@ -187,7 +192,7 @@ impl Arm for FrankaArm {
     fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
         while self.hand.is_moving() {
             if let Err(error) = self.observe(watch) {
-                self.hand.stop();
+                self.hand.stop_motion();
                 return Err(error);
             }
         }
