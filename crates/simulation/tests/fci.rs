@@ -190,6 +190,7 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
         let server = serve(pace, limits_of_server);
         let mut robot: Robot = connect(&server);
         let home = robot.read_state().unwrap().q_desired;
+        assert!((0..7).all(|joint| (home[joint] - limit_cases::READY[joint]).abs() < 1e-6), "{home:?}");
         let mut cases = limit_cases::all(&limits);
         cases.retain(|case| case.is_cartesian() == is_cartesian);
         if !is_cartesian {

@@ -5,6 +5,7 @@
 mod profile;
 mod signal;
 
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::fmt;
 
 use sdg_fci::client::Robot;
@@ -21,6 +22,8 @@ const MARGIN: f64 = 0.005;
 const MEASURED_BEYOND: f64 = 0.4;
 /// Measured velocities of the end effector swing beyond what is commanded, and a robot may stop a tenth of a metre a second later.
 const MEASURED_END_MARGIN: f64 = 0.1;
+/// The pose that a Panda is usually begun from, rad.
+pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_PI_2, FRAC_PI_4];
 /// What joint 2 turns for a metre forward at the ready pose, where all joints together move least, rad/m: an entry of the
 /// Jacobian's pseudoinverse. No other joint uses as much of its limits there.
 const JOINT_2_PER_METRE: f64 = 3.1520;
@@ -90,7 +93,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     let position = |profile| Signal::JointPosition { joint, profile };
     let speed = |profile| Signal::JointVelocity { joint, profile };
     // Joint 7 starts at 0.785 rad; near its end an FR3 allows little velocity, so that the inner motion ends earlier.
-    let to_the_end = limits.q_max[6] - std::f64::consts::FRAC_PI_4;
+    let to_the_end = limits.q_max[6] - FRAC_PI_4;
     let torque = |peak: f64| {
         let up = (0..=20).map(|step| peak * f64::from(step) / 20.0);
         let pulse: Vec<f64> = up.clone().chain(up.rev()).collect();
@@ -236,7 +239,7 @@ pub fn all(limits: &Limits) -> Vec<Case> {
     ]
 }
 
-/// What the joints need in Cartesian motions whose own limits are far, along the base's x from the ready pose. Franka's robots
+/// What the joints need in Cartesian motions whose own limits are far, along the base's x; to be run from [`READY`]. Franka's robots
 /// are stopped for it: 2.5 m/s² are refused by a Panda, as joint 2 would need 7.9 rad/s² of 7.5.
 pub fn joints_of_cartesian_motions(limits: &Limits) -> Vec<Case> {
     let (inside, outside) = (1.0 - MARGIN, 1.0 + MARGIN);
