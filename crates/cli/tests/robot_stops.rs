@@ -171,11 +171,10 @@ fn a_robot_that_goes_in_a_motion_is_one_line_and_its_last_second_is_kept() {
         let moving = Moving::start(&simulated, &workcell, &states, for_);
         drop(simulated);
         let (stderr, code) = moving.finish();
-        states.exists().then_some((address, stderr, code))
+        (states.exists() && num_states(&states) > 100).then_some((address, stderr, code))
     });
     assert_eq!(code, Some(1), "{stderr}");
     let lines: Vec<_> = stderr.lines().collect();
     assert_eq!(lines.len(), 2, "{stderr}");
     assert!(lines[1].starts_with(&format!("sdg: the connection to the robot at {address} is lost: ")), "{stderr}");
-    assert!(num_states(&states) > 100);
 }

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "each test file and the example use some of it")]
 
-#[path = "relay.rs"]
 pub mod relay;
 
 use sdg_fci::server::{Pace, Server, ServerConfig};
