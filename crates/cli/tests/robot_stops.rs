@@ -49,7 +49,7 @@ struct Moving {
 
 impl Moving {
     /// At a hundredth of the speed the motion takes a minute of simulated time.
-    fn start(simulated: &Simulated, workcell: &Path, states: &Path, for_: Duration) -> Self {
+    fn start(simulated: &Simulated, workcell: &Path, states: &Path, moving_for: Duration) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
             .args(["robot", "home", "--robot", &simulated.address, "--yes", "--no-realtime", "--speed", "0.01"])
             .args(["--workcell".as_ref(), workcell.as_os_str(), "--states".as_ref(), states.as_os_str()])
@@ -60,7 +60,7 @@ impl Moving {
         let mut line = String::new();
         stderr.read_line(&mut line).unwrap();
         assert!(line.starts_with("moving home, "), "{line}");
-        thread::sleep(for_);
+        thread::sleep(moving_for);
         Self { child, stderr }
     }
 
@@ -111,9 +111,9 @@ fn num_states(path: &Path) -> usize {
 fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it() {
     let folder = tempfile::tempdir().unwrap();
     let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
-    let simulated = once_moving(|for_| {
+    let simulated = once_moving(|moving_for| {
         let simulated = Simulated::start(&[]);
-        let moving = Moving::start(&simulated, &workcell, &states, for_);
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
         moving.signal("KILL");
         moving.finish();
         is_on_its_way(&simulated).then_some(simulated)
@@ -145,9 +145,9 @@ fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it()
 fn ctrl_c_stops_the_arm_on_its_path_and_keeps_the_last_second() {
     let folder = tempfile::tempdir().unwrap();
     let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
-    let (simulated, stderr, code) = once_moving(|for_| {
+    let (simulated, stderr, code) = once_moving(|moving_for| {
         let simulated = Simulated::start(&[]);
-        let moving = Moving::start(&simulated, &workcell, &states, for_);
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
         moving.signal("INT");
         let (stderr, code) = moving.finish();
         is_on_its_way(&simulated).then_some((simulated, stderr, code))
@@ -165,10 +165,10 @@ fn ctrl_c_stops_the_arm_on_its_path_and_keeps_the_last_second() {
 fn a_robot_that_goes_in_a_motion_is_one_line_and_its_last_second_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
-    let (address, stderr, code) = once_moving(|for_| {
+    let (address, stderr, code) = once_moving(|moving_for| {
         let simulated = Simulated::start(&[]);
         let address = simulated.address.clone();
-        let moving = Moving::start(&simulated, &workcell, &states, for_);
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
         drop(simulated);
         let (stderr, code) = moving.finish();
         (states.exists() && num_states(&states) > 100).then_some((address, stderr, code))
