@@ -3,6 +3,7 @@
 use crate::arm_state::{ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::RobotError;
 use crate::safety::CheckedMotion;
+use crate::touch::{TouchDown, Touched};
 use crate::watch::Watch;
 
 /// An arm with a hand, simulated or real.
@@ -68,4 +69,13 @@ pub trait Arm {
     /// # Errors
     /// Where the error stays.
     fn recover(&mut self) -> Result<(), RobotError>;
+}
+
+/// An arm that takes torques, and so can yield to what it touches.
+pub trait CompliantArm: Arm {
+    /// Comes straight down from where the arm stands until something is felt, presses on it, and stands; `watch` sees every state.
+    ///
+    /// # Errors
+    /// As [`Arm::follow`].
+    fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched, RobotError>;
 }

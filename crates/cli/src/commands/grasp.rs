@@ -190,7 +190,12 @@ fn attempt<A: Arm, P: Pictures<A>>(
     let mount = prepared.camera.mount();
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut (), mount, &prepared.config);
-    if ended.is_err() || robot.latched().is_some() {
+    // A part that is not there is no error, and a part that is held is none.
+    let has_failed = match &ended {
+        Ok(report) => !report.outcome.is_held() && !is_nothing_found(report),
+        Err(_) => true,
+    };
+    if has_failed || robot.latched().is_some() {
         write_states(&args.states, robot.watch())?;
     }
     let report = ended?;
@@ -236,13 +241,18 @@ fn print_report(
             );
             Ok(Outcome::Done)
         }
-        // A look was taken, and the part was not in it; a motion that was refused before is another matter.
-        GraspOutcome::Failed { step: GraspStep::Detect, why } if report.targets.last() == Some(&None) => {
+        GraspOutcome::Failed { why, .. } if is_nothing_found(report) => {
             eprintln!("{why}");
             Ok(Outcome::NothingToGrasp)
         }
         GraspOutcome::Failed { step, why } => Err(anyhow!("{step}: {why}")),
     }
+}
+
+/// Whether a look was taken and the part was not in it; a motion that was refused before is another matter.
+fn is_nothing_found(report: &GraspReport) -> bool {
+    let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
+    is_look && report.targets.last() == Some(&None)
 }
 
 fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Value {
