@@ -2,13 +2,14 @@
 //! (`make walk SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
 //!
 //! What the page makes a person wait for is measured. What a person takes is added by the keystroke-level model (Card, Moran,
-//! Newell 1980) for what is done, and by 200 words a minute for all that the page says on the way.
+//! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page says for the first time.
 #![allow(clippy::unwrap_used)]
 
 #[path = "browser/page.rs"]
 #[allow(dead_code)]
 mod page;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -19,7 +20,7 @@ use sdg_demonstration::{Annotation, ImageFacts};
 const MAX_SECONDS: f64 = 180.0;
 /// Finding out what to do next, moving the pointer to it, pressing.
 const ACTION_SECONDS: f64 = 1.35 + 1.1 + 0.2;
-const WORDS_PER_SECOND: f64 = 200.0 / 60.0;
+const WORDS_PER_SECOND: f64 = 238.0 / 60.0;
 /// A person's box is drawn a little outside the part.
 const BOX_LOOSENESS: f64 = 0.03;
 const MAX_TRIED: usize = 3;
@@ -29,6 +30,8 @@ struct StopWatch {
     page: Page,
     set: String,
     actions: usize,
+    /// Lines that were shown so far.
+    lines: BTreeSet<String>,
     words: usize,
     waited: f64,
 }
@@ -43,13 +46,13 @@ impl StopWatch {
         }
         let waited = start.elapsed().as_secs_f64();
         self.page.settle_frames();
-        // Words that were read already, in the step before, are read again: an upper bound.
-        let words = "return document.body.innerText.split(/\\s+/).length";
-        let words = self.page.browser.run(words, &[]).unwrap().as_u64().unwrap() as usize;
+        let text = self.page.text("body");
+        let new: Vec<_> = text.lines().filter(|line| self.lines.insert(line.trim().to_owned())).collect();
+        let words = new.iter().map(|line| line.split_whitespace().count()).sum::<usize>();
         self.actions += actions;
         self.words += words;
         self.waited += waited;
-        println!("{:10} {name:22} waited {waited:5.1} s, {actions} actions, {words} words", self.set);
+        println!("{:10} {name:22} waited {waited:5.1} s, {actions} actions, {words} new words", self.set);
         self.page.screenshot(&format!("walk-{}-{name}", self.set));
     }
 
@@ -76,7 +79,14 @@ fn walk(set: &Path, symmetry: &str) -> f64 {
     std::fs::copy(&photo, folder.path().join(copy)).unwrap();
     let start = Instant::now();
     let page = Page::open_in(folder, &[copy]);
-    let mut watch = StopWatch { page, set: name, actions: 0, words: 0, waited: start.elapsed().as_secs_f64() };
+    let mut watch = StopWatch {
+        page,
+        set: name,
+        actions: 0,
+        lines: BTreeSet::new(),
+        words: 0,
+        waited: start.elapsed().as_secs_f64(),
+    };
     let loaded = "const p = document.getElementById('photo'); return p.complete && p.naturalWidth";
     // The command is typed.
     watch.step("1-open", 3, |_| (), loaded);
@@ -125,7 +135,7 @@ fn walk(set: &Path, symmetry: &str) -> f64 {
     watch.page.assert_quiet();
     let seconds = watch.seconds();
     let (waited, actions, words) = (watch.waited, watch.actions, watch.words);
-    println!("{:10} {seconds:.0} s: waited {waited:.1} s; {actions} actions; {words} words", watch.set);
+    println!("{:10} {seconds:.0} s: waited {waited:.1} s; {actions} actions; {words} words to read", watch.set);
     seconds
 }
 
@@ -133,10 +143,13 @@ fn walk(set: &Path, symmetry: &str) -> f64 {
 #[ignore = "make walk: needs Chromium, and photographs that are not in this repository"]
 fn from_a_photograph_to_a_tried_model_in_three_minutes() {
     let sets = std::env::var("SDG_WALK").unwrap();
+    let mut slowest = 0.0f64;
     for set in sets.split_whitespace() {
         // A folder of parts that look the same when turned: FOLDER=2.
         let (folder, symmetry) = set.split_once('=').unwrap_or((set, "1"));
         let seconds = walk(Path::new(folder), symmetry);
-        assert!(seconds < MAX_SECONDS, "{folder}: {seconds:.0} s");
+        slowest = slowest.max(seconds);
     }
+    // All sets are walked first, so that each is told.
+    assert!((1.0..MAX_SECONDS).contains(&slowest), "{slowest:.0} s");
 }
