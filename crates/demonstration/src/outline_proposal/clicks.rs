@@ -21,7 +21,7 @@ const STEP: f32 = 0.05;
 /// The click's own surroundings belong to its region, as a share of the frame's diagonal.
 const RADIUS_SHARE: f64 = 0.012;
 /// A click changes what lies within so many of its distances to the part's border: what is wrong is often longer than wide.
-const REACH: f64 = 8.0;
+const REACH: f64 = 5.0;
 /// That distance is at least so many pixels.
 const MIN_DISTANCE_PX: f64 = 2.0;
 /// How often colours are learnt again after a click.

@@ -99,18 +99,6 @@ impl Frame {
         Mask::from_fn(self.width as u32, self.height() as u32, |x, y| in_part[y as usize * self.width + x as usize])
     }
 
-    /// The same pixels in a frame of the same box that has more or fewer.
-    pub fn resampled(&self, in_part: &[bool], to: &Self) -> Vec<bool> {
-        let (width, height) = (self.width, self.height());
-        (0..to.colors.len())
-            .map(|at| {
-                let x = (2 * (at % to.width) + 1) * width / (2 * to.width);
-                let y = (2 * (at / to.width) + 1) * height / (2 * to.height());
-                in_part[y * width + x] && to.candidates[at]
-            })
-            .collect()
-    }
-
     /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side. `None`
     /// for too few colours.
     pub fn cut(&self, mut in_part: Vec<bool>, pinned: &[Option<bool>], rounds: usize) -> Option<Vec<bool>> {

@@ -5,9 +5,9 @@
 //!    │
 //!    └─ guesses of the part: what the surroundings do not explain, lit or in shadow; what is light; what is dark
 //!         │
-//!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess, small
-//!         ├───────────────────────────◀─────────────────────────────────┤
-//!         └─ the cut that runs along edges and reaches the box, cut again at full size: largest piece ─ outer_outline ─ Polygon
+//!         ├─▶ two ColorMixtures ─ evidence of each pixel ─ minimal_cut ─┐   a few rounds for each guess
+//!         └───────────────────────────◀─────────────────────────────────┤
+//!              the largest piece that runs along edges and reaches the box ─ outer_outline ─ Polygon
 //! clicks ─ the pieces of the picture that they mean stay on their side while what is around them is cut again
 //! ```
 //!
@@ -37,12 +37,8 @@ use frame::Frame;
 
 /// Pixels of the frame that is cut; larger ones are shrunk. Bounds the time.
 const MAX_PIXELS: f64 = 60_000.0;
-/// The same of the frame in which guesses are compared.
-const MAX_COARSE_PIXELS: f64 = 30_000.0;
-/// How often colours are learnt again from the last cut, for each guess …
+/// How often colours are learnt again from the last cut, for each guess.
 const ROUNDS: usize = 4;
-/// … then at full size.
-const FINE_ROUNDS: usize = 2;
 /// A piece smaller than this share of the box is no part.
 const MIN_AREA_SHARE: f64 = 0.02;
 
@@ -71,8 +67,7 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, clicks: &[Outl
     let inside = bbox.clip(f64::from(image.width()), f64::from(image.height()));
     let nothing_found = || Polygon::from_box(&if inside.area() > 0.0 { inside } else { *bbox });
     let Some(frame) = Frame::cut_out(image, &inside, MAX_PIXELS) else { return nothing_found() };
-    let Some(coarse) = Frame::cut_out(image, &inside, MAX_COARSE_PIXELS) else { return nothing_found() };
-    let Some(in_part) = segment(&frame, &coarse, clicks) else { return nothing_found() };
+    let Some(in_part) = segment(&frame, clicks) else { return nothing_found() };
     let Some(outline) = outer_outline(&frame.mask(&in_part)) else { return nothing_found() };
     // Pieces of the mask reach the edges of whole pixels, the box may lie within one.
     let outline = frame.in_photo(&outline, &inside);
@@ -83,19 +78,15 @@ pub fn propose_outline_with(image: &RgbImage, bbox: &BoundingBox, clicks: &[Outl
     }
 }
 
-/// The part's pixels in `frame`, found in `coarse`; `None` where nothing stands out.
-fn segment(frame: &Frame, coarse: &Frame, clicks: &[OutlineClick]) -> Option<Vec<bool>> {
-    let found = guesses::likeliest_cut(coarse, ROUNDS).map(|found| coarse.resampled(&found, frame));
+/// The part's pixels; `None` where nothing stands out.
+fn segment(frame: &Frame, clicks: &[OutlineClick]) -> Option<Vec<bool>> {
+    let found = guesses::likeliest_cut(frame, ROUNDS);
     let clicks: Vec<_> = clicks.iter().filter_map(|click| frame.click(click)).collect();
-    let mut correction = match found {
-        Some(found) => {
-            let cut = frame.cut(found.clone(), &vec![None; found.len()], FINE_ROUNDS);
-            Correction::new(frame, cut.unwrap_or(found))
-        }
-        None if clicks.is_empty() => return None,
-        // Without anything that stands out, what was clicked does.
-        None => Correction::new(frame, vec![false; frame.colors.len()]),
-    };
+    if clicks.is_empty() {
+        return found;
+    }
+    // Without anything that stands out, what was clicked does.
+    let mut correction = Correction::new(frame, found.unwrap_or_else(|| vec![false; frame.colors.len()]));
     clicks.iter().for_each(|click| correction.apply(click));
     Some(correction.in_part)
 }
