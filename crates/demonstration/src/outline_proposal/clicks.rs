@@ -7,6 +7,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use super::click::Click;
 use super::frame::Frame;
 use super::lab::Lab;
 use super::pieces::{neighbours, pieces};
@@ -26,21 +27,6 @@ const REACH: f64 = 5.0;
 const MIN_DISTANCE_PX: f64 = 2.0;
 /// How often colours are learnt again after a click.
 const ROUNDS: usize = 3;
-
-/// A click, in pixels of the frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Click {
-    pub x: usize,
-    pub y: usize,
-    pub is_inside: bool,
-}
-
-impl Click {
-    /// From the middle of a pixel of a picture so wide, in pixels.
-    fn distance(&self, at: usize, width: usize) -> f64 {
-        ((at % width).abs_diff(self.x) as f64).hypot((at / width).abs_diff(self.y) as f64)
-    }
-}
 
 /// A part as far as it was corrected, and what was said.
 pub(crate) struct Correction<'a> {
@@ -69,7 +55,7 @@ impl<'a> Correction<'a> {
         pin(*click, &frame.colors, width, in_part, pinned);
 
         let start: Vec<bool> = in_part.iter().zip(&*pinned).map(|(&now, pinned)| pinned.unwrap_or(now)).collect();
-        let cut = frame.cut(start.clone(), pinned, ROUNDS).unwrap_or(start);
+        let cut = frame.cut(start.clone(), &[], pinned, ROUNDS).unwrap_or(start);
         let changed: Vec<bool> = (0..cut.len()).map(|at| reached[at] && cut[at] != in_part[at]).collect();
         for piece in pieces(&changed, width) {
             if piece.iter().any(|&at| pinned[at].is_some()) {

@@ -4,8 +4,7 @@ use image::{RgbImage, imageops};
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Mask, Polygon};
 
-use super::OutlineClick;
-use super::clicks::Click;
+use super::click::{Click, OutlineClick};
 use super::color_mixture::ColorMixture;
 use super::lab::Lab;
 use super::minimal_cut::{self, Edges, minimal_cut};
@@ -99,13 +98,20 @@ impl Frame {
         Mask::from_fn(self.width as u32, self.height() as u32, |x, y| in_part[y as usize * self.width + x as usize])
     }
 
-    /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side. `None`
-    /// for too few colours.
-    pub fn cut(&self, mut in_part: Vec<bool>, pinned: &[Option<bool>], rounds: usize) -> Option<Vec<bool>> {
+    /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side.
+    /// `elsewhere` has colours of surroundings beyond the frame. `None` for too few colours.
+    pub fn cut(
+        &self,
+        mut in_part: Vec<bool>,
+        elsewhere: &[Lab],
+        pinned: &[Option<bool>],
+        rounds: usize,
+    ) -> Option<Vec<bool>> {
         let mut share: Vec<f32> = self.candidates.iter().map(|&candidate| if candidate { 0.5 } else { 0.0 }).collect();
         let mut mixtures: Option<[ColorMixture; 2]> = None;
         for _ in 0..rounds {
-            let (part, surroundings) = self.colors_of(&in_part);
+            let (part, mut surroundings) = self.colors_of(&in_part);
+            surroundings.extend_from_slice(elsewhere);
             let [part, surroundings] = match &mixtures {
                 None => [ColorMixture::learn(&part)?, ColorMixture::learn(&surroundings)?],
                 Some([known, around]) => [known.relearn(&part)?, around.relearn(&surroundings)?],

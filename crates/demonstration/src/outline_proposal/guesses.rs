@@ -17,6 +17,9 @@ const MAX_GAP: f64 = 0.1;
 const GAP_COST: f64 = 2.0;
 /// In favour of the guess that leaves shadows out: a shadow's border is an edge, too, and reaches the box.
 const UNSHADED_BONUS: f64 = 0.15;
+/// More for the cut that knows the colours of the whole photo, where both run along edges. Of 0, 0.05 and 0.1 the shipped pneumatic cylinder's
+/// overlap was 0.846, 0.871, 0.871.
+const ELSEWHERE_BONUS: f64 = 0.05;
 /// A cut along fewer edges of the picture is no part: noise can be cut, too.
 const MIN_SCORE: f64 = 0.2;
 
@@ -24,8 +27,9 @@ const MIN_SCORE: f64 = 0.2;
 pub(crate) fn likeliest_cut(frame: &Frame, rounds: usize) -> Option<Vec<bool>> {
     let free = vec![None; frame.colors.len()];
     let mut best: Option<(f64, Vec<bool>)> = None;
-    for (guess, bonus) in guesses(frame) {
-        let Some((score, part)) = frame.cut(guess, &free, rounds).and_then(|cut| score(frame, &cut)) else { continue };
+    for (guess, bonus, elsewhere) in guesses(frame) {
+        let cut = frame.cut(guess, elsewhere, &free, rounds);
+        let Some((score, part)) = cut.and_then(|cut| score(frame, &cut)) else { continue };
         if score + bonus > best.as_ref().map_or(MIN_SCORE, |(best, _)| *best) {
             best = Some((score + bonus, part));
         }
@@ -33,8 +37,9 @@ pub(crate) fn likeliest_cut(frame: &Frame, rounds: usize) -> Option<Vec<bool>> {
     best.map(|(_, part)| part)
 }
 
-/// First divisions of the frame, each with what speaks for it beforehand.
-fn guesses(frame: &Frame) -> Vec<(Vec<bool>, f64)> {
+/// First divisions of the frame, each with what speaks for it beforehand, and the colours besides the frame's that surroundings have:
+/// those of the whole photo tell a shadow, but of something else that looks like the part they make the part surroundings.
+fn guesses(frame: &Frame) -> Vec<(Vec<bool>, f64, &[Lab])> {
     let among = |is_part: &dyn Fn(&Lab) -> bool| -> Vec<bool> {
         frame.colors.iter().zip(&frame.candidates).map(|(color, &candidate)| candidate && is_part(color)).collect()
     };
@@ -45,13 +50,14 @@ fn guesses(frame: &Frame) -> Vec<(Vec<bool>, f64)> {
     if let Some(surroundings) = ColorMixture::learn(&surroundings) {
         let unshaded = among(&|color| !surroundings.explains(color) && !surroundings.explains_shaded(color));
         if count(&unshaded) >= MIN_UNSHADED_SHARE * count(&frame.candidates) {
-            guesses.push((unshaded, UNSHADED_BONUS));
+            guesses.push((unshaded.clone(), UNSHADED_BONUS + ELSEWHERE_BONUS, &frame.elsewhere[..]));
+            guesses.push((unshaded, UNSHADED_BONUS, &[]));
         }
-        guesses.push((among(&|color| !surroundings.explains(color)), 0.0));
+        guesses.push((among(&|color| !surroundings.explains(color)), 0.0, &[]));
     }
     let threshold = lightness_threshold(frame);
-    guesses.push((among(&|color| color.0[0] > threshold), 0.0));
-    guesses.push((among(&|color| color.0[0] <= threshold), 0.0));
+    guesses.push((among(&|color| color.0[0] > threshold), 0.0, &[]));
+    guesses.push((among(&|color| color.0[0] <= threshold), 0.0, &[]));
     guesses
 }
 

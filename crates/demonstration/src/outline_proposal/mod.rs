@@ -20,6 +20,7 @@
 //!
 //! Absent: any knowledge of parts, and randomness. The same photo and box give the same outline.
 
+mod click;
 mod clicks;
 mod color_mixture;
 mod frame;
@@ -29,9 +30,9 @@ mod minimal_cut;
 mod pieces;
 
 use image::RgbImage;
-use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Polygon, outer_outline};
 
+pub use click::OutlineClick;
 use clicks::Correction;
 use frame::Frame;
 
@@ -50,15 +51,6 @@ const MIN_AREA_SHARE: f64 = 0.02;
 /// Pixels of the photo; the centre of the first pixel is (0.5, 0.5).
 pub fn propose_outline(image: &RgbImage, bbox: &BoundingBox) -> Polygon {
     propose_outline_with(image, bbox, &[])
-}
-
-/// A place of the photo that a person clicked where a proposed outline was wrong.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OutlineClick {
-    /// In pixels of the photo.
-    pub at: Point2<f64>,
-    /// Whether it belongs to the part.
-    pub is_inside: bool,
 }
 
 /// The same, corrected by clicks, in the order in which they were made: each means the piece of the picture that it lies on. Clicks
@@ -95,6 +87,7 @@ fn segment(frame: &Frame, clicks: &[OutlineClick]) -> Option<Vec<bool>> {
 mod tests {
     use super::*;
     use image::Rgb;
+    use nalgebra::Point2;
 
     /// A red disc on a chequered table.
     fn disc(size: u32, radius: f64) -> (RgbImage, BoundingBox) {
