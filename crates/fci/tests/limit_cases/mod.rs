@@ -29,8 +29,8 @@ pub const READY: [f64; 7] = [0.0, -FRAC_PI_4, 0.0, -3.0 * FRAC_PI_4, 0.0, FRAC_P
 const JOINT_2_PER_METRE: f64 = 3.1520;
 /// A pose just beside those at which no Cartesian motion begins, and one of them, rad: the smallest singular values of the
 /// end effector's Jacobian are 0.053 and 0.048, at the flange as at the finger tips, where 0.05 is asked for.
-const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3718, 0.7854];
-const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, 0.7854];
+const BESIDE_SINGULAR: [f64; 7] = [0.0000, -0.2081, 0.0000, -0.8449, 0.0000, 1.3718, std::f64::consts::FRAC_PI_4];
+const SINGULAR: [f64; 7] = [0.0000, -0.1924, 0.0000, -0.8038, 0.0000, 1.3663, std::f64::consts::FRAC_PI_4];
 /// Joints 4 and 6 of an arm that touches itself, rad.
 const FOLDED: (f64, f64) = (-3.0, 0.8);
 /// How much nearer than where the arm was stopped it is led to itself for a motion just inside, as a share of the way there.
