@@ -23,7 +23,8 @@ pub struct FineTuning {
 }
 
 impl FineTuning {
-    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts.
+    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts. Most parts are good enough after
+    /// 40 steps; of 35 held-back samples with the part some five are so covered or blurred that no network finds them.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {
