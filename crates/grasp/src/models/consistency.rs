@@ -28,6 +28,7 @@ const NEUTRAL_COSINE: f64 = 0.62;
 
 /// The threshold of the score that generated parts have, in log-odds. On the parts 9001 to 9004 it accepts 30 of 37 places and 2
 /// of 40 pictures without the part; 1.5 accepts 33 and 4.
+#[cfg(feature = "teach")]
 pub(crate) const USUAL_THRESHOLD: f64 = 2.0;
 
 /// Least share that is filled and most that the odds are, so that both logarithms are finite.
