@@ -57,7 +57,8 @@ impl Calibration {
     /// other, so that neither one odd picture nor those that are nowhere near the threshold move it.
     ///
     /// `None` without a right score; without a wrong one, `no_wrong` stands for them. `usual` is the threshold, in log-odds, that
-    /// networks of this kind have, if that is known: it counts as much as these scores.
+    /// networks of this kind have, if that is known: the threshold is no lower, since samples of a few other things say little of those to
+    /// come, and half-way to it from above.
     pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64, usual: Option<f64>) -> Option<Self> {
         let in_log_odds = |scores: &[f64]| -> Vec<f64> {
             scores.iter().copied().filter(|score| score.is_finite()).map(log_odds).collect()
@@ -75,7 +76,7 @@ impl Calibration {
         let (wrong, of_wrong) = spread(&wrong, 100.0 - FACING_PERCENT)?;
         let weight = WRONG_PER_RIGHT_DEVIATION * of_wrong;
         let threshold = (right * weight + wrong * of_right) / (weight + of_right);
-        let threshold = usual.map_or(threshold, |usual| 0.5 * (threshold + usual));
+        let threshold = usual.map_or(threshold, |usual| threshold.max(usual).midpoint(usual));
         // The slope of the logistic that is likeliest for two normal distributions of one deviation.
         let deviation = 0.5 * (of_right + of_wrong);
         let slope = ((right - wrong) / deviation.powi(2)).clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
@@ -152,10 +153,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_usual_counts_as_much_as_the_scores() {
+    fn the_threshold_is_not_below_the_usual_one_and_half_way_to_it_from_above() {
         let (right, wrong) = (scores(&[4.0, 5.0, 6.0]), scores(&[0.0, 1.0, 2.0]));
         let threshold = |usual| log_odds(Calibration::fit(&right, &wrong, 0.0, usual).unwrap().threshold);
         assert!((threshold(Some(1.0)) - 0.5 * (threshold(None) + 1.0)).abs() < 1e-3);
+        assert!((threshold(Some(4.5)) - 4.5).abs() < 1e-3);
     }
 
     #[test]
