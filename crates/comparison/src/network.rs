@@ -82,7 +82,7 @@ impl ComparisonNetwork {
         self.log_odds(&maps)
     }
 
-    /// The log-odds of each view.
+    /// The log-odds of each view, and by how much its pose is off.
     ///
     /// # Panics
     /// With views of another network's references.
@@ -102,7 +102,8 @@ impl ComparisonNetwork {
         rows(read, views.len()).await.iter().map(|values| of_view(values)).collect()
     }
 
-    /// By how much the pose of each view is off. The views may be finer than the log-odds are learnt on ([`ComparisonConfig::finer`]), since what finds features is the same at every place.
+    /// By how much the pose of each view is off. The views may be finer than those that the log-odds are learnt on
+    /// ([`ComparisonConfig::finer`]), since what finds features is the same at every place.
     ///
     /// # Panics
     /// With views of several sizes.

@@ -19,7 +19,7 @@ const WEIGHT: f64 = 3.0;
 /// many were placed: 35, with 2 and 3 34. What the network says of one part differs more than these four tell.
 const COMPARISON_WEIGHT: f64 = 2.0;
 
-/// Weight of how alike the part's features are in the finer views, and the mean cosine that says nothing: between those of other
+/// Weight of how alike the part's features are in the finer views, and the mean cosine that changes no score: between those of other
 /// things and of the part, which are 0.35 to 0.6 and 0.6 to 0.9. Of the generated parts 9001 to 9003, 49 pictures with the part
 /// placed right after 60 or 120 steps, so many were above every picture without it: 16 with a weight of 0, 34 with 5, 36 with 10,
 /// 37 with 20, 38 with 30 and 50.
