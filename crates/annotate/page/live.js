@@ -2,6 +2,7 @@
 
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
+import { numbered } from "./overlay.js";
 import { openImage, showCurrent } from "./strip.js";
 import { changed, isLive, state } from "./store.js";
 import { toast } from "./toast.js";
@@ -198,7 +199,7 @@ function cards(detections) {
     const best = detections[0];
     return [["There is nothing to grasp.", best ? `best ${best.score.toFixed(2)}` : "", ""]];
   }
-  const told = accepted.slice(0, MAX_TOLD).map((d) => ["Found the part", `score ${d.score.toFixed(2)}`, d.pose ? poseText(d.pose) : ""]);
+  const told = accepted.slice(0, MAX_TOLD).map((d, i) => [numbered("Found the part", i, accepted.length), `score ${d.score.toFixed(2)}`, d.pose ? poseText(d.pose) : ""]);
   if (accepted.length > MAX_TOLD) told.push([`And ${accepted.length - MAX_TOLD} more`, "", ""]);
   return told;
 }

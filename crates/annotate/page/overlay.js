@@ -170,8 +170,11 @@ function drawDifferences(refusal, i) {
   }
 }
 
+/** Text about one of several grasps, with the number that it has in the picture and in the list. */
+export const numbered = (text, i, count) => (count > 1 ? `${i + 1}: ${text}` : text);
+
 /** A grasp that a model found: drawn alike, but not to be taken hold of. */
-function drawDetection(detection, i) {
+function drawDetection(detection, i, count) {
   const parent = group(`found${i}`, detection.is_accepted ? "" : "refused");
   const { outline, grasp, box } = detection.marks;
   if (outline) {
@@ -186,7 +189,7 @@ function drawDetection(detection, i) {
     element(`found${i}/arrow${j}`, "path", { class: "arrow", d: path(arrow) }, gripper);
   });
   const [x, y] = toScreen(boundsOf(outline ?? boxPolygon(box)).slice(0, 2));
-  element(`found${i}/tag`, "text", { class: "tag", x, y: y - 6 }, parent).textContent = detection.score.toFixed(2);
+  element(`found${i}/tag`, "text", { class: "tag", x, y: y - 6 }, parent).textContent = numbered(detection.score.toFixed(2), i, count);
 }
 
 export function renderOverlay() {
@@ -199,7 +202,7 @@ export function renderOverlay() {
     // Worst first, so that the best is on top.
     shown.map((d, i) => [d, i]).reverse().forEach(([d, i]) => {
       if (d.refusal) drawDifferences(d.refusal, i);
-      drawDetection(d, i);
+      drawDetection(d, i, shown.length);
     });
   } else if (image() && !isLive()) {
     const correcting = state.tool === "select" && isMarking();

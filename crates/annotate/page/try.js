@@ -3,7 +3,7 @@
 import { api } from "./api.js";
 import { adopt } from "./editing.js";
 import { poseText } from "./live.js";
-import { MIN_SHOWN } from "./overlay.js";
+import { MIN_SHOWN, numbered } from "./overlay.js";
 import { openImage, openTrialPicture, removeTrialPicture } from "./strip.js";
 import { changed, isLive, state, trialPicture } from "./store.js";
 import { openTab } from "./tabs.js";
@@ -124,11 +124,11 @@ function text(tag, content, classes = "") {
   return Object.assign(document.createElement(tag), { textContent: content, className: classes });
 }
 
-function card(detection, i, shown) {
+function card(detection, i, count, shown) {
   const item = document.createElement("section");
   item.className = "found";
   item.setAttribute("aria-label", `Grasp ${i + 1}`);
-  const title = text("h3", detection.is_accepted ? "Found the part" : "Refused");
+  const title = text("h3", numbered(detection.is_accepted ? "Found the part" : "Refused", i, count));
   title.append(text("span", `score ${detection.score.toFixed(2)}`, "score"));
   const row = text("div", "", "row");
   if (shown.became === null) {
@@ -172,7 +172,7 @@ function renderFound() {
       button("The part is here after all", () => setAbsent(shown, false), "plain"));
   }
   const listed = shown.detections.filter((d) => d.is_accepted || isShown(d, shown));
-  listed.forEach((detection, i) => found.append(card(detection, i, shown)));
+  listed.forEach((detection, i) => found.append(card(detection, i, listed.length, shown)));
   if (shown.became !== null) {
     const index = state.images.findIndex((image) => image.id === shown.became);
     found.append(text("p", `A demonstration now: ${state.images[index]?.name}.`), button("Look at its marks", () => {

@@ -92,7 +92,7 @@ impl TeachingProgress {
         );
         if self.bar.is_none() {
             eprintln!(
-                "teaching: after {} steps the network alone finds {} of {} held-back, median {:.1} px and {:.1}°, {} false alarms in {}",
+                "teaching: after {} steps the network alone finds {} of {} held-back, median {:.1} px and {:.1}°; false alarms in {} of {}",
                 record.steps_done,
                 v.hits,
                 v.positives,

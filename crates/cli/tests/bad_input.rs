@@ -150,6 +150,7 @@ fn results_of_other_settings_are_not_mixed() {
         protocol: Settings::PROTOCOL,
         preset: "edge".to_owned(),
         steps: None,
+        time_budget: None,
         seed: 7,
         attempts: 10,
         views: 25,

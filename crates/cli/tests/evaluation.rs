@@ -23,6 +23,7 @@ fn settings() -> Settings {
         protocol: Settings::PROTOCOL,
         preset: Preset::Edge.name().to_owned(),
         steps: None,
+        time_budget: None,
         seed: 3,
         attempts: 2,
         views: 2,

@@ -92,8 +92,7 @@ impl ComparisonNetwork {
         }
         let maps = self.maps(views);
         // One tensor, because a device is waited for once for each that is read.
-        let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
-        let read = Tensor::cat(vec![self.log_odds(&maps), flat(&maps.inside), flat(&maps.cosines)], 1);
+        let read = Tensor::cat(vec![self.log_odds(&maps), maps.cells()], 1);
         let map_px = maps.map_px();
         let of_view = |values: &[f32]| {
             let (log_odds, cells) = values.split_at(1);
@@ -112,10 +111,8 @@ impl ComparisonNetwork {
             return Vec::new();
         }
         let maps = self.maps(views);
-        let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
-        let read = Tensor::cat(vec![flat(&maps.inside), flat(&maps.cosines)], 1);
         let map_px = maps.map_px();
-        rows(read, views.len()).await.iter().map(|values| self.cells(values, map_px).alignment()).collect()
+        rows(maps.cells(), views.len()).await.iter().map(|values| self.cells(values, map_px).alignment()).collect()
     }
 
     /// Out of the shares inside the outline and the cosines of one view.
@@ -190,6 +187,11 @@ impl Maps {
     /// M.
     fn map_px(&self) -> usize {
         self.inside.dims()[3]
+    }
+
+    /// The shares inside the outline and the cosines of each view, `[N, (1 + (2 reach + 1)²) M²]`.
+    fn cells(&self) -> Tensor<2> {
+        Tensor::cat(vec![self.inside.clone().flatten(1, 3), self.cosines.clone().flatten(1, 3)], 1)
     }
 }
 

@@ -26,22 +26,52 @@ pub(crate) fn best_agreement<'s, 'a>(sightings: &'s [Sighting<'a>]) -> Option<&'
 /// All such places in an image: first those that a network proposes, then those that the search finds. A place may come twice.
 pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) -> Vec<Sighting<'a>> {
     let found = search(image);
-    let proposed = parallel::map(&proposals.candidates, |candidate| {
-        let placed = found_already(candidate, &found).copied().or_else(|| verify(candidate, image))?;
-        Some(Sighting {
-            placed,
-            network_score: candidate.network_score,
-            keypoint_scores: candidate.keypoints.iter().map(|(_, score)| *score).collect(),
-            turn_source: candidate.turn_source,
-        })
-    });
-    let searched = found.iter().map(|placed| Sighting {
+    let proposed = parallel::map(&proposals.candidates, |candidate| proposed(candidate, &found, image));
+    proposed.into_iter().flatten().chain(found.iter().map(|placed| searched(placed, proposals))).collect()
+}
+
+/// The same, but of what the network proposes only the candidates down to the first that is right: verifying the others takes
+/// longer than the search, and says nothing of the network's score on the part.
+#[cfg(feature = "teach")]
+pub(crate) fn sightings_to_first<'a>(
+    proposals: &Proposals,
+    image: &SearchedImage<'a>,
+    is_right: impl Fn(&Sighting<'a>) -> bool,
+) -> Vec<Sighting<'a>> {
+    let found = search(image);
+    let mut all = Vec::new();
+    for sighting in proposals.candidates.iter().filter_map(|candidate| proposed(candidate, &found, image)) {
+        let is_right = is_right(&sighting);
+        all.push(sighting);
+        if is_right {
+            break;
+        }
+    }
+    all.extend(found.iter().map(|placed| searched(placed, proposals)));
+    all
+}
+
+fn proposed<'a>(
+    candidate: &PoseCandidate,
+    found: &[PlacedDemonstration<'a>],
+    image: &SearchedImage<'a>,
+) -> Option<Sighting<'a>> {
+    let placed = found_already(candidate, found).copied().or_else(|| verify(candidate, image))?;
+    Some(Sighting {
+        placed,
+        network_score: candidate.network_score,
+        keypoint_scores: candidate.keypoints.iter().map(|(_, score)| *score).collect(),
+        turn_source: candidate.turn_source,
+    })
+}
+
+fn searched<'a>(placed: &PlacedDemonstration<'a>, proposals: &Proposals) -> Sighting<'a> {
+    Sighting {
         placed: *placed,
         network_score: proposals.score_at(&placed.outline().bounds()),
         keypoint_scores: Vec::new(),
         turn_source: TurnSource::Search,
-    });
-    proposed.into_iter().flatten().chain(searched).collect()
+    }
 }
 
 /// The pose that the search found of the part that the candidate shows, where it agrees so well that refining the candidate's

@@ -15,6 +15,8 @@ pub struct Settings {
     pub preset: String,
     /// Optimiser steps other than the preset's.
     pub steps: Option<u32>,
+    /// Seconds that a network's training may take at most; a result then depends on the machine.
+    pub time_budget: Option<u32>,
     /// Decides every random choice.
     pub seed: u64,
     /// Grasp attempts of each cell.
@@ -32,13 +34,26 @@ impl Settings {
     /// Settings of preset `edge`, with as many pictures with the part as without it.
     #[cfg(test)]
     pub(super) fn for_test(seed: u64, attempts: u32, pictures: u32) -> Self {
-        let preset = "edge".into();
-        Self { protocol: Self::PROTOCOL, preset, steps: None, seed, attempts, views: pictures, scenes: pictures }
+        Self {
+            protocol: Self::PROTOCOL,
+            preset: "edge".into(),
+            steps: None,
+            time_budget: None,
+            seed,
+            attempts,
+            views: pictures,
+            scenes: pictures,
+        }
     }
 
     /// Those of them that decide a teaching.
     pub fn teaching(&self) -> TeachingSettings {
-        TeachingSettings { preset: self.preset.clone(), steps: self.steps, seed: self.seed }
+        TeachingSettings {
+            preset: self.preset.clone(),
+            steps: self.steps,
+            time_budget: self.time_budget,
+            seed: self.seed,
+        }
     }
 }
 
@@ -49,6 +64,8 @@ pub struct TeachingSettings {
     pub preset: String,
     /// Optimiser steps other than the preset's.
     pub steps: Option<u32>,
+    /// Seconds that a network's training may take at most; a result then depends on the machine.
+    pub time_budget: Option<u32>,
     /// Decides every random choice.
     pub seed: u64,
 }
@@ -93,9 +110,17 @@ mod tests {
         assert_eq!(told(&settings(), &settings()), None);
         let other = Settings { seed: 2, steps: Some(40), ..settings() };
         assert_eq!(told(&settings(), &other).unwrap(), "seed: expected 1, found 2; steps: expected none, found 40");
-        let each =
-            Settings { protocol: 0, preset: String::new(), steps: Some(1), seed: 0, attempts: 0, views: 0, scenes: 0 };
-        assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 7);
+        let each = Settings {
+            protocol: 0,
+            preset: String::new(),
+            steps: Some(1),
+            time_budget: Some(15),
+            seed: 0,
+            attempts: 0,
+            views: 0,
+            scenes: 0,
+        };
+        assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 8);
     }
 
     #[test]

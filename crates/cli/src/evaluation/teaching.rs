@@ -1,6 +1,7 @@
 //! A network is taught on a part and kept.
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
@@ -58,6 +59,7 @@ impl Teaching<'_> {
         options.preset = self.preset;
         options.symmetry = object.symmetry;
         options.steps = settings.steps.map(|steps| steps as usize);
+        options.time_budget = settings.time_budget.map(|secs| Duration::from_secs(secs.into()));
         options.lengths = lengths;
         // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
         let mut interrupted = false;

@@ -67,6 +67,31 @@ fn half_covered() -> RgbImage {
     picture
 }
 
+/// The part twice: its surroundings copied to another corner.
+fn two_parts() -> RgbImage {
+    let mut picture = photo();
+    let [x, y, width, height] = [BOX[0] - 8.0, BOX[1] - 8.0, BOX[2] - BOX[0] + 16.0, BOX[3] - BOX[1] + 16.0];
+    let part = image::imageops::crop_imm(&picture, x as u32, y as u32, width as u32, height as u32).to_image();
+    image::imageops::replace(&mut picture, &part, 10, 10);
+    picture
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn several_found_ones_have_numbers() {
+    let page = open(&[], &["photo"]);
+    teach_s(&page, 1);
+    try_picture(&page, "two.png", &two_parts());
+    page.settle_frames();
+    let found = page.text("#found");
+    assert!(found.contains("1: Found the part") && found.contains("2: Found the part"), "{found}");
+    let tags = "return [...document.querySelectorAll('#overlay .tag')].map((tag) => tag.textContent.slice(0, 2)).sort()";
+    assert_eq!(page.browser.run(tags, &[]).unwrap(), json!(["1:", "2:"]));
+    page.screenshot("project-11-two");
+    page.assert_accessible("two found");
+    page.assert_quiet();
+}
+
 #[test]
 #[ignore = "make test-browser: needs Chromium"]
 fn a_refused_one_says_why_and_is_learnt_from() {

@@ -20,6 +20,9 @@ const MAX_COMPARED: usize = 5;
 /// Candidates of an image whose poses are corrected before their features are compared finely: the likeliest. Four found not
 /// one more.
 const MAX_CORRECTED: usize = 2;
+/// Candidates of an image that are looked at the other way round in finer views: the likeliest. A finer view takes four times as
+/// long as another.
+const MAX_TURNED: usize = 2;
 
 /// Asks the network about one picture.
 pub(super) struct Comparer<'a> {
@@ -91,20 +94,23 @@ impl<'a> Comparer<'a> {
     }
 
     /// Each candidate where the part's features lie in views of twice the pixels, or the other way round where they are more
-    /// alike there, and its score by how alike they are.
+    /// alike there, and its score by how alike they are. The likeliest come first.
     async fn aligned(&self, compared: Vec<Compared>) -> Vec<PoseCandidate> {
         let reference = |one: &PoseCandidate| self.demonstration(one).finer_reference(self.network.config());
-        let both_ways = |(one, _): &Compared| both_ways_round(self.demonstration(one), &one.image_from_cutout);
-        let poses: Vec<[PlanarSimilarity; 2]> = compared.iter().map(both_ways).collect();
-        let views = |((one, _), poses): (&Compared, &[PlanarSimilarity; 2])| {
-            poses.map(|pose| reference(one).view(&self.picture, &pose))
+        let ways = |(idx, (one, _)): (usize, &Compared)| match idx {
+            ..MAX_TURNED => vec![one.image_from_cutout, turned(self.demonstration(one), &one.image_from_cutout)],
+            _ => vec![one.image_from_cutout],
+        };
+        let poses: Vec<Vec<PlanarSimilarity>> = compared.iter().enumerate().map(ways).collect();
+        let views = |((one, _), poses): (&Compared, &Vec<PlanarSimilarity>)| -> Vec<View> {
+            poses.iter().map(|pose| reference(one).view(&self.picture, pose)).collect()
         };
         let views: Vec<View> = compared.iter().zip(&poses).flat_map(views).collect();
         let mut alignments = self.network.align(&views).await.into_iter();
-        let aligned = |((one, comparison), [straight, turned]): (Compared, [PlanarSimilarity; 2])| {
-            let [of_straight, of_turned] = [alignments.next()?, alignments.next()?];
-            let is_turned = of_turned.cosine > of_straight.cosine;
-            let (pose, alignment) = if is_turned { (turned, of_turned) } else { (straight, of_straight) };
+        let aligned = |((one, comparison), poses): (Compared, Vec<PlanarSimilarity>)| {
+            let ways = poses.into_iter().zip(alignments.by_ref());
+            let (pose, alignment) =
+                ways.reduce(|best, other| if other.1.cosine > best.1.cosine { other } else { best })?;
             let pose = reference(&one).corrected(&pose, &alignment.offset);
             let evidence = ComparisonEvidence { log_odds: comparison.log_odds, cosine: Some(alignment.cosine) };
             let demonstration = self.demonstration(&one);
@@ -127,11 +133,10 @@ pub(super) fn best_first<T>(candidates: &mut [T], candidate: impl Fn(&T) -> &Pos
     candidates.sort_by(|a, b| candidate(b).network_score.total_cmp(&candidate(a).network_score));
 }
 
-/// A pose, and that in which the outline's box lies at the same place the other way round.
-fn both_ways_round(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> [PlanarSimilarity; 2] {
+/// The pose in which the outline's box lies at the same place the other way round.
+fn turned(demonstration: &TaughtDemonstration, pose: &PlanarSimilarity) -> PlanarSimilarity {
     let center = demonstration.marks.bbox.center();
-    let half_turn = PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0);
-    [*pose, pose.compose(&half_turn)]
+    pose.compose(&PlanarSimilarity::about(center, center, Angle::from_degrees(180.0), 1.0))
 }
 
 /// The pose that was read; laid into the box where that is another; laid into it the other way round.

@@ -9,8 +9,8 @@ use super::symmetry::HiddenTurns;
 use crate::calibration::Calibration;
 use crate::error::Result;
 use crate::facts::TurnSource;
-use crate::models::Network;
-use crate::sighting::{Sighting, best_agreement, sightings};
+use crate::models::{Network, Proposals};
+use crate::sighting::{Sighting, best_agreement, sightings, sightings_to_first};
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
@@ -48,35 +48,41 @@ struct Seen {
 }
 
 impl HeldBack<'_> {
-    /// The detections of the network alone in held-back samples.
+    /// What a network proposes in each sample.
     ///
     /// # Errors
     /// An image that the network refuses.
-    pub(super) fn examine(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Vec<Outcome>> {
-        side_by_side(self.samples, |sample| {
-            let best = network.proposals(&sample.image, demonstrations)?.candidates.into_iter().next();
-            Ok(match (best, sample.objects.first()) {
+    pub(super) fn propose(&self, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Vec<Proposals>> {
+        side_by_side(self.samples, |sample| network.proposals(&sample.image, demonstrations))
+    }
+
+    /// The detections of the network alone, from what it proposes in each sample.
+    pub(super) fn outcomes(&self, proposals: &[Proposals]) -> Vec<Outcome> {
+        let outcome =
+            |(sample, proposals): (&Sample, &Proposals)| match (proposals.candidates.first(), sample.objects.first()) {
                 (Some(candidate), Some(object)) => self.outcome(&candidate.grasp, object, candidate.network_score),
                 (None, Some(_)) => Outcome::Missed,
                 (candidate, None) => Outcome::Absent { score: candidate.map_or(0.0, |c| c.network_score) },
-            })
-        })
+            };
+        self.samples.iter().zip(proposals).map(outcome).collect()
     }
 
-    /// Tries the network on held-back samples, laid over by the demonstration as in use. `other_parts` are the network's
-    /// highest scores in pictures of other parts alone.
+    /// Calibrates a network by what it proposes in each sample, laid over by the demonstration as in use. `other_parts` are
+    /// its highest scores in pictures of other parts alone.
     ///
     /// # Errors
-    /// An image that the network refuses.
+    /// An image that cannot be searched.
     pub(super) fn calibrate(
         &self,
         network: &Network,
+        proposals: &[Proposals],
         demonstrations: &[TaughtDemonstration],
         other_parts: &[f64],
     ) -> Result<Calibrated> {
         /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
-        let seen = side_by_side(self.samples, |sample| self.measure(sample, network, demonstrations))?;
+        let samples: Vec<(&Sample, &Proposals)> = self.samples.iter().zip(proposals).collect();
+        let seen = side_by_side(&samples, |(sample, proposals)| Ok(self.measure(sample, proposals, demonstrations)))?;
         let scores = |score: fn(&Seen) -> Option<f64>| seen.iter().filter_map(score).collect::<Vec<_>>();
         let right_scores = scores(|seen| seen.proposed_on_part);
         let on_part = scores(|seen| seen.on_part);
@@ -95,12 +101,16 @@ impl HeldBack<'_> {
         })
     }
 
-    fn measure(&self, sample: &Sample, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Seen> {
-        let proposals = network.proposals(&sample.image, demonstrations)?;
-        let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, demonstrations));
+    fn measure(&self, sample: &Sample, proposals: &Proposals, demonstrations: &[TaughtDemonstration]) -> Seen {
+        let searched = SearchedImage::new(&sample.image, demonstrations);
         let hit = |sighting: &Sighting| {
             let grasp = sighting.placed.demonstration.grasp(&sighting.placed.image_from_marks);
             sample.objects.first().map(|object| self.outcome(&grasp, object, 1.0)).filter(Outcome::is_hit)
+        };
+        let has_part = !sample.objects.is_empty();
+        let sightings = match has_part {
+            true => sightings_to_first(proposals, &searched, |sighting| hit(sighting).is_some()),
+            false => sightings(proposals, &searched),
         };
         let highest = |right: bool, proposed: bool| {
             let of_kind = sightings
@@ -108,19 +118,18 @@ impl HeldBack<'_> {
                 .filter(|s| hit(s).is_some() == right && (!proposed || s.turn_source != TurnSource::Search));
             of_kind.map(|sighting| sighting.network_score).reduce(f64::max)
         };
-        let has_part = !sample.objects.is_empty();
         // What the search finds is no merit of the network, but its errors are the model's.
         let errors = sightings.iter().filter_map(hit).filter_map(|outcome| match outcome {
             Outcome::Found { error_px, error_degrees, .. } => Some([error_px, error_degrees]),
             _ => None,
         });
-        Ok(Seen {
+        Seen {
             proposed_on_part: highest(true, true),
             on_part: highest(true, false),
             without_part: (!has_part).then(|| highest(false, true).unwrap_or(0.0)),
             elsewhere: best_agreement(&sightings).filter(|_| !has_part).map(|sighting| sighting.network_score),
             errors: errors.collect(),
-        })
+        }
     }
 
     /// A grasp compared with the true one of an object in a sample.

@@ -34,11 +34,11 @@ pub(crate) mod tests;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use sdg_demonstration::{Augmenter, Demonstration, Sample};
+use sdg_demonstration::{Augmenter, Demonstration};
 use sdg_detection::GeneralizedRcnn;
 use sdg_geometry::GraspLine;
 use sdg_layers::state_dict;
-use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
+use sdg_training::{History, SampleSource, Trained, TrainingError, ValidationRecord, first_windows, train};
 
 use crate::calibration::Calibration;
 use crate::calibrations::Calibrations;
@@ -47,7 +47,7 @@ use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
-use crate::models::{Network, Reading};
+use crate::models::{Network, Proposals, Reading};
 use crate::network_evidence::NetworkEvidence;
 use crate::taught::TaughtDemonstration;
 
@@ -60,6 +60,7 @@ pub use options::TeachOptions;
 pub(crate) use plan::Plan;
 use plan::ReadingPlan;
 pub use preset::Preset;
+use side_by_side::side_by_side;
 pub use start::Start;
 use symmetry::HiddenTurns;
 
@@ -219,13 +220,13 @@ pub(crate) fn teach_network(
     };
 
     let augmenter = Augmenter::new(demonstrations, plan.samples.clone(), options.seed)?;
-    let held_back = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
+    let held_back_augmenter = Augmenter::new(demonstrations, plan.held_back.clone(), options.seed)?;
     let [to_learn, to_hold_back] = other_parts::draw(plan.num_other_parts, options.seed);
     let augmenter = augmenter.with_other_parts(&to_learn)?;
-    let held_back = held_back.with_other_parts(&to_hold_back)?;
+    let held_back_augmenter = held_back_augmenter.with_other_parts(&to_hold_back)?;
     let turns = HiddenTurns::new(demonstrations, options.symmetry);
-    let num_held_back = plan.training.validation.samples as u64;
-    let held_back: Vec<Sample> = (0..num_held_back).map(|i| turns.canonical(held_back.held_out(i))).collect();
+    let numbers: Vec<u64> = (0..plan.training.validation.samples as u64).collect();
+    let held_back = side_by_side(&numbers, |&number| Ok(turns.canonical(held_back_augmenter.held_out(number))))?;
     let held_back = HeldBack { samples: &held_back, turns: &turns };
     let mut training = plan.training.clone();
     training.time_budget = options.time_budget.map(|budget| budget.saturating_sub(start.elapsed()));
@@ -250,28 +251,35 @@ pub(crate) fn teach_network(
         }
         _ => detector,
     };
+    // Examined, calibrated and handed out is what a file will give back, without the head that only teaching has.
+    let finished = |detector: &GeneralizedRcnn| -> Result<Network> {
+        let own = plan.detector.network.init(&options.device, options.seed)?;
+        let detector = state_dict::import(own, &state_dict::export(detector)).0;
+        Ok(Network { detector, reading: reading.clone(), comparison: comparison.clone() }.rounded())
+    };
+    // The samples show the part at other sizes than those that may be looked for later.
+    let of_any_size: Vec<TaughtDemonstration> =
+        demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
+    let mut proposed = Vec::new();
     let Trained { detector, history } = train(
         detector,
         &training,
         source,
         &mut |detector: &GeneralizedRcnn| {
-            let (reading, comparison) = (reading.clone(), comparison.clone());
-            let network = Network { detector: detector.clone(), reading, comparison };
-            held_back.examine(&network, &taught).map_err(|error| TrainingError::Examination(error.into()))
+            let proposals = finished(detector).and_then(|network| held_back.propose(&network, &of_any_size));
+            proposed.push(proposals.map_err(|error| TrainingError::Examination(error.into()))?);
+            Ok(proposed.last().map_or_else(Vec::new, |proposals| held_back.outcomes(proposals)))
         },
         &mut |event| observe(&TeachingEvent::from(*event)),
     )?;
-    // Without the head that only teaching has.
-    let own = plan.detector.network.init(&options.device, options.seed)?;
-    let detector = state_dict::import(own, &state_dict::export(&detector)).0;
-    // Calibrated and handed out is what a file will give back.
-    let network = Network { detector, reading, comparison }.rounded();
-    // The samples show the part at other sizes than those that may be looked for later.
-    let of_any_size: Vec<TaughtDemonstration> =
-        demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
+    let network = finished(&detector)?;
     let mut on_other_parts = other_parts::shown(demonstrations, &to_hold_back, &network, options.seed)?;
     on_other_parts.highest.extend(absent::highest_scores(&network, &of_any_size, &options.negatives)?);
-    let calibrated = held_back.calibrate(&network, &of_any_size, &on_other_parts.highest)?;
+    let is_kept = |(record, _): &(&ValidationRecord, &Vec<Proposals>)| record.steps_done == history.best.steps_done;
+    let Some((_, proposals)) = history.validations.iter().zip(&proposed).find(is_kept) else {
+        panic!("the network that is kept was validated")
+    };
+    let calibrated = held_back.calibrate(&network, proposals, &of_any_size, &on_other_parts.highest)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });

@@ -42,7 +42,8 @@ impl NegativeScenes {
         let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
         let demonstrations: Vec<Demonstration> = demonstrations.iter().map(shrunk).collect();
         let augmenter = Augmenter::new(&demonstrations, config, seed)?;
-        let scenes = (0..count).map(|i| augmenter.held_out(i)).collect();
+        let numbers: Vec<u64> = (0..count).collect();
+        let scenes = side_by_side(&numbers, |&number| Ok(augmenter.held_out(number)))?;
         let demonstrations = demonstrations.iter().map(TaughtDemonstration::new).collect::<Result<_>>()?;
         Ok(Self { scenes, demonstrations })
     }

@@ -71,7 +71,7 @@ pub struct EarlyStop {
     pub median_error_px: f64,
     /// Median error, in degrees.
     pub median_error_degrees: f64,
-    /// False alarms over negatives.
+    /// False alarms over negatives; their number is rounded up, since of five negatives one says little.
     pub false_alarm_rate: f64,
     /// Steps from the validation that was good enough to the end.
     pub cool_down: usize,
@@ -83,7 +83,7 @@ impl EarlyStop {
         validation.hit_rate() >= self.hit_rate
             && validation.median_error_px <= self.median_error_px
             && validation.median_error_degrees <= self.median_error_degrees
-            && validation.false_alarms as f64 <= self.false_alarm_rate * validation.negatives as f64
+            && validation.false_alarms as f64 <= (self.false_alarm_rate * validation.negatives as f64).ceil()
     }
 }
 

@@ -40,7 +40,8 @@ pub struct EvaluateArgs {
         value_name = "DIR",
         requires = "grasp_model",
         conflicts_with_all = [
-            "models", "objects", "attempts", "views", "scenes", "unverified", "preset", "steps", "seed", "jobs", "out",
+            "models", "objects", "attempts", "views", "scenes", "unverified", "preset", "steps", "time_budget",
+            "seed", "jobs", "out",
             "axes", "cameras",
         ],
         help_heading = PICTURES
@@ -150,6 +151,9 @@ pub struct EvaluateArgs {
     /// Optimiser steps instead of the preset's
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: Option<u32>,
+    /// Seconds that a network's training may take at most; --jobs 1 gives each teaching the whole machine
+    #[arg(long, value_name = "SECS", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub time_budget: Option<u32>,
     /// Decides every random choice
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub seed: u64,

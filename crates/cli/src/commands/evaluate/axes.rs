@@ -182,6 +182,9 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
     if let Some(steps) = args.steps {
         option("steps", &steps);
     }
+    if let Some(secs) = args.time_budget {
+        option("time-budget", &secs);
+    }
     option("seed", &args.seed);
     command
 }

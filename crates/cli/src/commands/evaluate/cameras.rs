@@ -101,6 +101,7 @@ fn command(args: &EvaluateArgs, names: &[String]) -> String {
     words.extend((!args.objects.is_empty()).then(|| format!("--objects {}", args.objects.join(","))));
     words.push(format!("--axis-views {} --preset {}", args.axis_views, args.preset));
     words.extend(args.steps.map(|steps| format!("--steps {steps}")));
+    words.extend(args.time_budget.map(|secs| format!("--time-budget {secs}")));
     words.push(format!("--seed {}", args.seed));
     words.join(" ")
 }

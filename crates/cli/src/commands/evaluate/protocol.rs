@@ -107,6 +107,9 @@ fn command(args: &EvaluateArgs, settings: &Settings) -> String {
     if let Some(steps) = settings.steps {
         option("steps", &steps);
     }
+    if let Some(secs) = settings.time_budget {
+        option("time-budget", &secs);
+    }
     option("seed", &settings.seed);
     if args.unverified { command + " --unverified" } else { command }
 }

@@ -20,6 +20,7 @@ pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
         protocol: Settings::PROTOCOL,
         preset: preset.name().to_owned(),
         steps: args.steps,
+        time_budget: args.time_budget,
         seed: args.seed,
         attempts: args.attempts,
         views: args.views,
