@@ -1,0 +1,19 @@
+//! The network: nodes, topics, services, actions; a camera and an arm behind them.
+//!
+//! Calls block up to a time that is given; there is no runtime. Everything but [`Node`] may be moved to another thread.
+
+mod action;
+mod arm;
+mod camera;
+mod node;
+mod service;
+mod topic;
+mod wait;
+mod wire;
+
+pub use action::{ActionClient, ActionType, Goal, GoalEnd};
+pub use arm::{ArmConfig, TrajectoryArm};
+pub use camera::{RosCamera, TopicAddress, stamp_or_now};
+pub use node::{Node, NodeConfig, Rmw};
+pub use service::{RequestId, Server, ServiceClient, ServiceType};
+pub use topic::{Publisher, Qos, Received, Subscription};
