@@ -71,7 +71,10 @@ impl FromStr for TopicAddress {
 }
 
 /// `ROS_DOMAIN_ID`, 0 where it is not set.
-fn domain_of_environment() -> Result<u16, String> {
+///
+/// # Errors
+/// What is no domain.
+pub fn domain_of_environment() -> Result<u16, String> {
     match std::env::var("ROS_DOMAIN_ID") {
         Err(_) => Ok(0),
         Ok(text) => {

@@ -3,6 +3,7 @@
 //! Calls block up to a time that is given; there is no runtime. Everything but [`Node`] may be moved to another thread.
 
 mod action;
+mod action_server;
 mod arm;
 mod camera;
 mod node;
@@ -12,8 +13,9 @@ mod wait;
 mod wire;
 
 pub use action::{ActionClient, ActionType, Goal, GoalEnd};
+pub use action_server::{ActionServer, Asked};
 pub use arm::{ArmConfig, TrajectoryArm};
-pub use camera::{RosCamera, TopicAddress, stamp_or_now};
+pub use camera::{RosCamera, TopicAddress, domain_of_environment, stamp_or_now};
 pub use node::{Node, NodeConfig, Rmw};
 pub use service::{RequestId, Server, ServiceClient, ServiceType};
 pub use topic::{Publisher, Qos, Received, Subscription};

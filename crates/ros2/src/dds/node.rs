@@ -4,7 +4,7 @@ use std::net::Ipv4Addr;
 use std::str::FromStr;
 use std::thread::JoinHandle;
 
-use ros2_client::action::ActionClientQosPolicies;
+use ros2_client::action::{ActionClientQosPolicies, ActionServerQosPolicies};
 use ros2_client::dds::ServiceMapping;
 use ros2_client::dds::rustdds::DomainParticipantBuilder;
 use ros2_client::{
@@ -12,6 +12,7 @@ use ros2_client::{
 };
 
 use super::action::{ActionClient, ActionType};
+use super::action_server::ActionServer;
 use super::service::{Server, ServiceClient, ServiceType};
 use super::topic::{Publisher, Qos, Subscription};
 use super::wait::wait_for;
@@ -216,6 +217,31 @@ impl Node {
         let inner =
             self.node()?.create_action_client(mapping, &name, &of, qos).map_err(|error| network(&absolute, error))?;
         Ok(ActionClient::new(absolute, inner))
+    }
+
+    /// Serves an action.
+    ///
+    /// # Errors
+    /// As [`Self::subscribe`].
+    pub fn action_server<G, R, F>(&mut self, action: &str, of: ActionType) -> Result<ActionServer<G, R, F>, RosError>
+    where
+        G: Cdr + Clone + 'static,
+        R: Cdr + Clone + Default + 'static,
+        F: Cdr + Clone + 'static,
+    {
+        let (absolute, name) = self.name(action)?;
+        let (mapping, qos) = (self.rmw.mapping(), Qos::SERVICES.profile());
+        let qos = ActionServerQosPolicies {
+            goal_service: qos.clone(),
+            result_service: qos.clone(),
+            cancel_service: qos.clone(),
+            feedback_publisher: qos,
+            status_publisher: Qos::STATUSES.profile(),
+        };
+        let of = ActionTypeName::new(of.package, of.name);
+        let inner =
+            self.node()?.create_action_server(mapping, &name, &of, qos).map_err(|error| network(&absolute, error))?;
+        Ok(ActionServer::new(absolute, inner))
     }
 
     fn name(&self, name: &str) -> Result<(String, Name), RosError> {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use ros2_client::Gid;
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 
-use super::node::network;
+use super::node::{Node, network};
 use super::wait::wait_for;
 use super::wire::Wire;
 use crate::cdr::Cdr;
@@ -129,6 +129,11 @@ impl<T: Cdr> Publisher<T> {
     /// The topic's absolute name.
     pub fn topic(&self) -> &str {
         &self.topic
+    }
+
+    /// How many readers the topic has. `node` is the one that this was created by.
+    pub fn num_readers(&self, node: &Node) -> usize {
+        node.inner().map_or(0, |node| self.inner.get_subscription_count(node))
     }
 
     /// Sends a message.

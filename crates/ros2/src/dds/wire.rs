@@ -8,6 +8,10 @@ use serde::ser::SerializeTuple;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::cdr::{self, Cdr, CdrError};
+use crate::encoding::MAX_BYTES;
+
+/// A picture and what stands around it.
+const MAX_MESSAGE_BYTES: usize = MAX_BYTES + (1 << 16);
 
 /// A message on its way. What arrives and cannot be read is told with its place, not dropped: a service still answers then.
 #[derive(Debug, Clone)]
@@ -45,6 +49,10 @@ impl<'de, T: Cdr> Visitor<'de> for AllBytes<T> {
         // The end of the message is the first byte that is not there.
         while let Ok(Some(byte)) = bytes.next_element::<u8>() {
             all.push(byte);
+            if all.len() > MAX_MESSAGE_BYTES {
+                let expected = format!("a message of at most {} MiB", MAX_BYTES >> 20);
+                return Ok(Wire(Err(CdrError { expected, at: 0, length: all.len(), found: "more".to_owned() })));
+            }
         }
         Ok(Wire(cdr::from_bytes(&all)))
     }
