@@ -38,7 +38,7 @@ pub struct Ros2Args {
     #[arg(long, value_name = "SCORE", default_value_t = 0.5, value_parser = share)]
     pub min_score: f64,
     /// Pictures that wait while one is searched; the oldest are skipped
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub queue: u32,
     /// Where the network computes
     #[command(flatten)]

@@ -18,7 +18,7 @@ def main(sdg, folder, peer):
     packed.write_bytes(pack(image(photo()), "sensor_msgs/msg/Image"))
     for domain, rate, is_reliable in [(51, 10, 1), (52, 10, 0), (53, 30, 1), (54, 30, 0)]:
         option = ["--reliable"] if is_reliable else []
-        with Sdg(sdg, domain, f"--grasp-model={model}", f"--camera={CAMERA}", "--queue=100", *option, rmw="fastrtps") as node:
+        with Sdg(sdg, domain, f"--grasp-model={model}", f"--camera={CAMERA}", "--queue=250", *option, rmw="fastrtps") as node:
             done = subprocess.run([peer, str(domain), packed, "200", str(rate), str(is_reliable)], capture_output=True, text=True, timeout=200)
             found = json.loads(done.stdout)
             kind = "reliable" if is_reliable else "best effort"

@@ -88,8 +88,11 @@ def base_of(name, dice):
         return dice.random() < 0.5
     if name.startswith("float"):
         return float(np.float32(dice.uniform(-5, 5)))
-    bits = {"octet": 8, "byte": 8, "char": 8}.get(name) or int(name.lstrip("uint"))
-    return dice.randrange(2**bits) if name[0] in "ubco" else dice.randrange(-(2 ** (bits - 1)), 2 ** (bits - 1))
+    if name in ("octet", "byte", "char"):
+        # rosbags takes some of them for signed.
+        return dice.randrange(128)
+    bits = int(name.lstrip("uint"))
+    return dice.randrange(2**bits) if name[0] == "u" else dice.randrange(-(2 ** (bits - 1)), 2 ** (bits - 1))
 
 
 def message_of(store, name, dice):
