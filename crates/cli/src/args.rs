@@ -50,7 +50,7 @@ pub enum Command {
     Grasp(GraspArgs),
     /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teach and grasp as services
     #[cfg(feature = "ros2")]
-    Ros2(Box<crate::commands::ros2::Ros2Args>),
+    Ros2(Box<crate::commands::ros2::args::Ros2Args>),
     /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
     Plan(PlanArgs),
     /// Show the state of a real arm, bring it home, recover it after an error, open and close its hand

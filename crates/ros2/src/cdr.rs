@@ -291,15 +291,6 @@ mod tests {
     }
 
     #[test]
-    fn a_value_behind_one_byte_is_aligned_with_it() {
-        use crate::messages::AfterStatus;
-        let bytes = to_bytes(&AfterStatus((7_i32, "a".to_owned())));
-        // By hand: the status would be byte 0, so three bytes of padding stand before the i32.
-        assert_eq!(bytes, [0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0]);
-        assert_eq!(from_bytes::<AfterStatus<(i32, String)>>(&bytes).unwrap().0, (7, "a".to_owned()));
-    }
-
-    #[test]
     fn sequences_and_arrays_come_back() {
         let value = (vec![1_u8, 2, 3], ([0.5_f64; 3], vec!["x".to_owned(), String::new()]));
         assert_eq!(from_bytes::<(Vec<u8>, ([f64; 3], Vec<String>))>(&to_bytes(&value)).unwrap(), value);

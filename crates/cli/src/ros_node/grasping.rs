@@ -16,7 +16,7 @@ use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time}
 
 use super::pictures::Shared;
 use crate::camera_files;
-use crate::commands::ros2::Ros2Args;
+use crate::commands::ros2::args::Ros2Args;
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 use crate::robots::{self, ModelFinder, Pictures, PlacedCamera, TakenPicture};

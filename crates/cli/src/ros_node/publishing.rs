@@ -81,7 +81,7 @@ impl Topics {
         self.last_search_secs = searched.search_secs;
         self.last_picture = Some(searched.arrived);
         self.num_searched += 1;
-        let (raw, compressed) = (self.overlays.num_readers(node) > 0, self.compressed_overlays.num_readers(node) > 0);
+        let (raw, compressed) = (node.num_readers(&self.overlays) > 0, node.num_readers(&self.compressed_overlays) > 0);
         if !raw && !compressed {
             return;
         }

@@ -10,7 +10,7 @@ use super::place::PlaceSource;
 use super::teaching::TriggerTeaching;
 use crate::camera_files::CameraFile;
 use crate::commands::devices;
-use crate::commands::ros2::Ros2Args;
+use crate::commands::ros2::args::Ros2Args;
 use crate::exit::Usage;
 use crate::{files, robots};
 

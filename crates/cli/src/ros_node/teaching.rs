@@ -10,7 +10,7 @@ use sdg_ros2::messages::TeachRequest;
 
 use crate::args::{Args, Command};
 use crate::commands;
-use crate::commands::ros2::TeachTriggerArgs;
+use crate::commands::ros2::args::TeachTriggerArgs;
 use crate::exit::one_line;
 
 /// A teaching under way.

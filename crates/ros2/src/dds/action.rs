@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use futures_util::StreamExt;
 use ros2_client::action::{GoalId, GoalStatusEnum};
 
-use super::node::{Node, network};
+use super::failure::network;
 use super::wait::wait_for;
 use super::wire::Wire;
 use crate::cdr::Cdr;
@@ -71,20 +71,8 @@ where
         &self.name
     }
 
-    /// Waits until somebody serves this action.
-    ///
-    /// # Errors
-    /// Nobody in time.
-    pub fn wait_for_server(&self, node: &Node, timeout: Duration) -> Result<(), RosError> {
-        let Some(node) = node.inner() else { return Err(network(&self.name, "the node has left")) };
-        let all = async {
-            self.inner.goal_client().wait_for_service(node).await;
-            self.inner.result_client().wait_for_service(node).await;
-            self.inner.cancel_client().wait_for_service(node).await;
-        };
-        wait_for(all, Some(Instant::now() + timeout)).ok_or_else(|| {
-            network(&self.name, format!("nobody serves this action within {:.0} s", timeout.as_secs_f64()))
-        })
+    pub(super) fn inner(&self) -> &ros2_client::dds::ActionClient<Wire<G>, Wire<AfterStatus<R>>, Wire<F>> {
+        &self.inner
     }
 
     /// Sends a goal and asks for its result; `None` where the server refuses it.

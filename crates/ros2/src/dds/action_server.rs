@@ -8,7 +8,7 @@ use ros2_client::action_msgs::{
 use ros2_client::builtin_interfaces::Time;
 
 use super::action::GoalEnd;
-use super::node::network;
+use super::failure::network;
 use super::wire::Wire;
 use crate::cdr::Cdr;
 use crate::error::RosError;

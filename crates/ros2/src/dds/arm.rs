@@ -178,8 +178,8 @@ impl TrajectoryArm {
         let grip = ActionType { package: "control_msgs", name: "GripperCommand" };
         let motions = node.action_client(&config.trajectory_action, follow).map_err(unreachable)?;
         let gripper = node.action_client(&config.gripper_action, grip).map_err(unreachable)?;
-        motions.wait_for_server(node, timeout).map_err(unreachable)?;
-        gripper.wait_for_server(node, timeout).map_err(unreachable)?;
+        node.wait_for_server(&motions, timeout).map_err(unreachable)?;
+        node.wait_for_server(&gripper, timeout).map_err(unreachable)?;
         let states = StateReader::spawn(states, &config);
         let arm =
             Self { states, motions, gripper, config, commanded: None, hand: None, is_grasping: false, num_feedback: 0 };

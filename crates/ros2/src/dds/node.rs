@@ -3,6 +3,7 @@
 use std::net::Ipv4Addr;
 use std::str::FromStr;
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use ros2_client::action::{ActionClientQosPolicies, ActionServerQosPolicies};
 use ros2_client::dds::ServiceMapping;
@@ -13,7 +14,8 @@ use ros2_client::{
 
 use super::action::{ActionClient, ActionType};
 use super::action_server::ActionServer;
-use super::service::{Server, ServiceClient, ServiceType};
+use super::failure::network;
+use super::service::{Server, ServiceType};
 use super::topic::{Publisher, Qos, Subscription};
 use super::wait::wait_for;
 use crate::cdr::Cdr;
@@ -175,25 +177,6 @@ impl Node {
         Ok(Server::new(absolute, inner))
     }
 
-    /// Calls a service.
-    ///
-    /// # Errors
-    /// As [`Self::subscribe`].
-    pub fn client<Q: Cdr + Clone + 'static, A: Cdr + 'static>(
-        &mut self,
-        service: &str,
-        of: ServiceType,
-    ) -> Result<ServiceClient<Q, A>, RosError> {
-        let (absolute, name) = self.name(service)?;
-        let (mapping, profile) = (self.rmw.mapping(), Qos::SERVICES.profile());
-        let type_name = ServiceTypeName::new(of.package, of.name);
-        let inner = self
-            .node()?
-            .create_client(mapping, &name, &type_name, profile.clone(), profile)
-            .map_err(|error| network(&absolute, error))?;
-        Ok(ServiceClient::new(absolute, inner))
-    }
-
     /// Uses an action: its three services and two topics.
     ///
     /// # Errors
@@ -254,9 +237,31 @@ impl Node {
         self.node.as_mut().ok_or_else(|| network("node", "it has left"))
     }
 
-    /// The node beneath, to wait for others by.
-    pub(super) fn inner(&self) -> Option<&ros2_client::Node> {
-        self.node.as_ref()
+    /// Waits until somebody serves an action.
+    ///
+    /// # Errors
+    /// Nobody in time.
+    pub fn wait_for_server<G, R, F>(&self, client: &ActionClient<G, R, F>, timeout: Duration) -> Result<(), RosError>
+    where
+        G: Cdr + Clone + 'static,
+        R: Cdr + Clone + 'static,
+        F: Cdr + Clone + 'static,
+    {
+        let Some(node) = &self.node else { return Err(network(client.name(), "the node has left")) };
+        let inner = client.inner();
+        let all = async {
+            inner.goal_client().wait_for_service(node).await;
+            inner.result_client().wait_for_service(node).await;
+            inner.cancel_client().wait_for_service(node).await;
+        };
+        wait_for(all, Some(Instant::now() + timeout)).ok_or_else(|| {
+            network(client.name(), format!("nobody serves this action within {:.0} s", timeout.as_secs_f64()))
+        })
+    }
+
+    /// How many readers a topic of this node has.
+    pub fn num_readers<T: Cdr>(&self, publisher: &Publisher<T>) -> usize {
+        self.node.as_ref().map_or(0, |node| publisher.inner().get_subscription_count(node))
     }
 }
 
@@ -268,8 +273,4 @@ impl Drop for Node {
             let _ = spinner.join();
         }
     }
-}
-
-pub(super) fn network(what: &str, why: impl ToString) -> RosError {
-    RosError::Network { what: what.to_owned(), why: why.to_string() }
 }

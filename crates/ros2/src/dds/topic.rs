@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use ros2_client::Gid;
 use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
 
-use super::node::{Node, network};
+use super::failure::network;
 use super::wait::wait_for;
 use super::wire::Wire;
 use crate::cdr::Cdr;
@@ -131,9 +131,8 @@ impl<T: Cdr> Publisher<T> {
         &self.topic
     }
 
-    /// How many readers the topic has. `node` is the one that this was created by.
-    pub fn num_readers(&self, node: &Node) -> usize {
-        node.inner().map_or(0, |node| self.inner.get_subscription_count(node))
+    pub(super) fn inner(&self) -> &ros2_client::Publisher<Wire<T>> {
+        &self.inner
     }
 
     /// Sends a message.

@@ -212,3 +212,27 @@ structure! {
         reached_goal: bool,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cdr::{from_bytes, to_bytes};
+
+    #[test]
+    fn a_result_behind_the_status_is_aligned_with_it() {
+        let result = FollowJointTrajectoryResult { error_code: 7, error_string: "a".to_owned() };
+        let bytes = to_bytes(&AfterStatus(result.clone()));
+        // By hand: the status would be byte 0, so three bytes of padding stand before the i32.
+        assert_eq!(bytes, [0, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0]);
+        assert_eq!(from_bytes::<AfterStatus<FollowJointTrajectoryResult>>(&bytes).unwrap().0, result);
+    }
+
+    #[test]
+    fn durations_are_whole_nanoseconds() {
+        assert_eq!(Duration::from_secs(1.25), Duration { sec: 1, nanosec: 250_000_000 });
+        assert_eq!(Duration::from_secs(0.999_999_999_9), Duration { sec: 1, nanosec: 0 });
+        assert_eq!(Duration::from_secs(-1.0), Duration::default());
+        assert_eq!(Duration::from_secs(f64::NAN), Duration::default());
+        assert!((Duration::from_secs(3.5).secs() - 3.5).abs() < 1e-12);
+    }
+}
