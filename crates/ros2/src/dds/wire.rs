@@ -4,7 +4,7 @@ use std::fmt;
 use std::marker::PhantomData;
 
 use serde::de::{SeqAccess, Visitor};
-use serde::ser::SerializeTuple;
+use serde::ser::{Error as _, SerializeTuple};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::cdr::{self, Cdr, CdrError};
@@ -21,7 +21,7 @@ impl<T: Cdr> ros2_client::Message for Wire<T> {}
 
 impl<T: Cdr> Serialize for Wire<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let message = self.0.as_ref().map_err(serde::ser::Error::custom)?;
+        let message = self.0.as_ref().map_err(S::Error::custom)?;
         let bytes = cdr::to_bytes(message);
         let mut tuple = serializer.serialize_tuple(bytes.len())?;
         bytes.iter().try_for_each(|byte| tuple.serialize_element(byte))?;
