@@ -112,8 +112,15 @@ impl Node {
         for (parameter, value) in &parameters {
             options = options.declare_parameter(parameter, ParameterValue::String(value.clone()));
         }
-        let fixed = |_: &str, _: &ParameterValue| Err("it is set on the command line of sdg ros2".to_owned());
-        options = options.parameter_validator(Box::new(fixed));
+        // The first values are checked by it too, and that of use_sim_time, which every node has.
+        let is_fixed = move |name: &str, value: &ParameterValue| match value {
+            ParameterValue::String(text) if parameters.iter().any(|(known, told)| known == name && told == text) => {
+                Ok(())
+            }
+            ParameterValue::Boolean(false) if name == "use_sim_time" => Ok(()),
+            _ => Err("it is set on the command line of sdg ros2".to_owned()),
+        };
+        options = options.parameter_validator(Box::new(is_fixed));
         let mut node = context.new_node(name, options).map_err(|error| network("node", error))?;
         let spinner = node.spinner().map_err(|error| network("node", error))?;
         let spinner = std::thread::Builder::new()

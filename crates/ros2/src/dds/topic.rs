@@ -110,7 +110,10 @@ impl<T: Cdr + 'static> Subscription<T> {
             last_numbers.clear();
         }
         if let Some(last) = last_numbers.insert(sender, number) {
-            self.num_lost.fetch_add(u64::try_from(number - last - 1).unwrap_or(0), Ordering::Relaxed);
+            self.num_lost.fetch_add(
+                u64::try_from(number.saturating_sub(last).saturating_sub(1)).unwrap_or(0),
+                Ordering::Relaxed,
+            );
         }
     }
 }

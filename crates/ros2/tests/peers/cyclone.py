@@ -74,11 +74,11 @@ def unpack(data, name):
     return STORE.deserialize_cdr(ENCODING + data, name)
 
 
-def make(name, **fields):
+def make(type_name, /, **fields):
     """A message with these fields, and others as they are empty."""
     empty = {"string": "", "bool": False}
     values = []
-    for field, (kind, details) in STORE.get_msgdef(name).fields:
+    for field, (kind, details) in STORE.get_msgdef(type_name).fields:
         if field in fields:
             values.append(fields.pop(field))
         elif kind.name == "BASE":
@@ -96,7 +96,7 @@ def make(name, **fields):
             else:
                 values.append([])
     assert not fields, fields
-    return STORE.types[name](*values)
+    return STORE.types[type_name](*values)
 
 
 def stamp_now():

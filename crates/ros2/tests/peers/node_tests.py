@@ -50,6 +50,8 @@ class Sdg:
             found = [line for line in self.lines if text in line]
             if found:
                 return found[0]
+            if self.process.poll() is not None:
+                return None
             time.sleep(0.01)
         return None
 
