@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser test-v4l test-peers test-ros2 network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -40,6 +40,12 @@ test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
+
+# A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 where the part looks the same after half a turn.
+walk: build ## From a photograph to a tried model with a stop-watch, through the page in Chromium (SETS="FOLDER …")
+	@scripts/install.sh chromium chromium-driver
+	@scripts/axe.sh
+	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test walk -- --ignored --nocapture
 
 test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB camera of our own (no root, no camera)
 	@scripts/test-v4l.sh

@@ -25,9 +25,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 paint(&mut image, [x, y], [255, 255, 0]);
             }
             let grasp = mixed.instance.grasp;
-            for (end, colour) in [(grasp.start, [255, 0, 0]), (grasp.end, [0, 255, 0])] {
+            for (end, color) in [(grasp.start, [255, 0, 0]), (grasp.end, [0, 255, 0])] {
                 for [dx, dy] in [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-                    paint(&mut image, [end.x + dx, end.y + dy], colour);
+                    paint(&mut image, [end.x + dx, end.y + dy], color);
                 }
             }
         }
@@ -48,8 +48,8 @@ fn border([x1, y1, x2, y2]: [f64; 4]) -> Vec<[f64; 2]> {
     horizontal.chain(along(y1, y2).flat_map(|y| [[x1, y], [x2, y]])).collect()
 }
 
-fn paint(image: &mut RgbImage, [x, y]: [f64; 2], colour: [u8; 3]) {
+fn paint(image: &mut RgbImage, [x, y]: [f64; 2], color: [u8; 3]) {
     if x >= 0.0 && y >= 0.0 && (x as u32) < image.width() && (y as u32) < image.height() {
-        image.put_pixel(x as u32, y as u32, Rgb(colour));
+        image.put_pixel(x as u32, y as u32, Rgb(color));
     }
 }

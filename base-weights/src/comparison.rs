@@ -219,8 +219,8 @@ impl Asked<'_> {
             let turn = Angle::from_degrees(first + 360.0 * k as f64 / NUM_TURNS as f64);
             let turned = PlanarSimilarity::about(other.center, other.center, turn, 1.0);
             let bounds = other.outline.transformed(&turned).bounds();
-            let usual = nominal.scale * other.photo_from_shown.scale;
-            let scale = (instance.bbox.area() / bounds.area()).sqrt().clamp(usual / 1.35, usual * 1.35);
+            let nominal_scale = nominal.scale * other.photo_from_shown.scale;
+            let scale = (instance.bbox.area() / bounds.area()).sqrt().clamp(nominal_scale / 1.35, nominal_scale * 1.35);
             let target = instance.bbox.center();
             let pose = PlanarSimilarity::about(bounds.center(), target, Angle::ZERO, scale).compose(&turned);
             (other.outline.transformed(&pose).bounds().iou(&instance.bbox), pose)

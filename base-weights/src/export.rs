@@ -30,12 +30,12 @@ pub fn with_comparison(
     }
     file.parameters.retain(|name, _| !name.starts_with("comparison."));
     take(&comparison.parameters, "", "comparison.", &mut file.parameters)?;
-    file.origin.insert("comparison".into(), format!("{}, commit {commit}", told(comparison)));
+    file.origin.insert("comparison".into(), format!("{}, commit {commit}", origin_of(comparison)));
     Ok(file)
 }
 
 /// How a network was made.
-fn told(
+fn origin_of(
     Checkpoint { settings: Settings { seed, num_parts, batch_size, .. }, step, .. }: &Checkpoint<Settings>,
 ) -> String {
     format!("seed {seed}, {step} steps, {num_parts} parts, {} pictures", step * batch_size)
@@ -78,7 +78,7 @@ pub fn export(
     ]);
     for (network, checkpoint) in [("detector", Some(detector)), ("orientation", orientation)] {
         if let Some(checkpoint) = checkpoint {
-            origin.insert(network.to_owned(), told(checkpoint));
+            origin.insert(network.to_owned(), origin_of(checkpoint));
         }
     }
     Ok(BaseWeightsFile { preset: "edge".into(), reinitialized, parameters, origin })

@@ -111,7 +111,6 @@ enum Command {
     },
 }
 
-/// What is pretrained.
 #[derive(Clone, Copy, ValueEnum)]
 enum Pretrained {
     Detector,
@@ -137,7 +136,7 @@ struct PaceArguments {
 }
 
 /// Steps between lines about the losses.
-const TOLD_EVERY: usize = 50;
+const REPORT_EVERY: usize = 50;
 
 fn main() -> Result<()> {
     match Arguments::parse().command {
@@ -205,7 +204,7 @@ fn pretrain<T: Task>(task: T, settings: Settings, pace: &PaceArguments) -> Resul
         count += 1;
         let elapsed_secs = start.elapsed().as_secs_f64();
         let is_out_of_time = pace.minutes.is_some_and(|minutes| elapsed_secs > 60.0 * minutes);
-        if run.step().is_multiple_of(TOLD_EVERY) || is_out_of_time || run.is_over() {
+        if run.step().is_multiple_of(REPORT_EVERY) || is_out_of_time || run.is_over() {
             let means: Vec<String> =
                 sums.iter().map(|(name, sum)| format!("{name} {:.3}", sum / count as f64)).collect();
             println!("step {:5} {elapsed_secs:7.1} s  {}", run.step(), means.join("  "));

@@ -1,4 +1,4 @@
-//! What becomes of one teaching, as a line of JSON.
+//! The outcome of one teaching, as a line of JSON.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! A run: pictures, losses, gradients, steps; checkpoints. What is learnt is a [`Task`].
+//! A pretraining run: pictures, losses, gradients, steps, checkpoints. What differs between networks is a [`Task`].
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ impl Settings {
 
 /// What a network learns.
 pub trait Task: Sized {
-    /// The network.
+    /// The module that is pretrained, all of whose parameters the optimiser updates.
     type Network: Module + Clone;
 
     /// Draws the network, on a device that carries autodiff.

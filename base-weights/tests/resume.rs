@@ -1,4 +1,4 @@
-//! A run that was stopped goes on as if nothing had happened.
+//! A run that was stopped and resumed gives the same bits as one that was not.
 #![allow(clippy::unwrap_used)]
 
 use sdg_base_weights::comparison::ComparisonTask;

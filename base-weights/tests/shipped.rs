@@ -1,4 +1,4 @@
-//! The weights that are shipped are what their documents say.
+//! The shipped weights against their hash, their metadata and the figures in the documents.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;

@@ -17,7 +17,7 @@ pub const NUM_KEYPOINTS: usize = 17;
 /// candidates, so that the number is reached whatever the weights.
 pub const POSITIVE_ROIS: usize = 32;
 
-/// A network.
+/// The networks that both sides build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Network {
     /// R50-FPN with boxes.

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers that identify what was computed: equal where the same work was done.
 pub type Facts = BTreeMap<String, f64>;
 
-/// What a worker says first.
+/// The first line of a worker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ready {
     /// Seconds of the run that does not count, all its pieces; `None` where there was none.
@@ -50,7 +50,7 @@ pub struct Request {
 pub struct Work {
     pub run: Box<dyn FnMut() -> Result<()>>,
     pub facts: Facts,
-    /// How many pieces one run makes; times are told for one.
+    /// How many pieces one run makes; times are reported for one.
     pub pieces: usize,
     /// Whether one run goes before that does not count.
     pub warm_up: bool,

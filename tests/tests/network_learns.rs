@@ -22,10 +22,10 @@ const MAX_DISTANCE: f64 = 1.0 / 15.0;
 /// And within this turn.
 const MAX_TURN_DEG: f64 = 10.0;
 
-/// Bounds on the network alone. Seed 1, edge preset from the shipped weights, 120 steps: 29 hits and 1 false alarm; from
-/// nothing, 300 steps: 29 and 5, 100 steps: 2 and 39.
-const MIN_HITS: usize = 24;
-const MAX_FALSE_ALARMS: usize = 4;
+/// Bounds on the network alone. Seed 1, edge preset from the shipped weights, at most 120 steps: 31 hits and no false alarm; before
+/// features were compared in finer views 29 and 1; from nothing, 300 steps: 29 and 5, 100 steps: 2 and 39.
+const MIN_HITS: usize = 27;
+const MAX_FALSE_ALARMS: usize = 2;
 
 fn scenes(part: &Part, config: SceneConfig) -> Scenes {
     let config = SceneConfig { num_other_parts: 12, ..config };

@@ -1,4 +1,4 @@
-//! The road from end to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the one
+//! From end to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the one
 //! test that says whether the product works.
 #![allow(clippy::unwrap_used)]
 

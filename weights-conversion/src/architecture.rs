@@ -1,6 +1,6 @@
 //! The network to fill: which parameters it has, and of which shapes.
 //!
-//! Plain numbers, so that names and shapes are known without building the network (and without burn). Whoever knows
+//! Plain numbers, so that names and shapes are known without building the network (and without burn). The owner of
 //! the detector's configuration translates it; `sdg weights` does, and a test there compares with a built detector.
 
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! A checkpoint of any format: what it says of itself, and its tensors by name.
+//! A checkpoint of any format: its metadata, and its tensors by name.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -14,7 +14,7 @@ use crate::torch::{self, Storages};
 /// Where checkpoints keep their state dict, beside optimiser and counters: Detectron2 and torchvision; others; Caffe2.
 const STATE_DICT_KEYS: [&str; 3] = ["model", "state_dict", "blobs"];
 
-/// A file's format, told by its content.
+/// A file's format, recognised by its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileFormat {
     /// A pickled dict of numpy arrays: the model zoo's `.pkl`.

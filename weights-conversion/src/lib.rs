@@ -1,7 +1,7 @@
 //! Weights from elsewhere: Detectron2's and torchvision's checkpoints become this project's files.
 //!
 //! ```text
-//! file ─ format told by content ─┬─ pickle of numpy arrays ─┐
+//! file ─ format by content ─┬─ pickle of numpy arrays ─┐
 //!                                ├─ torch zip, legacy ──────┼─ Checkpoint: name → shape, place in the file
 //!                                └─ safetensors ────────────┘
 //! Checkpoint + Architecture ─ naming scheme ─ Conversion: what goes where, and a Report ─ write ─ safetensors

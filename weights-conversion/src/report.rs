@@ -1,4 +1,4 @@
-//! What became of every name, one line each.
+//! The outcome for every name, one line each.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! What a checkpoint tells of its network: number of classes, keypoints, masks; depth of a backbone.
+//! What the names and shapes in a checkpoint say about its network: number of classes, keypoints, masks; depth of a backbone.
 
 use crate::architecture::Backbone;
 use crate::checkpoint::Checkpoint;

@@ -1,10 +1,10 @@
 //! The driver: starts both sides of every work, lets them run turn by turn, writes medians.
 
-mod contestant;
 pub(crate) mod machine;
 mod pace;
 mod prepare;
 mod report;
+mod worker_process;
 
 use std::path::PathBuf;
 
@@ -13,12 +13,12 @@ use clap::Args as ClapArgs;
 
 use crate::protocol::Facts;
 use crate::registry::{GEMM, Side, WORKS, WorkSpec};
-use contestant::Contestant;
-pub(crate) use contestant::peak_of_status;
 use machine::Machine;
 use pace::Pace;
 use prepare::Paths;
 use report::{Measured, Report};
+use worker_process::WorkerProcess;
+pub(crate) use worker_process::peak_of_status;
 
 /// `sdg-bench compare`
 #[derive(Debug, ClapArgs)]
@@ -80,7 +80,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             Ok(measured) => {
                 report.add(work, measured);
                 eprint!("{}", report.last_lines());
-                // After each work, so that a run that is cut short has told something.
+                // After each work, so that a run that is cut short has written something.
                 report.write_json(&paths.out)?;
             }
             Err(error) => {
@@ -110,29 +110,29 @@ fn chosen(only: &[String]) -> Result<Vec<&'static WorkSpec>> {
 /// Measures one work: ours first in the answer, then the peers in the registry's order.
 fn measure(work: &WorkSpec, args: &CompareArgs, paths: &Paths, pace: &Pace) -> Result<Vec<Measured>> {
     let sides = std::iter::once(Side::Ours).chain(work.peers.iter().map(Side::Peer));
-    let mut contestants = Vec::new();
+    let mut workers = Vec::new();
     for side in sides.take(if args.alone { 1 } else { usize::MAX }) {
         let files = paths.files_for(work, side)?;
-        let contestant = Contestant::start(work, side, &files, args.threads as usize, paths)?;
-        if let Some(ours) = contestants.first() {
-            check_facts(ours, &contestant)?;
+        let worker = WorkerProcess::start(work, side, &files, args.threads as usize, paths)?;
+        if let Some(ours) = workers.first() {
+            check_facts(ours, &worker)?;
         }
-        contestants.push(contestant);
+        workers.push(worker);
     }
-    let warm_ups: Vec<Option<f64>> = contestants.iter().map(|contestant| contestant.ready.seconds).collect();
+    let warm_ups: Vec<Option<f64>> = workers.iter().map(|worker| worker.ready.seconds).collect();
     let plan = if work.long { pace.once(&warm_ups) } else { pace.plan(&warm_ups) };
-    let mut seconds = vec![Vec::new(); contestants.len()];
+    let mut seconds = vec![Vec::new(); workers.len()];
     for round in 0..plan.rounds {
         // Another one begins each time, so that whatever comes and goes on the machine meets everybody.
-        for turn in 0..contestants.len() {
-            let idx = (round + turn) % contestants.len();
-            seconds[idx].extend(contestants[idx].run(plan.repeats[idx])?);
+        for turn in 0..workers.len() {
+            let idx = (round + turn) % workers.len();
+            seconds[idx].extend(workers[idx].run(plan.repeats[idx])?);
         }
     }
-    contestants.into_iter().zip(seconds).map(|(contestant, seconds)| Measured::new(contestant, seconds)).collect()
+    workers.into_iter().zip(seconds).map(|(worker, seconds)| Measured::new(worker, seconds)).collect()
 }
 
-fn check_facts(ours: &Contestant, theirs: &Contestant) -> Result<()> {
+fn check_facts(ours: &WorkerProcess, theirs: &WorkerProcess) -> Result<()> {
     match contradiction(&ours.ready.facts, &theirs.ready.facts) {
         None => Ok(()),
         Some((name, our, their)) => {

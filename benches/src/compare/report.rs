@@ -8,8 +8,8 @@ use sdg_geometry::median;
 use sdg_report::write_atomically;
 use serde::Serialize;
 
-use crate::compare::contestant::Contestant;
 use crate::compare::machine::Machine;
+use crate::compare::worker_process::WorkerProcess;
 use crate::registry::{Peer, Side, WorkSpec};
 use crate::results::{duration, rewrite};
 
@@ -28,14 +28,14 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Reads the peak memory and ends the contestant.
-    pub fn new(contestant: Contestant, seconds: Vec<f64>) -> Result<Self> {
+    /// Reads the peak memory and ends the worker.
+    pub fn new(worker: WorkerProcess, seconds: Vec<f64>) -> Result<Self> {
         if seconds.is_empty() {
-            bail!("{} was never timed", contestant.side.title());
+            bail!("{} was never timed", worker.side.title());
         }
-        let memory_bytes = contestant.peak_memory_bytes();
-        let ready = contestant.ready.clone();
-        Ok(Self { side: contestant.side, seconds, memory_bytes, gflop: ready.gflop, version: ready.version })
+        let memory_bytes = worker.peak_memory_bytes();
+        let ready = worker.ready.clone();
+        Ok(Self { side: worker.side, seconds, memory_bytes, gflop: ready.gflop, version: ready.version })
     }
 
     fn median(&self) -> f64 {

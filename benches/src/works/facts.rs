@@ -1,4 +1,4 @@
-//! What a work tells beside its time.
+//! Facts of a work beside its time.
 
 use crate::protocol::Facts;
 

@@ -77,9 +77,11 @@ export const api = {
   rename: (label) => json("PUT", "/api/label", { label }),
   // `keepalive`: marks made just before the page is closed are saved, too.
   saveMarks: (id, marks) => json("PUT", `/api/images/${id}/marks`, marks, { keepalive: JSON.stringify(marks).length < MAX_KEEPALIVE_CHARS }),
-  proposeOutline: (id, box, clicks) => json("POST", `/api/images/${id}/outline`, { box, ...clicks }),
+  proposeOutline: (id, box, clicks) => json("POST", `/api/images/${id}/outline`, { box, clicks }),
   removeImage: (id) => send("DELETE", `/api/images/${id}`),
+  putBackImage: (id) => send("POST", `/api/images/${id}/put-back`),
   removeTrialPicture: (id) => send("DELETE", `/api/trial-pictures/${id}`),
+  putBackTrialPicture: (id) => send("POST", `/api/trial-pictures/${id}/put-back`),
   setAbsent: (id, absent) => json("PUT", `/api/trial-pictures/${id}/absent`, { absent }),
   useModel: (id) => send("PUT", `/api/models/${id}/current`),
   compareModels: (one, other) => inTurn(() => send("POST", `/api/models/${one}/compare/${other}`)),

@@ -1,17 +1,17 @@
 // Changes of marks: committed with a way back, saved at once.
 
 import { api, isLost, present } from "./api.js";
-import { boundsOf, boxPolygon, clamp, graspOf, gripperOf, placedAt } from "./geometry.js";
+import { boundsOf, boxPolygon, clamp, graspOf, gripperOf, isWithin, placedAt } from "./geometry.js";
 import { changed, image, marks, region, size, state } from "./store.js";
 import { toast } from "./toast.js";
 import { showBox } from "./view.js";
 
 /** Pixels are told to a hundredth. */
 const round = (_, value) => (typeof value === "number" ? Math.round(value * 100) / 100 : value);
-/** Gives what the server tells of a photo the page's own fields. */
+/** Gives what the server tells of a photo the page's own fields; `clicksOf`: the clicks that each proposed outline was found with. */
 export function adopt(view) {
   const committed = JSON.stringify(view.marks);
-  return { ...view, committed, sent: committed, past: [], future: [], revision: 0 };
+  return { ...view, committed, sent: committed, past: [], future: [], revision: 0, clicks: null, clicksOf: new Map() };
 }
 
 /** Makes the marks as they are now a step that can be undone, and saves them. */
@@ -34,6 +34,8 @@ function travel(from, to) {
   to(target).push(target.committed);
   target.committed = from(target).pop();
   target.marks = JSON.parse(target.committed);
+  // A click that is undone counts no more for the next one.
+  target.clicks = target.clicksOf.get(target.committed) ?? null;
   Object.assign(state, { draft: null, vertex: null });
   save(target);
   changed();
@@ -124,8 +126,7 @@ export function clickOutline(point, isInside) {
   const target = image();
   const box = target.marks.box ?? (target.marks.outline && boundsOf(target.marks.outline));
   if (!box) return toast("Draw a box around the part first: the outline is looked for in it.");
-  target.clicks ??= { inside: [], outside: [] };
-  target.clicks[isInside ? "inside" : "outside"].push(point);
+  target.clicks = [...(target.clicks ?? []), { at: point, is_inside: isInside }];
   // A place outside the box that belongs to the part makes the box larger.
   if (isInside && (point[0] < box[0] || point[1] < box[1] || point[0] > box[2] || point[1] > box[3])) {
     setBox(boundsOf([box.slice(0, 2), box.slice(2), point]));
@@ -145,7 +146,7 @@ export async function proposeOutline({ quietly = false, clicks = null } = {}) {
   state.proposing = true;
   changed();
   try {
-    const { outline } = await api.proposeOutline(target.id, box, clicks ?? { inside: [], outside: [] });
+    const { outline } = await api.proposeOutline(target.id, box, clicks ?? []);
     // Whoever has drawn on meanwhile is not overruled.
     const waited = target === image() && !(quietly && target.marks.outline);
     if (waited && !outline) {
@@ -154,7 +155,14 @@ export async function proposeOutline({ quietly = false, clicks = null } = {}) {
       target.marks.outline = outline;
       if (!target.marks.grasp) state.selected = "outline";
       commit();
+      target.clicksOf.set(target.committed, clicks);
+      const last = clicks?.at(-1);
       if (!clicks) toast("Found an outline. Click “In” or “Out” where it is wrong, or drag it.");
+      else if (!last.is_inside && isWithin(last.at, outline)) {
+        toast("That place has the part all around it. An outline is one line around the part and has no holes; a hole does no harm.");
+      } else if (last.is_inside && !isWithin(last.at, outline)) {
+        toast("That place does not hang together with the part. Click between it and the part, too, or draw the outline by hand.");
+      }
     }
   } catch (error) {
     if (!quietly) toast(error.message);

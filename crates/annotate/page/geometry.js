@@ -35,6 +35,14 @@ export function boundsOf(points) {
   return [Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)];
 }
 
+/** Whether a point lies within a polygon: a ray from it to the right crosses the polygon's edges an odd number of times. */
+export function isWithin([x, y], polygon) {
+  return polygon.filter(([bx, by], i) => {
+    const [ax, ay] = polygon.at(i - 1);
+    return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
+  }).length % 2 === 1;
+}
+
 /** Cuts a polygon at the line `dot(p, normal) = bound`, keeping what lies below. */
 function cut(polygon, normal, bound) {
   const kept = [];

@@ -16,7 +16,7 @@ const DOES = {
   A: "box and crop",
   B: "box and keypoints",
   D: "mask",
-  S: "instant",
+  S: "shape",
 };
 const ORDER = ["C", "A", "B", "D", "S"];
 

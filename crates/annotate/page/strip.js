@@ -24,15 +24,31 @@ export function openTrialPicture(index) {
   showCurrent();
 }
 
-/** Takes a photo, or a picture to try, out of the session; its file stays. */
-async function remove(entries, target, ask) {
+/** What the server says of all pictures to try and of the models, after one was taken out or put back. */
+function adoptSession(session) {
+  for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
+  state.models = session.models;
+}
+
+/** Takes a photo, or a picture to try, out of the session; its file stays, and it can be put back. */
+async function remove(entries, target, { takeOut, putBack, open }) {
   const index = entries.indexOf(target);
   try {
-    const session = await ask(target.id);
-    entries.splice(index, 1);
-    for (const view of session.trial_pictures) Object.assign(state.trialPictures.find((trial) => trial.id === view.id) ?? {}, view);
-    state.models = session.models;
-    toast(`${target.name} is taken out. Its file${entries === state.images ? " and its marks stay" : " stays"} in the folder.`);
+    const session = await takeOut(target.id);
+    entries.splice(entries.indexOf(target), 1);
+    adoptSession(session);
+    const back = async () => {
+      try {
+        const session = await putBack(target.id);
+        entries.splice(index, 0, target);
+        adoptSession(session);
+        open(index);
+      } catch (error) {
+        toast(error.message);
+      }
+    };
+    const stays = entries === state.images ? " and its marks stay" : " stays";
+    toast(`${target.name} is taken out. Its file${stays} in the folder.`, { text: "Put it back", run: back });
   } catch (error) {
     toast(error.message);
   }
@@ -41,8 +57,10 @@ async function remove(entries, target, ask) {
   showCurrent();
 }
 
-export const removePhoto = (target) => remove(state.images, target, api.removeImage);
-export const removeTrialPicture = (target) => remove(state.trialPictures, target, api.removeTrialPicture);
+export const removePhoto = (target) =>
+  remove(state.images, target, { takeOut: api.removeImage, putBack: api.putBackImage, open: openImage });
+export const removeTrialPicture = (target) =>
+  remove(state.trialPictures, target, { takeOut: api.removeTrialPicture, putBack: api.putBackTrialPicture, open: openTrialPicture });
 
 /** What is on the stage: address, size and words; null where there is nothing yet. */
 function onStage() {

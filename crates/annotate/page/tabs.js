@@ -48,8 +48,11 @@ for (const button of document.querySelectorAll("[data-next]")) {
 
 export function renderTabs() {
   const done = { mark: isMarked(), samples: false, teach: state.hasModel, try: state.images.length > 0 && state.trialPictures.some((s) => s.became !== null) };
+  // Where the way goes on: the button for it may be below what the panel shows.
+  const next = { mark: isMarked() && "samples", samples: "teach", teach: state.hasModel && "try" }[state.tab];
   for (const name of NAMES) {
     const open = name === state.tab;
+    tab(name).classList.toggle("next", name === next);
     tab(name).setAttribute("aria-selected", String(open));
     tab(name).tabIndex = open ? 0 : -1;
     tab(name).classList.toggle("done", Boolean(done[name]) && !open);

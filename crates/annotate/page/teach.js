@@ -18,7 +18,7 @@ const MODELS = [
 /** How often a part looks the same in a whole turn, each with a part that does. */
 const SHAPES = [
   ["1", "No", '<path d="M3 8h11l5 4-5 4H3z"/>'],
-  ["2", "Half a turn", '<path d="M3 9h5V5h8v4h5v6h-5v4H8v-4H3z" transform="translate(-1 0)"/>'],
+  ["2", "Half a turn: bar", '<path d="M2 8.5h20v7H2z"/>'],
   ["3", "A third", '<path d="m12 3 9 16H3z"/>'],
   ["4", "A quarter: square", '<path d="M4 4h16v16H4z"/>'],
   ["6", "A sixth: bolt head", '<path d="M7.5 4h9L21 12l-4.5 8h-9L3 12z"/>'],
@@ -141,7 +141,8 @@ function renderOutcome(news) {
   for (const name of ["good", "doubtful", "poor"]) outcome.classList.toggle(name, name === grade);
   let text = "";
   if (news.status === "done" && summary) {
-    text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)} Written to ${news.written_to}`;
+    const better = grade === "good" ? "" : " Try it on your own pictures: what is right or wrong there, said on the page, teaches it better, and so does a second photo.";
+    text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;
   by("teach-error").hidden = news.status !== "failed";

@@ -1,10 +1,26 @@
 // Short notes that go away by themselves.
 
 const SHOWN_MS = 3500;
+/** A note with a button has to be read, decided on and reached. */
+const SHOWN_WITH_BUTTON_MS = 12000;
 
-export function toast(text) {
+/** Shows `text`; with `action`, a `{ text, run }`, a button beside it. */
+export function toast(text, action = null) {
   const note = document.createElement("p");
   note.textContent = text;
   document.getElementById("toasts").append(note);
-  setTimeout(() => note.remove(), SHOWN_MS);
+  if (action) {
+    const button = Object.assign(document.createElement("button"), { textContent: action.text });
+    button.addEventListener("click", () => {
+      note.remove();
+      action.run();
+    });
+    note.append(button);
+  }
+  const end = () => {
+    // Whoever is about to press the button is not hurried.
+    if (note.matches(":hover, :focus-within")) setTimeout(end, SHOWN_MS);
+    else note.remove();
+  };
+  setTimeout(end, action ? SHOWN_WITH_BUTTON_MS : SHOWN_MS);
 }

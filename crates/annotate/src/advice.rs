@@ -22,6 +22,8 @@ const MAX_OPENING: f64 = 2.0;
 /// Jaws farther from the part than this share of its width were left wide open by mistake.
 const MAX_CLEARANCE: f64 = 1.0;
 
+const HAND_TOO_SMALL: &str = "The part is wider here than the hand opens. Hold it at another place, or turned.";
+
 /// What the marks of one picture suffice for.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Advice {
@@ -61,8 +63,8 @@ pub enum Fix {
     Box([f64; 4]),
 }
 
-/// Looks the marks over on a picture of `size` pixels.
-pub fn advise(marks: &Marks, size: [u32; 2]) -> Advice {
+/// Looks the marks over on a picture of `size` pixels, for a hand that opens so far in them where that is known.
+pub fn advise(marks: &Marks, size: [u32; 2], max_opening_px: Option<f64>) -> Advice {
     let lacks = |model: ModelKind| {
         let mut lacks = Vec::new();
         if !marks.has_object() {
@@ -79,7 +81,7 @@ pub fn advise(marks: &Marks, size: [u32; 2]) -> Advice {
     let models = ModelKind::ALL.map(|model| ModelAdvice { model, lacks: lacks(model) }).to_vec();
     let mut remarks = Vec::new();
     about_outline(marks, &mut remarks);
-    about_grasp(marks, &mut remarks);
+    about_grasp(marks, max_opening_px.unwrap_or(f64::INFINITY), &mut remarks);
     about_place(marks, size, &mut remarks);
     Advice { models, remarks }
 }
@@ -115,7 +117,7 @@ fn about_outline(marks: &Marks, remarks: &mut Vec<Remark>) {
     }
 }
 
-fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
+fn about_grasp(marks: &Marks, max_opening_px: f64, remarks: &mut Vec<Remark>) {
     let (Some(grasp), Some(part)) = (&marks.grasp, marks.region()) else { return };
     let gripper = Gripper { line: grasp.line(), jaw_width: grasp.jaw_width };
     if gripper.line.length() < MIN_LINE_PX {
@@ -142,11 +144,23 @@ fn about_grasp(marks: &Marks, remarks: &mut Vec<Remark>) {
             remarks.push(remark("gripper_along", text, None));
             return;
         }
+        if fitting > max_opening_px {
+            remarks.push(remark("hand_too_small", HAND_TOO_SMALL, None));
+            return;
+        }
         let text = "The gripper is too narrow: a jaw would come down on the part. Open it.";
         remarks.push(remark("gripper_narrow", text, Some(Fix::JawWidth(fitting))));
     } else if marks.outline.is_some() && grasp.jaw_width > fitting * (1.0 + MAX_CLEARANCE) {
         let text = "The jaws stand far from the part. Close them until they almost touch it.";
         remarks.push(remark("gripper_wide", text, Some(Fix::JawWidth(fitting))));
+    } else if grasp.jaw_width > max_opening_px {
+        // With an outline, what the part needs is known; the box is wider than a part that lies askew.
+        let (text, fix) = if marks.outline.is_some() && fitting > max_opening_px {
+            (HAND_TOO_SMALL, None)
+        } else {
+            ("The hand does not open so far. Close the jaws.", Some(Fix::JawWidth(max_opening_px.floor().max(1.0))))
+        };
+        remarks.push(remark("hand_too_small", text, fix));
     }
 }
 
@@ -181,7 +195,7 @@ mod tests {
     }
 
     fn codes(marks: &Marks) -> Vec<&'static str> {
-        advise(marks, SIZE).remarks.iter().map(|remark| remark.code).collect()
+        advise(marks, SIZE, None).remarks.iter().map(|remark| remark.code).collect()
     }
 
     fn with_grasp(start: [f64; 2], end: [f64; 2], jaw_width: f64) -> Marks {
@@ -190,14 +204,30 @@ mod tests {
 
     #[test]
     fn good_marks_suffice_for_all_and_earn_no_remark() {
-        let advice = advise(&good(), SIZE);
+        let advice = advise(&good(), SIZE, None);
         assert!(advice.models.iter().all(|model| model.lacks.is_empty()));
         assert!(advice.remarks.is_empty(), "{advice:?}");
     }
 
     #[test]
+    fn jaws_open_no_farther_than_the_hand() {
+        let told = |marks: &Marks, hand: f64| {
+            let remarks = advise(marks, SIZE, Some(hand)).remarks;
+            remarks.first().map(|remark| (remark.code, remark.fix))
+        };
+        // The part is 60 px high.
+        assert_eq!(told(&good(), 80.0), None);
+        assert_eq!(told(&good(), 50.0), Some(("hand_too_small", None)));
+        let narrow = with_grasp([180.0, 130.0], [220.0, 130.0], 30.0);
+        assert_eq!(told(&narrow, 80.0), Some(("gripper_narrow", Some(Fix::JawWidth(60.0)))));
+        assert_eq!(told(&narrow, 50.0), Some(("hand_too_small", None)));
+        let wide = with_grasp([180.0, 130.0], [220.0, 130.0], 90.0);
+        assert_eq!(told(&wide, 80.5), Some(("hand_too_small", Some(Fix::JawWidth(80.0)))));
+    }
+
+    #[test]
     fn what_is_missing_is_named_for_each_model() {
-        let lacks = |marks: &Marks| advise(marks, SIZE).models.into_iter().map(|m| m.lacks).collect::<Vec<_>>();
+        let lacks = |marks: &Marks| advise(marks, SIZE, None).models.into_iter().map(|m| m.lacks).collect::<Vec<_>>();
         let no_outline = Marks { outline: None, ..good() };
         assert_eq!(lacks(&no_outline), [vec![], vec![], vec![], vec!["the outline"], vec![]]);
         let nothing = lacks(&Marks::default());
@@ -210,7 +240,7 @@ mod tests {
     #[test]
     fn a_narrow_gripper_is_told_and_the_remedy_passes() {
         let narrow = with_grasp([180.0, 130.0], [220.0, 130.0], 40.0);
-        let advice = advise(&narrow, SIZE);
+        let advice = advise(&narrow, SIZE, None);
         assert_eq!(advice.remarks[0].code, "gripper_narrow");
         let Some(Fix::JawWidth(jaw_width)) = advice.remarks[0].fix else { panic!("{advice:?}") };
         assert_eq!(codes(&with_grasp([180.0, 130.0], [220.0, 130.0], jaw_width)), [""; 0]);
@@ -220,7 +250,7 @@ mod tests {
     fn jaws_along_the_part_are_to_be_turned_and_not_opened() {
         // Across the part's length of 200 px, where 60 would do the other way round.
         let along = with_grasp([200.0, 110.0], [200.0, 150.0], 66.0);
-        let advice = advise(&along, SIZE);
+        let advice = advise(&along, SIZE, None);
         assert_eq!((advice.remarks[0].code, advice.remarks[0].fix), ("gripper_along", None));
     }
 
@@ -234,7 +264,7 @@ mod tests {
 
     #[test]
     fn an_outline_that_misses_the_box_is_told_and_a_box_is_never_shrunk() {
-        let remark = |bbox: [f64; 4]| advise(&Marks { bbox: Some(bbox), ..good() }, SIZE).remarks.remove(0);
+        let remark = |bbox: [f64; 4]| advise(&Marks { bbox: Some(bbox), ..good() }, SIZE, None).remarks.remove(0);
         let apart = remark([400.0, 300.0, 500.0, 400.0]);
         assert_eq!((apart.code, apart.fix), ("outline_misses_box", None));
         // An outline of half of the part, in the right box.

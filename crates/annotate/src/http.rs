@@ -79,7 +79,7 @@ pub struct Response {
     pub status: u16,
     /// The body's media type.
     pub media_type: &'static str,
-    /// The body.
+    /// What follows the head.
     pub body: Cow<'static, [u8]>,
     /// Further headers.
     pub headers: Vec<(&'static str, String)>,

@@ -27,7 +27,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Reads and decodes the file once, so that everything wrong with it is told now.
+    /// Reads and decodes the file once, so that everything wrong with it is reported now.
     ///
     /// # Errors
     /// A file that cannot be read or is no picture.

@@ -32,10 +32,10 @@ use crate::session::Session;
 /// Between looks at whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 /// A connection on which nothing comes, or takes nothing, for so long is closed.
-const PATIENCE: Duration = Duration::from_secs(30);
+const MAX_WAIT: Duration = Duration::from_secs(30);
 /// How long the body of what is refused is read and dropped: a connection that is closed on unread bytes is reset, and
 /// the refusal may be lost.
-const LINGER: Duration = Duration::from_secs(2);
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Longer heads than any browser sends to a page of ours.
 const MAX_HEAD_BYTES: usize = 16 << 10;
 const MAX_HEADERS: usize = 64;
@@ -67,7 +67,7 @@ impl Server {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
         let service = Service { guard: Arc::new(Guard::new(port, session.token())?), session: Arc::new(session) };
-        Ok(Self { listener, port, patience: PATIENCE, service })
+        Ok(Self { listener, port, patience: MAX_WAIT, service })
     }
 
     /// Closes connections after so long a silence, instead of half a minute.
@@ -151,7 +151,7 @@ impl Service {
         let head = match self.admit(&parts, &body) {
             Ok(head) => head,
             Err(mut refusal) => {
-                let _ = timeout(LINGER, async { while let Some(Ok(_)) = body.frame().await {} }).await;
+                let _ = timeout(CLOSE_TIMEOUT, async { while let Some(Ok(_)) = body.frame().await {} }).await;
                 refusal.headers.push(("Connection", "close".into()));
                 return Ok(with_policy(refusal).into_hyper());
             }
@@ -159,7 +159,7 @@ impl Service {
         let is_page = head.path == "/";
         let request = Request { head, body: read_body(body, patience).await? };
         let session = self.session;
-        // What breaks in one request is told to the page, and the terminal has said more.
+        // A panic in one request is an error of that request alone; the terminal has its message.
         let answered = tokio::task::spawn_blocking(move || routes::answer(&session, &request)).await;
         let mut response = answered.unwrap_or_else(|_| routes::broken());
         if is_page {

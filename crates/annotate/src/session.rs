@@ -43,6 +43,8 @@ pub struct SessionOptions {
     pub project: Option<PathBuf>,
     /// The key to the page, for a server that is to be found again by the same page; a new one without it.
     pub token: Option<String>,
+    /// How far the hand opens, in pixels of a photo where the part lies; `None` where no camera tells.
+    pub max_opening_px: Option<f64>,
 }
 
 fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
@@ -151,6 +153,7 @@ impl Session {
             models,
             project: options.project.clone(),
             removed_earlier: project.removed,
+            max_opening_px: options.max_opening_px,
         };
         state.save_project()?;
         Ok(Self {
@@ -305,7 +308,8 @@ impl Session {
     /// No such picture, one that is a demonstration, a project that cannot be written.
     pub fn set_absent(&self, trial_id: usize, is_absent: bool) -> Result<TrialPictureView> {
         let mut state = self.state();
-        if state.trial_picture(trial_id)?.became.is_some() {
+        state.trial_picture(trial_id)?;
+        if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration: remove that first"));
         }
         state.trial_pictures[trial_id].is_absent = is_absent;
@@ -321,7 +325,18 @@ impl Session {
         let mut state = self.state();
         state.image(id)?;
         state.images[id].is_removed = true;
-        state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|trial| trial.became = None);
+        state.save_project()
+    }
+
+    /// Puts a photo back that was taken out in this session. The tried picture that it was made of is a demonstration again.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn put_back_image(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        let count = state.images.len();
+        state.images.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
+        state.trial_pictures.iter_mut().filter(|trial| trial.became == Some(id)).for_each(|t| t.is_absent = false);
         state.save_project()
     }
 
@@ -333,6 +348,17 @@ impl Session {
         let mut state = self.state();
         state.trial_picture(id)?;
         state.trial_pictures[id].is_removed = true;
+        state.save_project()
+    }
+
+    /// Puts a picture to try back that was taken out in this session.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn put_back_trial_picture(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        let count = state.trial_pictures.len();
+        state.trial_pictures.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
         state.save_project()
     }
 
@@ -359,19 +385,20 @@ impl Session {
         let (models, pictures) = {
             let state = self.state();
             let read = |id: usize| Ok::<_, Error>((state.models.read(id)?, state.models.get(id)?.summary.clone()));
-            let pictures: Vec<_> = state.trial_ids().map(|id| (id, state.trial_pictures[id].clone())).collect();
+            let tried = |id: usize| (id, state.trial_pictures[id].clone(), state.became(id).is_some());
+            let pictures: Vec<_> = state.trial_ids().map(tried).collect();
             ([read(one)?, read(other)?], pictures)
         };
         let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
         let models = [one?, other?];
-        let compared = pictures.into_iter().map(|(id, trial)| {
+        let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
             let pixels = trial.picture.pixels()?;
             let found = |model: &dyn TaughtModel| {
                 let found = model.detect(&pixels).map_err(Error::Teacher)?;
                 let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
                 Ok::<_, Error>((found.iter().filter(|one| one.is_accepted).count(), best))
             };
-            let is_there = if trial.is_absent { Some(false) } else { trial.became.map(|_| true) };
+            let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
             Ok(ComparedPicture {
                 id,
                 name: trial.picture.name,
@@ -390,7 +417,7 @@ impl Session {
     pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
         let mut state = self.state();
         let trial = state.trial_picture(trial_id)?.clone();
-        if trial.became.is_some() {
+        if state.became(trial_id).is_some() {
             return Err(Error::Busy("this picture is a demonstration already"));
         }
         let is_in_project = state.project.is_some();
@@ -536,9 +563,10 @@ impl Session {
     /// # Errors
     /// None is marked, or one only in part.
     pub fn demonstrations(&self, model: ModelKind) -> Result<Vec<Demonstration>> {
-        let (label, marked) = {
+        let (label, marked, max_opening_px) = {
             let state = self.state();
-            (state.label.clone(), state.image_ids().map(|id| state.images[id].clone()).collect::<Vec<_>>())
+            let marked: Vec<_> = state.image_ids().map(|id| state.images[id].clone()).collect();
+            (state.label.clone(), marked, state.max_opening_px)
         };
         let begun: Vec<_> = marked.iter().filter(|image| image.marks != Marks::default()).collect();
         if begun.is_empty() {
@@ -546,7 +574,7 @@ impl Session {
             return Err(Error::NotMarked { name, expected: "a box and a grasp", found: "no marks" });
         }
         for image in &begun {
-            let advice = advise(&image.marks, image.picture.size);
+            let advice = advise(&image.marks, image.picture.size, max_opening_px);
             let lacks = advice.models.iter().find(|advice| advice.model == model).map(|advice| &advice.lacks);
             if let Some(&missing) = lacks.and_then(|lacks| lacks.first()) {
                 let name = image.picture.name.clone();

@@ -26,6 +26,8 @@ pub struct State {
     pub project: Option<PathBuf>,
     /// Names of pictures of that folder that were removed earlier.
     pub removed_earlier: BTreeSet<String>,
+    /// How far the hand opens, where a camera tells.
+    pub max_opening_px: Option<f64>,
 }
 
 /// A picture of the object and what is marked on it.
@@ -44,7 +46,7 @@ pub struct MarkedPicture {
 pub struct TrialPicture {
     pub picture: Picture,
     pub uploaded: bool,
-    /// The number of the marked picture that it became.
+    /// The number of the marked picture that it became, which may have been taken out since: [`State::became`].
     pub became: Option<usize>,
     /// The person said that the part is not there.
     pub is_absent: bool,
@@ -69,6 +71,11 @@ impl State {
         there.ok_or(Error::NoSuchPicture { id, count: self.trial_pictures.len() })
     }
 
+    /// The marked picture that a tried one became, as long as it is there.
+    pub fn became(&self, trial_id: usize) -> Option<usize> {
+        self.trial_pictures[trial_id].became.filter(|&id| !self.images[id].is_removed)
+    }
+
     /// Adds a picture with marks that are not saved yet, and says its number.
     pub fn add_image(&mut self, picture: Picture, marks: Marks) -> Result<usize> {
         let opened = annotation_file::open(&picture.path, None, picture.size)?;
@@ -90,14 +97,14 @@ impl State {
     pub fn image_view(&self, id: usize) -> ImageView {
         let MarkedPicture { picture, marks, note, saved, .. } = &self.images[id];
         let Picture { name, size: [width, height], .. } = picture.clone();
-        let advice = advise(marks, picture.size);
+        let advice = advise(marks, picture.size, self.max_opening_px);
         ImageView { id, name, width, height, marks: marks.clone(), saved: saved.clone(), advice, note: note.clone() }
     }
 
     pub fn trial_picture_view(&self, id: usize) -> TrialPictureView {
-        let TrialPicture { picture, became, is_absent, .. } = &self.trial_pictures[id];
+        let TrialPicture { picture, is_absent, .. } = &self.trial_pictures[id];
         let Picture { name, size: [width, height], .. } = picture.clone();
-        TrialPictureView { id, name, width, height, became: *became, is_absent: *is_absent }
+        TrialPictureView { id, name, width, height, became: self.became(id), is_absent: *is_absent }
     }
 
     /// Numbers of the pictures that are there.
@@ -157,12 +164,13 @@ impl State {
             current_model: self.models.current,
             ..ProjectFile::default()
         };
-        for trial in self.trial_ids().map(|id| &self.trial_pictures[id]) {
+        for id in self.trial_ids() {
+            let trial = &self.trial_pictures[id];
             file.tried.push(Tried {
                 file: name(&trial.picture),
                 name: trial.picture.name.clone(),
                 absent: trial.is_absent,
-                became: trial.became.map(|id| name(&self.images[id].picture)),
+                became: self.became(id).map(|id| name(&self.images[id].picture)),
             });
         }
         file.removed.extend(self.images.iter().filter(|i| i.is_removed).map(|i| name(&i.picture)));

@@ -67,7 +67,7 @@ pub struct News {
 struct Pace {
     /// Every so many points of the loss curve are kept.
     stride: usize,
-    /// When its first step was told, and how many were done then.
+    /// When its first step was reported, and how many were done then.
     since_secs: f64,
     since_done: usize,
 }

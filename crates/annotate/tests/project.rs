@@ -126,6 +126,15 @@ fn what_is_taken_out_stays_out_and_its_file_stays() {
     let view = served.ask("DELETE", "/api/images/1", b"").json();
     assert_eq!((view["images"].as_array().unwrap().len(), &view["trial_pictures"][0]["became"]), (1, &Value::Null));
     assert_eq!(served.ask("GET", "/api/images/1/picture", b"").status, 404);
+    // Put back, each is what it was; the photo's picture is a demonstration again.
+    let view = served.ask("POST", "/api/images/1/put-back", b"").json();
+    assert_eq!((&view["images"][1]["name"], &view["trial_pictures"][0]["became"]), (&json!("table.png"), &json!(1)));
+    served.ask("DELETE", "/api/trial-pictures/1", b"").json();
+    let view = served.ask("POST", "/api/trial-pictures/1/put-back", b"").json();
+    assert_eq!(view["trial_pictures"][1]["name"], "other.png");
+    assert_eq!(served.ask("POST", "/api/images/7/put-back", b"").status, 404);
+
+    served.ask("DELETE", "/api/images/1", b"").json();
     served.ask("DELETE", "/api/trial-pictures/1", b"").json();
     let served = Served::of_project(served.end());
     let again = get(&served);

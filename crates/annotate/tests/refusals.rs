@@ -1,4 +1,4 @@
-//! Who is turned away, on the real server.
+//! Requests that are refused, on the real server.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod served;

@@ -1,4 +1,4 @@
-//! A camera's file changed where we know what it says, and left as it is elsewhere: comments, and fields of other programs.
+//! Changes in a camera's file that leave the rest as it is: comments, and fields of other programs.
 //!
 //! A section is a line that begins with its name and the indented lines below it, as every tool writes `camera_info`.
 

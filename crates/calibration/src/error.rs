@@ -103,14 +103,14 @@ pub enum CalibrationError {
          agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
     )]
     BoardUnclear { corners: usize },
-    /// The board has more squares than told.
+    /// The board has more squares than expected.
     #[error(
         "expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}: give its squares with --squares"
     )]
     OtherBoard {
-        /// Squares along x, as told.
+        /// Squares along x, as expected.
         columns: u32,
-        /// Squares along y, as told.
+        /// Squares along y, as expected.
         rows: u32,
         /// Squares along x, at least.
         found_columns: u32,

@@ -24,10 +24,10 @@ const CAMERA: PinholeCamera = PinholeCamera {
     cy: 238.0,
     lens: PlumbBob { k1: -0.1, k2: 0.04, p1: 0.0005, p2: -0.0004, k3: 0.0 },
 };
-/// The bounds, with exact robot poses.
+/// Bounds of place and angle with exact robot poses; docs/calibration.md has the figures.
 const MAX_ERROR_M: f64 = 0.0005;
 const MAX_ERROR_DEG: f64 = 0.1;
-/// The noise.
+/// Standard deviations of the simulated noise.
 const CORNER_SIGMA_PX: f64 = 0.3;
 const ROBOT_SIGMA_M: f64 = 0.0001;
 const ROBOT_SIGMA_DEG: f64 = 0.05;

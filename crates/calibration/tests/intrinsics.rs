@@ -17,7 +17,7 @@ use sdg_geometry::PinholeCamera;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-/// The bounds: reprojection over OpenCV's, and the focal length's error.
+/// Bounds: the reprojection error over OpenCV's, and the relative error of the focal length.
 const MAX_RMS_RATIO: f64 = 1.1;
 const MAX_FOCAL_ERROR: f64 = 0.002;
 /// Both optimisers on the same corners: they end where steps change nothing more, OpenCV after 30 steps or at 2.2e-16.

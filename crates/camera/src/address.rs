@@ -27,22 +27,22 @@ use crate::http::Url;
 /// must be followed by one more `?`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Address {
-    /// A V4L2 node.
+    /// `v4l:`, a camera of Video4Linux 2.
     V4l(NodeName),
-    /// A server.
+    /// `http://`, a server of motion JPEG or of single pictures.
     Http(Url),
-    /// A program.
+    /// `cmd:`, a program that writes pictures to its standard output.
     Command(CommandLine),
     /// The pictures in a folder.
     Folder {
-        /// The folder.
+        /// Where the pictures are; read in the order of their names.
         path: PathBuf,
         /// How they are played.
         playback: Playback,
     },
-    /// One picture.
+    /// `file:`, a single picture.
     File {
-        /// The file.
+        /// A picture in any of the formats that are read.
         path: PathBuf,
         /// How it is played.
         playback: Playback,

@@ -16,7 +16,7 @@ use crate::source::{Missing, Source, Taken};
 /// Between looks at a folder for new files.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// A file that does not decode is taken to be still written until its length stays the same for so long.
-const SETTLE_TIME: Duration = Duration::from_millis(500);
+const UNCHANGED_TIME: Duration = Duration::from_millis(500);
 /// What is read as a picture.
 const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "ppm", "webp", "bmp", "tif", "tiff"];
 
@@ -110,7 +110,7 @@ impl Source for Folder {
             }
         };
         self.next_at = Instant::now() + self.playback.interval.unwrap_or_default();
-        let read = read_settled(&path);
+        let read = read_finished(&path);
         self.mark_played(&path);
         match read {
             Ok((picture, captured)) => Ok(Some(Taken { picture, captured, num_skipped: 0 })),
@@ -134,8 +134,8 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
 }
 
 /// Reads a picture; where it does not decode and still grows, again until it does. With the time of its last change.
-fn read_settled(path: &Path) -> Result<(image::RgbImage, SystemTime), String> {
-    let mut settled: Option<(u64, Instant)> = None;
+fn read_finished(path: &Path) -> Result<(image::RgbImage, SystemTime), String> {
+    let mut unchanged: Option<(u64, Instant)> = None;
     loop {
         let mut bytes = Vec::new();
         let file = File::open(path).map_err(|error| error.to_string())?;
@@ -146,14 +146,14 @@ fn read_settled(path: &Path) -> Result<(image::RgbImage, SystemTime), String> {
             Ok(picture) => return Ok((picture, changed.unwrap_or_else(|_| SystemTime::now()))),
             Err(found) => found,
         };
-        match settled {
-            Some((length, since)) if length == read as u64 && since.elapsed() >= SETTLE_TIME => return Err(found),
+        match unchanged {
+            Some((length, since)) if length == read as u64 && since.elapsed() >= UNCHANGED_TIME => return Err(found),
             Some((length, _)) if length == read as u64 => {}
-            _ => settled = Some((read as u64, Instant::now())),
+            _ => unchanged = Some((read as u64, Instant::now())),
         }
         // A file that was finished long ago is not being written.
         let age = changed.ok().and_then(|changed| changed.elapsed().ok());
-        if age.is_some_and(|age| age > SETTLE_TIME * 4) {
+        if age.is_some_and(|age| age > UNCHANGED_TIME * 4) {
             return Err(found);
         }
         sleep(LOOK_EVERY);

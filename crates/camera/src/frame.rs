@@ -12,7 +12,7 @@ use crate::fault::Fault;
 /// A picture, when it was taken and by which camera.
 #[derive(Clone)]
 pub struct Frame {
-    /// The picture.
+    /// The pixels, decoded to RGB.
     pub picture: RgbImage,
     /// Counted by the camera from 0; a gap means frames that were not delivered.
     pub number: u64,

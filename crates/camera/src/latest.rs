@@ -57,7 +57,7 @@ impl LatestFrame {
                     Ok(Some(mut frame)) => {
                         if let Some(dropped) = newest.frame.take() {
                             newest.num_dropped += 1;
-                            // These are told once; who missed the frame must learn of them all the same.
+                            // These are reported once, so that they are kept for a caller that missed the frame.
                             let once = |fault: &Fault| matches!(fault, Fault::Back { .. } | Fault::OtherSize { .. });
                             frame.faults.extend(dropped.faults.into_iter().filter(once));
                         }

@@ -1,4 +1,4 @@
-//! What a camera is asked for.
+//! The options of a camera.
 
 use std::time::Duration;
 

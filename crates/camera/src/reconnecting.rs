@@ -46,7 +46,7 @@ impl Reconnecting {
     /// Opens the first connection.
     ///
     /// # Errors
-    /// Those of the opener: an address that is wrong is told at once.
+    /// Those of the opener: a wrong address is an error at once.
     pub(crate) fn open(name: Arc<str>, mut opener: Opener, stall_timeout: Duration) -> Result<Self, CameraError> {
         let source = opener(Instant::now() + stall_timeout)?;
         Ok(Self {

@@ -1,4 +1,4 @@
-//! `cmd:`: programs that write pictures, die, hang, or do not exist.
+//! `cmd:`: programs that write pictures, end, hang, or do not exist.
 #![allow(clippy::unwrap_used)]
 
 use std::fs;

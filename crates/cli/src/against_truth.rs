@@ -1,4 +1,4 @@
-//! A grasp found in a picture against the simulator's truth: where it leads the hand, and how far beside.
+//! A grasp found in a picture against the simulator's truth: where it leads the hand, and the error of place and angle.
 //!
 //! Rehearsals, tried pictures and evaluations all measure by this.
 

@@ -14,7 +14,7 @@ const FOLDERS_UP: usize = 3;
 
 /// An annotation file that was read, with what stands beside it.
 pub struct AnnotationFile {
-    /// What the content says that it is.
+    /// The format by the content.
     pub format: AnnotationFormat,
     path: PathBuf,
     bytes: Vec<u8>,

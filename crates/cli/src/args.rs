@@ -28,7 +28,6 @@ pub struct Args {
     pub command: Command,
 }
 
-/// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Teach a shipped object from one photo, then grasp it in simulation

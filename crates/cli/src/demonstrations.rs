@@ -41,7 +41,7 @@ fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     if argument.is_empty() {
         return Err(Usage("--demo: expected IMAGE or IMAGE:ANNOTATION, found nothing".to_owned()).into());
     }
-    // A photo that is not there is told as that, not as one without marks.
+    // A missing photo is reported as missing, not as one without marks.
     files::check_readable(photo)?;
     Ok((photo.to_owned(), beside_photo(photo)?))
 }

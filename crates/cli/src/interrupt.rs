@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks to end with what there is, the second ends at once.
+//! Ctrl-C: the first ends the run with what there is, the second at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -8,7 +8,7 @@ use sdg_simulation::objects::{Extrusion, ObjectSpec};
 use crate::exit::Usage;
 use crate::shared_args::OwnPartArgs;
 
-/// Between plastic and aluminium, in kg/m³: what a part weighs of which nothing is told.
+/// Between plastic and aluminium, in kg/m³: the density of a part without a given mass.
 const ASSUMED_DENSITY: f64 = 1500.0;
 /// That of most shipped parts.
 const ASSUMED_FRICTION: f64 = 0.6;
@@ -21,7 +21,7 @@ const MAX_ASSUMED_KG: f64 = 3.0;
 pub struct OwnPart {
     pub object: ObjectSpec,
     pub model: GraspModel,
-    /// What it is made from, told and assumed, for people.
+    /// What it is made from, given and assumed, for people.
     pub facts: String,
 }
 
@@ -29,7 +29,7 @@ impl OwnPartArgs {
     /// Makes the part; `model_file` names the model in errors.
     ///
     /// # Errors
-    /// [`Usage`] where height or length are neither told nor known; a part that no simulated hand can take.
+    /// [`Usage`] where height or length are neither given nor known; a part that no simulated hand can take.
     pub fn make(&self, model: GraspModel, model_file: &str) -> Result<OwnPart> {
         let known = model.facts().lengths;
         let demonstration = model.demonstrations()[0].clone();

@@ -19,7 +19,7 @@ use crate::live_pictures;
 /// core, before anybody has seen it.
 const FILES_INTERVAL: Duration = Duration::from_millis(200);
 /// A torn frame is a fault only when no whole one has come for so long: single ones are common with cheap cameras.
-const TORN_PATIENCE: Duration = Duration::from_secs(1);
+const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
 /// The newest picture of a camera that a thread reads for as long as the process runs.
 #[derive(Debug)]
@@ -80,7 +80,7 @@ fn lock(newest: &Mutex<Newest>) -> MutexGuard<'_, Newest> {
 }
 
 impl Newest {
-    /// Takes what the camera gave, and says whether there will be nothing more.
+    /// Takes what the camera gave; true where nothing more will come.
     fn has_ended_with(&mut self, next: Result<Option<sdg_camera::Frame>, CameraError>) -> bool {
         let fault = |kind, text: String| Some(LiveFault { kind, text });
         match next {
@@ -99,7 +99,7 @@ impl Newest {
                 true
             }
             Err(error) => {
-                let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < TORN_PATIENCE);
+                let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < MAX_TORN_AGE);
                 match error.fault() {
                     Some(Fault::Torn { .. }) if is_recent => {}
                     Some(passing) => self.fault = live_fault(passing),
@@ -111,7 +111,7 @@ impl Newest {
     }
 }
 
-/// What the page tells of a fault; `None` for what does not matter on it.
+/// The page's text for a fault; `None` for what does not matter on it.
 fn live_fault(fault: &Fault) -> Option<LiveFault> {
     let kind = match fault {
         Fault::Stale { .. } => LiveFaultKind::Stale,

@@ -101,7 +101,6 @@ impl PictureDetector {
         }
     }
 
-    /// The model.
     pub fn model(&self) -> &GraspModel {
         match self {
             Self::AnyCamera(model) => model,

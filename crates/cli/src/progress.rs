@@ -54,14 +54,14 @@ impl EvaluationProgress {
         counted.done += 1;
         let (done, of) = (counted.done, counted.of);
         // Under the lock, so that lines stand in the order of their numbers.
-        self.say(&format!("[{done}/{of}, {:.0} s] {what}", self.started.elapsed().as_secs_f64()));
+        self.print_line(&format!("[{done}/{of}, {:.0} s] {what}", self.started.elapsed().as_secs_f64()));
         if let Some(bar) = &self.bar {
             bar.inc(1);
         }
     }
 
     /// A line of its own.
-    pub fn say(&self, text: &str) {
+    pub fn print_line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
             None => eprintln!("{text}"),

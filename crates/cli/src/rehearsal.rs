@@ -1,4 +1,4 @@
-//! Grasp attempts with a model in the simulated workcell, and what became of them.
+//! Grasp attempts with a model in the simulated workcell, and their outcomes.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -142,7 +142,8 @@ impl Rehearsal<'_> {
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
         let mut workcell =
             Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
-        let mut perception = ModelPerception { rehearsal: self, told: self.told(number), detector: None, last: None };
+        let mut perception =
+            ModelPerception { rehearsal: self, assumed: self.assumed(number), detector: None, last: None };
         let config = AttemptConfig { record, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
@@ -157,12 +158,12 @@ impl Rehearsal<'_> {
         Ok(RehearsedAttempt { attempt, looks, frames, view: perception.last })
     }
 
-    /// The part as the robot is told of it in an attempt.
-    fn told(&self, number: usize) -> ObjectSpec {
+    /// The part as the robot takes it to be in an attempt, with the error of its height.
+    fn assumed(&self, number: usize) -> ObjectSpec {
         let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let mut told = self.object.clone();
-        told.mark_height_m += sign * self.errors.mark_height_m;
-        told
+        let mut assumed = self.object.clone();
+        assumed.mark_height_m += sign * self.errors.mark_height_m;
+        assumed
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
@@ -224,7 +225,7 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
 /// The model as the workcell's perception.
 struct ModelPerception<'a> {
     rehearsal: &'a Rehearsal<'a>,
-    told: ObjectSpec,
+    assumed: ObjectSpec,
     /// With a calibrated camera: ready since the first picture.
     detector: Option<PlanDetector>,
     last: Option<RgbImage>,
@@ -260,7 +261,7 @@ impl Perception for ModelPerception<'_> {
             jaw_width_m: pose.jaw_width_m,
             score: best.score,
         };
-        match grasp_pose(&self.told, &view.camera, &best.grasp) {
+        match grasp_pose(&self.assumed, &view.camera, &best.grasp) {
             Ok(pose) => Ok(Some(target(pose))),
             // What is nothing in all likelihood needs no pose.
             Err(_) if !best.is_accepted() => Ok(None),

@@ -67,7 +67,6 @@ pub struct SizeTolerance {
 }
 
 impl SizeTolerance {
-    /// As a range.
     pub fn range(self) -> std::ops::RangeInclusive<f64> {
         self.low..=self.high
     }

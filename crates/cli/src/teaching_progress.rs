@@ -138,7 +138,7 @@ fn left_secs(elapsed_secs: f64, done: usize, planned: usize) -> Option<f64> {
     (done < planned).then(|| elapsed_secs / done as f64 * (planned - done) as f64)
 }
 
-/// Minutes and seconds, as a clock shows them; what is left is never told as nothing.
+/// Minutes and seconds, as a clock shows them; a remaining time is never shown as zero.
 fn clock(secs: f64) -> String {
     let secs = secs.ceil() as u64;
     format!("{}:{:02}", secs / 60, secs % 60)

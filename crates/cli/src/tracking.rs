@@ -4,7 +4,7 @@
 //! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
 //!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
 //! ```
-//! A search takes as long as it takes, and what it found is carried forward. So that a test gives the same output on any machine,
+//! The duration of a search varies, and what it found is carried forward. So that a test gives the same output on any machine,
 //! [`SearchTime::Frames`] runs each search on the caller's thread and hands its outcome over a fixed number of frames later.
 
 use std::sync::Arc;
@@ -126,7 +126,7 @@ impl Drop for LiveTracker {
         if let Searches::Threaded { due, thread, .. } = &mut self.searches {
             due.take();
             if let Some(thread) = thread.take() {
-                // A search that panicked has said so itself.
+                // The message of a panic in a search was printed already.
                 let _ = thread.join();
             }
         }

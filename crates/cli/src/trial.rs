@@ -15,7 +15,7 @@ pub const RIGHT_MM: f64 = 10.0;
 /// Largest turn at which a detection counts as right, in degrees.
 pub const RIGHT_DEGREES: f64 = 10.0;
 
-/// One picture and what the model said of it.
+/// One picture and the model's detections in it.
 pub struct Trial {
     /// The picture with all detections drawn on it.
     pub drawn: RgbImage,

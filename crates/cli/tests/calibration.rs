@@ -17,7 +17,7 @@ use sdg_geometry::PinholeCamera;
 use serde_json::Value;
 use support::{Folder, sdg, stdout};
 
-/// The focal length from 15 pictures, as a share: the bound.
+/// The focal length from 15 pictures, as a share of itself.
 const MAX_FOCAL_ERROR: f64 = 0.002;
 /// The camera over the table with intrinsics that are off by that much, from 0.3 m.
 const MAX_PLACE_ERROR_M: f64 = 0.001;

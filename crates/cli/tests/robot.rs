@@ -1,13 +1,12 @@
-//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and who is asked before anything moves.
+//! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and the question before anything moves.
 #![allow(clippy::unwrap_used)]
 
+mod simulated_arm;
 mod support;
 
 use std::fs;
-use std::io::{BufRead, BufReader};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_geometry::PinholeCamera;
@@ -17,6 +16,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
 use serde_json::Value;
+use simulated_arm::Simulated;
 use support::sdg;
 
 fn shipped(name: &str) -> PathBuf {
@@ -240,39 +240,6 @@ fn a_robot_of_another_model_than_the_workcells_is_refused() {
     let arguments = ["robot", "home", "--robot", &simulated.address, "--workcell", text(&workcell), "--no-realtime"];
     let expected = "model of the robot: expected \"fr3\", as the workcell's file says, found a robot that speaks the protocol of \"panda\"";
     assert_refused(&arguments, 1, &[expected]);
-}
-
-/// A simulated Panda on the network, as another program would start it; ended when dropped.
-struct Simulated {
-    child: Child,
-    address: String,
-}
-
-impl Simulated {
-    fn start(further: &[&str]) -> Self {
-        // Two neighbouring ports that are free now.
-        let port = (20_000 + std::process::id() as u16 % 20_000..60_000)
-            .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
-            .unwrap()
-            .to_string();
-        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
-            .args(["simulate", "--fci", "--lockstep", "--json", "--port", &port])
-            .args(further)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        assert!(line.contains(&port), "{line}");
-        Self { child, address: format!("127.0.0.1:{port}") }
-    }
-}
-
-impl Drop for Simulated {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
 }
 
 /// The command that a real arm is driven by: a live camera beside the robot, detection, the arm over TCP and UDP.

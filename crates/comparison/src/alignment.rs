@@ -2,7 +2,7 @@
 //!
 //! Every cell of the demonstration's map has a cosine with each cell of the picture's map within the network's reach. What
 //! is looked for is the shift, turn and size under which the cosines of the part's cells are greatest in the mean, less a
-//! penalty for moving. A cell on an edge says nothing of the direction along it; its cosines are alike there, and others decide.
+//! penalty for moving. A cell on an edge does not fix the shift along the edge, since its cosines are alike there; other cells do.
 
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
@@ -33,12 +33,22 @@ pub(crate) struct CellCosines {
     pub(crate) map_px: usize,
 }
 
+/// Where the features of the part lie in the picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// Moves each place of the demonstration's map to where the picture's map shows it, in cells from the middle: for
+    /// [`crate::Reference::corrected`].
+    pub offset: PlanarSimilarity,
+    /// How alike they are there, in `[0, 1]`: the mean over the part.
+    pub cosine: f64,
+}
+
 /// Shift in cells, turn in radians, ln of size.
 type Offset = [f64; 4];
 
 impl CellCosines {
-    /// Moves each place of the demonstration's map to where the picture's map shows it, in cells from the middle.
-    pub(crate) fn offset(&self) -> PlanarSimilarity {
+    /// By how much the pose is off.
+    pub(crate) fn alignment(&self) -> Alignment {
         let reach = self.reach as f64;
         let moved = |offset: &Offset, k: usize, step: f64| {
             let mut next = *offset;
@@ -46,9 +56,11 @@ impl CellCosines {
             (next[0].abs() <= reach && next[1].abs() <= reach).then_some(next)
         };
         let cells = self.cells();
-        let ([dx, dy, turn, ln_size], _) = SEARCH.climb([0.0; 4], moved, |offset| self.score(&cells, offset));
+        let (found, _) = SEARCH.climb([0.0; 4], moved, |offset| self.mean_cosine(&cells, offset) - penalty(offset));
+        let [dx, dy, turn, ln_size] = found;
         let turn = Angle::from_radians(turn);
-        PlanarSimilarity::about(Point2::origin(), Point2::new(dx, dy), turn, ln_size.exp())
+        let offset = PlanarSimilarity::about(Point2::origin(), Point2::new(dx, dy), turn, ln_size.exp());
+        Alignment { offset, cosine: self.mean_cosine(&cells, &found) }
     }
 
     /// Index, place from the middle and weight of each cell of the part; the weights' sum is 1.
@@ -60,7 +72,7 @@ impl CellCosines {
         of_part().map(|(i, share)| (i, place(i), f64::from(*share) / total)).collect()
     }
 
-    fn score(&self, cells: &[(usize, Vector2<f64>, f64)], [dx, dy, turn, ln_size]: &Offset) -> f64 {
+    fn mean_cosine(&self, cells: &[(usize, Vector2<f64>, f64)], [dx, dy, turn, ln_size]: &Offset) -> f64 {
         let (sin, cos) = turn.sin_cos();
         let size = ln_size.exp();
         let of_cell = |(i, at, weight): &(usize, Vector2<f64>, f64)| {
@@ -68,8 +80,7 @@ impl CellCosines {
             let y = size * (sin * at.x + cos * at.y) + dy - at.y;
             weight * self.cosine(*i, x, y).max(0.0)
         };
-        let mean: f64 = cells.iter().map(of_cell).sum();
-        mean - SHIFT_PENALTY * (dx * dx + dy * dy) - TURN_PENALTY * (turn * turn + ln_size * ln_size)
+        cells.iter().map(of_cell).sum()
     }
 
     /// The cosine of a cell with the picture's map so far beside it, by Catmull-Rom splines between the shifts: between straight
@@ -89,6 +100,10 @@ impl CellCosines {
         };
         down.iter().enumerate().map(row).sum()
     }
+}
+
+fn penalty([dx, dy, turn, ln_size]: &Offset) -> f64 {
+    SHIFT_PENALTY * (dx * dx + dy * dy) + TURN_PENALTY * (turn * turn + ln_size * ln_size)
 }
 
 /// Weights of four neighbouring values for a place between the second and the third, `t` from 0 to 1.
@@ -121,7 +136,9 @@ mod tests {
     fn a_shift_a_turn_and_a_size_are_found_and_the_penalty_makes_them_smaller() {
         let inside: Vec<f32> = (0..256).map(|i| if (4..12).contains(&(i / 16)) { 1.0 } else { 0.0 }).collect();
         let of = |offset: &PlanarSimilarity| {
-            CellCosines { cosines: cosines(offset, 16, 2), inside: inside.clone(), reach: 2, map_px: 16 }.offset()
+            CellCosines { cosines: cosines(offset, 16, 2), inside: inside.clone(), reach: 2, map_px: 16 }
+                .alignment()
+                .offset
         };
         let middle = Point2::origin();
         let none = of(&PlanarSimilarity::IDENTITY);
@@ -136,6 +153,6 @@ mod tests {
     #[test]
     fn a_part_that_is_outside_everywhere_stays() {
         let outside = CellCosines { cosines: vec![0.5; 25 * 256], inside: vec![0.0; 256], reach: 2, map_px: 16 };
-        assert_eq!(outside.offset(), PlanarSimilarity::IDENTITY);
+        assert_eq!(outside.alignment(), Alignment { offset: PlanarSimilarity::IDENTITY, cosine: 0.0 });
     }
 }

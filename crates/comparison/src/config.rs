@@ -48,6 +48,11 @@ impl ComparisonConfig {
         }
     }
 
+    /// Views of twice the pixels along each side. Log-odds are learnt for one size; where features lie shows in any.
+    pub fn finer(&self) -> Self {
+        Self { input_px: 2 * self.input_px, ..self.clone() }
+    }
+
     /// Side of the trunk's map.
     pub fn trunk_map_px(&self) -> usize {
         self.input_px as usize >> self.trunk_channels.len()

@@ -6,8 +6,8 @@
 //! picture, pose ─ turned upright by the pose, S×S ─────┘
 //! ```
 //!
-//! Both are cut by the pose, so that the same place of the part is the same pixel of both: what is left to tell is whether
-//! they look alike. That is the same question for every part, so nothing in the network belongs to one part; it is learnt
+//! Both are cut by the pose, so that the same place of the part is the same pixel of both, and what remains is whether
+//! they look alike. That question is the same for every part, so nothing in the network belongs to one part; it is learnt
 //! once, on generated parts and their look-alikes, and teaching adds nothing but the demonstration.
 //!
 //! **Frame of a view.** A square about the middle of the outline's box, in the demonstration's direction, x right, y down.
@@ -43,6 +43,7 @@ mod config;
 mod network;
 mod view;
 
+pub use alignment::Alignment;
 pub use config::{ComparisonConfig, ComparisonError};
 pub use network::{Comparison, ComparisonNetwork};
 pub use sdg_orientation::Pyramid;

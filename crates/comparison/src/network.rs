@@ -3,10 +3,9 @@
 use burn::module::Module;
 use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, activation};
-use sdg_geometry::PlanarSimilarity;
 use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
-use crate::alignment::CellCosines;
+use crate::alignment::{Alignment, CellCosines};
 use crate::config::{ComparisonConfig, ComparisonError};
 use crate::view::{Batch, DIFFERENCES, View};
 
@@ -83,7 +82,7 @@ impl ComparisonNetwork {
         self.log_odds(&maps)
     }
 
-    /// What the network says of each view.
+    /// The log-odds of each view, and by how much its pose is off.
     ///
     /// # Panics
     /// With views of another network's references.
@@ -95,16 +94,34 @@ impl ComparisonNetwork {
         // One tensor, because a device is waited for once for each that is read.
         let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
         let read = Tensor::cat(vec![self.log_odds(&maps), flat(&maps.inside), flat(&maps.cosines)], 1);
-        let values: Vec<f32> =
-            read.into_data_async().await.expect("what the device computes can be read").iter().collect();
-        let (reach, map_px) = (self.config.reach, self.config.trunk_map_px());
+        let map_px = maps.map_px();
         let of_view = |values: &[f32]| {
-            let (log_odds, values) = values.split_at(1);
-            let (inside, cosines) = values.split_at(map_px * map_px);
-            let cells = CellCosines { cosines: cosines.to_vec(), inside: inside.to_vec(), reach, map_px };
-            Comparison { log_odds: log_odds[0].into(), cells }
+            let (log_odds, cells) = values.split_at(1);
+            Comparison { log_odds: log_odds[0].into(), cells: self.cells(cells, map_px) }
         };
-        values.chunks_exact(values.len() / views.len()).map(of_view).collect()
+        rows(read, views.len()).await.iter().map(|values| of_view(values)).collect()
+    }
+
+    /// By how much the pose of each view is off. The views may be finer than those that the log-odds are learnt on
+    /// ([`ComparisonConfig::finer`]), since what finds features is the same at every place.
+    ///
+    /// # Panics
+    /// With views of several sizes.
+    pub async fn align(&self, views: &[View]) -> Vec<Alignment> {
+        if views.is_empty() {
+            return Vec::new();
+        }
+        let maps = self.maps(views);
+        let flat = |map: &Tensor<4>| map.clone().flatten::<2>(1, 3);
+        let read = Tensor::cat(vec![flat(&maps.inside), flat(&maps.cosines)], 1);
+        let map_px = maps.map_px();
+        rows(read, views.len()).await.iter().map(|values| self.cells(values, map_px).alignment()).collect()
+    }
+
+    /// Out of the shares inside the outline and the cosines of one view.
+    fn cells(&self, values: &[f32], map_px: usize) -> CellCosines {
+        let (inside, cosines) = values.split_at(map_px * map_px);
+        CellCosines { cosines: cosines.to_vec(), inside: inside.to_vec(), reach: self.config.reach, map_px }
     }
 
     fn maps(&self, views: &[View]) -> Maps {
@@ -140,7 +157,7 @@ impl ComparisonNetwork {
     }
 }
 
-/// What the network says of a view.
+/// The output of the network for a view.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     /// The log-odds that the view shows the part in the pose that it was made by.
@@ -149,9 +166,9 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// By how much the pose is off, in cells of the trunk's map: for [`crate::Reference::corrected`].
-    pub fn offset(&self) -> PlanarSimilarity {
-        self.cells.offset()
+    /// By how much the pose is off.
+    pub fn alignment(&self) -> Alignment {
+        self.cells.alignment()
     }
 }
 
@@ -167,6 +184,20 @@ struct Maps {
     inside: Tensor<4>,
     /// `[N, (2 reach + 1)², M, M]`.
     cosines: Tensor<4>,
+}
+
+impl Maps {
+    /// M.
+    fn map_px(&self) -> usize {
+        self.inside.dims()[3]
+    }
+}
+
+/// The rows of a tensor, `[N, …]`.
+async fn rows(tensor: Tensor<2>, n: usize) -> Vec<Vec<f32>> {
+    let values: Vec<f32> =
+        tensor.into_data_async().await.expect("what the device computes can be read").iter().collect();
+    values.chunks_exact(values.len() / n).map(<[f32]>::to_vec).collect()
 }
 
 /// Stages that halve their maps each; the first convolution's kernel has a side of its own.
@@ -231,7 +262,7 @@ mod tests {
             let alone = &read_sync(network.compare(&[view]))[0];
             assert!((alone.log_odds - found.log_odds).abs() < 1e-4, "{alone:?} {found:?}");
             assert_eq!(found.log_odds, f64::from(forward));
-            assert!((alone.offset().tx - found.offset().tx).abs() < 1e-3);
+            assert!((alone.alignment().offset.tx - found.alignment().offset.tx).abs() < 1e-3);
         }
         assert!(read_sync(network.compare(&[])).is_empty());
     }

@@ -76,17 +76,17 @@ fn mark(sample: &mut Sample) {
     }
 }
 
-fn dot(image: &mut RgbImage, x: f64, y: f64, colour: Rgb<u8>) {
+fn dot(image: &mut RgbImage, x: f64, y: f64, color: Rgb<u8>) {
     if x >= 0.0 && y >= 0.0 && x < f64::from(image.width()) && y < f64::from(image.height()) {
-        image.put_pixel(x as u32, y as u32, colour);
+        image.put_pixel(x as u32, y as u32, color);
     }
 }
 
-fn line(image: &mut RgbImage, a: Point2<f64>, b: Point2<f64>, colour: Rgb<u8>) {
+fn line(image: &mut RgbImage, a: Point2<f64>, b: Point2<f64>, color: Rgb<u8>) {
     let steps = (b - a).norm().ceil().max(1.0);
     for step in 0..=steps as u32 {
         let p = a + (b - a) * (f64::from(step) / steps);
-        dot(image, p.x, p.y, colour);
+        dot(image, p.x, p.y, color);
     }
 }
 

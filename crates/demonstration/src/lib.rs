@@ -69,5 +69,5 @@ pub use format::{AnnotationFormat, DeclaredImage};
 pub use label_file::LabelFile;
 pub use labelled_instance::LabelledInstance;
 pub use model_kind::{ModelKind, UnknownModel};
-pub use outline_proposal::{OutlineClicks, propose_outline, propose_outline_with};
+pub use outline_proposal::{OutlineClick, propose_outline, propose_outline_with};
 pub use written::WrittenAnnotation;

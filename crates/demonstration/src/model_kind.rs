@@ -17,7 +17,7 @@ pub enum ModelKind {
     C,
     /// Mask R-CNN; position and angle from the mask's texture or outline (paper, section IV-D).
     D,
-    /// Instant: no network, the demonstration itself is looked for in the whole image.
+    /// No network; the demonstration itself is searched for in the whole image.
     S,
 }
 

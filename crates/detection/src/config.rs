@@ -155,7 +155,7 @@ pub struct ResNetConfig {
     pub res2_channels: usize,
     /// Blocks in res2, res3, res4, res5.
     pub num_blocks: [usize; 4],
-    /// Kind of block.
+    /// Basic or bottleneck, and where a bottleneck strides.
     pub block: BlockKind,
     /// Norm after every convolution.
     pub norm: NormKind,
@@ -285,7 +285,7 @@ pub struct RpnConfig {
     pub matcher: MatcherConfig,
     /// Anchors in the loss.
     pub sampler: SamplerConfig,
-    /// Box coder.
+    /// Weights of the deltas from anchors, or from proposals, to boxes.
     pub box_coder: BoxCoderConfig,
     /// Best anchors kept on each level before NMS.
     pub pre_nms_top_n: PerMode,
@@ -332,7 +332,7 @@ pub struct RoiHeadsConfig {
     /// as Detectron2 and torchvision have it, all are drawn, and most lie on the bare table.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub hard_negative_share: f64,
-    /// The box head.
+    /// Classes and refined boxes of the proposals.
     pub box_head: BoxHeadConfig,
     /// The keypoint head, if the detector has one.
     pub keypoint_head: Option<KeypointHeadConfig>,
@@ -355,7 +355,7 @@ pub struct BoxHeadConfig {
     pub background: BackgroundClass,
     /// Own deltas for each class or not.
     pub box_deltas: BoxDeltas,
-    /// Box coder.
+    /// Weights of the deltas from anchors, or from proposals, to boxes.
     pub box_coder: BoxCoderConfig,
     /// Loss on deltas.
     pub regression_loss: RegressionLoss,
@@ -407,7 +407,7 @@ pub struct KeypointHeadConfig {
     pub loss_weight: f64,
     /// From heatmap to keypoint.
     pub readout: KeypointReadout,
-    /// Score of a keypoint.
+    /// Which value of the heatmap's peak is the score.
     pub score: KeypointScore,
 }
 

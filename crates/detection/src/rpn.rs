@@ -35,10 +35,10 @@ pub struct RpnHead {
     pub anchor_deltas: Conv2d,
 }
 
-/// The region proposal network.
+/// Scores every anchor and moves it onto an object: boxes that may contain one.
 #[derive(Module, Debug)]
 pub struct RegionProposalNetwork {
-    /// The head.
+    /// Convolutions that all levels share.
     pub rpn_head: RpnHead,
     #[module(skip)]
     config: RpnConfig,
@@ -62,7 +62,7 @@ pub struct RpnPredictions {
 pub struct Proposals {
     /// Boxes in pixels of the resized image.
     pub boxes: Vec<Corners>,
-    /// Objectness logits.
+    /// One logit an anchor, in the order of the anchors.
     pub objectness_logits: Vec<f32>,
 }
 

@@ -23,7 +23,7 @@ pub struct Target {
 /// The objects of one image, in pixels of the resized image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResizedTarget {
-    /// Boxes.
+    /// One box an object, in pixels of the resized image.
     pub boxes: Vec<Corners>,
     /// Class of each box.
     pub labels: Vec<usize>,

@@ -1,18 +1,20 @@
-//! Does a robot stop for every limit, and for nothing else? `limit_checks HOST panda|fr3 [TRIES]`.
+//! Does a robot stop for every limit, and for nothing else? `limit_checks HOST panda|fr3 [TRIES [joints]]`.
 //!
 //! Runs one motion just inside and one just outside of every limit and prints a line for each; ends with an error where a
 //! motion inside was stopped, or one outside was not, or for another reason. Against a robot in real time, each motion has
-//! TRIES (1): a lost command may look like a broken limit.
+//! TRIES (1): a lost command may look like a broken limit. Where the limits of the joints in Cartesian motions are the robot's
+//! own, and not widened, `joints` tries those and folds the arm until it would touch itself, in place of all others.
 
 #[path = "../tests/limit_cases/mod.rs"]
 mod limit_cases;
 
-use sdg_fci::Limits;
+use limit_cases::Found;
 use sdg_fci::client::{Robot, RobotConfig};
+use sdg_fci::{FciError, Limits, RobotError};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
-    let usage = "usage: limit_checks HOST panda|fr3 [TRIES]";
+    let usage = "usage: limit_checks HOST panda|fr3 [TRIES [joints]]";
     let host = arguments.next().ok_or(usage)?;
     let limits = match arguments.next().as_deref() {
         Some("panda") => Limits::PANDA,
@@ -20,24 +22,48 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         _ => return Err(usage.into()),
     };
     let num_tries: u32 = arguments.next().as_deref().unwrap_or("1").parse()?;
+    let only_joints = match arguments.next().as_deref() {
+        None => false,
+        Some("joints") => true,
+        Some(_) => return Err(usage.into()),
+    };
     let mut robot = Robot::connect(&host, &RobotConfig::default())?;
-    let home = robot.read_state()?.q_desired;
+    let home = if only_joints { limit_cases::READY } else { robot.read_state()?.q_desired };
     let mut num_wrong = 0;
-    for case in limit_cases::all(&limits) {
+    let mut tell = |is_right: bool, name: &str, is_inside: bool, found: &Found, num_tries: u32| {
+        num_wrong += u32::from(!is_right);
+        let verdict = if is_right { "ok  " } else { "FAIL" };
+        let side = if is_inside { "inside" } else { "outside" };
+        println!("{verdict} {name}, {side}: {found} (try {num_tries})");
+    };
+    if only_joints {
+        let [inside, outside] = limit_cases::fold(&mut robot, &home)?;
+        let touches = RobotError::SelfCollisionAvoidanceViolation;
+        let is_stopped = matches!(&outside, Found::Stopped(errors) if errors.contains(touches));
+        tell(inside == Found::Done, "self-collision", true, &inside, 1);
+        tell(is_stopped, "self-collision", false, &outside, 1);
+    }
+    let cases = if only_joints { limit_cases::joints_of_cartesian_motions(&limits) } else { limit_cases::all(&limits) };
+    for case in cases {
         for is_inside in [true, false] {
             let mut tries = 0;
             let (found, is_right) = loop {
-                let found = case.run(&mut robot, &home, is_inside)?;
                 tries += 1;
+                let found = match case.run(&mut robot, &home, is_inside) {
+                    // On the way to where the motion begins.
+                    Err(FciError::Motion { errors, .. }) if tries < num_tries => {
+                        println!("     on the way to {}: {errors}", case.name);
+                        robot.automatic_error_recovery()?;
+                        continue;
+                    }
+                    ended => ended?,
+                };
                 let is_right = case.is_expected(is_inside, &found);
                 if is_right || tries >= num_tries {
                     break (found, is_right);
                 }
             };
-            num_wrong += u32::from(!is_right);
-            let verdict = if is_right { "ok  " } else { "FAIL" };
-            let side = if is_inside { "inside" } else { "outside" };
-            println!("{verdict} {}, {side}: {found} (try {tries})", case.name);
+            tell(is_right, case.name, is_inside, &found, tries);
         }
     }
     if num_wrong > 0 {

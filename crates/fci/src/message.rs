@@ -5,9 +5,12 @@ use std::io::{self, Read};
 use crate::wire::{Header, HeaderKind};
 use crate::wire_error::WireError;
 
+/// Memory for a message is taken in steps of this size as its bytes arrive, so that a header that announces much takes little.
+const STEP: usize = 8192;
+
 /// Reads the next message; the inner error is a header that cannot be.
 ///
-/// Memory is taken as bytes arrive, never by what a header announces.
+/// Memory is taken as bytes arrive, and never more than the message has.
 ///
 /// # Errors
 /// The stream's end or its error.
@@ -23,9 +26,12 @@ pub fn read_message(
     };
     let size = header.payload_size(kind);
     let mut payload = Vec::new();
-    stream.by_ref().take(size as u64).read_to_end(&mut payload)?;
-    if payload.len() < size {
-        return Err(io::ErrorKind::UnexpectedEof.into());
+    while payload.len() < size {
+        let arrived = payload.len();
+        let step = STEP.min(size - arrived);
+        payload.reserve_exact(step);
+        payload.resize(arrived + step, 0);
+        stream.read_exact(&mut payload[arrived..])?;
     }
     Ok(Ok((header, payload)))
 }

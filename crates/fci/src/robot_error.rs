@@ -29,7 +29,7 @@ macro_rules! robot_errors {
     };
 }
 
-/// Number of errors that a state tells of.
+/// Number of error flags in a state.
 pub const NUM_ERRORS: usize = 41;
 
 robot_errors! {
@@ -113,7 +113,7 @@ robot_errors! {
     JointViaMotionGeneratorPlanningJointLimitViolation = "joint_via_motion_generator_planning_joint_limit_violation",
     /// The base's accelerometer did not start.
     BaseAccelerationInitializationTimeout = "base_acceleration_initialization_timeout",
-    /// The base's accelerometer told nonsense.
+    /// The base's accelerometer gave implausible values.
     BaseAccelerationInvalidReading = "base_acceleration_invalid_reading",
 }
 

@@ -79,7 +79,7 @@ impl Mask {
         if union == 0 { 0.0 } else { intersection as f64 / union as f64 }
     }
 
-    /// The mask as runs.
+    /// The same mask as the lengths of its runs of equal pixels.
     pub fn encode(&self) -> RunLengthMask {
         let mut counts = Vec::new();
         let (mut run, mut inside) = (0u32, false);

@@ -23,7 +23,7 @@ use crate::base_weights::BaseWeights;
 use crate::error::{GraspError, Result};
 use crate::safetensors_file::{self, TensorBytes, values_from_halves};
 
-/// What the file says it is, without and with the version.
+/// The name of the format, without and with the version.
 const FORMAT_NAME: &str = "sdg base weights";
 const FORMAT: &str = "sdg base weights 1";
 

@@ -56,8 +56,10 @@ impl Calibration {
     /// median of the right ones and from that of the wrong ones. Each side's deviation is that of its scores towards the
     /// other, so that neither one odd picture nor those that are nowhere near the threshold move it.
     ///
-    /// `None` without a right score; without a wrong one, `no_wrong` stands for them.
-    pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64) -> Option<Self> {
+    /// `None` without a right score; without a wrong one, `no_wrong` stands for them. `usual` is the threshold, in log-odds, that
+    /// networks of this kind have, if that is known: the threshold is no lower, since samples of a few other things say little of those to
+    /// come, and half-way to it from above.
+    pub fn fit(right: &[f64], wrong: &[f64], no_wrong: f64, usual: Option<f64>) -> Option<Self> {
         let in_log_odds = |scores: &[f64]| -> Vec<f64> {
             scores.iter().copied().filter(|score| score.is_finite()).map(log_odds).collect()
         };
@@ -74,6 +76,7 @@ impl Calibration {
         let (wrong, of_wrong) = spread(&wrong, 100.0 - FACING_PERCENT)?;
         let weight = WRONG_PER_RIGHT_DEVIATION * of_wrong;
         let threshold = (right * weight + wrong * of_right) / (weight + of_right);
+        let threshold = usual.map_or(threshold, |usual| threshold.max(usual).midpoint(usual));
         // The slope of the logistic that is likeliest for two normal distributions of one deviation.
         let deviation = 0.5 * (of_right + of_wrong);
         let slope = ((right - wrong) / deviation.powi(2)).clamp(SLOPE_BOUNDS.0, SLOPE_BOUNDS.1);
@@ -131,7 +134,7 @@ mod tests {
     fn the_threshold_lies_nearer_to_the_scores_that_are_spread_less() {
         let right = scores(&[2.4, 2.6, 2.8, 3.0, 3.2, 3.4, 3.6]);
         let wrong = scores(&[-9.0, -8.0, -3.0, -1.0, 0.0, 0.5, 1.0]);
-        let calibration = Calibration::fit(&right, &wrong, 0.0).unwrap();
+        let calibration = Calibration::fit(&right, &wrong, 0.0, None).unwrap();
         let threshold = log_odds(calibration.threshold);
         assert!((1.0..2.4).contains(&threshold), "{threshold}");
         assert!(3.0 - threshold < threshold + 1.0);
@@ -143,17 +146,25 @@ mod tests {
     fn one_odd_picture_of_many_moves_it_little() {
         let mut right: Vec<f64> = (0..30).map(|i| probability(2.0 + f64::from(i) / 30.0)).collect();
         let wrong: Vec<f64> = (0..30).map(|i| probability(-3.0 + f64::from(i) / 10.0)).collect();
-        let threshold = |right: &[f64]| log_odds(Calibration::fit(right, &wrong, 0.0).unwrap().threshold);
+        let threshold = |right: &[f64]| log_odds(Calibration::fit(right, &wrong, 0.0, None).unwrap().threshold);
         let before = threshold(&right);
         right[0] = probability(-5.0);
         assert!((threshold(&right) - before).abs() < 0.1);
     }
 
     #[test]
+    fn the_threshold_is_not_below_the_usual_one_and_half_way_to_it_from_above() {
+        let (right, wrong) = (scores(&[4.0, 5.0, 6.0]), scores(&[0.0, 1.0, 2.0]));
+        let threshold = |usual| log_odds(Calibration::fit(&right, &wrong, 0.0, usual).unwrap().threshold);
+        assert!((threshold(Some(1.0)) - 0.5 * (threshold(None) + 1.0)).abs() < 1e-3);
+        assert!((threshold(Some(4.5)) - 4.5).abs() < 1e-3);
+    }
+
+    #[test]
     fn nothing_right_is_no_calibration_and_nothing_wrong_is_one() {
-        assert_eq!(Calibration::fit(&[], &[0.3], 0.1), None);
-        assert_eq!(Calibration::fit(&[f64::NAN], &[], 0.1), None);
-        let calibration = Calibration::fit(&[0.9, 0.92, 0.95], &[], 0.1).unwrap();
+        assert_eq!(Calibration::fit(&[], &[0.3], 0.1, None), None);
+        assert_eq!(Calibration::fit(&[f64::NAN], &[], 0.1, None), None);
+        let calibration = Calibration::fit(&[0.9, 0.92, 0.95], &[], 0.1, None).unwrap();
         assert!(calibration.apply(0.9) > 0.8 && calibration.apply(0.1) < 0.2, "{calibration:?}");
     }
 }

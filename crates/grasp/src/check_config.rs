@@ -22,7 +22,7 @@ pub struct CheckConfig {
 }
 
 impl CheckConfig {
-    /// Sizes of a part over the nominal one that are looked for where nothing else is said: hand-held photographs of one part
+    /// Sizes of a part over the nominal one that are searched for by default: hand-held photographs of one part
     /// vary by 0.81 to 1.14, and cameras by 0.75 to 1.3 of their height. Chosen from that.
     pub const DEFAULT_SIZE_TOLERANCE: RangeInclusive<f64> = 0.75..=1.35;
     /// The same for a camera that is always as far from the part as it was for the photo: the simulated workcell's. A lever that
@@ -30,7 +30,7 @@ impl CheckConfig {
     pub const FIXED_HEIGHT_TOLERANCE: RangeInclusive<f64> = 0.97..=1.03;
     /// The same in a plan view, where the size is known and look-alikes of another size are found to be refused by it.
     pub const KNOWN_SIZE_TOLERANCE: RangeInclusive<f64> = 0.9..=1.11;
-    /// Most detections in one picture where nothing else is said. Chosen by hand.
+    /// Most detections in one picture by default. Chosen by hand.
     pub const DEFAULT_MAX_DETECTIONS: usize = 100;
 
     /// The values of [`Default`], as a constant.

@@ -1,7 +1,7 @@
 //! Numbers that JSON gives back to the bit.
 //!
 //! `serde_json` reads a number exactly when it has at most 15 digits or so; longer ones may come back one unit in the
-//! last place off, and then a model read from its file would not say quite what the model that was written said.
+//! last place off, and then a model read from its file would give slightly other scores than the model that was written.
 
 /// Rounded to nine decimals. Exact in JSON below about nine million; what is not finite stays so.
 pub(crate) fn decimal(value: f64) -> f64 {

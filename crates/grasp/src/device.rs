@@ -1,8 +1,8 @@
 //! Where a network computes: the backends of this build, and what this machine offers them.
 //!
 //! `flex`, burn's CPU backend with this project's kernels, is always there. The others are cargo features, compiled only
-//! for who asks, since each brings minutes of compile time: `ndarray` (burn's older CPU backend, slow, a second
-//! opinion), `wgpu` (any graphics card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
+//! for who asks, since each brings minutes of compile time: `ndarray` (burn's older CPU backend, slow, a
+//! reference), `wgpu` (any graphics card, through Vulkan, Metal or DirectX 12) and `cuda` (NVIDIA's).
 
 use std::fmt;
 use std::str::FromStr;

@@ -34,7 +34,7 @@ pub enum GraspError {
     /// Bytes that are no grasp model.
     #[error("expected a grasp model file of this project, found {found}")]
     NotAModel {
-        /// What the bytes are, as far as can be told.
+        /// What the bytes are, as far as their beginning shows.
         found: String,
     },
     /// A grasp model file of another version.

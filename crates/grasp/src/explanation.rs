@@ -1,4 +1,4 @@
-//! What a person wants to know of a detection, above all of a refused one: its size, and where picture and demonstration differ.
+//! The explanation of a detection, above all of a refused one: its size, and where picture and demonstration differ.
 
 use image::RgbImage;
 use sdg_geometry::PlanarSimilarity;

@@ -1,4 +1,4 @@
-//! What a model file tells about itself.
+//! The facts that a model file has about its teaching.
 
 pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
@@ -62,7 +62,7 @@ pub struct TeachingFacts {
     /// How the orientation CNN came to be; `None` for models without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<OrientationFacts>,
-    /// What pictures without the part said; `None` where none were given.
+    /// The result on pictures without the part; `None` where none were given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub negatives: Option<NegativeFacts>,
     /// SHA-256 of the weights that teaching started from; `None` when it started from nothing.
@@ -124,8 +124,8 @@ mod tests {
         let written = serde_json::to_value(&facts).unwrap();
         assert_eq!(written, serde_json::from_str::<serde_json::Value>(file).unwrap());
         assert_eq!(facts.symmetry, RotationalSymmetry::None);
-        let instant = TeachingFacts { validation: None, symmetry: RotationalSymmetry::Fold(2), ..facts };
-        let written = serde_json::to_string(&instant).unwrap();
-        assert_eq!(serde_json::from_str::<TeachingFacts>(&written).unwrap(), instant);
+        let without_network = TeachingFacts { validation: None, symmetry: RotationalSymmetry::Fold(2), ..facts };
+        let written = serde_json::to_string(&without_network).unwrap();
+        assert_eq!(serde_json::from_str::<TeachingFacts>(&written).unwrap(), without_network);
     }
 }

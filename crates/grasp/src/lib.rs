@@ -55,6 +55,7 @@ mod base_weights;
 #[cfg(feature = "teach")]
 mod base_weights_file;
 mod calibration;
+mod calibrations;
 mod check_config;
 mod decimal;
 mod device;
@@ -73,6 +74,7 @@ mod pose;
 mod prepared;
 mod record;
 mod safetensors_file;
+mod same_part;
 mod sighting;
 mod sizes;
 mod taught;

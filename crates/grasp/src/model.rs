@@ -14,12 +14,13 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
 
+use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
-use crate::model_file::Calibrations;
 use crate::models::{Network, PoseCandidate, Proposals};
-use crate::sighting::{SAME_PART_IOU, Sighting, sightings};
+use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
+use crate::sighting::{Sighting, sightings};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage};
@@ -369,9 +370,6 @@ impl Sighting<'_> {
     }
 }
 
-/// Outlines of which one lies so far in the other are the same part's: parts do not lie in each other. Chosen by hand.
-const SAME_PART_SHARE: f64 = 0.3;
-
 /// Of detections of the same part the best one stays: by the overlap of their outlines, or of their boxes where there are no
 /// outlines. Of those that ended in the same pose it is the one that the network was surest of, and not a matter of the
 /// last bit.
@@ -398,11 +396,6 @@ pub(crate) fn are_of_same_part(one: &GraspDetection, other: &GraspDetection) -> 
         (Some(one), Some(other)) => are_outlines_of_same_part(one, other),
         _ => one.bbox.iou(&other.bbox) >= SAME_PART_IOU,
     }
-}
-
-pub(crate) fn are_outlines_of_same_part(one: &Polygon, other: &Polygon) -> bool {
-    one.bounds().intersection(&other.bounds()) > 0.0
-        && one.share_inside(other).max(other.share_inside(one)) > SAME_PART_SHARE
 }
 
 #[cfg(test)]

@@ -25,17 +25,16 @@ use sdg_demonstration::{ImageLimits, decode_image};
 use sdg_detection::RcnnConfig;
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_orientation::OrientationConfig;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
-use crate::calibration::Calibration;
-use crate::check_config::{CheckConfig, ScoreConfig};
+use crate::calibrations::Calibrations;
+use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
 use crate::model::GraspModel;
 use crate::models::mask::MaskMatcher;
 use crate::models::{self, Network, Reading};
-use crate::network_evidence::NetworkEvidence;
 use crate::safetensors_file::{self, TensorBytes};
 use crate::taught::TaughtDemonstration;
 use crate::taught_marks::TaughtMarks;
@@ -49,45 +48,7 @@ const OLDEST_VERSION: u32 = 1;
 /// More demonstrations than anybody takes; bounds the work on a forged file.
 const MAX_DEMONSTRATIONS: usize = 1000;
 
-/// What was measured of the part while teaching, as stored.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Calibrations {
-    pub(crate) network: Calibration,
-    /// What the network's scores are worth; `None` without a network, and in version 1.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) evidence: Option<NetworkEvidence>,
-    /// Mean agreement of other things with the part.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) resemblance: Option<f64>,
-    /// Version 1: the agreement from which on the part counted as found.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    agreement: Option<Calibration>,
-}
-
-impl Calibrations {
-    #[cfg(any(feature = "teach", test))]
-    pub(crate) fn new(network: Calibration, evidence: Option<NetworkEvidence>, resemblance: f64) -> Self {
-        Self { network, evidence, resemblance: Some(resemblance), agreement: None }
-    }
-
-    fn of_older_file(self) -> Self {
-        Self { network: self.network.of_older_file(), ..self }
-    }
-
-    /// What the network's score says of a place, 0 where it proposes nothing; `None` where that is not known.
-    pub(crate) fn log_likelihood_ratio(&self, network_score: f64) -> Option<f64> {
-        Some(self.evidence?.log_likelihood_ratio(network_score, &self.network))
-    }
-
-    /// Mean agreement of other things with the part. Version 1 set its threshold 0.2 above that, within bounds.
-    pub(crate) fn resemblance(&self) -> f64 {
-        const MARGIN_OF_VERSION_1: f64 = 0.2;
-        let from_threshold = || self.agreement.map(|agreement| agreement.threshold - MARGIN_OF_VERSION_1);
-        self.resemblance.or_else(from_threshold).unwrap_or(ScoreConfig::DEFAULT.resemblance.neutral)
-    }
-}
-
-/// What a file says of itself, without its weights.
+/// The metadata of a file, without its weights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelSummary {
     /// The grasp model's kind.
@@ -354,7 +315,7 @@ fn to_json<T: Serialize>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// What a file says of itself; reads the header alone.
+/// The metadata of a file; reads the header alone.
 ///
 /// # Errors
 /// As [`GraspModel::from_bytes`].
@@ -371,6 +332,7 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::calibration::Calibration;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;

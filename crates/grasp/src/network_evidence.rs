@@ -1,12 +1,11 @@
 //! Log-odds of a place from a network's proposal, or from having none.
 //!
-//! A network taught for half a minute gives detections on other things, and that it misses parts makes no proposal weak
-//! evidence.
-//! How much, teaching counts on samples that it was not trained on:
+//! A network that was taught for half a minute also gives detections on other things, and misses parts: neither a proposal
+//! nor its absence is strong evidence. How strong, is measured while teaching, on held-back samples:
 //!
 //! ```text
 //! held-back samples with the part ─ places on the part ────────┐
-//!                                                              ├─ what the network says there, counted ─ likelihood ratio
+//!                                                              ├─ the network's scores there, counted ─ likelihood ratio
 //! samples without it ─ the place that agrees best with it ─────┘
 //! ```
 
@@ -21,7 +20,7 @@ pub(crate) struct NetworkEvidence {
     elsewhere: [u32; 3],
 }
 
-/// What the network says of a place: nothing, something below its threshold, or something above it.
+/// The network's output at a place: nothing, something below its threshold, or something above it.
 fn class(score: f64, calibration: &Calibration) -> usize {
     match score {
         0.0 => 0,

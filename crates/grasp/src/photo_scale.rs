@@ -1,4 +1,4 @@
-//! A model taught without a camera, told afterwards what a pixel of its photo covers.
+//! The scale of the photo, given to a model that was taught without a camera.
 
 use image::imageops::{self, FilterType};
 use sdg_geometry::BoundingBox;

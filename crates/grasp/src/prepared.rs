@@ -14,7 +14,7 @@ use image::RgbImage;
 use image::imageops::{self, FilterType};
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeTemplate};
+use sdg_shape::{GradientField, SearchConfig, ShapeSearch, ShapeTemplate};
 
 use crate::error::Result;
 use crate::sizes::SizeRange;
@@ -62,7 +62,7 @@ impl WorkingSize {
 /// A demonstration at one size.
 #[derive(Debug)]
 pub(crate) struct Prepared {
-    pub(crate) search: InstantSearch,
+    pub(crate) search: ShapeSearch,
     /// The edges about the marks alone; `None` where there are too few.
     about_marks: Option<ShapeTemplate>,
     /// In pixels of the resized cut-out.
@@ -92,7 +92,7 @@ impl Prepared {
             (&resized, scaling(cutout_scale))
         };
         let outline = marks.region().transformed(&resize);
-        let search = InstantSearch::new(cutout, &outline, config)?;
+        let search = ShapeSearch::new(cutout, &outline, config)?;
         let grasp = marks.grasp.transformed(&resize);
         let bounds = outline.bounds();
         let diagonal = bounds.width().hypot(bounds.height());

@@ -3,12 +3,9 @@
 use sdg_shape::parallel;
 
 use crate::facts::TurnSource;
-use crate::model::are_outlines_of_same_part;
 use crate::models::{PoseCandidate, Proposals};
+use crate::same_part::are_outlines_of_same_part;
 use crate::verification::{PlacedDemonstration, SearchedImage, search, verify};
-
-/// Boxes that overlap so much are taken for the same part's. Chosen by hand, not measured.
-pub(crate) const SAME_PART_IOU: f64 = 0.5;
 
 /// A place where the part may be, before it is scored.
 pub(crate) struct Sighting<'a> {

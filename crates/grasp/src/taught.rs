@@ -26,6 +26,7 @@ pub struct TaughtDemonstration {
     pub marks: TaughtMarks,
     prepared: PreparedSizes,
     reference: OnceLock<Reference>,
+    finer_reference: OnceLock<Reference>,
     check: CheckConfig,
 }
 
@@ -83,7 +84,14 @@ impl TaughtDemonstration {
 
     pub(crate) fn with_config(cutout: RgbImage, marks: TaughtMarks, check: CheckConfig) -> Result<Self, GraspError> {
         check.check()?;
-        let made = Self { cutout, marks, prepared: PreparedSizes::default(), reference: OnceLock::new(), check };
+        let made = Self {
+            cutout,
+            marks,
+            prepared: PreparedSizes::default(),
+            reference: OnceLock::new(),
+            finer_reference: OnceLock::new(),
+            check,
+        };
         // What is wrong with a demonstration should come out here, not at the first picture.
         let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
         made.prepared(own_size)?;
@@ -104,6 +112,12 @@ impl TaughtDemonstration {
     /// What the model's comparison network compares pictures with.
     pub(crate) fn reference(&self, config: &ComparisonConfig) -> &Reference {
         self.reference.get_or_init(|| Reference::new(&self.cutout, &self.marks.region(), config))
+    }
+
+    /// The same in views of twice the pixels.
+    pub(crate) fn finer_reference(&self, config: &ComparisonConfig) -> &Reference {
+        let made = || Reference::new(&self.cutout, &self.marks.region(), &config.finer());
+        self.finer_reference.get_or_init(made)
     }
 
     /// The same demonstration, compared and searched for otherwise. Files do not keep how: read from one, a demonstration

@@ -8,7 +8,7 @@
 //! resemblance ──────────────────┘  how much other things look like this part: known from teaching
 //! ```
 //! Each kind of evidence is wrong in its own pictures: gloss spoils edges and surface, a covering hand hides half of the
-//! part, the network fires on other parts. So each adds log-odds within bounds, and none of them alone takes a pose that all
+//! part, the network detects other parts as well. So each adds log-odds within bounds, and none of them alone takes a pose that all
 //! others support below 0.5. The weights are those of a logistic regression on generated parts ([`crate::fitting`]).
 
 use sdg_shape::Evidence;
@@ -36,7 +36,7 @@ pub struct Contributions {
     pub outside: f64,
     /// How much other things resemble this part.
     pub resemblance: f64,
-    /// What the small network says that sees photo and picture laid over each other; its least where edges and surface agree
+    /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
     /// too little for it to be asked.
     pub likeness: f64,
 }

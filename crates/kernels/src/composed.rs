@@ -1,7 +1,7 @@
 //! The operations as compositions of burn's own tensor operations, on any backend.
 //!
-//! They are the default bodies of [`KernelBackend`](crate::KernelBackend), and the second opinion that the
-//! kernels' tests ask for. They are right, differentiable, and make no attempt at speed.
+//! They are the default bodies of [`KernelBackend`](crate::KernelBackend), and the reference of the
+//! kernels' tests. They are right, differentiable, and make no attempt at speed.
 
 use burn::backend::ops::{ConvOptions, ConvTransposeOptions};
 use burn::backend::tensor::FloatTensor;

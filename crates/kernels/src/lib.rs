@@ -1,7 +1,7 @@
 //! CPU kernels for the operations on which a detector spends its time, behind burn's backend extension.
 //!
 //! burn's CPU backend `Flex` runs a convolution forwards at a fair speed and backwards through a generic
-//! fallback, and it has no ROIAlign. This crate adds both, and what else training was seen to wait for:
+//! fallback, and it has no ROIAlign. This crate adds both, and the other operations that took most of the time of training:
 //! 3×3 convolutions of stride 1 by Winograd's transforms, all others as matrix products that read the maps where
 //! they stand, group norm, max pooling, doubling, and non-maximum suppression.
 //!

@@ -1,4 +1,4 @@
-//! The extension on burn's `NdArray`: the composed defaults throughout. A second opinion, not a fast one.
+//! The extension on burn's `NdArray`: the composed defaults throughout. A reference, not fast.
 
 // burn deprecates the backend in favour of `Flex`; it stays for who compares.
 #![allow(deprecated)]

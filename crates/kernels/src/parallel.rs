@@ -37,7 +37,7 @@ pub(crate) struct SharedSlice<'a> {
 
 // SAFETY: the only access is through `range`, whose callers promise disjoint parts.
 unsafe impl Sync for SharedSlice<'_> {}
-// SAFETY: as above; `f32` is `Send`.
+// SAFETY: it is a pointer to floats, which may be written on any thread.
 unsafe impl Send for SharedSlice<'_> {}
 
 impl<'a> SharedSlice<'a> {
@@ -81,7 +81,7 @@ impl Raw {
 
 // SAFETY: no access by itself; kernels that write through it are unsafe and promise disjoint parts.
 unsafe impl Sync for Raw {}
-// SAFETY: as above; `f32` is `Send`.
+// SAFETY: a pointer may be sent; the floats that it points to may be written on any thread.
 unsafe impl Send for Raw {}
 
 /// A vector being filled by several units at once, without being zeroed first.

@@ -147,7 +147,7 @@ pub struct RoiAlignParams {
 /// The numbers of one step of [`adamw`](crate::adamw).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdamWParams {
-    /// Learning rate.
+    /// Factor of the update at this step of the schedule.
     pub learning_rate: f32,
     /// Share of the gradient's running mean that a step keeps.
     pub beta_1: f32,

@@ -66,16 +66,16 @@ pub(crate) struct PanelProduct<'a> {
     /// Whether to add to what stands in the output.
     pub(crate) accumulate: bool,
     /// What is read next, to be fetched into the cache meanwhile.
-    pub(crate) ahead: Ahead<'a>,
+    pub(crate) prefetch: Prefetch<'a>,
 }
 
 /// Runs of memory that are fetched while a product computes, a cache line at each step of its depth.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Ahead<'a> {
+pub(crate) struct Prefetch<'a> {
     pub(crate) runs: [&'a [f32]; 2],
 }
 
-impl Ahead<'_> {
+impl Prefetch<'_> {
     /// The next lines, `steps` of them, or as many as there are: where they start, and from one to the next.
     #[inline(always)]
     fn next(&mut self, steps: usize) -> (*const f32, usize) {
@@ -126,7 +126,7 @@ lanes_kernel! {
 unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
     let tiles = product.rows.div_ceil(L::ROWS);
     let mut row = 0;
-    let mut ahead = product.ahead;
+    let mut prefetch = product.prefetch;
     for tile in 0..tiles {
         // As even as they come: short tiles wait for their sums.
         let rows = (product.rows - row).div_ceil(tiles - tile);
@@ -137,9 +137,9 @@ unsafe fn panel_lanes<L: Lanes>(product: &PanelProduct<'_>, output: *mut f32) {
             // SAFETY: within the product.
             unsafe {
                 if columns > LANES {
-                    tile_of_rows::<L, 2>(product, output, row, rows, column, columns, &mut ahead);
+                    tile_of_rows::<L, 2>(product, output, row, rows, column, columns, &mut prefetch);
                 } else {
-                    tile_of_rows::<L, 1>(product, output, row, rows, column, columns, &mut ahead);
+                    tile_of_rows::<L, 1>(product, output, row, rows, column, columns, &mut prefetch);
                 }
             }
             column += step;
@@ -156,13 +156,13 @@ unsafe fn tile_of_rows<L: Lanes, const V: usize>(
     rows: usize,
     column: usize,
     columns: usize,
-    ahead: &mut Ahead<'_>,
+    prefetch: &mut Prefetch<'_>,
 ) {
     macro_rules! choose {
         ($($count:literal)*) => {
             match rows {
                 // SAFETY: within the product, and `rows` is the count.
-                $($count if $count <= L::ROWS => unsafe { tile::<L, $count, V>(product, output, row, column, columns, ahead) },)*
+                $($count if $count <= L::ROWS => unsafe { tile::<L, $count, V>(product, output, row, column, columns, prefetch) },)*
                 _ => unreachable!("a tile has 1 to {} rows", L::ROWS),
             }
         };
@@ -178,10 +178,10 @@ unsafe fn tile<L: Lanes, const R: usize, const V: usize>(
     row: usize,
     column: usize,
     columns: usize,
-    ahead: &mut Ahead<'_>,
+    prefetch: &mut Prefetch<'_>,
 ) {
     let [outer, inner] = product.depth;
-    let (mut line, line_step) = ahead.next(outer * inner);
+    let (mut line, line_step) = prefetch.next(outer * inner);
     let (left, right) = (&product.left, &product.right);
     // SAFETY: reads are the operands' within the depth, as asserted; writes are the tile's. `wrapping_add`
     // only steps past the last.
@@ -297,7 +297,7 @@ unsafe fn finish<L: Lanes, const R: usize, const V: usize>(
 /// Sixteen floats, or the first `len` where not whole, can be read.
 #[inline(always)]
 unsafe fn load<L: Lanes>(from: *const f32, whole: bool, len: usize) -> L {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller promises that 16 floats, or `len`, can be read.
     unsafe { if whole { L::load(from) } else { L::load_first(from, len) } }
 }
 

@@ -1,4 +1,4 @@
-//! A grasp's last stretch: from a pose before it straight to it, with the configuration chosen so that the stretch works.
+//! The straight motion to a grasp from a pose before it, with a configuration for which all of it stays within the limits.
 //!
 //! The best configuration for the first pose may run into a joint limit on the way to the second. The arm has several ways to
 //! take and two fingers that may be exchanged, so the choice is made over whole approaches.

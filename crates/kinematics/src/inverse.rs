@@ -2,7 +2,7 @@
 //!
 //! The arm has one joint more than a pose needs. For each angle of joint 7 on a grid, [`crate::analytic`] gives every
 //! configuration; those inside the limits are compared by [`IkOptions`]' cost, and the best is refined over q7. So the
-//! search sees all ways of the arm, needs no random restarts and is the same on every call. Where the grid finds nothing, the
+//! search covers all branches of solutions, needs no random restarts and is the same on every call. Where the grid finds nothing, the
 //! branches that break limits least are refined over q7, which finds poses that only a sliver of angles reaches; if that
 //! fails as well, damped least squares within the limits gives the nearest pose and the error names the reason.
 
@@ -244,7 +244,7 @@ impl<'a> Search<'a> {
         let mut least_infeasible = self.least_infeasible_solutions();
         least_infeasible.truncate(NUM_RESCUES);
         for solution in &least_infeasible {
-            if self.badness(solution) <= LIMIT_ROUNDING_RAD
+            if self.violation(solution) <= LIMIT_ROUNDING_RAD
                 && let Some(solution) = self.accept(&solution.q)
             {
                 return Ok(solution);
@@ -276,22 +276,22 @@ impl<'a> Search<'a> {
     }
 
     /// How much a solution breaks limits and geometry: 0 where it is a solution.
-    fn badness(&self, solution: &AnalyticSolution) -> f64 {
+    fn violation(&self, solution: &AnalyticSolution) -> f64 {
         let beyond: f64 = self.limits.margins(&solution.q).iter().map(|m| (-m).max(0.0)).sum();
         beyond + INFEASIBILITY_RAD * solution.infeasibility
     }
 
-    /// The local minima over q7 of each branch's badness, refined, least bad first.
+    /// The local minima over q7 of each branch's violation, refined, least bad first.
     fn least_infeasible_solutions(&self) -> Vec<AnalyticSolution> {
         let on_grid: Vec<_> = self.grid.iter().map(|q7| self.analytic_solutions(*q7)).collect();
         let mut minima = Vec::new();
         for branch_idx in 0..NUM_BRANCHES {
-            let badness_on_grid: Vec<f64> =
-                on_grid.iter().map(|c| c[branch_idx].as_ref().map_or(f64::INFINITY, |c| self.badness(c))).collect();
+            let violation_on_grid: Vec<f64> =
+                on_grid.iter().map(|c| c[branch_idx].as_ref().map_or(f64::INFINITY, |c| self.violation(c))).collect();
             for i in 0..self.grid.len() {
-                let here = badness_on_grid[i];
-                let before = if i > 0 { badness_on_grid[i - 1] } else { f64::INFINITY };
-                let after = badness_on_grid.get(i + 1).copied().unwrap_or(f64::INFINITY);
+                let here = violation_on_grid[i];
+                let before = if i > 0 { violation_on_grid[i - 1] } else { f64::INFINITY };
+                let after = violation_on_grid.get(i + 1).copied().unwrap_or(f64::INFINITY);
                 if here.is_finite() && here <= before && here <= after {
                     minima.push((here, branch_idx, i));
                 }
@@ -305,14 +305,14 @@ impl<'a> Search<'a> {
             .filter_map(|(_, branch_idx, grid_idx)| {
                 let badness_at = |q7: f64| {
                     let solution = self.analytic_solutions(q7)[branch_idx];
-                    (solution, solution.map_or(f64::INFINITY, |c| self.badness(&c)))
+                    (solution, solution.map_or(f64::INFINITY, |c| self.violation(&c)))
                 };
                 let (low, high) = self.neighbours(grid_idx);
                 let (solution, _) = golden_section(low, high, badness_at);
                 solution
             })
             .collect();
-        refined.sort_by(|a, b| self.badness(a).total_cmp(&self.badness(b)));
+        refined.sort_by(|a, b| self.violation(a).total_cmp(&self.violation(b)));
         refined
     }
 }

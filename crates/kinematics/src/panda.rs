@@ -37,7 +37,7 @@ pub const HAND_OPENING_MAX_M: f64 = 0.08;
 pub struct Frames {
     /// Links 1 to 7, link 1 first.
     pub base_from_link: [Isometry3<f64>; NUM_JOINTS],
-    /// The flange.
+    /// The pose of the flange, 0.107 m along z of link 7.
     pub base_from_flange: Isometry3<f64>,
     /// The hand: the flange turned by [`HAND_TURN_RAD`].
     pub base_from_hand: Isometry3<f64>,

@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_struct_of_another_size_is_noticed() {
-        /// Writes a struct of 24 bytes whatever it is told.
+        /// Writes a struct of 24 bytes whatever `T` is.
         unsafe extern "C-unwind" fn writes_24_bytes<T>(out: *mut T) {
             // SAFETY: `check_size` hands over room for two `T`s of at least 16 bytes.
             unsafe { ptr::write_bytes(out.cast::<u8>(), 0, 24) };

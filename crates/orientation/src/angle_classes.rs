@@ -5,7 +5,7 @@
 //!
 //! A part that looks the same after a turn by 360° / n cannot tell its angle within n equal choices, and a network
 //! asked to would learn their mean. So the angle is **folded**: n·θ takes θ's place, one turn of the classes is one
-//! n-th of a turn of the part, and what cannot be seen is never asked.
+//! n-th of a turn of the part, and the loss does not depend on what no picture shows.
 
 use std::f64::consts::TAU;
 

@@ -78,8 +78,8 @@ impl CropWindow {
             for tap_y in 0..taps {
                 for tap_x in 0..taps {
                     let at = corner + right * (tap_x as f64 + 0.5) + down * (tap_y as f64 + 0.5);
-                    let colour = bilinear(image, at.x as f32, at.y as f32);
-                    (0..3).for_each(|channel| sum[channel] += colour[channel]);
+                    let color = bilinear(image, at.x as f32, at.y as f32);
+                    (0..3).for_each(|channel| sum[channel] += color[channel]);
                 }
             }
             image::Rgb(sum.map(|value| rounded(value * share)))
@@ -122,9 +122,9 @@ fn bilinear(image: &RgbImage, x: f32, y: f32) -> [f32; 3] {
     let (fx, fy) = (x - 0.5 - left, y - 0.5 - top);
     let (left, top) = (left as i32, top as i32);
     let weights = [(1.0 - fx) * (1.0 - fy), fx * (1.0 - fy), (1.0 - fx) * fy, fx * fy];
-    let mean = |colours: [[u8; 3]; 4]| -> [f32; 3] {
+    let mean = |colors: [[u8; 3]; 4]| -> [f32; 3] {
         std::array::from_fn(|c| {
-            let terms: [f32; 4] = std::array::from_fn(|i| weights[i] * f32::from(colours[i][c]));
+            let terms: [f32; 4] = std::array::from_fn(|i| weights[i] * f32::from(colors[i][c]));
             terms[0] + terms[1] + terms[2] + terms[3]
         })
     };

@@ -19,7 +19,7 @@ use crate::error::{OrientationError, Result};
 /// Grey values that make one unit of the network's input: about the deviation of photos.
 const GREY_VALUES_PER_UNIT: f32 = 58.0;
 
-/// The orientation CNN.
+/// Convolutions of stride 2 and two fully connected layers: logits of the angle classes.
 #[derive(Module, Debug)]
 pub struct OrientationCnn {
     /// From the crop to the last map.
@@ -96,7 +96,7 @@ impl OrientationCnn {
         self.classes.forward(self.features(crops))
     }
 
-    /// Gives the values that the classes are told from, `[N, H]` of the hidden layer.
+    /// Gives the features that the classes are computed from, `[N, H]` of the hidden layer.
     ///
     /// # Shapes
     /// - `crops`: `[N, 3, S, S]`

@@ -102,7 +102,7 @@ pub(crate) struct Relief {
     pub step: f32,
     /// The highest point.
     pub top_mm: f32,
-    /// The materials.
+    /// The materials that the cells refer to by index.
     pub materials: Vec<Material>,
 }
 

@@ -3,13 +3,14 @@
 use crate::arm_state::{ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::RobotError;
 use crate::safety::CheckedMotion;
+use crate::touch::{TouchDown, Touched};
 use crate::watch::Watch;
 
 /// An arm with a hand, simulated or real.
 ///
 /// Calls block until what they ask for is done. An error leaves the arm at rest, or coming to rest by the robot's own means.
 pub trait Arm {
-    /// What the arm says of itself now.
+    /// The present state of the arm.
     ///
     /// # Errors
     /// [`RobotError::Lost`] where it does not answer.
@@ -27,7 +28,7 @@ pub trait Arm {
     /// As [`Arm::follow`].
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<(), RobotError>;
 
-    /// What the hand says of itself now.
+    /// The present state of the hand.
     ///
     /// # Errors
     /// [`RobotError::Lost`] where it does not answer.
@@ -68,4 +69,13 @@ pub trait Arm {
     /// # Errors
     /// Where the error stays.
     fn recover(&mut self) -> Result<(), RobotError>;
+}
+
+/// An arm that takes torques, and so can yield to what it touches.
+pub trait CompliantArm: Arm {
+    /// Comes straight down from where the arm stands until something is felt, presses on it, and stands; `watch` sees every state.
+    ///
+    /// # Errors
+    /// As [`Arm::follow`].
+    fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched, RobotError>;
 }

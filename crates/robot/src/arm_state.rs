@@ -1,4 +1,4 @@
-//! What an arm and its hand tell of themselves, and what they are asked: plain values.
+//! States of an arm and its hand, and commands to them, as plain values.
 
 use sdg_kinematics::JointVector;
 
@@ -36,7 +36,7 @@ impl ArmMode {
     }
 }
 
-/// What the arm says of itself at one instant.
+/// The arm's measurements at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArmState {
     /// The arm's own clock, in seconds.
@@ -53,14 +53,14 @@ pub struct ArmState {
     pub mode: ArmMode,
 }
 
-/// What the hand says of itself.
+/// The state of the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandState {
     /// Distance between the fingers, m.
     pub opening_m: f64,
-    /// Whether the hand presses on something with the force that it was told, at a width that it was told to expect.
+    /// Whether the hand presses on something with the commanded force, at a width near the commanded one.
     pub is_grasping: bool,
-    /// Force of each finger, N, where the hand tells it.
+    /// Force of each finger, N, where the hand measures it.
     pub force_n: Option<f64>,
 }
 
@@ -85,7 +85,7 @@ pub enum HandCommand {
     },
 }
 
-/// How much thinner (first) or wider (second) a part may be than the hand was told, m. A width read from a picture is right to
+/// How much thinner (first) or wider (second) a part may be than the commanded width, m. A width read from a picture is right to
 /// a few millimetres, and a round part is met beside its thickest place; what the fingers must not do is close on nothing.
 pub const GRASP_TOLERANCE_M: [f64; 2] = [0.03, 0.03];
 /// Fingers that are nearer together than this hold nothing, m.

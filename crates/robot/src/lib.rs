@@ -29,6 +29,7 @@ mod arm;
 mod arm_state;
 mod error;
 mod franka;
+mod impedance;
 mod pace;
 mod perception;
 mod planned_arm;
@@ -36,16 +37,18 @@ mod playback;
 mod robot;
 mod safety;
 mod sequence;
+mod touch;
 mod watch;
 pub mod workcell;
 
-pub use arm::Arm;
+pub use arm::{Arm, CompliantArm};
 pub use arm_state::{
     ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
     MotionEnd, PERIOD_SECS,
 };
 pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
+pub use impedance::{Impedance, ImpedanceControl, TcpReference};
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 pub use planned_arm::{PlannedAction, PlannedArm};
@@ -56,4 +59,5 @@ pub use sequence::{
     CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, SURE,
     camera_looking_down, grasp,
 };
+pub use touch::{TouchDown, Touched};
 pub use watch::{HISTORY_SECS, MAX_SILENCE_SECS, StopReason, StopRequest, Watch};

@@ -1,4 +1,4 @@
-//! What the sequence takes from perception, and what it tells an observer.
+//! The trait by which the sequence finds a part, and the one that observes its steps.
 
 use std::fmt;
 use std::time::Instant;

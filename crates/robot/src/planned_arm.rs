@@ -18,7 +18,7 @@ pub enum PlannedAction {
     Hand(HandCommand),
 }
 
-/// Follows every motion exactly and grasps whatever it is told to; keeps what it was asked.
+/// Follows every motion exactly and holds after every grasp; records the commands.
 #[derive(Debug, Clone)]
 pub struct PlannedArm {
     state: ArmState,
@@ -148,9 +148,9 @@ mod tests {
     use nalgebra::{Isometry3, UnitQuaternion, Vector3};
     use sdg_kinematics::{Panda, ready_pose};
 
-    struct Given(Option<GraspTarget>);
+    struct FixedTarget(Option<GraspTarget>);
 
-    impl PartFinder<PlannedArm> for Given {
+    impl PartFinder<PlannedArm> for FixedTarget {
         fn find(&mut self, _arm: &mut PlannedArm) -> Result<Option<GraspTarget>> {
             Ok(self.0)
         }
@@ -175,7 +175,7 @@ mod tests {
         start[0] = 0.6;
         let mut arm = PlannedArm::new(start, 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut Given(Some(target())), &mut (), MOUNT, &config()).unwrap();
+        let report = grasp(&mut robot, &mut FixedTarget(Some(target())), &mut (), MOUNT, &config()).unwrap();
         assert_eq!(report.outcome, GraspOutcome::Held);
         let motions: Vec<_> = arm
             .actions()
@@ -204,7 +204,7 @@ mod tests {
     fn a_part_that_is_not_seen_ends_the_plan_at_the_look_out() {
         let mut arm = PlannedArm::new(ready_pose(), 0.08);
         let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
-        let report = grasp(&mut robot, &mut Given(None), &mut (), MOUNT, &config()).unwrap();
+        let report = grasp(&mut robot, &mut FixedTarget(None), &mut (), MOUNT, &config()).unwrap();
         assert!(matches!(report.outcome, GraspOutcome::Failed { step: crate::GraspStep::Detect, .. }));
     }
 }

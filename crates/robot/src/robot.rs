@@ -1,11 +1,14 @@
 //! An arm with its limits: every motion is planned and checked here.
 
-use sdg_kinematics::{CartesianLimits, JointLimits, JointPath, JointVector, NUM_JOINTS, Panda, Trajectory};
+use sdg_kinematics::{
+    CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, Panda, Trajectory,
+};
 
-use crate::arm::Arm;
+use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
 use crate::safety::{SafetyLimits, Violation};
+use crate::touch::{TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 
 /// A motion must begin this near to the controller's reference, rad: a difference that a person cannot see.
@@ -58,7 +61,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.latched.as_deref()
     }
 
-    /// What the arm says of itself.
+    /// The present state of the arm.
     ///
     /// # Errors
     /// As [`Arm::state`].
@@ -164,7 +167,7 @@ impl<'a, A: Arm> Robot<'a, A> {
         self.note(finished)
     }
 
-    /// What the hand says of itself.
+    /// The present state of the hand.
     ///
     /// # Errors
     /// As [`Arm::hand`].
@@ -228,5 +231,31 @@ impl<'a, A: Arm> Robot<'a, A> {
             self.latched = Some(error.to_string());
         }
         result
+    }
+}
+
+/// Share of the tcp's limits at which the way down is checked: it is slower than that.
+const TOUCH_SHARES: [f64; 3] = [0.05, 0.05, 0.02];
+
+impl<A: CompliantArm> Robot<'_, A> {
+    /// Comes straight down from where the arm stands until something is felt. The whole way is checked before, with the table as low as
+    /// [`TouchDown::below_table_m`] says.
+    ///
+    /// # Errors
+    /// As [`Robot::follow`]; [`crate::RobotError::Configuration`] for a speed or a force that is none for contact.
+    pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
+        touch_down.validate()?;
+        let start = self.ready()?.q_commanded;
+        let mut lowest = self.panda.forward(&start);
+        lowest.translation.z -= touch_down.max_way_m;
+        let path = self.panda.straight_path(&start, &lowest, &LineOptions::default())?;
+        let [velocity, acceleration, jerk] = TOUCH_SHARES;
+        let slow = CartesianLimits::franka().scaled(velocity, acceleration, jerk)?;
+        let way = Trajectory::along_path(path, &self.limits.joints, &slow)?;
+        let table_height_m = self.limits.table_height_m - touch_down.below_table_m;
+        SafetyLimits { table_height_m, ..self.limits.clone() }.check(way)?;
+        self.watch.begin();
+        let touched = self.arm.touch_down(touch_down, &mut self.watch);
+        self.note(touched)
     }
 }

@@ -34,6 +34,8 @@ impl fmt::Display for StopReason {
 
 /// The longest gap between two states of a moving arm, in seconds of its clock: what Franka's controller bridges itself.
 pub const MAX_SILENCE_SECS: f64 = 0.020;
+/// States are a whole number of milliseconds apart; their difference in seconds is rounded.
+const ROUNDING_SECS: f64 = 0.5e-3;
 /// How much of the past is kept, in seconds of the arm's clock.
 pub const HISTORY_SECS: f64 = 1.0;
 /// A measured joint moves at most so many times as fast as Franka's limit between two states, and by so much for noise, rad.
@@ -102,27 +104,33 @@ impl Watch {
     }
 
     fn implausible(&self, state: &ArmState) -> Option<StopReason> {
-        if let Some(joint_idx) = (0..NUM_JOINTS).find(|&idx| !(state.q[idx].is_finite() && state.dq[idx].is_finite())) {
-            return Some(StopReason::Implausible(format!("joint {} is at {}", joint_idx + 1, state.q[joint_idx])));
+        let quantities = [(state.q, "is at"), (state.dq, "moves at"), (state.q_commanded, "is led to")];
+        for (values, verb) in quantities {
+            if let Some(joint_idx) = (0..NUM_JOINTS).find(|&idx| !values[idx].is_finite()) {
+                let (joint, value) = (joint_idx + 1, values[joint_idx]);
+                return Some(StopReason::Implausible(format!("joint {joint} {verb} {value}")));
+            }
         }
         let before = self.states.back().filter(|before| before.mode == ArmMode::Moving)?;
         let elapsed_secs = state.time_secs - before.time_secs;
-        if elapsed_secs > self.max_silence_secs {
+        if elapsed_secs > self.max_silence_secs + ROUNDING_SECS {
             return Some(StopReason::Watchdog(format!(
                 "no state of the arm for {:.0} ms, at most {:.0} ms are allowed",
                 elapsed_secs * 1e3,
                 self.max_silence_secs * 1e3
             )));
         }
-        let moved = (state.q - before.q).abs();
         let allowed = JointVector::from(VELOCITY_MAX_RAD_S) * (MAX_SPEED_SHARE * elapsed_secs.max(0.0));
-        let joint_idx = (0..NUM_JOINTS).find(|&idx| moved[idx] > allowed[idx] + NOISE_RAD)?;
-        Some(StopReason::Implausible(format!(
-            "joint {} jumped by {:.3} rad within {:.0} ms",
-            joint_idx + 1,
-            moved[joint_idx],
-            elapsed_secs * 1e3
-        )))
+        let jump = |now: &JointVector, before: &JointVector, what: &str| {
+            let moved = (now - before).abs();
+            let joint_idx = (0..NUM_JOINTS).find(|&idx| moved[idx] > allowed[idx] + NOISE_RAD)?;
+            let (joint, moved_rad, elapsed_ms) = (joint_idx + 1, moved[joint_idx], elapsed_secs * 1e3);
+            Some(StopReason::Implausible(format!(
+                "{what}{joint} jumped by {moved_rad:.3} rad within {elapsed_ms:.0} ms"
+            )))
+        };
+        jump(&state.q, &before.q, "joint ")
+            .or_else(|| jump(&state.q_commanded, &before.q_commanded, "the reference of joint "))
     }
 
     /// The states of the last second, oldest first.
@@ -169,9 +177,12 @@ mod tests {
         jumped[2] += 1.0;
         let mut nan = ready_pose();
         nan[4] = f64::NAN;
+        let led_to = |q_commanded| ArmState { q_commanded, ..state(0.001, ready_pose()) };
         for (second, expected) in [
             (state(0.001, jumped), "joint 3 jumped by 1.000 rad within 1 ms"),
             (state(0.001, nan), "joint 5 is at NaN"),
+            (led_to(jumped), "the reference of joint 3 jumped by 1.000 rad within 1 ms"),
+            (led_to(nan), "joint 5 is led to NaN"),
             (state(0.050, ready_pose()), "no state of the arm for 50 ms"),
         ] {
             let mut watch = Watch::default();
@@ -190,6 +201,16 @@ mod tests {
         assert_eq!(watch.observe(&state(0.0, ready_pose())), None);
         assert_eq!(watch.observe(&state(0.1, ready_pose())), None);
         assert!(watch.observe(&state(0.25, ready_pose())).unwrap().to_string().contains("at most 100 ms"));
+    }
+
+    #[test]
+    fn nineteen_states_in_a_row_may_be_lost() {
+        for (cycle, is_stopped) in [(20, false), (21, true)] {
+            let mut watch = Watch::default();
+            assert_eq!(watch.observe(&state(0.480, ready_pose())), None);
+            let later = watch.observe(&state(0.480 + f64::from(cycle) * 1e-3, ready_pose()));
+            assert_eq!(later.is_some(), is_stopped, "{later:?}");
+        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub struct Comparison<'a> {
     pub likeness: &'a Likeness,
     /// Poses that agree by less are not worth that network's time.
     pub min_agreement: f64,
-    /// The image.
+    /// The image in which the demonstration is laid over.
     pub image: &'a RgbImage,
     /// The image's gradients.
     pub field: &'a GradientField,

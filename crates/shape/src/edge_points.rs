@@ -187,7 +187,7 @@ fn spread_out(candidates: &[EdgeCandidate], max_points: usize, pixel_size: f64) 
     }
 }
 
-/// Weighs points up whose normals tell of a direction of the pose that few others tell of.
+/// Gives more weight to points whose normals constrain a direction of the pose that few others constrain.
 ///
 /// The ends of a tube are few beside its flanks, yet only they say where along its axis it lies.
 ///

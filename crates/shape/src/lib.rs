@@ -14,7 +14,7 @@
 //! ```
 //! [`Surface`] compares the colours inside the outline, [`Structure`] the edges over the whole area both ways; a
 //! [`Comparison`] scores edges and surface together and gathers the [`Evidence`] for a pose.
-//! [`InstantSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
+//! [`ShapeSearch`] needs no detector: it tries every place, turn and scale of a whole image coarsely and refines the
 //! best. [`ShapeConfig`] holds what was fitted, with its origin.
 //!
 //! # Legend
@@ -42,7 +42,7 @@
 //! use image::{Rgb, RgbImage};
 //! use nalgebra::Point2;
 //! use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity, Polygon};
-//! use sdg_shape::{GradientField, InstantSearch, SearchConfig, ShapeConfig, ShapeTemplate};
+//! use sdg_shape::{GradientField, ShapeSearch, SearchConfig, ShapeConfig, ShapeTemplate};
 //!
 //! // A dark 80 × 40 plate in the demonstration, and the same plate 5 px further to the right.
 //! let plate_at = |x: u32| {
@@ -62,7 +62,7 @@
 //! assert!(refinement.agreement > 0.9);
 //!
 //! // Without knowing where to start:
-//! let search = InstantSearch::new(&plate_at(50), &outline, &SearchConfig::default())?;
+//! let search = ShapeSearch::new(&plate_at(50), &outline, &SearchConfig::default())?;
 //! let matches = search.search(&plate_at(110));
 //! assert!((matches[0].image_from_demonstration.apply(&Point2::new(90.0, 70.0)).x - 150.0).abs() < 0.2);
 //! # Ok::<(), sdg_shape::ShapeError>(())
@@ -98,7 +98,7 @@ pub use following::Reach;
 pub use gradient_field::GradientField;
 pub use likeness::{LAYERS, Layer, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
 pub use refinement::Refinement;
-pub use search::{InstantSearch, Match, SearchConfig};
+pub use search::{Match, SearchConfig, ShapeSearch};
 pub use structure::{Structure, StructureAgreement};
 pub use surface::Surface;
 pub use template::ShapeTemplate;

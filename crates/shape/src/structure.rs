@@ -1,6 +1,6 @@
 //! Edge directions compared in both directions: what the demonstration has and the image lacks, and the other way round.
 //!
-//! [`crate::ShapeTemplate`] asks of the image what stands at the demonstration's edges, and nothing else: a plate without
+//! [`crate::ShapeTemplate`] reads the image at the demonstration's edges alone: a plate without
 //! the holes agrees with every plate that has holes beside. Here directions are compared at a grid of points over the
 //! whole part, whether the demonstration has an edge there or not.
 //!

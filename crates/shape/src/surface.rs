@@ -1,7 +1,7 @@
 //! What lies inside the outline, compared as correlations of brightness and colour.
 //!
 //! A lever of nearly the same outline as the taught one agrees in its edges (0.71 to 0.75 was measured, where the part
-//! itself in bad light gave 0.64), but where the part has a bushing it has a hole. The surface sees that: brightness and
+//! itself in bad light gave 0.64), but where the part has a bushing it has a hole. That shows in the surface: brightness and
 //! colour inside the outline, as correlations, so that the light's strength and tint do not count.
 //!
 //! ```text
@@ -10,7 +10,7 @@
 //!                              cell's own mean, averaged               2/3 ─┘
 //! ```
 //! Across the whole part, bright against dark ends count; so does the edge of another thing's shadow that falls over it,
-//! and there the whole correlation is at a loss. Within a cell that shadow is in most cells no edge at all. On 480
+//! and there the correlation over the whole part is low. Within a cell that shadow is in most cells no edge at all. On 480
 //! pictures of the eight shipped parts and 480 without them, edges and the whole correlation (6 : 4) left 48 of 950 right
 //! poses below the best wrong one of any part; edges, cells and the whole (7 : 2 : 1) left 30, and 4 instead of 13 below the
 //! best wrong one of their own part.
@@ -27,7 +27,7 @@ use crate::pixel_cell::PixelCell;
 /// Points that are compared; a few hundred are enough for correlations, and cost microseconds. Chosen by that reasoning; 700
 /// before there were cells.
 const POINTS: f64 = 900.0;
-/// A cell of fewer points tells nothing. Chosen by hand, not measured.
+/// A cell of fewer points is not compared. Chosen by hand, not measured.
 const MIN_IN_CELL: usize = 4;
 /// Points this near to the outline show the background when the pose is a pixel off. Chosen by that reasoning, not
 /// measured.

@@ -8,7 +8,7 @@ use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{Angle, PlanarSimilarity};
-use sdg_shape::{GradientField, InstantSearch, SearchConfig};
+use sdg_shape::{GradientField, SearchConfig, ShapeSearch};
 
 /// Farther than this beside the part, in pixels, nothing is grasped.
 const BESIDE_PX: f64 = 3.0;
@@ -28,7 +28,7 @@ fn refined_outcome(part_idx: usize, seed: u64) -> Outcome {
     let part = &parts[part_idx];
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let (image, outline, demonstration_from_part) = scenes::demonstration(part, 1, 0.05);
-    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
+    let taught = ShapeSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
     let image_from_part = scenes::pose(
         rng.random_range(150.0..490.0),
         rng.random_range(130.0..350.0),
@@ -79,7 +79,7 @@ fn refine_pose_lowers_no_agreement_and_fewer_poses_lie_beside() {
 fn what_is_sure_is_left_where_the_edges_put_it() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
-    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
+    let taught = ShapeSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
     let field = GradientField::new(&image);
     let comparison = taught.comparison(&image, &field);
     let start = PlanarSimilarity { tx: 3.0, ..PlanarSimilarity::IDENTITY };
@@ -91,7 +91,7 @@ fn what_is_sure_is_left_where_the_edges_put_it() {
 fn scales_stay_in_range() {
     let parts = scenes::parts();
     let (image, outline, _) = scenes::demonstration(&parts[0], 1, 0.05);
-    let taught = InstantSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
+    let taught = ShapeSearch::new(&image, &outline, &SearchConfig::default()).unwrap();
     // Seen from twice as far, the part is half as large, and that is not allowed.
     let pivot = outline.bounds().center();
     let shrunk = image::imageops::resize(&image, 320, 240, image::imageops::FilterType::Triangle);

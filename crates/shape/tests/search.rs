@@ -8,7 +8,7 @@ use proptest::test_runner::RngSeed;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{BoundingBox, PlanarSimilarity, Polygon};
-use sdg_shape::{InstantSearch, SearchConfig, ShapeError};
+use sdg_shape::{SearchConfig, ShapeError, ShapeSearch};
 
 /// Errors allowed on another table under another light, as for refinement from a near start.
 const TOLERANCE_PX: f64 = 2.0;
@@ -22,7 +22,7 @@ fn with(change: impl FnOnce(&mut SearchConfig)) -> SearchConfig {
 }
 
 struct Taught {
-    search: InstantSearch,
+    search: ShapeSearch,
     outline: Polygon,
     demonstration_from_part: PlanarSimilarity,
     part: scenes::Part,
@@ -31,7 +31,7 @@ struct Taught {
 fn taught(part_idx: usize, config: &SearchConfig) -> Taught {
     let part = scenes::parts().swap_remove(part_idx);
     let (image, outline, demonstration_from_part) = scenes::demonstration(&part, 1, 0.05);
-    let search = InstantSearch::new(&image, &outline, config).expect("a part with edges");
+    let search = ShapeSearch::new(&image, &outline, config).expect("a part with edges");
     Taught { search, outline, demonstration_from_part, part }
 }
 
@@ -125,9 +125,8 @@ fn ring_outline(center: [f64; 2]) -> Polygon {
 
 #[test]
 fn a_round_part_is_found_once_also_in_weak_contrast() {
-    let search =
-        InstantSearch::new(&ring([160.0, 120.0], 90.0), &ring_outline([160.0, 120.0]), &SearchConfig::default())
-            .expect("a ring has edges");
+    let search = ShapeSearch::new(&ring([160.0, 120.0], 90.0), &ring_outline([160.0, 120.0]), &SearchConfig::default())
+        .expect("a ring has edges");
     for contrast in [90.0, 12.0] {
         let matches = search.search(&ring([90.0, 151.0], contrast));
         assert_eq!(matches.len(), 1, "{matches:?}");
@@ -173,12 +172,12 @@ fn a_tiny_part_is_found_and_a_smaller_one_refused() {
     };
     let outline =
         |x: f64, y: f64, side: f64| Polygon::from_box(&BoundingBox { x1: x, y1: y, x2: x + side, y2: y + side });
-    let search = InstantSearch::new(&dot(70, 50, 16), &outline(70.0, 50.0, 16.0), &SearchConfig::default())
+    let search = ShapeSearch::new(&dot(70, 50, 16), &outline(70.0, 50.0, 16.0), &SearchConfig::default())
         .expect("a square has edges");
     let matches = search.search(&dot(20, 81, 16));
     let center = matches[0].image_from_demonstration.apply(&nalgebra::Point2::new(78.0, 58.0));
     assert!((center - nalgebra::Point2::new(28.0, 89.0)).norm() < 0.5, "{center}");
-    let refused = InstantSearch::new(&dot(70, 50, 6), &outline(70.0, 50.0, 6.0), &SearchConfig::default());
+    let refused = ShapeSearch::new(&dot(70, 50, 6), &outline(70.0, 50.0, 6.0), &SearchConfig::default());
     assert!(matches!(refused, Err(ShapeError::OutlineTooSmall { .. })));
 }
 
@@ -210,7 +209,7 @@ fn a_part_is_found_with_half_and_with_twice_the_points() {
 #[test]
 fn bad_configurations_are_refused() {
     let (image, outline, _) = scenes::demonstration(&scenes::parts()[0], 1, 0.05);
-    let refused = |config: SearchConfig| match InstantSearch::new(&image, &outline, &config) {
+    let refused = |config: SearchConfig| match ShapeSearch::new(&image, &outline, &config) {
         Err(ShapeError::InvalidConfig { name, .. }) => name,
         other => panic!("{other:?}"),
     };

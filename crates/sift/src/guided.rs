@@ -1,4 +1,4 @@
-//! More matches, once the pose is known.
+//! Further matches near the places that a known pose predicts.
 //!
 //! The ratio test throws away right matches where the part repeats itself. With the pose at hand, a keypoint of the
 //! template is looked for only where it must lie, which a kd-tree over the image's keypoints answers.

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn luma_of_pure_colours() {
+    fn luma_of_pure_colors() {
         let image = RgbImage::from_raw(3, 1, vec![255, 0, 0, 0, 255, 0, 0, 0, 255]).unwrap();
         let levels: Vec<u8> = Plane::from_rgb(&image).data().iter().map(|v| (v * 255.0).round() as u8).collect();
         assert_eq!(levels, [76, 150, 29]);

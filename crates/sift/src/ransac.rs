@@ -205,18 +205,18 @@ impl Search<'_> {
 
     /// Number of subsets of this size times the chance that all of one agree.
     fn log10_false_alarms(&self, inliers: &[usize], search_area: f64) -> f64 {
-        // Matches of one keypoint with several directions, or of one blob at two scales, are one witness.
-        let mut witnesses: Vec<usize> = Vec::new();
+        // Matches of one keypoint with several directions, or of one blob at two scales, count once.
+        let mut distinct: Vec<usize> = Vec::new();
         for &i in inliers {
             let apart = |&other: &usize| {
                 let (a, b) = (&self.pairs[i], &self.pairs[other]);
                 (a.0.position - b.0.position).norm() > 1.5 && (a.1.position - b.1.position).norm() > 1.5
             };
-            if witnesses.iter().all(apart) {
-                witnesses.push(i);
+            if distinct.iter().all(apart) {
+                distinct.push(i);
             }
         }
-        let (n, k) = (self.pairs.len(), witnesses.len());
+        let (n, k) = (self.pairs.len(), distinct.len());
         if k < 3 {
             return f64::INFINITY;
         }
@@ -229,7 +229,7 @@ impl Search<'_> {
         };
         let log10_choose = |n: usize, k: usize| (0..k).map(|i| ((n - i) as f64 / (i + 1) as f64).log10()).sum::<f64>();
         // Two of the matches fixed the pose, so their agreement in place is no surprise.
-        let surprising: f64 = witnesses[2..].iter().map(|&i| chance(i)).sum();
+        let surprising: f64 = distinct[2..].iter().map(|&i| chance(i)).sum();
         (n as f64 - 2.0).log10() + log10_choose(n, k) + log10_choose(k, 2) + surprising
     }
 }

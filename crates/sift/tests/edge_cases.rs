@@ -6,13 +6,7 @@ mod support;
 
 use sdg_geometry::Mask;
 use sdg_sift::{Features, Plane, Sift, SiftConfig, SiftError, match_features};
-
-/// The default with a change.
-fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
-    let mut config = SiftConfig::default();
-    change(&mut config);
-    config
-}
+use support::with;
 
 fn describe(image: &Plane) -> Features {
     Sift::default().detect_and_describe(image, None).unwrap()

@@ -7,14 +7,7 @@ mod support;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_sift::{Features, Plane, Sift, SiftConfig, match_features};
-use support::{PARTS, picture, relit, warped};
-
-/// The default with a change.
-fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
-    let mut config = SiftConfig::default();
-    change(&mut config);
-    config
-}
+use support::{PARTS, picture, relit, warped, with};
 
 fn describe(image: &Plane) -> Features {
     Sift::new(SiftConfig::default()).unwrap().detect_and_describe(image, None).unwrap()

@@ -65,14 +65,14 @@ fn drawn_on(shown: &AxisView) -> RgbImage {
     image
 }
 
-fn stroke(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, colour: Rgb<u8>) {
+fn stroke(image: &mut RgbImage, from: Point2<f64>, to: Point2<f64>, color: Rgb<u8>) {
     let steps = (to - from).norm().ceil().max(1.0) * 2.0;
     for step in 0..=steps as u32 {
         let at = from + (to - from) * (f64::from(step) / steps);
         for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)] {
             let (x, y) = (at.x + dx, at.y + dy);
             if x >= 0.0 && y >= 0.0 && x < f64::from(image.width()) && y < f64::from(image.height()) {
-                image.put_pixel(x as u32, y as u32, colour);
+                image.put_pixel(x as u32, y as u32, color);
             }
         }
     }

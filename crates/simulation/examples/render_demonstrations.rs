@@ -113,12 +113,12 @@ fn drawn_over(shown: &DemonstrationView) -> RgbImage {
     const SCALE: u32 = 3;
     let image = &shown.view.image;
     let mut large = resize(image, image.width() * SCALE, image.height() * SCALE, FilterType::Nearest);
-    let mut stroke = |a: Point2<f64>, b: Point2<f64>, colour: Rgb<u8>| {
+    let mut stroke = |a: Point2<f64>, b: Point2<f64>, color: Rgb<u8>| {
         let steps = ((b - a).norm() * f64::from(SCALE)).ceil().max(1.0);
         for step in 0..=steps as u32 {
             let at = (a + (b - a) * (f64::from(step) / steps)) * f64::from(SCALE);
             if at.x >= 0.0 && at.y >= 0.0 && (at.x as u32) < large.width() && (at.y as u32) < large.height() {
-                large.put_pixel(at.x as u32, at.y as u32, colour);
+                large.put_pixel(at.x as u32, at.y as u32, color);
             }
         }
     };

@@ -40,7 +40,7 @@ pub enum ArmFaultKind {
     Jump,
     /// The arm stops itself, as after a contact.
     Reflex,
-    /// The hand does not do what it is told any more.
+    /// The hand does not follow commands any more.
     HandStuck,
 }
 
@@ -56,8 +56,8 @@ pub struct ArmFault {
 /// Errors of a workcell; by default there is none, and nothing changes.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AttemptErrors {
-    /// The pose that perception is told of the camera, in the camera's own frame.
-    pub camera_from_told: Option<Isometry3<f64>>,
+    /// The error of the pose that perception is given for the camera, in the camera's own frame.
+    pub camera_from_assumed: Option<Isometry3<f64>>,
     /// Sliding friction of the pads. They then lose their priority: MuJoCo takes the larger of the pad's and the part's.
     pub pad_friction: Option<f64>,
     /// What the arm does between lifting and holding.
@@ -72,7 +72,7 @@ impl AttemptErrors {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed ^ 0x4841_4e44_5f45_5945);
         let shift = direction(rng).into_inner() * HAND_EYE_SHIFT_M;
         let turn = UnitQuaternion::from_axis_angle(&direction(rng), HAND_EYE_TURN_DEG.to_radians());
-        Self { camera_from_told: Some(Isometry3::from_parts(Translation3::from(shift), turn)), ..Self::default() }
+        Self { camera_from_assumed: Some(Isometry3::from_parts(Translation3::from(shift), turn)), ..Self::default() }
     }
 
     /// Pads with a friction of 0.6 to 0.8 by the seed, without priority.
@@ -109,7 +109,7 @@ mod tests {
     fn errors_have_their_size_in_every_direction() {
         let mut sum = Vector3::zeros();
         for seed in 0..200 {
-            let error = AttemptErrors::hand_eye(seed).camera_from_told.unwrap();
+            let error = AttemptErrors::hand_eye(seed).camera_from_assumed.unwrap();
             assert!((error.translation.vector.norm() - 0.002).abs() < 1e-12);
             assert!((error.rotation.angle().to_degrees() - 0.5).abs() < 1e-9);
             sum += error.translation.vector;

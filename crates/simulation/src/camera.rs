@@ -128,9 +128,9 @@ mod tests {
         for (name, channel) in [("middle", 0), ("right", 1), ("up", 2)] {
             let centre = data.world_from_geom(model.id(name).unwrap()).translation.vector;
             let pixel = view.camera.project(&centre.into()).unwrap();
-            let colour = view.image.get_pixel(pixel.x as u32, pixel.y as u32).0;
-            let strongest = (0..3).max_by_key(|&c| colour[c]).unwrap();
-            assert_eq!(strongest, channel, "{name}: {colour:?}");
+            let color = view.image.get_pixel(pixel.x as u32, pixel.y as u32).0;
+            let strongest = (0..3).max_by_key(|&c| color[c]).unwrap();
+            assert_eq!(strongest, channel, "{name}: {color:?}");
         }
     }
 }

@@ -24,7 +24,7 @@ unsafe impl Send for Data {}
 /// Two geoms that touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// One of the geoms.
+    /// One of the two geoms; MuJoCo decides which.
     pub geom1: Id<Geom>,
     /// The other.
     pub geom2: Id<Geom>,
@@ -168,7 +168,7 @@ impl Data {
 
     /// Generalised positions, to be set.
     pub fn qpos_mut(&mut self) -> &mut [f64] {
-        // SAFETY: as in `qpos`, and `self` is borrowed mutably.
+        // SAFETY: the array has `nq` entries, lives as long as the data, and `self` is borrowed mutably.
         unsafe { std::slice::from_raw_parts_mut(self.raw().qpos, self.model.raw().nq as usize) }
     }
 
@@ -180,7 +180,7 @@ impl Data {
 
     /// Generalised velocities, to be set.
     pub fn qvel_mut(&mut self) -> &mut [f64] {
-        // SAFETY: as in `qvel`, and `self` is borrowed mutably.
+        // SAFETY: the array has `nv` entries, lives as long as the data, and `self` is borrowed mutably.
         unsafe { std::slice::from_raw_parts_mut(self.raw().qvel, self.model.raw().nv as usize) }
     }
 
@@ -303,7 +303,7 @@ fn isometry_from_quaternion([x, y, z]: [f64; 3], [w, i, j, k]: [f64; 4]) -> Isom
 /// # Safety
 /// The arrays must hold more than `index` triples and ninefolds.
 unsafe fn isometry_at(positions: *const f64, rotations: *const f64, index: usize) -> Isometry3<f64> {
-    // SAFETY: promised by the caller.
+    // SAFETY: the caller promises more than `index` triples and ninefolds.
     let (position, rotation) =
         unsafe { (*positions.add(3 * index).cast::<[f64; 3]>(), *rotations.add(9 * index).cast::<[f64; 9]>()) };
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&rotation));

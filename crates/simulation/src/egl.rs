@@ -22,7 +22,7 @@ struct Surfaceless {
 // SAFETY: EGL's functions may be called from any thread (EGL 1.5, section 2.2), and the handles are
 // only passed back to them.
 unsafe impl Send for Surfaceless {}
-// SAFETY: as above.
+// SAFETY: a shared reference passes the handles to EGL's functions only, which several threads may call at once.
 unsafe impl Sync for Surfaceless {}
 
 fn surfaceless() -> Result<&'static Surfaceless> {

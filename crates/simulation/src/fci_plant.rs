@@ -42,7 +42,12 @@ pub struct PandaPlant {
     /// Arm and hand alone, at rest: what gravity takes.
     standing: (Data, PandaIds),
     positions: SharedPositions,
+    /// What each joint takes of its motor's torque while it moves, N·m.
+    friction_nm: f64,
 }
+
+/// From this velocity on most of the friction acts, rad/s: slower, the simulation's step would be too long for it.
+const FULL_FRICTION_RAD_S: f64 = 0.02;
 
 impl PandaPlant {
     /// A scene at its start: the arm at rest in its ready pose, the hand open.
@@ -88,7 +93,14 @@ impl PandaPlant {
             capsules,
             standing: (Data::new(alone)?, standing_ids),
             positions,
+            friction_nm: 0.0,
         })
+    }
+
+    /// The same with dry friction in every joint that the robot does not make up for, N·m.
+    #[must_use]
+    pub fn with_friction_nm(self, friction_nm: f64) -> Self {
+        Self { friction_nm, ..self }
     }
 
     /// The positions of all things, kept up to date while the plant moves.
@@ -140,10 +152,12 @@ impl Plant for PandaPlant {
 
     fn step(&mut self, torque: &JointVector) -> std::result::Result<(), String> {
         let joints = *self.ids.qvel_indices();
+        let dq = self.ids.velocity(&self.data);
         for joint in 0..NUM_ARM_JOINTS {
             // A robot's torque sensors sit behind the gears, whose friction its own control makes up for.
-            let friction = self.data.qfrc_passive()[joints[joint]];
-            self.data.ctrl_mut()[self.ids.motors[joint].index()] = torque[joint] - friction;
+            let compensated = self.data.qfrc_passive()[joints[joint]];
+            let friction = self.friction_nm * (dq[joint] / FULL_FRICTION_RAD_S).tanh();
+            self.data.ctrl_mut()[self.ids.motors[joint].index()] = torque[joint] - compensated - friction;
         }
         self.gripper.apply(&mut self.data, &self.ids, PERIOD_SECS);
         self.data.step2().map_err(|error| error.to_string())?;

@@ -108,7 +108,7 @@ pub struct Model {
 // SAFETY: the model is owned by this value, is not bound to the thread that made it, and after
 // `from_xml` it is only read.
 unsafe impl Send for Model {}
-// SAFETY: as above; MuJoCo takes `const mjModel*` wherever we pass it.
+// SAFETY: after `from_xml` nothing writes to the model: MuJoCo takes `const mjModel*` wherever we pass it.
 unsafe impl Sync for Model {}
 
 /// MuJoCo keeps the last XML in a global, and its XML reader is not known to be reentrant.

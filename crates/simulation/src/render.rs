@@ -199,18 +199,18 @@ impl Renderer {
         // Colours are numbers of the scene's list plus one; the list says what it was made from.
         // SAFETY: the scene's buffer has `ngeom` filled entries.
         let shown = unsafe { std::slice::from_raw_parts(self.scene.geoms, self.scene.ngeom as usize) };
-        let mut geom_of_colour = vec![None; shown.len() + 1];
+        let mut geom_of_color = vec![None; shown.len() + 1];
         for geom in shown {
             let is_geom = geom.objtype == mj::mjOBJ_GEOM as i32 && geom.objid >= 0;
-            if let (true, Some(slot)) = (is_geom, geom_of_colour.get_mut((geom.segid + 1) as usize)) {
+            if let (true, Some(slot)) = (is_geom, geom_of_color.get_mut((geom.segid + 1) as usize)) {
                 *slot = Some(Id::new(geom.objid as usize));
             }
         }
         let geoms = bytes
             .chunks_exact(3)
             .map(|rgb| {
-                let colour = usize::from(rgb[0]) | usize::from(rgb[1]) << 8 | usize::from(rgb[2]) << 16;
-                geom_of_colour.get(colour).copied().flatten()
+                let color = usize::from(rgb[0]) | usize::from(rgb[1]) << 8 | usize::from(rgb[2]) << 16;
+                geom_of_color.get(color).copied().flatten()
             })
             .collect();
         Ok(Segmentation { width: self.config.width, height: self.config.height, geoms })

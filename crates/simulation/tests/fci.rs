@@ -190,7 +190,13 @@ fn each_limit_stops_the_motion_outside_of_it_and_none_inside() {
         let server = serve(pace, limits_of_server);
         let mut robot: Robot = connect(&server);
         let home = robot.read_state().unwrap().q_desired;
-        for case in limit_cases::all(&limits).iter().filter(|case| case.is_cartesian() == is_cartesian) {
+        assert!((0..7).all(|joint| (home[joint] - limit_cases::READY[joint]).abs() < 1e-6), "{home:?}");
+        let mut cases = limit_cases::all(&limits);
+        cases.retain(|case| case.is_cartesian() == is_cartesian);
+        if !is_cartesian {
+            cases.extend(limit_cases::joints_of_cartesian_motions(&limits));
+        }
+        for case in cases {
             for is_inside in [true, false] {
                 let found = case.run(&mut robot, &home, is_inside).unwrap();
                 assert!(case.is_expected(is_inside, &found), "{}, inside: {is_inside}: {found}", case.name);

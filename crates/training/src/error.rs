@@ -1,6 +1,6 @@
 //! Why a training run ended without a network.
 
-/// Errors of training.
+/// Why a run ended without a network.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]

@@ -6,13 +6,13 @@
 //! held-back samples ─────────────────────── validation in pixels and degrees ─────┘ best checkpoint, early stop
 //! ```
 //!
-//! Both are taught by one loop (run.rs), which asks what differs of a `Task`: batches, loss, validation.
+//! Both are taught by one loop (run.rs), and what differs is a `Task`: batches, loss, validation.
 //!
 //! A run is a function of its seed: which samples, in which order, every random choice of the losses. Only a time
 //! budget that cuts a run short makes it depend on the machine.
 //!
 //! What is deliberately absent: how a grasp is read off detections (the `grasp` crate passes that in), files, and any
-//! printing: a run tells what happens through [`TrainingEvent`]s.
+//! printing: a run reports its progress by [`TrainingEvent`]s.
 //!
 //! ```
 //! use sdg_training::{OneCycle, TrainingConfig};

@@ -1,4 +1,4 @@
-//! What JavaScript sees: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
+//! The interface of JavaScript: the class `Model`. Errors arrive there as `Error`, with the message of the Rust error.
 
 use sdg_grasp::{Device, Verification};
 use wasm_bindgen::prelude::*;
@@ -32,7 +32,7 @@ impl Model {
         Ok(Self(Detector::open(&bytes, &device().await?)?))
     }
 
-    /// What the file says of itself, as JSON; see [`Detector::summary`].
+    /// The metadata of the file, as JSON; see [`Detector::summary`].
     pub fn summary(&self) -> String {
         self.0.summary()
     }

@@ -34,7 +34,7 @@ impl Detector {
         Ok(Self { model: GraspModel::from_bytes(bytes, device)?, summary })
     }
 
-    /// What the file says of itself, as JSON: `model`, `preset`, `object`, `teaching`.
+    /// The metadata of the file, as JSON: `model`, `preset`, `object`, `teaching`.
     pub fn summary(&self) -> String {
         to_json(&self.summary)
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with what a page hands over.
+//! Errors in the inputs that a page hands over.
 
 /// Why a model could not be opened or an image not be looked at.
 #[derive(Debug, thiserror::Error)]

@@ -10,8 +10,8 @@
 //! same pixels; frames of a camera come as RGBA.
 //!
 //! The module is built twice: once for the processor, and once (feature `webgpu`, several times as large, and fetched
-//! only when asked for) for the graphics card that a browser lends. What a card computed, a browser hands over only to
-//! who awaits it, so looking is asynchronous.
+//! only when asked for) for the graphics card that a browser lends. A browser hands over results of its
+//! card to asynchronous code only, so detection is asynchronous.
 //!
 //! Left out on purpose: teaching, threads (a page may use them only where its host sends special headers), and any
 //! request to anywhere: what is dropped on the page stays in it. `make web` builds modules and page into target/web.

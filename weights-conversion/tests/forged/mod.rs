@@ -1,4 +1,4 @@
-//! Files put together by hand, as a forger would.
+//! Checkpoint files built byte by byte, with contents that no regular writer makes.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 /// Parts in a row.

@@ -1,6 +1,6 @@
 //! Requests about marked pictures.
 
-use sdg_demonstration::OutlineClicks;
+use sdg_demonstration::OutlineClick;
 use sdg_geometry::BoundingBox;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +17,7 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
         ("GET", ["picture"]) => picture_of(session.picture(id).and_then(|picture| picture.for_browser())),
         ("PUT", ["marks"]) => json_of(read("marks", body).and_then(|marks| session.set_marks(id, marks))),
         ("DELETE", []) => json_of(session.remove_image(id).map(|()| session.view())),
+        ("POST", ["put-back"]) => json_of(session.put_back_image(id).map(|()| session.view())),
         ("POST", ["outline"]) => json_of(propose_outline(session, id, body)),
         ("GET", ["samples", index]) => {
             let seed = request.head.query_value("seed").and_then(|seed| seed.parse().ok()).unwrap_or(1);
@@ -31,16 +32,20 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
 struct BoxRequest {
     #[serde(rename = "box")]
     bbox: [f64; 4],
-    /// Places that belong to the part.
+    /// In the order in which they were made.
     #[serde(default)]
-    inside: Vec<[f64; 2]>,
-    /// Places that do not.
-    #[serde(default)]
-    outside: Vec<[f64; 2]>,
+    clicks: Vec<ClickRequest>,
+}
+
+#[derive(Deserialize)]
+struct ClickRequest {
+    at: [f64; 2],
+    /// Whether the place belongs to the part.
+    is_inside: bool,
 }
 
 /// More clicks than any hand makes for one outline; each costs some milliseconds.
-const MAX_CLICKS: usize = 200;
+const MAX_CLICKS: usize = 100;
 
 #[derive(Serialize)]
 struct Proposal {
@@ -48,13 +53,12 @@ struct Proposal {
 }
 
 fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal> {
-    let BoxRequest { bbox: [x1, y1, x2, y2], inside, outside } = read("box", body)?;
-    let found = inside.len() + outside.len();
-    if found > MAX_CLICKS {
+    let BoxRequest { bbox: [x1, y1, x2, y2], clicks } = read("box", body)?;
+    if clicks.len() > MAX_CLICKS {
         return Err(Error::Request {
             what: "clicks",
             expected: format!("at most {MAX_CLICKS}"),
-            found: found.to_string(),
+            found: clicks.len().to_string(),
         });
     }
     let picture = session.picture(id)?;
@@ -63,8 +67,8 @@ fn propose_outline(session: &Session, id: usize, body: &[u8]) -> Result<Proposal
         expected: "two corners".into(),
         found: error.to_string(),
     })?;
-    let places = |places: Vec<[f64; 2]>| places.into_iter().map(Into::into).collect();
-    let clicks = OutlineClicks { inside: places(inside), outside: places(outside) };
+    let of = |ClickRequest { at, is_inside }| OutlineClick { at: at.into(), is_inside };
+    let clicks: Vec<_> = clicks.into_iter().map(of).collect();
     let outline = outline::propose(&picture.pixels()?, &bbox, &clicks);
     Ok(Proposal { outline: outline.map(|outline| outline.vertices.into_iter().map(Into::into).collect()) })
 }

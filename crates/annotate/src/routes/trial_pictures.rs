@@ -21,6 +21,7 @@ pub fn answer(session: &Session, request: &Request, method: &str, id: usize, res
         ("PUT", ["absent"]) => {
             json_of(read("absent", &request.body).and_then(|Absent { absent }| session.set_absent(id, absent)))
         }
+        ("POST", ["put-back"]) => json_of(session.put_back_trial_picture(id).map(|()| session.view())),
         ("DELETE", []) => json_of(session.remove_trial_picture(id).map(|()| session.view())),
         _ => return None,
     })

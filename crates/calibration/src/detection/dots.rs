@@ -102,7 +102,7 @@ fn within(&[a, b, c, d]: &[Point2<f64>; 4], [u, v]: [f64; 2]) -> Point2<f64> {
 /// The only placement on a board of so many squares that the dots agree with.
 fn place(grid: &Grid, dots: &Dots, sides: [u32; 2]) -> Option<Placed> {
     let mut placements: Vec<(f64, Turned)> = Turned::all(grid, sides)
-        .filter(|turned| turned.agrees_in_colour(grid))
+        .filter(|turned| turned.agrees_in_color(grid))
         .filter_map(|turned| Some((turned.contradiction(grid, dots, sides)?, turned)))
         .collect();
     placements.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -119,7 +119,7 @@ fn plain(grid: &Grid, board: &Board) -> Option<Placed> {
         return None;
     }
     let mut whole = Turned::all(grid, sides)
-        .filter(|turned| turned.agrees_in_colour(grid) && turned.corners(grid, sides).len() == grid.len());
+        .filter(|turned| turned.agrees_in_color(grid) && turned.corners(grid, sides).len() == grid.len());
     let first = whole.next()?;
     whole.next().is_none().then(|| first.corners(grid, sides))
 }
@@ -164,7 +164,7 @@ impl Turned {
         [a[0].min(b[0]), a[1].min(b[1])]
     }
 
-    fn agrees_in_colour(&self, grid: &Grid) -> bool {
+    fn agrees_in_color(&self, grid: &Grid) -> bool {
         let [column, row] = self.square([0, 0]);
         ((column + row).rem_euclid(2) == 0) == grid.first_is_dark
     }

@@ -1,7 +1,8 @@
 //! The focal length of a camera that was never calibrated, from one picture of the sheet, and what it costs not to know it.
 //!
 //! Square pixels, no lens distortion, and an optical axis near the middle of the picture are assumed. A sheet seen from straight above
-//! has the same picture at every focal length (twice as long, twice as far); the more it is tilted, the better it tells.
+//! has the same picture at every focal length (twice as long, twice as far); the more it is tilted, the more exactly
+//! the focal length follows.
 
 use nalgebra::{Isometry3, Matrix6, Point2, SMatrix, SVector, Vector6};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};

@@ -5,7 +5,7 @@
 //!          └─ without: homography, focal length where the tilt tells it, else a guess  focal.rs
 //! ```
 //! A homography alone says what lies where on the table. For what stands above the table the focal length counts;
-//! [`FocalCost`] tells how much.
+//! [`FocalCost`] has the size of that effect.
 
 mod focal;
 mod sheet_pose;

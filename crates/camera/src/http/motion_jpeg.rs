@@ -30,7 +30,7 @@ impl MotionJpeg {
     fn catch_up(&mut self, mut part: Vec<u8>) -> (Vec<u8>, u64) {
         let start = Instant::now();
         let mut num_skipped = 0;
-        // Broken framing is met again, and told, by the next call.
+        // The next call meets the broken framing again and reports it.
         loop {
             match self.multipart.next_part() {
                 Ok(Some(newer)) => {

@@ -28,7 +28,7 @@ pub struct Format {
     pub description: String,
     /// The encoding, where it is one that is read here.
     pub encoding: Option<Encoding>,
-    /// The sizes.
+    /// Sizes in pixels: a list, or a range with steps.
     pub sizes: Sizes,
     /// The highest frame rate of each of [`Sizes::Listed`], in frames a second; 0 where the driver does not say. Empty for an encoding
     /// that is not read here.

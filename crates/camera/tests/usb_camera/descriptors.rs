@@ -1,4 +1,4 @@
-//! What the webcam says of itself.
+//! The descriptors by which the webcam names its formats and its endpoint.
 
 /// The sizes of its frames, by frame index from 1.
 pub const FRAME_SIZES: [(u16, u16); 2] = [(640, 480), (320, 240)];

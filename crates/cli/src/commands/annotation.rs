@@ -31,7 +31,7 @@ pub enum AnnotationCommand {
 /// `sdg annotation convert`
 #[derive(Debug, ClapArgs)]
 pub struct ConvertAnnotationArgs {
-    /// COCO, LabelMe, YOLO-pose (data.yaml beside or above it), OpenDR's boxes_*.npy (kps_*.npy beside it): told by content
+    /// COCO, LabelMe, YOLO-pose (data.yaml beside or above it), OpenDR's boxes_*.npy (kps_*.npy beside it): recognised by content
     #[arg(value_name = "IN")]
     pub input: PathBuf,
     /// The file to write
@@ -55,7 +55,7 @@ pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
     }
 }
 
-/// What the output has no room for is told on standard error, and in the JSON.
+/// What the output has no room for is listed on standard error, and in the JSON.
 fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let format = format_of_output(args)?;
     if args.output.exists() && same_file(&args.input, &args.output) {

@@ -190,14 +190,19 @@ fn attempt<A: Arm, P: Pictures<A>>(
     let mount = prepared.camera.mount();
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
     let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut (), mount, &prepared.config);
-    if ended.is_err() || robot.latched().is_some() {
+    // A part that is not there is no error, and a part that is held is none.
+    let has_failed = match &ended {
+        Ok(report) => !report.outcome.is_held() && !is_nothing_found(report),
+        Err(_) => true,
+    };
+    if has_failed || robot.latched().is_some() {
         write_states(&args.states, robot.watch())?;
     }
     let report = ended?;
-    tell(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
+    print_report(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
 }
 
-/// Plans from where the arm stands, draws, tells.
+/// Plans from where the arm stands, draws and prints the plan.
 fn dry_run<A: Arm>(
     args: &GraspArgs,
     prepared: &Prepared,
@@ -210,7 +215,7 @@ fn dry_run<A: Arm>(
     let mount = prepared.camera.mount();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config)?;
     eprintln!("what would be done:");
-    plan.tell(target.is_some())?;
+    plan.print(target.is_some())?;
     for file in plan.draw(&args.out, seen.filter(|_| target.is_some()))? {
         eprintln!("  {}", file.display());
     }
@@ -218,7 +223,13 @@ fn dry_run<A: Arm>(
 }
 
 /// The closing lines, or the one object.
-fn tell(args: &GraspArgs, prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Result<Outcome> {
+fn print_report(
+    args: &GraspArgs,
+    prepared: &Prepared,
+    report: &GraspReport,
+    secs: f64,
+    robot: &str,
+) -> Result<Outcome> {
     if args.json {
         println!("{}", to_json(prepared, report, secs, robot));
     }
@@ -230,13 +241,18 @@ fn tell(args: &GraspArgs, prepared: &Prepared, report: &GraspReport, secs: f64, 
             );
             Ok(Outcome::Done)
         }
-        // A look was taken, and the part was not in it; a motion that was refused before is another matter.
-        GraspOutcome::Failed { step: GraspStep::Detect, why } if report.targets.last() == Some(&None) => {
+        GraspOutcome::Failed { why, .. } if is_nothing_found(report) => {
             eprintln!("{why}");
             Ok(Outcome::NothingToGrasp)
         }
         GraspOutcome::Failed { step, why } => Err(anyhow!("{step}: {why}")),
     }
+}
+
+/// Whether a look was taken and the part was not in it; a motion that was refused before is another matter.
+fn is_nothing_found(report: &GraspReport) -> bool {
+    let is_look = matches!(report.outcome, GraspOutcome::Failed { step: GraspStep::Detect, .. });
+    is_look && report.targets.last() == Some(&None)
 }
 
 fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Value {

@@ -244,7 +244,7 @@ fn command(args: &TeachArgs) -> String {
     command
 }
 
-/// Puts the weights to start from into the options. What does not simply fit is told at once, because teaching takes
+/// Puts the weights to start from into the options. What does not simply fit is refused at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
 fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };

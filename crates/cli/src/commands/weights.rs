@@ -45,7 +45,7 @@ pub enum WeightsCommand {
 /// `sdg weights convert`
 #[derive(Debug, ClapArgs)]
 pub struct ConvertArgs {
-    /// Detectron2 .pkl or .pth, torchvision .pth, safetensors: told by content, not by name
+    /// Detectron2 .pkl or .pth, torchvision .pth, safetensors: recognised by content, not by name
     #[arg(value_name = "IN")]
     pub input: PathBuf,
     /// The file to write

@@ -56,7 +56,7 @@ impl Cell<'_> {
         store.read_made_with(&self.teaching_file(marks), &store.settings().teaching())
     }
 
-    /// What it said of pictures, if it was shown them.
+    /// Its detections in pictures, if it was run on them.
     pub fn look(self, store: &Store) -> Result<Option<LookRecord>> {
         store.read(&self.file("look"))
     }

@@ -1,4 +1,4 @@
-//! Pictures with the part and without it, and what models say of them.
+//! Pictures with the part and without it, and the detections of the models in them.
 
 use anyhow::{Context, Result};
 use sdg_grasp::{GraspModel, Verification};
@@ -8,7 +8,7 @@ use sdg_simulation::scene::{SceneVariation, TestView, VariationConfig, test_view
 use super::records::{DetectionRecord, PictureRecord};
 use crate::trial::{Trial, try_view};
 
-/// What a model says of a picture, both ways; the trial is the verified one.
+/// A model's detections in a picture, both ways; the trial is the verified one.
 pub(super) fn observe_picture(
     model: &GraspModel,
     object: &ObjectSpec,

@@ -23,23 +23,23 @@ pub const CPU_FRAMES_PER_SECOND: f64 = 0.4;
 /// # Source
 /// Table II; success with a decimal as its section VI gives it. For A both networks' samples, times and sizes.
 pub fn row(model: ModelKind) -> Option<PaperRow> {
-    Some(match model.letter() {
-        "A" => PaperRow {
+    Some(match model {
+        ModelKind::A => PaperRow {
             samples: "1500 + 5000",
             teaching: "14:00 + 2:00",
             size: "300 + 8",
             frames_per_second: "–",
             success_percent: 91.3,
         },
-        "B" => {
+        ModelKind::B => {
             PaperRow { samples: "1500", teaching: "7:30", size: "450", frames_per_second: "20", success_percent: 82.5 }
         }
-        "C" => {
+        ModelKind::C => {
             PaperRow { samples: "1500", teaching: "7:00", size: "450", frames_per_second: "20", success_percent: 93.5 }
         }
-        "D" => {
+        ModelKind::D => {
             PaperRow { samples: "1500", teaching: "6:30", size: "330", frames_per_second: "–", success_percent: 78.0 }
         }
-        _ => return None,
+        ModelKind::S => return None,
     })
 }

@@ -17,7 +17,7 @@ pub const LOSS_STEPS: usize = 10;
 pub enum TeachingRecord {
     /// There is a model.
     Taught {
-        /// What it says of itself.
+        /// Its own description.
         facts: Box<TeachingFacts>,
         /// Size of its file.
         bytes: usize,
@@ -64,7 +64,7 @@ impl AttemptRecord {
         [Self::TEACH].into_iter().chain(GraspStep::ALL.map(GraspStep::name)).chain([Self::SIMULATION])
     }
 
-    /// As the rehearsal tells it.
+    /// As the rehearsal gives it.
     pub fn new(RehearsedAttempt { attempt, looks, .. }: &RehearsedAttempt) -> Self {
         Self {
             attempt: attempt.number,
@@ -116,7 +116,7 @@ impl AttemptsRecord {
     }
 }
 
-/// What a model said of a picture.
+/// A model's detections in a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DetectionRecord {
     /// Score of the best detection, accepted or not; zero for none.
@@ -132,7 +132,7 @@ pub struct DetectionRecord {
 }
 
 impl DetectionRecord {
-    /// As the trial tells it.
+    /// As the trial gives it.
     pub fn new(trial: &Trial) -> Self {
         Self {
             score: trial.best_score,
@@ -143,24 +143,24 @@ impl DetectionRecord {
         }
     }
 
-    /// Whether it says that the part is there.
+    /// Whether the part was detected.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }
 
-    /// How far beside the truth it is, where it says that the part is there.
+    /// The error against the truth, where the part was detected.
     pub fn error(&self) -> Option<DetectionError> {
         let (distance_mm, angle_deg) = self.error_mm.zip(self.error_deg)?;
         self.is_accepted().then_some(DetectionError { distance_mm, angle_deg })
     }
 
-    /// Whether it says so near enough to the truth.
+    /// Whether that is near enough to the truth.
     pub fn is_right(&self) -> bool {
         self.error().is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
     }
 }
 
-/// A picture and what was said of it.
+/// A picture and the detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PictureRecord {
     /// Seed of its scene.
@@ -173,7 +173,7 @@ pub struct PictureRecord {
     pub alone: Option<DetectionRecord>,
 }
 
-/// What a model said of a part's pictures.
+/// A model's detections in a part's pictures.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct LookRecord {
     /// The part is there.

@@ -1,4 +1,4 @@
-//! What decides an evaluation's results.
+//! The settings on which an evaluation's results depend.
 
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
@@ -28,6 +28,13 @@ pub struct Settings {
 impl Settings {
     /// The protocol of this version.
     pub const PROTOCOL: u32 = 2;
+
+    /// Settings of preset `edge`, with as many pictures with the part as without it.
+    #[cfg(test)]
+    pub(super) fn for_test(seed: u64, attempts: u32, pictures: u32) -> Self {
+        let preset = "edge".into();
+        Self { protocol: Self::PROTOCOL, preset, steps: None, seed, attempts, views: pictures, scenes: pictures }
+    }
 
     /// Those of them that decide a teaching.
     pub fn teaching(&self) -> TeachingSettings {
@@ -74,7 +81,7 @@ mod tests {
     use super::*;
 
     fn settings() -> Settings {
-        Settings { protocol: 1, preset: "edge".into(), steps: None, seed: 1, attempts: 10, views: 25, scenes: 25 }
+        Settings { protocol: 1, ..Settings::for_test(1, 10, 25) }
     }
 
     fn told(expected: &impl Serialize, found: &Settings) -> Option<String> {

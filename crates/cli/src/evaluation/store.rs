@@ -73,7 +73,6 @@ impl Store {
         Ok(store)
     }
 
-    /// The folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -165,15 +164,7 @@ mod tests {
     use crate::exit::one_line;
 
     fn settings(seed: u64) -> Settings {
-        Settings {
-            protocol: Settings::PROTOCOL,
-            preset: "edge".into(),
-            steps: None,
-            seed,
-            attempts: 2,
-            views: 1,
-            scenes: 1,
-        }
+        Settings::for_test(seed, 2, 1)
     }
 
     #[test]

@@ -289,15 +289,7 @@ mod tests {
     #[test]
     fn cells_add_up_and_a_failed_teaching_counts_as_failed_attempts() {
         let folder = tempfile::tempdir().unwrap();
-        let settings = Settings {
-            protocol: Settings::PROTOCOL,
-            preset: "edge".into(),
-            steps: None,
-            seed: 1,
-            attempts: 3,
-            views: 2,
-            scenes: 2,
-        };
+        let settings = Settings::for_test(1, 3, 2);
         let store = Store::open(folder.path(), &settings).unwrap();
         let facts = TeachingFacts {
             seed: 1,

@@ -125,22 +125,10 @@ mod tests {
     use super::*;
     use crate::evaluation::{AttemptRecord, AttemptsRecord, LookRecord, Settings, TeachingRecord};
 
-    fn settings() -> Settings {
-        Settings {
-            protocol: Settings::PROTOCOL,
-            preset: "edge".into(),
-            steps: None,
-            seed: 1,
-            attempts: 2,
-            views: 1,
-            scenes: 1,
-        }
-    }
-
     #[test]
     fn models_that_share_a_network_wait_for_one_teaching() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path(), &settings()).unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
         let objects = [ObjectSpec::by_name("pendulum").unwrap(), ObjectSpec::by_name("rod_end").unwrap()];
         let evaluation = Evaluation {
             models: &[ModelKind::B, ModelKind::C],
@@ -150,10 +138,10 @@ mod tests {
             unverified: true,
             jobs: 1,
         };
-        let told = |tasks: &[Task<Unit>]| -> Vec<String> {
+        let listed = |tasks: &[Task<Unit>]| -> Vec<String> {
             tasks.iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect()
         };
-        let tasks = told(&evaluation.tasks().unwrap());
+        let tasks = listed(&evaluation.tasks().unwrap());
         assert_eq!(
             tasks[..4],
             ["teach C pendulum []", "look pendulum [0, 0]", "grasp B pendulum [0]", "grasp C pendulum [0]"]
@@ -176,7 +164,7 @@ mod tests {
         store.write("cells/C-rod_end.attempts-verified.json", &done).unwrap();
         store.write("cells/B-rod_end.look.json", &LookRecord::default()).unwrap();
         assert_eq!(
-            told(&evaluation.tasks().unwrap()),
+            listed(&evaluation.tasks().unwrap()),
             [
                 "teach C rod_end []",
                 "look rod_end [0]",

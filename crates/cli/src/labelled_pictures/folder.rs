@@ -124,7 +124,7 @@ fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
         let known = IMAGE_EXTENSIONS.join(", ");
         bail!("{}: expected pictures ({known}), found none among {} files", folder.display(), paths.len());
     }
-    // A phone's photos that are not read are told here, not missed in the result.
+    // A phone's photos that are not read are listed here, not missed in the result.
     for path in paths.iter().filter(|path| files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
         let why = files::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
         left_out.push(LeftOut { file: file_name(path), why });

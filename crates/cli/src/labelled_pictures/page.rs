@@ -31,7 +31,7 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
     let mut order: Vec<usize> = (0..judged.len()).collect();
-    order.sort_by_key(|&at| std::cmp::Reverse(badness(&judged[at])));
+    order.sort_by_key(|&at| std::cmp::Reverse(num_errors(&judged[at])));
     let object = evaluated.model.object().replace('_', " ");
     let check = match evaluated.verification {
         Verification::ByShape => "with the check against the demonstration",
@@ -81,10 +81,10 @@ pub fn page(evaluated: &Evaluated, command: &str) -> Result<Report> {
     Ok(report.section(this_run(evaluated, command)).footer(FOOTER))
 }
 
-/// How much is amiss.
-fn badness(judged: &Judged) -> (usize, usize) {
-    let amiss = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
-    (amiss, judged.wrong())
+/// Errors of any kind, then those that would grasp wrongly: the worst picture has most.
+fn num_errors(judged: &Judged) -> (usize, usize) {
+    let all = judged.wrong() + judged.missed() + if judged.is_false_alarm() { judged.hits.len() } else { 0 };
+    (all, judged.wrong())
 }
 
 fn key_figures(totals: &Totals) -> Vec<KeyFigure> {

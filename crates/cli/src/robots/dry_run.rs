@@ -1,4 +1,4 @@
-//! What a grasp would do from where the arm stands: planned with the same sequence and limits, drawn, and told; nothing moves.
+//! What a grasp would do from where the arm stands: planned with the same sequence and limits, drawn and described; nothing moves.
 
 use std::path::{Path, PathBuf};
 
@@ -19,10 +19,10 @@ pub(crate) struct DryRun {
     outcome: GraspOutcome,
 }
 
-/// What was found from where the arm stands.
-struct Given(Option<GraspTarget>);
+/// Finds the same target, or none, wherever the arm is.
+struct FixedTarget(Option<GraspTarget>);
 
-impl PartFinder<PlannedArm> for Given {
+impl PartFinder<PlannedArm> for FixedTarget {
     fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
         Ok(self.0)
     }
@@ -43,7 +43,7 @@ impl DryRun {
     ) -> Result<Self> {
         let mut arm = PlannedArm::new(start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
-        let report = grasp(&mut robot, &mut Given(target), &mut (), mount, config)?;
+        let report = grasp(&mut robot, &mut FixedTarget(target), &mut (), mount, config)?;
         Ok(Self { start, opening_m, arm, outcome: report.outcome })
     }
 
@@ -51,7 +51,7 @@ impl DryRun {
     ///
     /// # Errors
     /// The step that cannot be planned.
-    pub(crate) fn tell(&self, is_seen: bool) -> Result<()> {
+    pub(crate) fn print(&self, is_seen: bool) -> Result<()> {
         let panda = sdg_kinematics::Panda::new();
         for action in self.arm.actions() {
             match action {

@@ -19,7 +19,7 @@ use sdg_robot::workcell::Mounting;
 use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, RobotError};
 
 /// How long a picture that was taken after the arm stopped is waited for.
-const PATIENCE: Duration = Duration::from_secs(5);
+const MAX_WAIT: Duration = Duration::from_secs(5);
 
 /// A calibrated camera and where it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,15 +111,15 @@ impl<A: Arm> Pictures<A> for LivePictures {
         let (now, called) = (SystemTime::now(), Instant::now());
         let failed = |why: String| RobotError::Perception(why);
         loop {
-            let left = PATIENCE.saturating_sub(called.elapsed());
+            let left = MAX_WAIT.saturating_sub(called.elapsed());
             let frame = match self.0.take(left) {
                 Ok(Some(frame)) => frame,
                 Ok(None) if self.0.has_ended() => return Err(failed("the camera has no more pictures".to_owned())),
                 Ok(None) => {
-                    let secs = PATIENCE.as_secs();
+                    let secs = MAX_WAIT.as_secs();
                     return Err(failed(format!("no picture for {secs} s that was taken after the arm stopped")));
                 }
-                Err(error) if error.is_passing() && called.elapsed() < PATIENCE => continue,
+                Err(error) if error.is_passing() && called.elapsed() < MAX_WAIT => continue,
                 Err(error) => return Err(failed(error.to_string())),
             };
             if frame.captured < now {

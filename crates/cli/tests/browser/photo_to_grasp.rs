@@ -15,6 +15,9 @@ fn from_a_photo_to_a_taught_model_and_another_demonstration() {
     assert_light(&page);
     page.assert_accessible("empty page");
     page.screenshot("1-empty");
+    page.click("#tab-try");
+    page.assert_accessible("trying before anything is taught");
+    page.click("#tab-mark");
 
     mark(&page);
     see_samples(&page);
@@ -97,6 +100,7 @@ fn mark(page: &Page) {
     // A point of the outline dragged, and a reload: everything is as it was left.
     page.click("#do-outline h2");
     page.settle();
+    page.assert_accessible("with the outline's points");
     let point = page.handle("[data-vertex='0'] .knob");
     browser.drag(&[point, [point[0] + 2.0, point[1] + 1.0], [point[0] + 5.0, point[1] + 4.0]]).unwrap();
     let left = page.saved();
@@ -128,6 +132,7 @@ fn teach(page: &Page) {
     page.click("#teach-start");
     page.wait_for("its steps", "return /Step [1-4] of 4/.test(document.getElementById('progress-text').innerText)");
     page.screenshot("6-teaching");
+    page.assert_accessible("while it is taught");
     let written = "return document.getElementById('teach-outcome').innerText.includes('Written to')";
     patiently(page, "a model of the network", written);
     let outcome = page.text("#teach-outcome");
@@ -142,6 +147,7 @@ fn teach(page: &Page) {
     patiently(page, "a model without a network", instant);
     assert!(page.folder.path().join("pendulum.sdg").exists());
     page.screenshot("7-taught");
+    page.assert_accessible("taught");
 }
 
 /// Asks again for longer than the browser's own patience: the computer may be busy.
@@ -163,6 +169,16 @@ fn try_on_another_picture(page: &Page) {
     turned.save(&other).unwrap();
     let before = page.saved_grasp();
     page.click("#go-try");
+    // What only looks like a picture is told by its name.
+    let broken = page.folder.path().join("broken.png");
+    std::fs::write(&broken, "no picture").unwrap();
+    page.browser.find("#picture-input").unwrap().type_text(broken.to_str().unwrap()).unwrap();
+    page.wait_for("its error", "return document.getElementById('try-error').innerText.includes('broken.png')");
+    // The browser's console has the refusal, too, and nothing else.
+    let told = page.browser.console_errors().unwrap();
+    assert!(told.len() == 1 && told[0].contains("422"), "{told:?}");
+    page.screenshot("9-broken");
+    page.assert_accessible("a picture that cannot be read");
     page.browser.find("#picture-input").unwrap().type_text(other.to_str().unwrap()).unwrap();
     patiently(page, "a grasp", "return document.querySelector('.found') !== null");
     assert!(page.text(".found").contains("Found the part"), "{}", page.text("#found"));

@@ -7,7 +7,7 @@ use image::{Rgb, RgbImage};
 use sdg_demonstration::Annotation;
 use serde_json::json;
 
-use crate::page::{HOLD, Page, repository, shipped_photo};
+use crate::page::{BOX, HOLD, Page, repository, shipped_photo};
 use crate::photo_to_grasp::patiently;
 
 /// Opens a project that holds the pendulum's photo under these names, each with the marks that are shipped.
@@ -121,7 +121,8 @@ fn a_picture_without_the_part_is_kept_and_versions_are_compared_after_opening_ag
     teach_s(&page, 2);
     assert!(page.text("#version-list").contains("1 without the part"), "{}", page.text("#version-list"));
 
-    // Left and opened again: everything is there.
+    // Left and opened again: everything is there. The page is left first, or it would ask for the server in between.
+    page.browser.open("about:blank").unwrap();
     page.stop_server();
     page.start_server();
     page.browser.open(&page.url.clone()).unwrap();
@@ -153,9 +154,18 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port().to_string();
     let mut page = open(&["--port", &port, "--token-file", "key"], &["earlier", "photo"]);
-    // Taken out: the server that is started anew gives the other photo its number.
-    page.click("#remove-photo");
-    page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
+    // Taken out, put back and taken out again: the server that is started anew gives the other photo its number.
+    for again in [true, false] {
+        page.click("#remove-photo");
+        page.wait_for("the other photo", "return document.getElementById('photo').alt === 'Photo photo.png'");
+        page.settle_frames();
+        if again {
+            page.screenshot("project-8-taken-out");
+            page.assert_accessible("a photo taken out");
+            page.click("#toasts button");
+            page.wait_for("it again", "return document.getElementById('photo').alt === 'Photo earlier.png'");
+        }
+    }
     page.stop_server();
     page.wait_for("the banner", "return !document.getElementById('lost').hidden");
     page.settle_frames();
@@ -185,6 +195,15 @@ fn the_server_s_end_is_told_and_marks_are_kept_in_the_browser() {
     assert!((by - 5.0).abs() < 0.1, "five keys turn by five degrees: {by}");
     assert!(!saved.with_file_name("earlier.coco.json").exists(), "the other photo is left alone");
     page.wait_for("nothing kept any more", "return localStorage.getItem('kept-marks') === null");
+
+    // Started again with another key, it does not answer to this page any more, which says what to do.
+    page.stop_server();
+    std::fs::remove_file(page.folder.path().join("key")).unwrap();
+    page.start_server();
+    page.wait_for("the other key", "return document.getElementById('lost').innerText.includes('another key')");
+    page.settle_frames();
+    page.screenshot("project-9-another-key");
+    page.assert_accessible("another key");
 }
 
 #[test]
@@ -207,6 +226,37 @@ fn a_click_corrects_the_outline_and_is_undone() {
     page.settle();
     assert_eq!(area(&page), before);
     page.assert_accessible("clicking the outline");
+    page.assert_quiet();
+}
+
+#[test]
+#[ignore = "make test-browser: needs Chromium"]
+fn that_an_outline_has_no_holes_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let middle = [0.5 * (BOX[0] + BOX[2]), 0.5 * (BOX[1] + BOX[3])];
+    let washer = RgbImage::from_fn(640, 480, |x, y| {
+        let radius = (f64::from(x) - middle[0]).hypot(f64::from(y) - middle[1]);
+        // Two greys of a table, and a dark ring on it.
+        let table = if (x / 8 + y / 8).is_multiple_of(2) { 150 } else { 156 };
+        Rgb([if (25.0..56.0).contains(&radius) { 70 } else { table }; 3])
+    });
+    washer.save(folder.path().join("photo.png")).unwrap();
+    let page = Page::open_in(folder, &["photo.png"]);
+    page.wait_for("the photo", "return document.getElementById('photo').naturalWidth");
+    page.draw_box();
+    page.wait_for("the outline", "return document.querySelector('#do-outline.done') !== null");
+    page.settle();
+    let area = std::f64::consts::PI * 56.0 * 56.0;
+    let found = page.saved().outline.unwrap().area();
+    assert!((found / area - 1.0).abs() < 0.05, "{found} of {area}");
+    page.click("[data-tool=out]");
+    page.browser.drag(&[page.on_screen(middle)]).unwrap();
+    page.wait_for("a word of the hole", "return document.getElementById('toasts').innerText.includes('no holes')");
+    page.settle();
+    let after = page.saved().outline.unwrap().area();
+    assert!((after / area - 1.0).abs() < 0.05, "{after} of {area}");
+    page.screenshot("project-10-hole");
+    page.assert_accessible("a click in a hole");
     page.assert_quiet();
 }
 

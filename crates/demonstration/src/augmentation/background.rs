@@ -74,7 +74,7 @@ fn paint_surface(canvas: &mut Raster, bank: &NoiseBank, part: &Prepared, rng: &m
     // Texture sizes are given for a frame 320 pixels wide.
     let px = 320.0 / canvas.frame_width as f32;
     let frame = Frame::draw(rng);
-    let [dark, light] = draw_colours(part, rng);
+    let [dark, light] = draw_colors(part, rng);
     match index_below(rng, 12) {
         0 => fill_with(canvas, dark, dark, |_, _| 0.0),
         1 => {
@@ -163,7 +163,7 @@ fn fill_with(canvas: &mut Raster, dark: [f32; 3], light: [f32; 3], value: impl F
 }
 
 /// Two colours, mostly near grey or wood, at times those of the photo's own background.
-fn draw_colours(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
+fn draw_colors(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
     let level = uniform(rng, 0.05, 0.9);
     let base = match index_below(rng, 6) {
         0 | 1 => [level; 3].map(|v| v + uniform(rng, -0.04, 0.04)),
@@ -172,10 +172,10 @@ fn draw_colours(part: &Prepared, rng: &mut SampleRng) -> [[f32; 3]; 2] {
             [level, level * uniform(rng, 0.68, 0.85), level * uniform(rng, 0.4, 0.65)]
         }
         3 => {
-            let (grey, colour) = (uniform(rng, 0.05, 0.9), uniform(rng, 0.1, 0.8));
-            std::array::from_fn(|_| grey + (uniform(rng, 0.0, 0.95) - grey) * colour)
+            let (grey, color) = (uniform(rng, 0.05, 0.9), uniform(rng, 0.1, 0.8));
+            std::array::from_fn(|_| grey + (uniform(rng, 0.0, 0.95) - grey) * color)
         }
-        4 => part.colours[index_below(rng, part.colours.len())],
+        4 => part.colors[index_below(rng, part.colors.len())],
         _ => {
             let at = index_below(rng, part.background.pixels.len());
             let [r, g, b, _] = part.background.pixels[at];

@@ -1,4 +1,4 @@
-//! What the augmented samples look like.
+//! The configuration of the augmentation.
 
 use crate::{Error, Result};
 

@@ -40,7 +40,7 @@ impl Lamp {
 /// What a drawn thing looks like.
 enum Material<'a> {
     Plain {
-        colour: [f32; 3],
+        color: [f32; 3],
         grain: f32,
         gloss: f32,
     },
@@ -67,8 +67,8 @@ impl<'a> Distractor<'a> {
         let material = if chance(rng, 0.12) {
             Material::PartSurface { part }
         } else {
-            let colour = draw_colour(part, rng);
-            Material::Plain { colour, grain: uniform(rng, 0.0, 0.3), gloss: uniform(rng, 0.0, 0.6) }
+            let color = draw_color(part, rng);
+            Material::Plain { color, grain: uniform(rng, 0.0, 0.3), gloss: uniform(rng, 0.0, 0.6) }
         };
         let grain_at = [uniform(rng, 0.0, 256.0), uniform(rng, 0.0, 256.0)];
         Self { figure, material, center, turn: direction(rng), size_px, grain_at }
@@ -115,14 +115,14 @@ impl<'a> Distractor<'a> {
                 let distance = self.distance_px(px, py);
                 if distance < 0.7 {
                     let alpha = (0.5 - distance / 1.4).clamp(0.0, 1.0);
-                    let colour = self.colour(px, py, distance, lamp, noise);
-                    blend(&mut canvas.pixels[y * canvas.width + x], colour, alpha);
+                    let color = self.color(px, py, distance, lamp, noise);
+                    blend(&mut canvas.pixels[y * canvas.width + x], color, alpha);
                 }
             }
         }
     }
 
-    fn colour(&self, x: f32, y: f32, distance: f32, lamp: &Lamp, noise: &NoiseTile) -> [f32; 3] {
+    fn color(&self, x: f32, y: f32, distance: f32, lamp: &Lamp, noise: &NoiseTile) -> [f32; 3] {
         // The rim falls off like a quarter circle; within it the surface is flat.
         let rim = (self.figure.rim * self.size_px).max(0.5);
         let steepness = (1.0 + distance / rim).clamp(0.0, 0.95);
@@ -139,10 +139,10 @@ impl<'a> Distractor<'a> {
             shine = mirrored.powi(8);
         }
         match &self.material {
-            Material::Plain { colour, grain, gloss } => {
+            Material::Plain { color, grain, gloss } => {
                 let texture = noise.at(x * 1.7 + self.grain_at[0], y * 1.7 + self.grain_at[1]) - 0.5;
                 let light = (0.4 + 0.6 * diffuse / lamp.elevation) * (1.0 + grain * texture);
-                colour.map(|c| c * light + gloss * shine)
+                color.map(|c| c * light + gloss * shine)
             }
             Material::PartSurface { part } => {
                 let (u, v) = self.local(x, y);
@@ -157,10 +157,10 @@ impl<'a> Distractor<'a> {
 }
 
 /// Steel, brass, copper, black and coloured plastic, or a colour of the part itself.
-fn draw_colour(part: &Prepared, rng: &mut SampleRng) -> [f32; 3] {
+fn draw_color(part: &Prepared, rng: &mut SampleRng) -> [f32; 3] {
     let level = uniform(rng, 0.6, 1.3);
     let tint = match index_below(rng, 8) {
-        0 | 1 => part.colours[index_below(rng, part.colours.len())],
+        0 | 1 => part.colors[index_below(rng, part.colors.len())],
         2 => [0.62, 0.64, 0.67],
         3 => [0.33, 0.34, 0.36],
         4 => [0.72, 0.6, 0.33],
@@ -217,8 +217,8 @@ pub(crate) fn paint_mutant(
             // Edges lie a little inside, so that no rim of the photo's background comes along.
             let alpha = smoothstep(0.0, 1.4, inside);
             if alpha > 0.0 {
-                let colour = std::array::from_fn(|k| pixel[k] * gain[k]);
-                blend(&mut canvas.pixels[y * canvas.width + x], colour, alpha);
+                let color = std::array::from_fn(|k| pixel[k] * gain[k]);
+                blend(&mut canvas.pixels[y * canvas.width + x], color, alpha);
             }
         }
     }

@@ -137,10 +137,10 @@ mod tests {
                 for (pixel, expected) in image.pixels().zip(&expected) {
                     match expected {
                         None => assert_eq!(pixel.0, [0; 3], "{draw:?} cut this off"),
-                        Some(colour) => {
+                        Some(color) => {
                             seen += 1;
-                            let off = (0..3).map(|k| (f64::from(pixel[k]) - colour[k]).abs()).fold(0.0, f64::max);
-                            assert!(off <= TOLERANCE, "{draw:?}: {pixel:?}, not {colour:?}");
+                            let off = (0..3).map(|k| (f64::from(pixel[k]) - color[k]).abs()).fold(0.0, f64::max);
+                            assert!(off <= TOLERANCE, "{draw:?}: {pixel:?}, not {color:?}");
                         }
                     }
                 }

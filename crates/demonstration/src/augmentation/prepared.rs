@@ -45,7 +45,7 @@ pub(crate) struct Prepared {
     /// The keypoints on the grasp line; empty where no grasp is marked.
     pub keypoints: Vec<Keypoint>,
     /// Colours of the part.
-    pub colours: Vec<[f32; 3]>,
+    pub colors: Vec<[f32; 3]>,
     /// Ways to make something of the part's pieces that is not the part.
     pub mutants: Vec<Mutant>,
 }
@@ -91,7 +91,7 @@ impl Prepared {
         let hole: Vec<bool> = distance.iter().map(|&d| d > -margin).collect();
         let background = fill(&photo, &hole);
 
-        let colours = (0..24)
+        let colors = (0..24)
             .map(|_| {
                 let p = area_points[index_below(rng, area_points.len())] * prepared_from_photo;
                 let [r, g, b, _] = photo.nearest(p.x as f32, p.y as f32);
@@ -113,7 +113,7 @@ impl Prepared {
             radius,
             area_points,
             keypoints,
-            colours,
+            colors,
             mutants: Vec::new(),
         }
     }

@@ -116,9 +116,9 @@ pub(crate) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 
 /// `from` towards `to` by `t`, colour only.
 #[inline(always)]
-pub(crate) fn blend(pixel: &mut [f32; 4], colour: [f32; 3], alpha: f32) {
+pub(crate) fn blend(pixel: &mut [f32; 4], color: [f32; 3], alpha: f32) {
     for k in 0..3 {
-        pixel[k] += (colour[k] - pixel[k]) * alpha;
+        pixel[k] += (color[k] - pixel[k]) * alpha;
     }
 }
 

@@ -155,8 +155,8 @@ impl Studio<'_> {
                 let pixel = part.photo.bilinear(u, v);
                 let alpha = smoothstep(edge - feather, edge + feather, pixel[3] * canvas_from_prepared);
                 if alpha > 0.0 {
-                    let colour = std::array::from_fn(|k| pixel[k] * gain[k] * level);
-                    blend(&mut canvas.pixels[y * canvas.width + x], colour, alpha);
+                    let color = std::array::from_fn(|k| pixel[k] * gain[k] * level);
+                    blend(&mut canvas.pixels[y * canvas.width + x], color, alpha);
                 }
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! A pixel is one 64-bit word of four 16-bit lanes (red, green, blue, nothing), so that bilinear interpolation of all
 //! channels is four loads and three multiplications of plain integers. Places along a row are sums of one step, and
-//! rows are read in runs that lie inside the picture, so that the inner loop asks nothing.
+//! rows are read in runs that lie inside the picture, so that the inner loop has no conditions.
 //!
 //! ```text
 //! row ── place, step ── run: columns inside ── blocks of words, 8.8 bits a lane ── gain ── bytes

@@ -41,7 +41,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_colours() {
+    fn known_colors() {
         // Values of sRGB's primaries and grey as every colour table gives them, to a tenth.
         for (rgb, lab) in [
             ([255, 255, 255], [100.0, 0.0, 0.0]),

@@ -45,6 +45,11 @@ impl Edges {
             .collect();
         Self { width, cost }
     }
+
+    /// How strong the edge at a pixel is, in [0, 1].
+    pub fn strength(&self, at: usize) -> f32 {
+        (1.0 - self.cost[at] / BOUNDARY_COST) / (1.0 - MIN_COST_SHARE)
+    }
 }
 
 /// Moves `share` to the cut of least cost; starts from what it holds.

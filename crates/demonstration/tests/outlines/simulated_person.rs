@@ -1,7 +1,7 @@
 //! A person who clicks where a proposed outline is wrong: into the widest part of the largest wrong piece.
 
 use nalgebra::Point2;
-use sdg_demonstration::{OutlineClicks, propose_outline_with};
+use sdg_demonstration::{OutlineClick, propose_outline_with};
 use sdg_geometry::{BoundingBox, Mask, Polygon};
 
 use image::RgbImage;
@@ -33,17 +33,13 @@ pub fn agreement(proposed: &Polygon, truth: &Polygon, image: &RgbImage) -> Agree
 pub fn outlines(image: &RgbImage, bbox: &BoundingBox, truth: &Polygon, num_clicks: usize) -> Vec<Polygon> {
     let (width, height) = image.dimensions();
     let truth = truth.rasterize(width, height);
-    let mut clicks = OutlineClicks::default();
+    let mut clicks = Vec::new();
     let mut outlines = vec![propose_outline_with(image, bbox, &clicks)];
     for _ in 0..num_clicks {
         let proposed = outlines[outlines.len() - 1].rasterize(width, height);
         let Some(place) = widest_of_largest_error(&proposed, &truth, bbox) else { break };
-        let clicked = Point2::new(f64::from(place[0]) + 0.5, f64::from(place[1]) + 0.5);
-        if truth.get(place[0], place[1]) {
-            clicks.inside.push(clicked)
-        } else {
-            clicks.outside.push(clicked)
-        }
+        let at = Point2::new(f64::from(place[0]) + 0.5, f64::from(place[1]) + 0.5);
+        clicks.push(OutlineClick { at, is_inside: truth.get(place[0], place[1]) });
         outlines.push(propose_outline_with(image, bbox, &clicks));
     }
     outlines

@@ -1,6 +1,6 @@
 //! The detector for two cores.
 
-use super::{ROI_WEIGHTS, RcnnKind, UNIT_WEIGHTS};
+use super::{IMAGENET_MEAN, IMAGENET_STD, ROI_WEIGHTS, RcnnKind, UNIT_WEIGHTS};
 use crate::config::*;
 
 /// The default, with keypoints: [`edge_of`] this kind.
@@ -29,8 +29,8 @@ pub fn edge_of(kind: RcnnKind) -> RcnnConfig {
             filter: ResizeFilter::AntialiasedBytes,
             channel_order: ChannelOrder::Rgb,
             pixel_range: PixelRange::Unit,
-            mean: [0.485, 0.456, 0.406],
-            std: [0.229, 0.224, 0.225],
+            mean: IMAGENET_MEAN,
+            std: IMAGENET_STD,
             size_divisibility: 32,
         },
         backbone: ResNetConfig {

@@ -1,7 +1,7 @@
 //! torchvision's R50-FPN.
 
 use super::r50_detectron2;
-use super::{RcnnKind, UNIT_WEIGHTS};
+use super::{IMAGENET_MEAN, IMAGENET_STD, RcnnKind};
 use crate::config::*;
 
 /// torchvision's R50-FPN with its numerics, for imported weights.
@@ -28,8 +28,8 @@ pub fn r50_torchvision(kind: RcnnKind) -> RcnnConfig {
             filter: ResizeFilter::Bilinear,
             channel_order: ChannelOrder::Rgb,
             pixel_range: PixelRange::Unit,
-            mean: [0.485, 0.456, 0.406],
-            std: [0.229, 0.224, 0.225],
+            mean: IMAGENET_MEAN,
+            std: IMAGENET_STD,
             size_divisibility: 32,
         },
         backbone: ResNetConfig {
@@ -44,7 +44,6 @@ pub fn r50_torchvision(kind: RcnnKind) -> RcnnConfig {
             ..base.anchors
         },
         rpn: RpnConfig {
-            box_coder: UNIT_WEIGHTS,
             post_nms_top_n: PerMode { train: 2000, test: 1000 },
             min_box_size_px: 1e-3,
             regression_loss: smooth_l1,
@@ -52,7 +51,6 @@ pub fn r50_torchvision(kind: RcnnKind) -> RcnnConfig {
             ..base.rpn
         },
         roi_heads: RoiHeadsConfig {
-            hard_negative_share: 0.0,
             box_head: BoxHeadConfig {
                 pooler: pooler(7),
                 background: BackgroundClass::First,

@@ -8,18 +8,19 @@
 
 use burn::module::Module;
 use burn::tensor::Tensor;
-use sdg_layers::{Conv2d, Conv2dShape, ConvTranspose2x, Distribution, Initializer, upsample_bilinear_2x};
+use sdg_layers::{Conv2d, ConvTranspose2x, Initializer, upsample_bilinear_2x};
 
-use crate::config::{KeypointHeadConfig, NormKind};
+use crate::config::KeypointHeadConfig;
 use crate::host::read;
 use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 
+use super::head_convs;
 use super::heatmap::{decode, encode};
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
 use crate::target::ResizedTarget;
 
-/// The keypoint head.
+/// Convolutions, a transposed convolution and an upsampling: heatmap logits of each keypoint.
 #[derive(Module, Debug)]
 pub struct KeypointHead {
     /// 3×3 convolutions; Detectron2's `conv_fcn1` is number 0.
@@ -33,16 +34,8 @@ pub struct KeypointHead {
 impl KeypointHead {
     /// Draws the parameters for a pyramid of `channels` channels.
     pub fn init(config: &KeypointHeadConfig, channels: usize, init: &mut Initializer) -> Self {
-        let mut in_channels = channels;
-        let conv_fcn = config
-            .conv_channels
-            .iter()
-            .map(|out_channels| {
-                let shape = Conv2dShape::new(in_channels, *out_channels, 3);
-                in_channels = *out_channels;
-                shape.init(Distribution::he_normal(shape.fan_out()), NormKind::Identity, init)
-            })
-            .collect();
+        let conv_fcn = head_convs::init(channels, &config.conv_channels, init);
+        let in_channels = config.conv_channels.last().copied().unwrap_or(channels);
         Self {
             conv_fcn,
             score_lowres: ConvTranspose2x::init(in_channels, config.num_keypoints, 4, init),

@@ -16,6 +16,7 @@ use crate::losses;
 use crate::roi_pooler::{Roi, pool};
 use crate::rpn::ImageSize;
 
+use super::head_convs;
 use super::mask_paste::BoxMask;
 use super::mask_target::encode;
 use super::roi::{RoiClass, RoiDetection, SampledRoi};
@@ -24,7 +25,7 @@ use crate::target::ResizedTarget;
 /// Standard deviation of the predictor's first weights: small, so that training starts undecided.
 const PREDICTOR_STD: f64 = 0.001;
 
-/// The mask head.
+/// Convolutions, a transposed and a 1×1 convolution: mask logits of each class.
 #[derive(Module, Debug)]
 pub struct MaskHead {
     /// 3×3 convolutions; Detectron2's `mask_fcn1` is number 0.
@@ -50,16 +51,8 @@ impl MaskHead {
         background: BackgroundClass,
         init: &mut Initializer,
     ) -> Self {
-        let mut in_channels = channels;
-        let mask_fcn = config
-            .conv_channels
-            .iter()
-            .map(|out_channels| {
-                let shape = Conv2dShape::new(in_channels, *out_channels, 3);
-                in_channels = *out_channels;
-                shape.init(Distribution::he_normal(shape.fan_out()), NormKind::Identity, init)
-            })
-            .collect();
+        let mask_fcn = head_convs::init(channels, &config.conv_channels, init);
+        let in_channels = config.conv_channels.last().copied().unwrap_or(channels);
         let first_class_map = match background {
             BackgroundClass::First => 1,
             BackgroundClass::Last => 0,

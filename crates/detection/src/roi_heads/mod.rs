@@ -8,6 +8,7 @@
 //! ```
 
 pub mod box_head;
+mod head_convs;
 pub mod heatmap;
 pub mod keypoint_head;
 pub mod mask_head;

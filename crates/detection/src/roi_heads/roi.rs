@@ -22,7 +22,7 @@ pub enum RoiClass {
     Background,
     /// An object of the image.
     Object {
-        /// Class.
+        /// Index of the class, from 0 without the background.
         class_idx: usize,
         /// Index among the image's objects.
         gt_idx: usize,
@@ -36,7 +36,7 @@ pub struct RoiDetection {
     pub corners: Corners,
     /// Probability of the class.
     pub score: f32,
-    /// Class.
+    /// Index of the class, from 0 without the background.
     pub class_idx: usize,
     /// Keypoints, empty without a keypoint head.
     pub keypoints: Vec<ReadKeypoint>,

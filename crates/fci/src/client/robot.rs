@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::session::{Sending, Session};
 use super::statistics::ControlStatistics;
@@ -147,7 +147,7 @@ impl Robot {
         self.execute(&Request::StopMove, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Clears the errors after a reflex, as a person has said; nothing moves by it.
+    /// Clears the errors after a reflex, at a person's request; nothing moves by it.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -155,7 +155,7 @@ impl Robot {
         self.execute(&Request::AutomaticErrorRecovery, Some(RECOVERY_TIMEOUT))
     }
 
-    /// Sets when contacts are told and collisions stop the robot; not during a motion.
+    /// Sets from when on contacts are reported and collisions stop the robot; not during a motion.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -195,7 +195,7 @@ impl Robot {
         self.set(&Request::SetNeToEe(*ne_from_ee))
     }
 
-    /// Sets the frame that external forces and Cartesian stiffness are told in, on the end effector.
+    /// Sets the frame of external forces and Cartesian stiffness, on the end effector.
     ///
     /// # Errors
     /// [`FciError::Refused`] and the errors of the connection.
@@ -231,7 +231,7 @@ impl Robot {
         accept(&response, request.command())
     }
 
-    /// Takes the newest state that is newer than the last one.
+    /// Takes the newest state that is newer than the last one: a datagram that the network repeats or delivers late is none.
     pub(super) fn receive(&mut self, discard_waiting: bool) -> Result<()> {
         let version = self.version;
         let size = match version {
@@ -239,12 +239,18 @@ impl Robot {
             Version::V10 => STATE_SIZE_V10,
         };
         let mut discard_waiting = discard_waiting;
+        // A number that leapt ahead by mistake would let all later states look old.
+        let deadline = Instant::now() + self.session.timeout();
         loop {
             let state = self.session.receive(size, discard_waiting, |bytes| RobotState::decode(bytes, version))?;
             discard_waiting = false;
             if state.message_id > self.state.message_id || self.recent.is_empty() {
                 self.state = state;
                 break;
+            }
+            if Instant::now() >= deadline {
+                let (what, waited) = ("state that is newer than the last one", self.session.timeout());
+                return Err(FciError::Timeout { what, address: self.session.address, waited });
             }
         }
         if self.recent.len() == NUM_RECENT_STATES {

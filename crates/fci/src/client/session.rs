@@ -168,7 +168,7 @@ impl Session {
                 Err(source) => return Err(socket_error("receive from", self.address, source)),
             }
             if newest.is_none() && Instant::now() >= deadline {
-                // The robot's end is told as such.
+                // The end of the robot's connection has an error of its own.
                 self.fetch()?;
                 return Err(FciError::Timeout { what: "state", address: self.address, waited: self.timeout });
             }

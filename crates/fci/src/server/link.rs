@@ -18,7 +18,7 @@ const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
 /// disconnected may connect again at once. Shorter than clients wait for an answer (1 s).
 const HANDOVER: Duration = Duration::from_millis(500);
 
-/// What a listening thread or a reading one tells the loop.
+/// Messages of the listening thread and of the reading one to the loop.
 #[derive(Debug)]
 enum LinkEvent {
     Connected(TcpStream, SocketAddr),
@@ -160,7 +160,7 @@ impl Link {
             match self.udp.recv_from(buffer) {
                 Ok((length, from)) if from == peer => return Some(length),
                 Ok(_) => {}
-                // An error of an earlier datagram (port unreachable) is told here; the next call reads on.
+                // An error of an earlier datagram (port unreachable) arrives here; the next call reads on.
                 Err(_) => return None,
             }
         }
@@ -195,7 +195,7 @@ impl Link {
     /// Takes a client, or lets it wait where there is one already; a third one is turned away.
     fn meet(&mut self, stream: TcpStream, address: SocketAddr) {
         if self.client.is_none() {
-            self.welcome(stream, address);
+            self.take_client(stream, address);
         } else if self.waiting.is_none() {
             self.waiting = Some(WaitingClient { stream, address, until: Instant::now() + HANDOVER });
         } else {
@@ -207,7 +207,7 @@ impl Link {
     fn admit_waiting(&mut self) {
         let Some(waiting) = self.waiting.take() else { return };
         if self.client.is_none() {
-            self.welcome(waiting.stream, waiting.address);
+            self.take_client(waiting.stream, waiting.address);
         } else if Instant::now() < waiting.until {
             self.waiting = Some(waiting);
         } else {
@@ -215,7 +215,7 @@ impl Link {
         }
     }
 
-    fn welcome(&mut self, stream: TcpStream, address: SocketAddr) {
+    fn take_client(&mut self, stream: TcpStream, address: SocketAddr) {
         self.num_sessions += 1;
         let (session, kind, sender) = (self.num_sessions, self.kind, self.sender.clone());
         let set_up = || -> std::io::Result<TcpStream> {

@@ -10,8 +10,8 @@ const MEASURED_VELOCITY_MARGIN: f64 = 0.1;
 /// Measured positions may be this far, rad, beyond the range that commanded ones must keep.
 const MEASURED_POSITION_MARGIN: f64 = 0.01;
 impl RobotCore {
-    /// Contacts, and what is measured against its limits.
-    pub(super) fn feel(&mut self, plant: &dyn Plant) {
+    /// Estimates contacts and compares measurements with their limits.
+    pub(super) fn monitor(&mut self, plant: &dyn Plant) {
         let (flange, flange_jacobian) = plant.flange(&self.observation.q);
         let flange_from_ee = self.settings.flange_from_ee();
         let flange_from_stiffness = flange_from_ee * self.settings.ee_from_stiffness;

@@ -1,4 +1,4 @@
-//! The state that a robot tells of itself.
+//! The state that a robot reports.
 
 use nalgebra::Isometry3;
 

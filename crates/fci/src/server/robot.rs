@@ -32,7 +32,7 @@ pub struct Outgoing {
     pub command_id: u32,
     /// The request's command.
     pub command: Command,
-    /// The response.
+    /// Status and payload that the client gets.
     pub response: Response,
 }
 
@@ -201,8 +201,8 @@ impl RobotCore {
         self.torque_rate = (total - self.torque) / PERIOD_SECS;
         self.torque = total;
         self.observation = plant.observe();
-        self.feel(plant);
-        self.settle();
+        self.monitor(plant);
+        self.send_waiting();
         Ok(())
     }
 
@@ -328,7 +328,7 @@ impl RobotCore {
     }
 
     /// Sends what waited for the arm to stand.
-    fn settle(&mut self) {
+    fn send_waiting(&mut self) {
         let is_standing = self.references.joints.is_at_rest() && self.observation.dq.amax() < STANDING;
         if self.motion.is_some() || !is_standing || self.recovery_cycles > 0 {
             return;

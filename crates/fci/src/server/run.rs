@@ -22,7 +22,7 @@ use crate::wire::{
 const VERSION: Version = Version::V5;
 /// One cycle.
 const PERIOD: Duration = Duration::from_millis(1);
-/// The hand tells its state every so many cycles.
+/// The hand sends its state every so many cycles.
 const HAND_STATE_CYCLES: u64 = 20;
 /// In lockstep, a state is answered within this time or counts as not answered while a motion begins: libfranka leaves the
 /// first one or two without an answer.
@@ -95,7 +95,7 @@ impl Server {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Ends the server and tells how it went.
+    /// Ends the server.
     ///
     /// # Errors
     /// [`FciError::Plant`] where the simulation failed.

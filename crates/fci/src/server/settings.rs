@@ -35,7 +35,7 @@ pub struct Settings {
     pub joint_stiffness: JointVector,
     /// N/m and N·m/rad.
     pub cartesian_stiffness: [f64; 6],
-    /// When contacts are told and collisions stop the robot.
+    /// From when on contacts are reported and collisions stop the robot.
     pub collision: CollisionBehavior,
 }
 

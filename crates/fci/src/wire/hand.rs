@@ -43,7 +43,7 @@ impl HandCommand {
     }
 }
 
-/// What a client asks of the hand. Widths in m, speeds in m/s, forces in N.
+/// The requests of a client to the hand. Widths in m, speeds in m/s, forces in N.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum HandRequest {
     /// Opens a session; states go to the UDP port.

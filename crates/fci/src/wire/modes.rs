@@ -1,4 +1,4 @@
-//! What the robot is doing, as a state tells it and a Move asks for it.
+//! Modes of the robot and of its motions, in states and in Move requests.
 
 use crate::wire_error::WireError;
 

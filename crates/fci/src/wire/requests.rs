@@ -1,4 +1,4 @@
-//! What a client asks of the robot over TCP.
+//! The requests of a client to the robot, over TCP.
 
 use super::codec::{Codec, Decoder, Encoder, Real};
 use super::commands::Command;
@@ -32,7 +32,7 @@ pub struct MoveRequest {
     pub max_goal_deviation: Deviation,
 }
 
-/// When contacts and collisions are told and stop the robot; lower thresholds for contacts, upper ones for collisions.
+/// From when on contacts and collisions are reported and stop the robot; lower thresholds for contacts, upper ones for collisions.
 /// Torques in N·m, forces in N and N·m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CollisionBehavior {

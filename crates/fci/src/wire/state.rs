@@ -17,7 +17,7 @@ pub type Transform = [f64; 16];
 /// Standing at the origin.
 pub(crate) const IDENTITY: Transform = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
-/// What the robot tells about itself in a millisecond. In brackets the field's name in libfranka.
+/// The state that the robot sends each millisecond. In brackets the field's name in libfranka.
 ///
 /// # Units and frames
 /// rad, m, kg, N, N·m and seconds; `base` is libfranka's `O`, `flange` `F`, `ne` the nominal end effector, `ee` the end

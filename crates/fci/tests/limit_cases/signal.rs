@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use sdg_fci::client::{Answer, InternalController, Robot};
-use sdg_fci::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand, RobotState, Version};
+use sdg_fci::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand, RobotState, Transform, Version};
 use sdg_fci::{FciError, isometry, transform};
 
 use super::profile::Profile;
@@ -20,10 +20,10 @@ pub enum Signal {
     Pose { profile: Profile },
     /// The same as a velocity.
     Twist { profile: Profile },
-    /// The way of the end effector along the base's y, as poses: turning in the base needs the least of the joints.
-    PoseAlong { profile: Profile },
+    /// The way of the end effector along an axis of the base, as poses.
+    PoseAlong { axis: Axis, profile: Profile },
     /// The same as a velocity.
-    TwistAlong { profile: Profile },
+    TwistAlong { axis: Axis, profile: Profile },
     /// The elbow, the end effector standing.
     Elbow { profile: Profile },
     /// Joint 7's torque, the others standing.
@@ -42,7 +42,25 @@ pub enum Signal {
     Frame { scale: f64 },
     /// So many answers in a row are left out.
     Unanswered { num: u64 },
+    /// The speed of an end effector that is set [`FAR_END_M`] beyond its place, turned by joint 6.
+    FarEnd { profile: Profile },
+    /// A pose that stands, begun from joint positions.
+    StandingPose { from: [f64; 7] },
 }
+
+/// An axis of the base.
+#[derive(Debug, Clone, Copy)]
+pub enum Axis {
+    /// Forward, along which joint 2 moves most.
+    X,
+    /// Sideways: turning in the base needs the least of the joints.
+    Y,
+}
+
+/// How far [`Signal::FarEnd`] sets the end effector along its own z, m.
+const FAR_END_M: f64 = 2.0;
+/// From joint 6's axis to the flange, along the flange's z and across it, m.
+const JOINT_6_TO_FLANGE_M: [f64; 2] = [0.107, 0.088];
 
 /// Moves the joints at leisure.
 pub fn go_to(robot: &mut Robot, goal: &[f64; 7]) -> Result<(), FciError> {
@@ -90,7 +108,7 @@ impl Signal {
             Signal::JointPosition { .. } | Signal::StartPosition { .. } | Signal::Unanswered { .. } => {
                 MotionGeneratorMode::JointPosition
             }
-            Signal::JointVelocity { .. } => MotionGeneratorMode::JointVelocity,
+            Signal::JointVelocity { .. } | Signal::FarEnd { .. } => MotionGeneratorMode::JointVelocity,
             Signal::Twist { .. } | Signal::TwistAlong { .. } => MotionGeneratorMode::CartesianVelocity,
             Signal::Torque { .. } | Signal::SpunJoint { .. } => {
                 let generator = match version {
@@ -104,7 +122,21 @@ impl Signal {
         (ControllerMode::JointImpedance, generator)
     }
 
+    /// Runs the motion from where the arm stands, but for [`Signal::StandingPose`], which goes to its place first.
     pub fn run(&self, robot: &mut Robot) -> Result<RobotState, FciError> {
+        match self {
+            Signal::StandingPose { from } => go_to(robot, from)?,
+            Signal::FarEnd { .. } => robot.set_ee(&ee_moved_by(FAR_END_M))?,
+            _ => {}
+        }
+        let ended = self.run_prepared(robot);
+        if matches!(self, Signal::FarEnd { .. }) {
+            robot.set_ee(&ee_moved_by(0.0))?;
+        }
+        ended
+    }
+
+    fn run_prepared(&self, robot: &mut Robot) -> Result<RobotState, FciError> {
         let (controller, generator) = self.generator(robot.version());
         let start = robot.read_state()?.clone();
         let mut clock = Clock::default();
@@ -146,6 +178,7 @@ impl Signal {
                 | Signal::StartElbow { .. }
                 | Signal::ElbowSign { .. }
                 | Signal::Frame { .. }
+                | Signal::StandingPose { .. }
                 | Signal::Unanswered { .. }
         );
         let ms = match since_start {
@@ -173,12 +206,17 @@ impl Signal {
                 motion.twist[5] = profile.value(ms);
                 return profile.is_over(ms);
             }
-            Signal::PoseAlong { profile } => {
-                motion.base_from_ee[13] += profile.offset(ms);
+            Signal::PoseAlong { axis, profile } => {
+                motion.base_from_ee[12 + *axis as usize] += profile.offset(ms);
                 return profile.is_over(ms);
             }
-            Signal::TwistAlong { profile } => {
-                motion.twist[1] = profile.value(ms);
+            Signal::TwistAlong { axis, profile } => {
+                motion.twist[*axis as usize] = profile.value(ms);
+                return profile.is_over(ms);
+            }
+            Signal::FarEnd { profile } => {
+                let [along_m, across_m] = JOINT_6_TO_FLANGE_M;
+                motion.dq[5] = profile.value(ms) / (along_m + start.flange_from_ee[14]).hypot(across_m);
                 return profile.is_over(ms);
             }
             Signal::Elbow { profile } => {
@@ -211,10 +249,15 @@ impl Signal {
             Signal::Frame { scale } if ms >= EVENT_MS => {
                 motion.base_from_ee[..12].iter_mut().for_each(|value| *value *= scale);
             }
-            Signal::Frame { .. } | Signal::Unanswered { .. } => {}
+            Signal::Frame { .. } | Signal::StandingPose { .. } | Signal::Unanswered { .. } => {}
         }
         ms >= STANDING_MS
     }
+}
+
+/// The end effector moved from the finger tips along its own z, m.
+fn ee_moved_by(z_m: f64) -> Transform {
+    transform(&nalgebra::Isometry3::translation(0.0, 0.0, z_m))
 }
 
 /// Springs and dampers that keep the joints where they started; joint 7 is let go.

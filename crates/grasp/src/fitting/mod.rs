@@ -65,9 +65,9 @@ pub fn constant_names() -> Vec<&'static str> {
 pub enum FitEvent<'a> {
     /// All pictures are searched with a constant's value.
     Searching {
-        /// The constant.
+        /// Name of the constant.
         constant: &'static str,
-        /// The value.
+        /// The value that is tried.
         value: f64,
     },
     /// The score's weights are fitted.
@@ -76,7 +76,7 @@ pub enum FitEvent<'a> {
     Fitted(&'a ConstantReport),
 }
 
-/// Fits each constant on `training` and tells what its value does on `held_out`; `observe` is called with the progress.
+/// Fits each constant on `training` and reports the effect of its value on `held_out`; `observe` is called with the progress.
 ///
 /// # Errors
 /// A name that no constant has, fewer than two parts on either side, and a part that cannot be taught.

@@ -1,4 +1,4 @@
-//! What the search sees of a part: evidence for right poses, for wrong ones, and how much other things resemble it.
+//! The results of the search on a part's pictures: evidence for right poses, for wrong ones, and how much other things resemble it.
 
 use sdg_geometry::{Angle, PlanarGrasp};
 
@@ -6,7 +6,7 @@ use super::pictures::{FitInstance, FitPart, FitPicture};
 use crate::check_config::CheckConfig;
 use crate::error::Result;
 use crate::taught::TaughtDemonstration;
-use crate::teach::NUM_NEGATIVE_SCENES_INSTANT;
+use crate::teach::NUM_NEGATIVE_SCENES_WITHOUT_NETWORK;
 use crate::teach::negatives::NegativeScenes;
 use crate::teach::symmetry::HiddenTurns;
 use crate::verdict::Clues;
@@ -78,7 +78,7 @@ impl<'a> PreparedPart<'a> {
                 Ok(Self {
                     part,
                     turns: HiddenTurns::new(demonstrations, part.symmetry),
-                    negatives: NegativeScenes::new(demonstrations, seed, NUM_NEGATIVE_SCENES_INSTANT)?,
+                    negatives: NegativeScenes::new(demonstrations, seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?,
                     taught: TaughtDemonstration::new(&part.demonstration)?,
                 })
             })

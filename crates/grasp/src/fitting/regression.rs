@@ -24,7 +24,7 @@ type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 const NUM_ROUNDS: usize = 16;
 /// Newton's steps of one regression.
 const NUM_STEPS: usize = 12;
-/// Keeps weights finite where a term tells nothing, in units of a term's standard deviation. Chosen by hand.
+/// Keeps weights finite where a term carries no information, in units of a term's standard deviation. Chosen by hand.
 const RIDGE: f64 = 2e-4;
 /// Parts of which fewer instances have a right pose among those found say nothing about the score: near-symmetric ones.
 const MIN_COVERAGE: f64 = 0.6;
@@ -83,7 +83,7 @@ fn examples(parts: &[&PartObservations], config: &ScoreConfig) -> Vec<Example> {
 /// The terms' values of every pose of a picture.
 fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f64, NUM_TERMS>> {
     let clues = picture.clues();
-    // Its size is told by what it contributes.
+    // Its size follows from its contributions.
     let judged = judge_picture(&clues, config);
     clues
         .iter()

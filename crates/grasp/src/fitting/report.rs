@@ -8,7 +8,7 @@ use crate::check_config::ScoreConfig;
 /// A value that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// The value.
+    /// The value that was tried.
     pub value: f64,
     /// The loss on the training half.
     pub loss: f64,
@@ -164,7 +164,7 @@ fn change(f: &mut fmt::Formatter<'_>, before: &Loss, after: &Loss, difference: &
     )
 }
 
-/// What the fit says of a constant.
+/// The conclusion of the fit for a constant.
 fn verdict(is_other: bool, difference: &Difference) -> &'static str {
     match (is_other, difference.is_improvement()) {
         (false, _) => "no",

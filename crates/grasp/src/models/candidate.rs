@@ -3,12 +3,12 @@
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity};
 
-use super::consistency;
+use super::consistency::{self, ComparisonEvidence};
 use crate::facts::TurnSource;
-use crate::sighting::SAME_PART_IOU;
+use crate::same_part::SAME_PART_IOU;
 use crate::taught::TaughtDemonstration;
 
-/// What a network says of an image.
+/// The output of a network for an image, read by the model.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
     /// Best first, those that cannot be read as a pose left out.
@@ -45,17 +45,16 @@ pub(crate) struct PoseCandidate {
 }
 
 impl PoseCandidate {
-    /// The same detection with the demonstration in this pose, and its score there; `log_odds` are those of the comparison
-    /// network.
+    /// The same detection with the demonstration in this pose, and its score there.
     pub(super) fn in_pose(
         self,
         demonstration: &TaughtDemonstration,
         image_from_cutout: PlanarSimilarity,
         picture_size: (u32, u32),
-        log_odds: Option<f64>,
+        evidence: Option<ComparisonEvidence>,
     ) -> Self {
         let filled = consistency::filled(demonstration, &image_from_cutout, &self.bbox, picture_size);
-        let network_score = consistency::score(self.class_probability, filled, log_odds);
+        let network_score = consistency::score(self.class_probability, filled, evidence);
         let is_there = image_from_cutout == self.image_from_cutout;
         let placed = if is_there { self } else { self.moved_to(demonstration, image_from_cutout) };
         Self { network_score, ..placed }

@@ -4,8 +4,7 @@ use nalgebra::Point2;
 use sdg_detection::Detections;
 use sdg_geometry::{BoundingBox, Keypoint, PlanarGrasp, PlanarSimilarity};
 
-use super::placing::fill_box;
-use super::{Placement, nearest_demonstration};
+use super::placing::{PoseReading, fill_box, nearest_demonstration};
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
 
@@ -19,7 +18,7 @@ pub(super) fn on_line(
     keypoints: &[(Point2<f64>, f64)],
     bbox: &BoundingBox,
     demonstrations: &[TaughtDemonstration],
-) -> Option<Placement> {
+) -> Option<PoseReading> {
     let seen: Vec<Point2<f64>> = keypoints.iter().map(|(point, _)| *point).collect();
     nearest_demonstration(demonstrations, bbox, |_, demonstration| {
         let taught: Vec<Point2<f64>> = demonstration.keypoints().iter().map(|k| k.point()).collect();
@@ -45,7 +44,7 @@ pub(super) fn box_and_turn(
     keypoints: &[(Point2<f64>, f64)],
     bbox: &BoundingBox,
     demonstrations: &[TaughtDemonstration],
-) -> Option<Placement> {
+) -> Option<PoseReading> {
     let angle = grasp(keypoints, 0.0)?.angle;
     nearest_demonstration(demonstrations, bbox, |_, demonstration| {
         Some((fill_box(demonstration, bbox, angle), TurnSource::Keypoints))

@@ -7,7 +7,7 @@ use image::RgbImage;
 use sdg_geometry::{BoundingBox, Mask, PlanarSimilarity, Polygon};
 use sdg_sift::{Plane, RotationConfig, RotationEstimator, RotationMethod, RotationTemplate, Sift, SiftConfig};
 
-use super::{Placement, nearest_demonstration};
+use super::placing::{PoseReading, nearest_demonstration};
 use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
@@ -71,7 +71,7 @@ impl MaskMatcher {
         mask: &Mask,
         bbox: &BoundingBox,
         demonstrations: &[TaughtDemonstration],
-    ) -> Result<Option<Placement>> {
+    ) -> Result<Option<PoseReading>> {
         let Some(bounds) = mask.bounds() else { return Ok(None) };
         let window = Window::around(&bounds, image);
         let (plane, mask) = (Plane::from_rgb(&window.cut(image)), window.cut_mask(mask));

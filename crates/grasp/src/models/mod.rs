@@ -25,7 +25,6 @@ use sdg_comparison::ComparisonNetwork;
 #[cfg(any(feature = "teach", test))]
 use sdg_detection::presets::RcnnKind;
 use sdg_detection::{Detections, GeneralizedRcnn, RcnnConfig};
-use sdg_geometry::{BoundingBox, PlanarSimilarity};
 #[cfg(feature = "teach")]
 use sdg_layers::state_dict;
 use sdg_orientation::OrientationCnn;
@@ -33,9 +32,10 @@ use sdg_orientation::OrientationCnn;
 pub(crate) use self::candidate::{PoseCandidate, Proposals};
 use self::comparison::Comparer;
 use self::mask::MaskMatcher;
+use self::placing::PoseReading;
 use crate::NUM_KEYPOINTS;
 use crate::error::{GraspError, Result};
-use crate::facts::{ModelKind, TurnSource};
+use crate::facts::ModelKind;
 use crate::taught::TaughtDemonstration;
 
 /// Candidates looked at in one image, best first; verification costs time for each, and what is beyond, the search finds.
@@ -66,14 +66,6 @@ pub(crate) enum Reading {
     Mask(MaskMatcher),
 }
 
-/// Where a demonstration lies.
-#[derive(Debug, Clone, Copy)]
-struct Placement {
-    demonstration_idx: usize,
-    image_from_cutout: PlanarSimilarity,
-    turn_source: TurnSource,
-}
-
 /// The detector that a model looks with; `None` for model S.
 #[cfg(any(feature = "teach", test))]
 pub(crate) fn rcnn_kind(kind: ModelKind) -> Option<RcnnKind> {
@@ -94,6 +86,12 @@ impl Network {
             Reading::Keypoints => ModelKind::C,
             Reading::Mask(_) => ModelKind::D,
         }
+    }
+
+    /// The threshold, in log-odds, that scores of networks of this kind have; `None` without a comparison network.
+    #[cfg(feature = "teach")]
+    pub(crate) fn usual_threshold(&self) -> Option<f64> {
+        self.comparison.as_ref().map(|_| consistency::USUAL_THRESHOLD)
     }
 
     /// The same detector read as another model does that is taught alike.
@@ -185,13 +183,13 @@ impl Network {
     ) -> Result<Option<PoseCandidate>> {
         let bbox = &detections.boxes[i];
         let keypoints = keypoints::scored(detections, i);
-        let placement = match &self.reading {
+        let pose = match &self.reading {
             Reading::BoxAndCrop(network) => orientation::box_and_crop(network, image, bbox, demonstrations).await?,
             Reading::BoxAndKeypoints => keypoints::box_and_turn(&keypoints, bbox, demonstrations),
             Reading::Keypoints => keypoints::on_line(&keypoints, bbox, demonstrations),
             Reading::Mask(matcher) => matcher.place(image, &detections.masks[i], bbox, demonstrations)?,
         };
-        Ok(placement.and_then(|Placement { demonstration_idx, image_from_cutout, turn_source }| {
+        Ok(pose.and_then(|PoseReading { demonstration_idx, image_from_cutout, turn_source }| {
             let demonstration = &demonstrations[demonstration_idx];
             let grasp = match self.reading {
                 Reading::Keypoints => {
@@ -236,22 +234,4 @@ pub(crate) fn check_heads(kind: ModelKind, config: &RcnnConfig) -> Result<()> {
         expected: describe(expected_keypoints, expected_masks, 1),
         found: describe(keypoints, heads.mask_head.is_some(), heads.num_classes),
     })
-}
-
-/// The demonstration that, where `pose` puts it, fills the detected box best.
-fn nearest_demonstration(
-    demonstrations: &[TaughtDemonstration],
-    bbox: &BoundingBox,
-    pose: impl Fn(usize, &TaughtDemonstration) -> Option<(PlanarSimilarity, TurnSource)>,
-) -> Option<Placement> {
-    demonstrations
-        .iter()
-        .enumerate()
-        .filter_map(|(demonstration_idx, demonstration)| {
-            let (image_from_cutout, turn_source) = pose(demonstration_idx, demonstration)?;
-            let overlap = demonstration.outline(&image_from_cutout).bounds().iou(bbox);
-            Some((Placement { demonstration_idx, image_from_cutout, turn_source }, overlap))
-        })
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(placement, _)| placement)
 }

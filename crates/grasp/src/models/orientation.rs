@@ -4,8 +4,7 @@ use image::RgbImage;
 use sdg_geometry::BoundingBox;
 use sdg_orientation::{OrientationCnn, crop_for};
 
-use super::placing::fill_box;
-use super::{Placement, nearest_demonstration};
+use super::placing::{PoseReading, fill_box, nearest_demonstration};
 use crate::error::Result;
 use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
@@ -22,7 +21,7 @@ pub(super) async fn box_and_crop(
     image: &RgbImage,
     bbox: &BoundingBox,
     demonstrations: &[TaughtDemonstration],
-) -> Result<Option<Placement>> {
+) -> Result<Option<PoseReading>> {
     let crop = crop_for(image, bbox, network.config().input_px)?;
     let angle = network.predict_async(&crop).await?.angle;
     Ok(nearest_demonstration(demonstrations, bbox, |_, demonstration| {

@@ -1,8 +1,35 @@
-//! Where the demonstration lies, when its turn and its box are known.
+//! Where a detection puts a demonstration: the reading of every model, and the pose that fills a box at a known turn.
 
 use sdg_geometry::{Angle, BoundingBox, PlanarSimilarity};
 
+use crate::facts::TurnSource;
 use crate::taught::TaughtDemonstration;
+
+/// A detection read as a pose of a demonstration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PoseReading {
+    pub(super) demonstration_idx: usize,
+    pub(super) image_from_cutout: PlanarSimilarity,
+    pub(super) turn_source: TurnSource,
+}
+
+/// The demonstration that, where `pose` puts it, fills the detected box best.
+pub(super) fn nearest_demonstration(
+    demonstrations: &[TaughtDemonstration],
+    bbox: &BoundingBox,
+    pose: impl Fn(usize, &TaughtDemonstration) -> Option<(PlanarSimilarity, TurnSource)>,
+) -> Option<PoseReading> {
+    demonstrations
+        .iter()
+        .enumerate()
+        .filter_map(|(demonstration_idx, demonstration)| {
+            let (image_from_cutout, turn_source) = pose(demonstration_idx, demonstration)?;
+            let overlap = demonstration.outline(&image_from_cutout).bounds().iou(bbox);
+            Some((PoseReading { demonstration_idx, image_from_cutout, turn_source }, overlap))
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(reading, _)| reading)
+}
 
 /// The demonstration turned until its grasp line points to `grasp_angle`, so large and so placed that its outline fills
 /// `bbox`.

@@ -229,7 +229,7 @@ pub(crate) fn slant(camera: &PosedCamera, point: &Point3<f64>) -> [f64; 2] {
     [sight.x / -sight.z, sight.y / sight.z]
 }
 
-/// What the camera sees of the marks' plane, as fine as the model's demonstrations.
+/// The part of the marks' plane in the camera's picture, as fine as the model's demonstrations.
 pub(crate) fn plan_view(over_table: &CameraOverTable, lengths: &Lengths) -> Result<PlanView> {
     let CameraOverTable { camera, table_height_m, workspace } = over_table;
     let height = table_height_m + lengths.mark_height_m;

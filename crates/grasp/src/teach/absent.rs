@@ -24,7 +24,7 @@ use crate::taught::TaughtDemonstration;
 const ONE_IN: u64 = 12;
 /// Held-back samples with the part that the score is held against. Chosen for time: one takes some 50 ms.
 const NUM_POSITIVES: u64 = 12;
-/// The samples begin far beyond those that networks are validated on, and apart from those that figures are told of.
+/// The samples begin far beyond those that networks are validated on, and apart from those that figures are measured on.
 const FIRST_POSITIVE: u64 = 1 << 36;
 /// What is found without the part is to score below 0.5 by so much, in log-odds. Chosen by hand.
 const MARGIN: f64 = 0.2;

@@ -23,14 +23,15 @@ pub struct FineTuning {
 }
 
 impl FineTuning {
-    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts.
+    /// Half a minute on two cores with all that teaching does besides, among two dozen other parts. Most parts are good enough after
+    /// 40 steps; of 35 held-back samples with the part some five are so covered or blurred that no network finds them.
     pub fn new(seed: u64) -> Self {
         Self {
             training: TrainingConfig {
                 steps: STEPS,
-                validation: ValidationConfig { every: 40, first: 80, samples: 48 },
+                validation: ValidationConfig { every: 20, first: 40, samples: 40 },
                 early_stop: Some(EarlyStop {
-                    hit_rate: 0.9,
+                    hit_rate: 0.85,
                     median_error_px: 3.0,
                     median_error_degrees: 2.0,
                     false_alarm_rate: 0.1,

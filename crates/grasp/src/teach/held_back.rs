@@ -48,7 +48,7 @@ struct Seen {
 }
 
 impl HeldBack<'_> {
-    /// What the network alone says of held-back samples.
+    /// The detections of the network alone in held-back samples.
     ///
     /// # Errors
     /// An image that the network refuses.
@@ -76,7 +76,7 @@ impl HeldBack<'_> {
     ) -> Result<Calibrated> {
         /// Highest raw score of a wrong detection where the held-back samples gave none. Chosen by hand, not measured.
         const NO_WRONG: f64 = 0.1;
-        let seen = side_by_side(self.samples, |sample| self.see(sample, network, demonstrations))?;
+        let seen = side_by_side(self.samples, |sample| self.measure(sample, network, demonstrations))?;
         let scores = |score: fn(&Seen) -> Option<f64>| seen.iter().filter_map(score).collect::<Vec<_>>();
         let right_scores = scores(|seen| seen.proposed_on_part);
         let on_part = scores(|seen| seen.on_part);
@@ -86,7 +86,8 @@ impl HeldBack<'_> {
         Ok(Calibrated {
             positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
-            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG).unwrap_or(Calibration::NEUTRAL),
+            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG, network.usual_threshold())
+                .unwrap_or(Calibration::NEUTRAL),
             on_part,
             elsewhere,
             error_px: median(errors().map(|[px, _]| *px)).unwrap_or(f64::INFINITY),
@@ -94,7 +95,7 @@ impl HeldBack<'_> {
         })
     }
 
-    fn see(&self, sample: &Sample, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Seen> {
+    fn measure(&self, sample: &Sample, network: &Network, demonstrations: &[TaughtDemonstration]) -> Result<Seen> {
         let proposals = network.proposals(&sample.image, demonstrations)?;
         let sightings = sightings(&proposals, &SearchedImage::new(&sample.image, demonstrations));
         let hit = |sighting: &Sighting| {

@@ -41,11 +41,11 @@ use sdg_layers::state_dict;
 use sdg_training::{History, SampleSource, Trained, TrainingError, first_windows, train};
 
 use crate::calibration::Calibration;
+use crate::calibrations::Calibrations;
 use crate::decimal::decimal;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, ValidationFacts};
 use crate::model::GraspModel;
-use crate::model_file::Calibrations;
 use crate::models::mask::MaskMatcher;
 use crate::models::{Network, Reading};
 use crate::network_evidence::NetworkEvidence;
@@ -87,7 +87,7 @@ pub fn teach(
     let options = options.with_start_read()?;
     let mut taught = match Plan::new(&options) {
         Some(plan) => teach_network(demonstrations, &plan, &options, observe, start)?,
-        None => instant(demonstrations, &options, start)?,
+        None => without_network(demonstrations, &options, start)?,
     };
     if !options.negatives.is_empty() {
         taught.model = absent::calibrated(taught.model, demonstrations, &options)?;
@@ -146,8 +146,8 @@ fn check_agreement(demonstrations: &[Demonstration]) -> Result<()> {
 
 /// Scenes of other things that the agreement is calibrated on: for a network, and for model S, which is to be there in
 /// less than a second. Chosen by hand for time, not measured.
-const NUM_NEGATIVE_SCENES: u64 = 24;
-pub(crate) const NUM_NEGATIVE_SCENES_INSTANT: u64 = 8;
+const NUM_NEGATIVE_SCENES: u64 = 12;
+pub(crate) const NUM_NEGATIVE_SCENES_WITHOUT_NETWORK: u64 = 8;
 
 /// The demonstrations as the model keeps them.
 fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Vec<TaughtDemonstration>> {
@@ -161,9 +161,10 @@ fn taught(demonstrations: &[Demonstration], options: &TeachOptions) -> Result<Ve
 }
 
 /// Model S: the demonstrations alone.
-fn instant(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
-    let resemblance =
-        NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES_INSTANT)?.observe(None)?.resemblance();
+fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, start: Instant) -> Result<Taught> {
+    let resemblance = NegativeScenes::new(demonstrations, options.seed, NUM_NEGATIVE_SCENES_WITHOUT_NETWORK)?
+        .observe(None)?
+        .resemblance();
     let demonstrations = taught(demonstrations, options)?;
     let model = GraspModel {
         preset: options.preset.name().to_owned(),

@@ -1,9 +1,8 @@
 //! Scenes of things that are not the part: how much of the demonstration is seen in them all the same.
 //!
 //! How well a demonstration agrees with what it is not depends on the part: a ring agrees with anything round, a housing
-//! full of edges with nothing. Composed scenes tell by how much before a single real one was seen. Their highest
-//! agreement varies with the seed more than parts differ, and was no guide; their mean is one: over the eight shipped
-//! parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
+//! full of edges with nothing. It is therefore measured in composed scenes while teaching. The highest agreement varies more
+//! with the seed than from part to part, so the mean is taken: over the eight shipped parts it was 0.26 to 0.39 in 60 composed scenes each, within 0.04 of that in as many of the simulator's pictures.
 
 use sdg_demonstration::{
     Annotation, AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, Sample, SceneStyle,

@@ -1,4 +1,4 @@
-//! What a teaching is asked for.
+//! The options of a teaching.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;

@@ -33,9 +33,9 @@ pub(super) fn draw(count: usize, seed: u64) -> [Vec<Demonstration>; 2] {
 
 /// Pictures of other parts that the network's score is calibrated on: with them there are about as many without the part
 /// as with it. Chosen by that reasoning, not measured.
-const NUM_PICTURES: u64 = 24;
+const NUM_PICTURES: u64 = 16;
 
-/// What a network says in pictures of other parts without the part.
+/// The scores of a network in pictures of other parts without the part.
 #[derive(Default)]
 pub(super) struct OnOtherParts {
     /// Its highest score in each.

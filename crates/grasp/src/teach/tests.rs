@@ -97,7 +97,7 @@ pub(super) fn taught(preset: Preset, kind: ModelKind) -> GraspModel {
 /// Steps of detector and orientation CNN.
 const STEPS: usize = 12;
 
-/// What a model says of its own photo is what a file of it says, to the bit.
+/// A model and the same model read from its file give the same detections in its own photo, to the bit.
 fn assert_same_after_a_file(model: &GraspModel) {
     let bytes = model.to_bytes().unwrap();
     let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
@@ -167,7 +167,7 @@ fn one_network_serves_the_models_that_are_taught_alike() {
 }
 
 #[test]
-fn the_instant_model_is_taught_at_once_and_detects_the_same_after_a_file() {
+fn model_s_is_taught_at_once_and_detects_the_same_after_a_file() {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
     let taught = teach(&[demonstration()], &options, &mut |_: &TeachingEvent| panic!("nothing is trained")).unwrap();
     // How long it takes depends on the machine: `sdg evaluate` measures that.
@@ -240,7 +240,7 @@ fn an_interrupt_before_there_is_a_network_leaves_nothing() {
     }
 }
 
-fn instant(demonstrations: &[Demonstration]) -> crate::error::Result<GraspModel> {
+fn without_network(demonstrations: &[Demonstration]) -> crate::error::Result<GraspModel> {
     let options = TeachOptions { kind: ModelKind::S, ..TeachOptions::new(1) };
     teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).map(|taught| taught.model)
 }
@@ -264,12 +264,12 @@ fn a_photo_with_another_number_of_pixels_teaches_as_well() {
     let picture = demonstration().image;
     let truth = demonstration().annotation.grasp.unwrap();
     for factor in [0.5, 0.75, 1.5, 3.0] {
-        let model = instant(&[resized(factor)]).unwrap();
+        let model = without_network(&[resized(factor)]).unwrap();
         let best = &model.detect(&picture, Verification::ByShape).unwrap()[0];
         assert!(best.is_accepted() && (best.grasp.center() - truth.center()).norm() < 1.5, "{factor}: {best:?}");
         assert!(best.grasp.angle.distance(truth.angle()) < 0.03, "{factor}: {best:?}");
         // And the other way round: the photo as it was, the picture with more or fewer pixels.
-        let model = instant(&[demonstration()]).unwrap();
+        let model = without_network(&[demonstration()]).unwrap();
         let best = &model.detect(&resized(factor).image, Verification::ByShape).unwrap()[0];
         let scaled = truth.center() * factor;
         assert!(
@@ -297,7 +297,7 @@ fn a_narrower_size_tolerance_refuses_other_sizes_and_is_kept_in_the_file() {
 
 #[test]
 fn at_most_so_many_are_found_and_none_is_no_number() {
-    let model = instant(&[demonstration()]).unwrap();
+    let model = without_network(&[demonstration()]).unwrap();
     let photo = demonstration().image;
     assert_eq!(model.clone().with_max_detections(1).unwrap().detect(&photo, Verification::ByShape).unwrap().len(), 1);
     let refused = model.with_max_detections(0).unwrap_err().to_string();
@@ -306,7 +306,7 @@ fn at_most_so_many_are_found_and_none_is_no_number() {
 
 #[test]
 fn what_cannot_be_taught_from_is_refused_with_what_was_found() {
-    let refused = |demonstrations: &[Demonstration]| instant(demonstrations).unwrap_err().to_string();
+    let refused = |demonstrations: &[Demonstration]| without_network(demonstrations).unwrap_err().to_string();
     let bbox = demonstration().annotation.bbox;
     let tiny = resized(15.0 / bbox.width().max(bbox.height()));
     assert!(refused(&[tiny]).contains("at least 20 pixels in its photo, found 15 × 15"));

@@ -17,7 +17,8 @@ use image::RgbImage;
 use super::detector::PartDetector;
 use super::follow::Effort;
 use super::track::{PastPose, Standing, Track};
-use crate::model::{Found, Placement, are_outlines_of_same_part};
+use crate::model::{Found, Placement};
+use crate::same_part::are_outlines_of_same_part;
 
 /// Longest time from one frame that a detection is carried through to the next: a part at 0.5 m/s moves by 20 pixels of a
 /// millimetre, which a capture reaches. Chosen by that reasoning.

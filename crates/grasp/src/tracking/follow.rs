@@ -147,7 +147,7 @@ impl SizedPart {
         })
     }
 
-    /// What the comparing network says of a pose; `None` where too little of it lies in the frame.
+    /// The output of the comparing network for a pose; `None` where too little of it lies in the frame.
     pub(super) fn likeness(
         &self,
         detector: &PartDetector,

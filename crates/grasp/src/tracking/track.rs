@@ -40,7 +40,7 @@ const MAX_LIKENESS_AGE: Duration = Duration::from_secs(1);
 /// Frames whose poses are kept for searches that have not ended. Chosen by hand: two seconds at 100 frames a second.
 const MAX_HISTORY: usize = 200;
 
-/// What the comparing network said, and when.
+/// The comparing network's log-odds, and when they were computed.
 #[derive(Debug, Clone, Copy)]
 struct Likeness {
     log_odds: f64,
@@ -209,7 +209,7 @@ impl Track {
         Some(followed)
     }
 
-    /// What the comparing network says of the part where it was refined to; it is asked only where that may have changed.
+    /// The output of the comparing network for the refined pose; it is computed only where that may have changed.
     pub(super) fn likeness(
         &mut self,
         detector: &PartDetector,

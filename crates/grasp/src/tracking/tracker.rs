@@ -59,7 +59,7 @@ pub struct Tracker {
     searched_at: Option<Duration>,
 }
 
-/// A track and what was last said of it.
+/// A track and its last score.
 #[derive(Debug)]
 struct Tracked {
     track: Track,
@@ -94,7 +94,7 @@ impl Tracker {
     /// begin a new sequence.
     pub fn frame(&mut self, picture: Arc<RgbImage>, captured: Duration) -> Vec<TrackedPart> {
         if self.frames.newest().is_some_and(|newest| newest.picture.dimensions() != picture.dimensions()) {
-            self.begin_anew();
+            self.restart();
         }
         let number = self.next_number;
         self.next_number += 1;
@@ -172,7 +172,7 @@ impl Tracker {
         })
     }
 
-    fn begin_anew(&mut self) {
+    fn restart(&mut self) {
         self.frames = FrameBuffer::default();
         self.tracks.clear();
         self.arriving.clear();

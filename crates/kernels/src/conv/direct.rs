@@ -6,7 +6,7 @@
 
 use super::panels::Panels;
 use crate::parallel::{Raw, for_each_unit};
-use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch};
 use crate::scratch::Scratch;
 use crate::simd::Isa;
 
@@ -64,10 +64,10 @@ impl DirectConv<'_> {
             && self.grid == self.source.size
             && self.grid == self.target.size;
         if pointwise {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
             unsafe { self.run_pointwise(isa, output) };
         } else {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller promises that nothing else has the target's pixels of `output`.
             unsafe { self.run_window(isa, output) };
         }
     }
@@ -90,7 +90,7 @@ impl DirectConv<'_> {
             for panel in self.panels_of(group, groups) {
                 let left = Operand { values: &values[first * channels..], step: channels, inner: 1, outer: 0 };
                 let mut product = self.product(panel, chunk.min(rows - first), left, [1, channels], first);
-                product.ahead = self.ahead(panel, self.panels_of(group, groups).end, next);
+                product.prefetch = self.prefetch(panel, self.panels_of(group, groups).end, next);
                 // SAFETY: a unit has its own rows and panels.
                 unsafe { product.run(isa, output) };
             }
@@ -171,17 +171,17 @@ impl DirectConv<'_> {
             first_column,
             epilogue: self.epilogue,
             accumulate: false,
-            ahead: Ahead::default(),
+            prefetch: Prefetch::default(),
         }
     }
 
     /// What is read after a panel: the next panel, or after the last (`end`) the next unit's positions, `next`.
-    fn ahead<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Ahead<'a> {
+    fn prefetch<'a>(&'a self, panel: usize, end: usize, next: &'a [f32]) -> Prefetch<'a> {
         let run = if panel + 1 < end { self.filters.panel(0, panel + 1).0 } else { next };
-        Ahead { runs: [run, &[]] }
+        Prefetch { runs: [run, &[]] }
     }
 
-    /// What the window sees from the grid rows `rows` of an image, zeros outside the map.
+    /// The input of the window for the grid rows `rows` of an image, zeros outside the map.
     fn copy_band(&self, image: usize, rows: std::ops::Range<usize>) -> Scratch {
         let Maps { values, size: [height, width], channels, .. } = self.source;
         let band_width = (self.grid[1] - 1) * self.stride[1] + self.window[1];

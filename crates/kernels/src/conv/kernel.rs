@@ -70,7 +70,7 @@ unsafe fn run_direct(
             epilogue,
             target: Target { size: shape.out_size, origin: [0, 0], step: [1, 1] },
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller promises that nothing else has the output, all of which is the target.
         unsafe { conv.run(isa, output) };
         return;
     }

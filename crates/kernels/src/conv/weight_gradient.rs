@@ -11,7 +11,7 @@
 use super::direct::{Maps, copy_row};
 use super::shape::ConvShape;
 use crate::parallel::{SharedSlice, for_each_unit};
-use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch};
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
@@ -89,7 +89,7 @@ pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_
                         first_column: 0,
                         epilogue: Epilogue::default(),
                         accumulate: block > first_block,
-                        ahead: Ahead::default(),
+                        prefetch: Prefetch::default(),
                     };
                     // SAFETY: every unit has its own chunk and filters.
                     unsafe { product.run(isa, raw) };
@@ -105,7 +105,7 @@ pub(super) fn direct_weight_gradient(isa: Isa, x: Maps<'_>, output_grad: Maps<'_
         // SAFETY: every unit has its own filter, of all chunks.
         let sum = unsafe { shared.range(filter * per_filter, per_filter) };
         for chunk in 1..num_chunks {
-            // SAFETY: as above; another chunk than `sum`.
+            // SAFETY: the unit's filter of another chunk than `sum`'s.
             let other = unsafe { shared.range(chunk * len + filter * per_filter, per_filter) };
             for (sum, other) in sum.iter_mut().zip(other) {
                 *sum += *other;

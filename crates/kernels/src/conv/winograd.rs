@@ -20,7 +20,7 @@ use super::direct::Maps;
 use super::panels::{Direction, Panels, gather};
 use super::shape::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
-use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct, packed_len, panel_width};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch, packed_len, panel_width};
 use crate::scratch::Scratch;
 use crate::simd::Isa;
 use crate::simd::lanes::LANES;
@@ -104,7 +104,7 @@ pub(super) unsafe fn run(
             unsafe { conv.tiles(unit * per_unit, per_unit.min(num_tiles - unit * per_unit), false) };
         });
     } else {
-        // SAFETY: the caller's promise.
+        // SAFETY: no other call writes tiles of this output: there is this one call.
         unsafe { conv.tiles(0, num_tiles, true) };
     }
     finite.load(Ordering::Relaxed)
@@ -177,7 +177,7 @@ impl Winograd<'_> {
                     first_column,
                     epilogue: Epilogue::default(),
                     accumulate: false,
-                    ahead: Ahead { runs: [next_panel, next_input] },
+                    prefetch: Prefetch { runs: [next_panel, next_input] },
                 };
                 // SAFETY: a unit has its own frequency.
                 unsafe { product.run(self.isa, raw) };

@@ -71,8 +71,6 @@ pub(crate) trait Lanes: Copy {
 #[derive(Clone, Copy)]
 pub(crate) struct Zmm(__m512);
 
-// SAFETY of the unsafe blocks below: each intrinsic needs the instruction set, which the trait's caller
-// promises, and pointers that are good, which it promises too. Masked accesses touch the first `len` only.
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Zmm {
     const ROWS: usize = 12;
@@ -80,53 +78,53 @@ impl Lanes for Zmm {
 
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_set1_ps(value)) }
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512, and `from` is good for 16 floats; the instruction needs no alignment.
         unsafe { Self(_mm512_loadu_ps(from)) }
     }
     #[inline(always)]
     unsafe fn load_first(from: *const f32, len: usize) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512, and `from` is good for `len` floats: the masked load reads no others.
         unsafe { Self(_mm512_maskz_loadu_ps(first_mask(len), from)) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512, and `to` is good for 16 floats; the instruction needs no alignment.
         unsafe { _mm512_storeu_ps(to, self.0) }
     }
     #[inline(always)]
     unsafe fn store_first(self, to: *mut f32, len: usize) {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512, and `to` is good for `len` floats: the masked store writes no others.
         unsafe { _mm512_mask_storeu_ps(to, first_mask(len), self.0) }
     }
     #[inline(always)]
     unsafe fn add(self, other: Self) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_add_ps(self.0, other.0)) }
     }
     #[inline(always)]
     unsafe fn sub(self, other: Self) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_sub_ps(self.0, other.0)) }
     }
     #[inline(always)]
     unsafe fn mul(self, other: Self) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_mul_ps(self.0, other.0)) }
     }
     #[inline(always)]
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_fmadd_ps(self.0, factor.0, summand.0)) }
     }
     #[inline(always)]
     unsafe fn relu(self) -> Self {
         // The second operand is what comes out where either is NaN.
-        // SAFETY: see above.
+        // SAFETY: the caller promises AVX-512; no memory is touched.
         unsafe { Self(_mm512_max_ps(_mm512_setzero_ps(), self.0)) }
     }
 }
@@ -146,7 +144,7 @@ pub(crate) struct Ymm2([__m256; 2]);
 #[cfg(target_arch = "x86_64")]
 macro_rules! halves {
     ($intrinsic:ident, $a:expr, $b:expr) => {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA; no memory is touched.
         unsafe { Ymm2([$intrinsic($a[0], $b[0]), $intrinsic($a[1], $b[1])]) }
     };
 }
@@ -158,17 +156,17 @@ impl Lanes for Ymm2 {
 
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA; no memory is touched.
         unsafe { Self([_mm256_set1_ps(value); 2]) }
     }
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA, and 16 floats at `from`; the instruction needs no alignment.
         unsafe { Self([_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))]) }
     }
     #[inline(always)]
     unsafe fn store(self, to: *mut f32) {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA, and room for 16 floats at `to`; the instruction needs no alignment.
         unsafe {
             _mm256_storeu_ps(to, self.0[0]);
             _mm256_storeu_ps(to.add(8), self.0[1]);
@@ -188,7 +186,7 @@ impl Lanes for Ymm2 {
     }
     #[inline(always)]
     unsafe fn mul_add(self, factor: Self, summand: Self) -> Self {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA; no memory is touched.
         unsafe {
             Self([
                 _mm256_fmadd_ps(self.0[0], factor.0[0], summand.0[0]),
@@ -198,7 +196,7 @@ impl Lanes for Ymm2 {
     }
     #[inline(always)]
     unsafe fn relu(self) -> Self {
-        // SAFETY: as for `Zmm`.
+        // SAFETY: the caller promises AVX2 and FMA; no memory is touched.
         let zeros = unsafe { [_mm256_setzero_ps(); 2] };
         halves!(_mm256_max_ps, zeros, self.0)
     }

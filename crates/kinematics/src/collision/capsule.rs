@@ -11,7 +11,7 @@ pub struct Capsule {
     pub from: Point3<f64>,
     /// The other end.
     pub to: Point3<f64>,
-    /// Radius.
+    /// Distance of the surface from the segment, in metres.
     pub radius_m: f64,
 }
 

@@ -119,7 +119,7 @@ impl CollisionModel {
         }
     }
 
-    /// The obstacles.
+    /// The obstacles, in the order in which they were given.
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
     }

@@ -17,14 +17,14 @@ pub enum Shape {
     },
     /// A cylinder around z.
     Cylinder {
-        /// Radius.
+        /// Distance of the surface from the axis, in metres.
         radius_m: f64,
         /// Half of its length along z.
         half_length_m: f64,
     },
     /// All points within a radius of a segment of z; a sphere where the segment has no length.
     Capsule {
-        /// Radius.
+        /// Distance of the surface from the axis, in metres.
         radius_m: f64,
         /// Half of the segment's length.
         half_length_m: f64,

@@ -215,7 +215,7 @@ const LIMIT_ROUNDING_RAD: f64 = 1e-9;
 
 fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
     /// Number of pairs that a message names.
-    const MAX_TOLD: usize = 3;
+    const MAX_REPORTED: usize = 3;
     let mut counts = BTreeMap::<String, usize>::new();
     for q in stops.configurations() {
         let nearest = checker.model().nearest(q);
@@ -225,7 +225,7 @@ fn not_found(checker: &Checker<'_>, stops: &Stops) -> PlanError {
     let mut blockers: Vec<(String, f64)> =
         counts.into_iter().map(|(pair, count)| (pair, count as f64 / total)).collect();
     blockers.sort_by(|a, b| b.1.total_cmp(&a.1));
-    blockers.truncate(MAX_TOLD);
+    blockers.truncate(MAX_REPORTED);
     PlanError::NotFound { num_checks: checker.num_checked(), blockers }
 }
 

@@ -5,7 +5,7 @@
 pub(crate) enum Shape {
     /// A circle.
     Disc {
-        /// Its radius.
+        /// In millimetres, about the origin.
         radius: f32,
     },
     /// A rectangle with rounded corners.
@@ -24,7 +24,7 @@ pub(crate) enum Shape {
     },
     /// A circle whose radius varies with the direction: gears, knobs, knurls.
     Lobed {
-        /// Mean radius.
+        /// Mean over all directions, in millimetres.
         radius: f32,
         /// Number of lobes.
         lobes: u32,

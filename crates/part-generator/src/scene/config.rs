@@ -1,4 +1,4 @@
-//! What scenes are like.
+//! The configuration of scenes.
 
 use crate::{GeneratorError, PhotoConfig, Result};
 

@@ -1,5 +1,6 @@
 //! Heights of everything on the table as one grid; shadows and contact darkening from it.
 
+use super::color_grid::bilinear;
 use super::placement::Placement;
 use crate::tiles::floor;
 
@@ -206,20 +207,9 @@ impl Ground {
     /// What [`light_table`](Self::light_table) prepared, between cells.
     #[inline(always)]
     pub fn on_table(&self, [x, y]: [f32; 2]) -> [f32; 4] {
-        let gx = ((x - self.min[0]) * self.inverse_cell - 0.5).max(0.01).min(self.width as f32 - 1.01);
-        let gy = ((y - self.min[1]) * self.inverse_cell - 0.5).max(0.01).min(self.height as f32 - 1.01);
-        let (column, row) = (floor(gx), floor(gy));
-        let (fx, fy) = (gx - column as f32, gy - row as f32);
-        let (column, row) = (column as usize, row as usize);
-        let idx = row * self.width + column;
-        let (upper, lower) = (&self.table_light[idx..idx + 2], &self.table_light[idx + self.width..][..2]);
-        let mut sum = [0.0; 4];
-        for k in 0..4 {
-            let a = upper[0][k] + (upper[1][k] - upper[0][k]) * fx;
-            let b = lower[0][k] + (lower[1][k] - lower[0][k]) * fx;
-            sum[k] = a + (b - a) * fy;
-        }
-        sum
+        let x = (x - self.min[0]) * self.inverse_cell - 0.5;
+        let y = (y - self.min[1]) * self.inverse_cell - 0.5;
+        bilinear(&self.table_light, [self.width, self.height], x, y)
     }
 }
 

@@ -2,9 +2,9 @@
 
 use rand_pcg::Pcg64Mcg;
 
+use super::color_grid::bilinear;
 use crate::random::Draw;
 use crate::recipe::Material;
-use crate::tiles::floor;
 
 /// Side of the map of reflections.
 const SIDE: usize = 32;
@@ -99,20 +99,8 @@ impl Lighting {
     #[inline(always)]
     pub fn reflected(&self, direction: [f32; 3], level: usize) -> [f32; 4] {
         let half = 0.5 * SIDE as f32;
-        let x = (direction[0] * half + (half - 0.5)).max(0.01).min(SIDE as f32 - 1.01);
-        let y = (direction[1] * half + (half - 0.5)).max(0.01).min(SIDE as f32 - 1.01);
-        let (column, row) = (floor(x), floor(y));
-        let (fx, fy) = (x - column as f32, y - row as f32);
-        let idx = row as usize * SIDE + column as usize;
-        let map = &self.maps[level];
-        let (upper, lower) = (&map[idx..idx + 2], &map[idx + SIDE..][..2]);
-        let mut sum = [0.0; 4];
-        for k in 0..4 {
-            let a = upper[0][k] + (upper[1][k] - upper[0][k]) * fx;
-            let b = lower[0][k] + (lower[1][k] - lower[0][k]) * fx;
-            sum[k] = a + (b - a) * fy;
-        }
-        sum
+        let [x, y] = [direction[0], direction[1]].map(|along| along * half + (half - 0.5));
+        bilinear(&self.maps[level], [SIDE; 2], x, y)
     }
 
     /// The map for a material.

@@ -1,6 +1,7 @@
 //! Pictures of parts on tables, with the truth.
 
 mod blur;
+mod color_grid;
 mod composition;
 mod config;
 mod contents;

@@ -85,7 +85,7 @@ impl Scenes {
         Ok(Self { config, seed, subjects, others })
     }
 
-    /// The configuration.
+    /// The configuration with which the scenes were set up.
     pub fn config(&self) -> &SceneConfig {
         &self.config
     }
@@ -95,7 +95,7 @@ impl Scenes {
         &self.subjects[part_idx].photo
     }
 
-    /// A part.
+    /// The part of an index, in the order in which parts were given.
     pub fn part(&self, part_idx: usize) -> &Part {
         &self.subjects[part_idx].part
     }

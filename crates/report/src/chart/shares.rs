@@ -14,7 +14,6 @@ const LETTER_WIDTH: f64 = 6.6;
 /// Where the axis may begin, in percent: at the last of these below everything drawn.
 const STARTS: [f64; 4] = [0.0, 50.0, 80.0, 90.0];
 
-/// One share.
 #[derive(Debug, Clone, PartialEq)]
 struct ShareRow {
     label: String,

@@ -24,6 +24,11 @@ const STANDING_RAD_S: f64 = 1e-4;
 const STANDING_RAD_S2: f64 = 0.05;
 /// So near to the motion's end it has arrived, rad: at the tcp, a hundredth of a millimetre.
 const ARRIVED_RAD: f64 = 1e-5;
+/// A robot that goes on for 19 cycles without commands is less than 0.01 rad beside its trajectory. A reference that is further off
+/// is a mistake of the state that tells it, and no robot can be led back from there.
+const MAX_DEVIATION_RAD: f64 = 0.1;
+/// A robot that was silent for longer has left the motion.
+const MAX_ELAPSED_MS: u64 = 1000;
 /// So many cycles after its end a motion is ended, wherever the robot says that its reference is.
 const MAX_CYCLES_AFTER_END: u32 = 2000;
 
@@ -85,7 +90,7 @@ impl<'a> Follower<'a> {
     pub(super) fn next(&mut self, state: &RobotState, elapsed_ms: u64) -> Next {
         let mut is_over = false;
         // The trajectory was asked for the time of the cycle after the last state.
-        for _ in 1..elapsed_ms {
+        for _ in 1..elapsed_ms.min(MAX_ELAPSED_MS) {
             is_over |= self.advance();
         }
         let reference = Deviation {
@@ -94,7 +99,8 @@ impl<'a> Follower<'a> {
             ddq: JointVector::from(state.ddq_desired),
         };
         let is_as_sent = self.sent.is_some_and(|sent| (reference.q - sent).amax() <= self.same_rad);
-        if !is_as_sent {
+        let is_credible = self.is_credible(&reference);
+        if is_credible && !is_as_sent {
             let deviation = reference - self.on_trajectory();
             self.num_corrections += u32::from(self.sent.is_some());
             self.correction = Some(Correction::new(deviation, self.limits));
@@ -105,7 +111,11 @@ impl<'a> Follower<'a> {
             self.correction = None;
         }
         let wanted = self.trajectory[0] + offset.unwrap_or_else(JointVector::zeros);
-        let limited = JointVector::from(limit_joint_positions(self.limits, state, &wanted.into()));
+        // From a reference that cannot be, nothing can be limited; the motion goes on as it was.
+        let limited = match is_credible {
+            true => JointVector::from(limit_joint_positions(self.limits, state, &wanted.into())),
+            false => wanted,
+        };
         // Rounding is no limit.
         let command = if (limited - wanted).amax() < 1e-12 { wanted } else { limited };
         // What was held back is seen as a difference in the next cycle.
@@ -117,6 +127,13 @@ impl<'a> Follower<'a> {
             return Next::Last(command);
         }
         Next::Position(command)
+    }
+
+    /// Whether the robot can be where a state tells.
+    fn is_credible(&self, reference: &Deviation) -> bool {
+        let [newest, ..] = self.trajectory;
+        let is_near = (reference.q - newest).iter().all(|apart| apart.abs() <= MAX_DEVIATION_RAD);
+        is_near && reference.dq.iter().chain(&reference.ddq).all(|value| value.is_finite())
     }
 
     /// One cycle on along the trajectory; whether it has ended.

@@ -36,6 +36,13 @@ impl HandWorker {
         self.running.as_ref().is_some_and(|running| !running.is_finished())
     }
 
+    /// Stops the fingers where they move; what they hold stays held.
+    pub(super) fn stop_motion(&self) {
+        if self.is_moving() {
+            self.stop();
+        }
+    }
+
     /// Waits for the motion that runs.
     pub(super) fn finish(&mut self) -> Result<()> {
         let Some(running) = self.running.take() else { return Ok(()) };

@@ -19,13 +19,14 @@ use std::time::Duration;
 use sdg_fci::FciError;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};
 use sdg_fci::wire::{CollisionBehavior, RobotMode, RobotState, Status, Version};
-use sdg_kinematics::JointVector;
+use sdg_kinematics::{JointVector, Panda};
 
-use crate::arm::Arm;
+use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
 use crate::playback::Playback;
 use crate::safety::CheckedMotion;
+use crate::touch::{Descent, TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 use crate::workcell::RobotModel;
 
@@ -114,7 +115,26 @@ impl FrankaArm {
         }
     }
 
-    /// The loop of a motion; runs in a thread of its own where it is scheduled in real time.
+    /// Runs a control loop, in a thread of its own where it is scheduled in real time.
+    fn in_control<T: Send>(&mut self, control: impl FnOnce(&mut Self) -> Result<T> + Send) -> Result<T> {
+        let ended = match self.scheduling {
+            Scheduling::Ordinary => control(self),
+            Scheduling::RealTime => std::thread::scope(|scope| {
+                let controlled = scope.spawn(|| {
+                    real_time::enter()?;
+                    control(self)
+                });
+                controlled.join().unwrap_or_else(|_| Err(RobotError::Device("the control loop panicked".into())))
+            }),
+        };
+        if ended.is_err() {
+            // The fingers may have been opening on the way.
+            self.hand.stop_motion();
+        }
+        ended
+    }
+
+    /// The loop of a motion.
     fn play(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
         let mut follower = Follower::new(Playback::new(motion), self.robot.version());
         let mut stopped: Option<StopReason> = None;
@@ -132,6 +152,33 @@ impl FrankaArm {
             (Err(error), _) => Err(self.error(error)),
             (Ok(_), Some(reason)) => Err(RobotError::Stopped(reason)),
             (Ok(_), None) => Ok(MotionEnd::Arrived),
+        }
+    }
+
+    /// The loop of coming down.
+    fn come_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
+        let panda = Panda::new();
+        let mut descent: Option<Descent> = None;
+        let mut stopped: Option<StopReason> = None;
+        let controlled = self.robot.control_torques(|state, _| {
+            let (q, dq) = (JointVector::from(state.q), JointVector::from(state.dq));
+            let descent = descent
+                .get_or_insert_with(|| Descent::new(*touch_down, &panda, q, JointVector::from(state.torque_desired)));
+            if let Some(reason) = watch.observe(&arm_state(state)) {
+                stopped = Some(reason.clone());
+                // At this speed the robot's own control holds the arm where it is.
+                return ControlFlow::Break((*descent.last_torque()).into());
+            }
+            match descent.next(&panda, &q, &dq, state.external_wrench_in_base[2]) {
+                (torque, false) => ControlFlow::Continue(torque.into()),
+                (torque, true) => ControlFlow::Break(torque.into()),
+            }
+        });
+        match (controlled, stopped, descent) {
+            (Err(error), ..) => Err(self.error(error)),
+            (Ok(_), Some(reason), _) => Err(RobotError::Stopped(reason)),
+            (Ok(_), None, Some(descent)) => Ok(descent.touched()),
+            (Ok(_), None, None) => Err(RobotError::Device("the control loop did not begin".into())),
         }
     }
 
@@ -158,16 +205,7 @@ impl Arm for FrankaArm {
     }
 
     fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
-        match self.scheduling {
-            Scheduling::Ordinary => self.play(motion, watch),
-            Scheduling::RealTime => std::thread::scope(|scope| {
-                let played = scope.spawn(|| {
-                    real_time::enter()?;
-                    self.play(motion, watch)
-                });
-                played.join().unwrap_or_else(|_| Err(RobotError::Device("the control loop panicked".into())))
-            }),
-        }
+        self.in_control(|arm| arm.play(motion, watch))
     }
 
     fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
@@ -187,7 +225,7 @@ impl Arm for FrankaArm {
     fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
         while self.hand.is_moving() {
             if let Err(error) = self.observe(watch) {
-                self.hand.stop();
+                self.hand.stop_motion();
                 return Err(error);
             }
         }
@@ -227,6 +265,13 @@ impl Arm for FrankaArm {
 
     fn recover(&mut self) -> Result<()> {
         self.robot.automatic_error_recovery().map_err(|error| self.error(error))
+    }
+}
+
+impl CompliantArm for FrankaArm {
+    fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
+        self.set_contact_sensitivity(ContactSensitivity::Contact)?;
+        self.in_control(|arm| arm.come_down(touch_down, watch))
     }
 }
 

@@ -44,7 +44,7 @@ pub enum GraspOutcome {
     },
 }
 
-/// Report of a grasp.
+/// How a grasp ended, with the targets of each look and the measurements of the hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GraspReport {
     /// How it ended.
@@ -53,9 +53,9 @@ pub struct GraspReport {
     pub targets: Vec<Option<GraspTarget>>,
     /// How many looks there were from afar, and how many from above what they found.
     pub looks: [usize; 2],
-    /// What the hand said when it had closed.
+    /// The hand's state when it had closed.
     pub closed: Option<HandState>,
-    /// What the hand's width and force said after closing, lifting and holding: `None` where the part is held, otherwise why not.
+    /// The verdict of the hand's width and force after closing, lifting and holding: `None` where the part is held, otherwise why not.
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
 }
 
@@ -144,7 +144,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             CameraMount::Base => first,
         };
         let approach = self.go_above(&target)?;
-        self.come_down(approach)?;
+        self.descend(approach)?;
         self.close(&target)?;
         self.lift()?;
         self.hold()

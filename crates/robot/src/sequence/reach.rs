@@ -57,8 +57,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// Comes down with the hand open.
-    pub(super) fn come_down(&mut self, approach: Approach) -> Steps<()> {
+    /// Moves straight down to the grasp with the hand open.
+    pub(super) fn descend(&mut self, approach: Approach) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
         let planned = self.robot.plan_along(&approach.path, &self.config.pace.approach_limits());

@@ -1,4 +1,4 @@
-//! The file's own layout, and the checks of what it says.
+//! The layout of the file, and the checks of its values.
 
 use nalgebra::Vector3;
 use sdg_kinematics::{JointLimits, JointVector, NUM_JOINTS};

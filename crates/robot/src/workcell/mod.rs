@@ -91,7 +91,7 @@ impl Mounting {
     }
 }
 
-/// A workcell, as its file says.
+/// A workcell, as its file describes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Workcell {
     /// The robot's model.

@@ -5,8 +5,8 @@
 //!                                 ├─ 64×64 pixels each, the part about 53 long ─ network ─ log-odds of the same part
 //! picture, turned and sized as it ┘
 //! ```
-//! Agreements of edges and colours count how much differs. This one sees what it is: something lying over the part, its
-//! shadow, a highlight, or a hole that belongs elsewhere. It was trained on generated parts and knows no part in
+//! Agreements of edges and colours count how much differs. The network can tell the causes apart: something lying over
+//! the part, its shadow, a highlight, or a hole that belongs elsewhere. It was trained on generated parts and knows no part in
 //! particular (docs/decisions/008-likeness.md).
 
 mod network;
@@ -31,7 +31,7 @@ impl Likeness {
         Self { photo: Photo::new(cutout, outline) }
     }
 
-    /// What the network sees at a pose.
+    /// The input of the network at a pose.
     pub fn pair(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Pair {
         self.photo.beside(image, image_from_cutout)
     }

@@ -28,7 +28,7 @@ pub(super) struct Photo {
     inside: Vec<bool>,
 }
 
-/// What the network sees of a pose: colours from 0 to 1, row by row; `None` where there is no picture.
+/// The input of the network at a pose: colours from 0 to 1, row by row; `None` where there is no picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
     /// The photo's.

@@ -92,7 +92,7 @@ pub struct Match {
     pub image_from_demonstration: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`: [`Agreement::both`].
     pub agreement: f64,
-    /// Everything that the image says of that place.
+    /// All measurements in the image at that place.
     pub evidence: Evidence,
 }
 
@@ -152,7 +152,7 @@ const MAX_OVERLAP: f64 = 0.3;
 /// On 640×480 pixels a search over all scales from 0.75 to 1.3 takes some tens of milliseconds on two cores, and time
 /// grows with the number of pixels; for a part smaller than about 100 pixels it is up to four times that.
 #[derive(Debug, Clone)]
-pub struct InstantSearch {
+pub struct ShapeSearch {
     config: SearchConfig,
     template: ShapeTemplate,
     surface: Surface,
@@ -163,7 +163,7 @@ pub struct InstantSearch {
     sweep_level_idx: usize,
 }
 
-impl InstantSearch {
+impl ShapeSearch {
     /// Makes a demonstration ready to be looked for: milliseconds.
     ///
     /// # Units and frames

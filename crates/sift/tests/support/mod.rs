@@ -7,7 +7,14 @@ use std::path::PathBuf;
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Mask, PlanarSimilarity, Polygon};
-use sdg_sift::Plane;
+use sdg_sift::{Plane, SiftConfig};
+
+/// The default with a change.
+pub fn with(change: impl FnOnce(&mut SiftConfig)) -> SiftConfig {
+    let mut config = SiftConfig::default();
+    change(&mut config);
+    config
+}
 
 pub const PARTS: [&str; 3] = ["fuel_line", "pendulum", "rod_end"];
 

@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_simulation::scene::texture::{Colour, Noise, Texture};
+use sdg_simulation::scene::texture::{Color, Noise, Texture};
 
 use crate::circuit_board::{
     BUTTON, Block, CANS, CHIPS, CONTROLLER, DRIVER, FIXINGS, HEADER, JACK, LAMPS, LENGTH, MEMORY, MIDDLE_X, OPEN_HOLES,
@@ -12,12 +12,12 @@ use crate::circuit_board::{
 use crate::print::{Lettering, distance_to_segment, in_rectangle, plan_texture};
 
 const TEXELS: u32 = 512;
-const MASK: Colour = [0.06, 0.33, 0.17];
-const MASK_OVER_COPPER: Colour = [0.10, 0.43, 0.22];
-const PAD: Colour = [0.76, 0.76, 0.72];
-const PRINT: Colour = [0.90, 0.92, 0.90];
-const EDGE: Colour = [0.55, 0.55, 0.33];
-const BLACK: Colour = [0.09, 0.09, 0.10];
+const MASK: Color = [0.06, 0.33, 0.17];
+const MASK_OVER_COPPER: Color = [0.10, 0.43, 0.22];
+const PAD: Color = [0.76, 0.76, 0.72];
+const PRINT: Color = [0.90, 0.92, 0.90];
+const EDGE: Color = [0.55, 0.55, 0.33];
+const BLACK: Color = [0.09, 0.09, 0.10];
 
 /// White print on the board.
 const LETTERING: [Lettering; 14] = [

@@ -1,7 +1,7 @@
 //! Textures drawn to scale from above: lettering, pads, tracks and outlines at places in metres.
 
 use nalgebra::Point2;
-use sdg_simulation::scene::texture::{Colour, Texture};
+use sdg_simulation::scene::texture::{Color, Texture};
 
 /// Rows of a letter of 5 by 7 dots from the top, the leftmost dot the highest of five bits.
 const LETTERS: [(char, [u8; 7]); 40] = [
@@ -50,13 +50,13 @@ const LETTERS: [(char, [u8; 7]); 40] = [
 /// A texture of the plan `span` metres wide and high about the origin, `colour` given the place in metres.
 ///
 /// A mesh fits to it with `centred_texture(mesh, span)`. Each texel is the mean of nine places.
-pub fn plan_texture(size: u32, span: f64, mut colour: impl FnMut(Point2<f64>) -> Colour) -> Texture {
+pub fn plan_texture(size: u32, span: f64, mut color: impl FnMut(Point2<f64>) -> Color) -> Texture {
     let texel = span / f64::from(size);
     Texture::paint(size, |u, v| {
         let middle = Point2::new((u - 0.5) * span, (0.5 - v) * span);
         let mut sum = [0.0; 3];
         for (dx, dy) in (0..9).map(|idx| (f64::from(idx % 3) - 1.0, f64::from(idx / 3) - 1.0)) {
-            let sample = colour(middle + nalgebra::Vector2::new(dx, dy) * (texel / 3.0));
+            let sample = color(middle + nalgebra::Vector2::new(dx, dy) * (texel / 3.0));
             for channel in 0..3 {
                 sum[channel] += sample[channel] / 9.0;
             }

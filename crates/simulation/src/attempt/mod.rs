@@ -160,8 +160,8 @@ struct ViewFinder<'a, 'p> {
 impl PartFinder<Workcell> for ViewFinder<'_, '_> {
     fn find(&mut self, cell: &mut Workcell) -> sdg_robot::Result<Option<GraspTarget>> {
         let mut view = cell.wrist_view()?;
-        if let Some(camera_from_told) = cell.config().errors.camera_from_told {
-            view.camera.world_from_camera *= camera_from_told;
+        if let Some(camera_from_assumed) = cell.config().errors.camera_from_assumed {
+            view.camera.world_from_camera *= camera_from_assumed;
         }
         let started = Instant::now();
         let found = (self.perceive)(cell, &view).map_err(|error| RobotError::Perception(error.to_string()))?;

@@ -17,14 +17,14 @@ pub struct AttemptReport {
     pub base_from_object: Option<Isometry3<f64>>,
     /// What the wrist camera saw, look by look: from afar until the part was found, then from above it.
     pub views: Vec<CameraView>,
-    /// What perception said to each of the views, where it was sure enough.
+    /// The target that perception gave for each of the views, where its score was high enough.
     pub targets: Vec<Option<GraspTarget>>,
     /// How many looks there were from afar, and how many from above what they found: one each where the part was found
     /// at the first look.
     pub looks: [usize; 2],
     /// How far the hand swung to either side after lifting, in metres; `None` where it was not shaken.
     pub shake_amplitude_m: Option<f64>,
-    /// What the hand's width and force said of the same, after each of the last steps; see [`sdg_robot::GraspReport`].
+    /// The same by the hand's width and force, after each of the last steps; see [`sdg_robot::GraspReport`].
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
     /// Height of the part's lowest point above the table at the end, in metres.
     pub object_height_m: Option<f64>,

@@ -1,4 +1,4 @@
-//! The features of a part: groups of connected pieces of its meshes that could stand elsewhere on it.
+//! The features of a part: groups of connected pieces of its meshes that could be elsewhere on it.
 //!
 //! ```text
 //! meshes ─> pieces ─> what touches what ─> from the largest piece outwards: each piece with all that stands on it

@@ -1,4 +1,4 @@
-//! `object.json`: what it says, and the checks that its types leave open.
+//! `object.json`: its content, and the checks that its types leave open.
 
 use nalgebra::Point3;
 use sdg_geometry::RotationalSymmetry;

@@ -1,4 +1,4 @@
-//! The tags of an MJCF text and their attributes, to be changed in place.
+//! The tags of an MJCF text and their attributes, changed in place.
 
 /// One tag: its name and attributes in the order in which they are written.
 pub(super) struct Tag {

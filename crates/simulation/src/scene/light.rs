@@ -5,7 +5,7 @@ use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
 use super::fragment::MjcfFragment;
-use super::texture::Colour;
+use super::texture::Color;
 
 /// The middle of the table's part that the camera sees, which lamps are aimed at (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);
@@ -30,7 +30,7 @@ pub struct Lamp {
     /// Where it points.
     pub target: Point3<f64>,
     /// Its colour times its strength, each channel from 0 to 1.
-    pub diffuse: Colour,
+    pub diffuse: Color,
     /// Strength of the highlights that it makes.
     pub specular: f64,
     /// Half of its cone's angle in degrees.
@@ -43,10 +43,10 @@ pub struct Lamp {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lighting {
     /// Light from everywhere.
-    pub ambient: Colour,
+    pub ambient: Color,
     /// Light from the camera's own direction: the diffuse light of a bright hall.
-    pub from_camera: Colour,
-    /// The lamps.
+    pub from_camera: Color,
+    /// Each aimed at a place of the table.
     pub lamps: Vec<Lamp>,
 }
 
@@ -77,7 +77,7 @@ impl Lighting {
             let warmth = rng.random_range(-1.0..1.0);
             [1.0 + 0.08 * warmth, 1.0, 1.0 - 0.10 * warmth]
         };
-        let scaled = |colour: Colour, strength: f64| colour.map(|channel| (channel * strength).clamp(0.0, 1.0));
+        let scaled = |color: Color, strength: f64| color.map(|channel| (channel * strength).clamp(0.0, 1.0));
         // The light of lamps and surroundings together stays within what a camera's exposure would take in.
         let total = rng.random_range(0.62..1.10);
         let surrounding = rng.random_range(0.32..0.62);
@@ -114,7 +114,7 @@ impl Lighting {
     }
 
     pub(super) fn fragment(&self) -> MjcfFragment {
-        let rgb = |colour: Colour| format!("{:.4} {:.4} {:.4}", colour[0], colour[1], colour[2]);
+        let rgb = |color: Color| format!("{:.4} {:.4} {:.4}", color[0], color[1], color[2]);
         let mut fragment = MjcfFragment::default();
         fragment.write(format_args!(
             "<visual><headlight ambient=\"{}\" diffuse=\"{}\" specular=\"0.05 0.05 0.05\"/>\

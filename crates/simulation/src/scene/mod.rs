@@ -10,6 +10,8 @@
 
 mod axis;
 mod distractor;
+mod distractor_kind;
+mod distractor_pieces;
 pub mod footprint;
 mod fragment;
 mod light;
@@ -30,7 +32,8 @@ use rand_pcg::Pcg64Mcg;
 use crate::objects::ObjectSpec;
 
 pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_view};
-pub use distractor::{Distractor, DistractorKind};
+pub use distractor::Distractor;
+pub use distractor_kind::DistractorKind;
 pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
 pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, other_view};

@@ -4,7 +4,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::fragment::MjcfFragment;
-use super::texture::{Colour, Noise, Texture};
+use super::texture::{Color, Noise, Texture};
 
 /// Metres of table that one repeat of the surface's picture covers.
 const METRES_PER_REPEAT: f64 = 0.5;
@@ -53,9 +53,9 @@ pub struct Table {
     /// What it is made of.
     pub surface: TableSurface,
     /// Its main colour.
-    pub base: Colour,
+    pub base: Color,
     /// The colour of its grain, lines or speckles.
-    pub accent: Colour,
+    pub accent: Color,
     /// Seed of its pattern.
     pub seed: u64,
 }
@@ -73,12 +73,12 @@ impl Table {
             let level = rng.random_range(low..high);
             [level * rng.random_range(0.95..1.05), level, level * rng.random_range(0.92..1.08)]
         };
-        let coloured = |rng: &mut Pcg64Mcg| {
+        let colored = |rng: &mut Pcg64Mcg| {
             let level = rng.random_range(0.25..0.8);
             [0; 3].map(|_: i32| level * rng.random_range(0.65..1.2))
         };
         let (base, accent) = match surface {
-            TableSurface::Plain => (coloured(rng), [0.5; 3]),
+            TableSurface::Plain => (colored(rng), [0.5; 3]),
             TableSurface::Speckled => (grey(rng, 0.3, 0.85), grey(rng, 0.1, 0.9)),
             TableSurface::Wood => {
                 let level = rng.random_range(0.45..0.9);
@@ -100,7 +100,7 @@ impl Table {
     pub fn texture(&self) -> Texture {
         let seed = self.seed;
         let base = self.base;
-        let mix = |a: Colour, b: Colour, t: f64| {
+        let mix = |a: Color, b: Color, t: f64| {
             let t = t.clamp(0.0, 1.0);
             [0, 1, 2].map(|channel| a[channel] * (1.0 - t) + b[channel] * t)
         };
@@ -142,8 +142,8 @@ impl Table {
             }),
             TableSurface::Chequered => Texture::paint(TEXELS, |u, v| {
                 let dark = ((u * 12.0) as i64 + (v * 12.0) as i64) % 2 == 0;
-                let colour = if dark { self.accent } else { base };
-                colour.map(|c| c * (1.0 + 0.05 * noise.fractal(u, v, 3)))
+                let color = if dark { self.accent } else { base };
+                color.map(|c| c * (1.0 + 0.05 * noise.fractal(u, v, 3)))
             }),
             TableSurface::Cardboard => Texture::paint(TEXELS, |u, v| {
                 let flute = 0.02 * (std::f64::consts::TAU * 60.0 * v).sin();

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A colour, each channel from 0 to 1.
-pub type Colour = [f64; 3];
+pub type Color = [f64; 3];
 
 /// A square picture that can be laid side by side without a seam.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,10 +16,10 @@ pub struct Texture {
 
 impl Texture {
     /// Paints every texel; `colour` is given (u, v) from 0 to 1.
-    pub fn paint(size: u32, mut colour: impl FnMut(f64, f64) -> Colour) -> Self {
+    pub fn paint(size: u32, mut color: impl FnMut(f64, f64) -> Color) -> Self {
         let image = RgbImage::from_fn(size, size, |x, y| {
             let (u, v) = ((f64::from(x) + 0.5) / f64::from(size), (f64::from(y) + 0.5) / f64::from(size));
-            Rgb(colour(u, v).map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8))
+            Rgb(color(u, v).map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8))
         });
         Self { image }
     }
@@ -38,7 +38,7 @@ impl Texture {
     }
 
     /// An even colour with fine grain, as painted or plastic surfaces have it.
-    pub fn grained(size: u32, base: Colour, strength: f64, seed: u64) -> Self {
+    pub fn grained(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let blotches = Noise::new(8, seed);
         Self::paint(size, |u, v| {
@@ -48,7 +48,7 @@ impl Texture {
     }
 
     /// Metal brushed along u.
-    pub fn brushed(size: u32, base: Colour, strength: f64, seed: u64) -> Self {
+    pub fn brushed(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let lines = Noise::new_stretched(4, size as usize, seed);
         let broad = Noise::new_stretched(2, 16, seed ^ 1);
         Self::paint(size, |u, v| {
@@ -58,7 +58,7 @@ impl Texture {
     }
 
     /// A turned face: rings about the middle of the texture, and the two bright fans that rings of a tool give.
-    pub fn turned(size: u32, base: Colour, strength: f64, seed: u64) -> Self {
+    pub fn turned(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let rings = Noise::new_stretched(1, 64, seed);
         Self::paint(size, |u, v| {
             let (x, y) = (u - 0.5, v - 0.5);
@@ -70,7 +70,7 @@ impl Texture {
     }
 
     /// The top of a printed part: strands at 45° and slight blotches.
-    pub fn printed(size: u32, base: Colour, strands: f64, seed: u64) -> Self {
+    pub fn printed(size: u32, base: Color, strands: f64, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let blotches = Noise::new(6, seed);
         Self::paint(size, |u, v| {
@@ -83,7 +83,7 @@ impl Texture {
     /// A round bar seen from above, u once round it (0.5 on top): bright along the top, dark flanks, a lighter rim.
     ///
     /// The renderer has no reflections; a bar lying on a table shows these bands from wherever above one looks.
-    pub fn round_bar(size: u32, base: Colour, gloss: f64, seed: u64) -> Self {
+    pub fn round_bar(size: u32, base: Color, gloss: f64, seed: u64) -> Self {
         let lines = Noise::new_stretched(4, size as usize, seed);
         Self::paint(size, |u, v| {
             let from_top = (u - 0.5).abs() * 4.0;
@@ -95,7 +95,7 @@ impl Texture {
     }
 
     /// Rough casting: blotches at several scales and dark pores.
-    pub fn cast(size: u32, base: Colour, strength: f64, seed: u64) -> Self {
+    pub fn cast(size: u32, base: Color, strength: f64, seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let blotches = Noise::new(16, seed);
         Self::paint(size, |u, v| {

@@ -54,7 +54,7 @@ pub struct TableView {
     pub number: u64,
     /// Simulated time since the first frame.
     pub time: Duration,
-    /// The picture.
+    /// As the camera delivers it, with noise.
     pub picture: RgbImage,
     /// All of the part, in a fixed order; what lies beside is not among them.
     pub truths: Vec<MovingTruth>,

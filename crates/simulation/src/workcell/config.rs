@@ -1,4 +1,4 @@
-//! What a workcell is made of.
+//! The configuration of a workcell.
 
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "each test file and the example use some of it")]
 
+pub mod relay;
+
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::{JointLimits, JointVector, Trajectory};
 use sdg_robot::{Arm, FrankaArm, GraspConfig, GraspTarget, PartFinder, RobotAddress, Scheduling};

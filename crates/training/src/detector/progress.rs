@@ -1,4 +1,4 @@
-//! What a run tells while it goes on, and keeps of itself afterwards.
+//! Progress of a run, and its record.
 
 use burn::tensor::Tensor;
 use sdg_detection::Losses;

@@ -26,8 +26,8 @@ pub struct Trained {
 
 /// Trains `detector` on the samples that `source` gives by their index.
 ///
-/// `examine` looks at the held-back samples with the detector as it is and says what became of each; `observe` hears
-/// of every step and every validation and may end the run, which then keeps the best checkpoint so far.
+/// `examine` runs the present detector on the held-back samples and returns the outcome of each; `observe` gets
+/// every step and every validation and may end the run, which then keeps the best checkpoint so far.
 ///
 /// # Errors
 /// A bad setting, a loss that is not finite, a network that refuses a batch, or an end before the first validation.

@@ -3,7 +3,7 @@
 //! A pixel error says little when the training image is half the photo's size, so errors are given in pixels **of the
 //! demonstration**: there, millimetres a pixel are a constant of the camera's height.
 
-use sdg_geometry::{Angle, PlanarGrasp, median};
+use sdg_geometry::{Angle, PlanarGrasp, median, percentile};
 use serde::{Deserialize, Serialize};
 
 /// A detection farther from the truth than this is not the part, in demonstration pixels. With the paper's camera (550 px
@@ -11,6 +11,11 @@ use serde::{Deserialize, Serialize};
 pub const HIT_PX: f64 = 9.2;
 /// Largest error of the angle of a hit, in degrees.
 pub const HIT_DEGREES: f64 = 10.0;
+/// False alarms are counted at the score that so many percent of the hits do not exceed: a score means nothing before it is
+/// calibrated, and the calibrated threshold refuses about as many.
+const REFUSED_PERCENT: f64 = 10.0;
+/// The score from which they are counted where nothing was hit.
+const NO_HIT_SCORE: f64 = 0.5;
 
 /// What the detector said of one held-back sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +68,7 @@ pub struct Validation {
     pub median_error_degrees: f64,
     /// Samples without the part.
     pub negatives: usize,
-    /// Of those, with a detection scored 0.5 or more.
+    /// Of those, with a detection scored as high as nine in ten hits.
     pub false_alarms: usize,
 }
 
@@ -71,6 +76,11 @@ impl Validation {
     /// Sums up outcomes.
     pub fn from_outcomes(outcomes: &[Outcome]) -> Self {
         let (mut errors_px, mut errors_degrees) = (Vec::new(), Vec::new());
+        let hit_scores = outcomes.iter().filter_map(|outcome| match outcome {
+            Outcome::Found { score, .. } => Some(*score).filter(|_| outcome.is_hit()),
+            _ => None,
+        });
+        let min_score = percentile(hit_scores, REFUSED_PERCENT).unwrap_or(NO_HIT_SCORE);
         let mut made = Self {
             positives: 0,
             hits: 0,
@@ -90,7 +100,7 @@ impl Validation {
                 Outcome::Missed => made.positives += 1,
                 Outcome::Absent { score } => {
                     made.negatives += 1;
-                    made.false_alarms += usize::from(score >= 0.5);
+                    made.false_alarms += usize::from(score >= min_score);
                 }
             }
         }
@@ -128,13 +138,16 @@ mod tests {
             found(1.0, 2.0),
             found(3.0, 179.0),
             Outcome::Missed,
-            Outcome::Absent { score: 0.6 },
-            Outcome::Absent { score: 0.4 },
+            Outcome::Absent { score: 0.91 },
+            Outcome::Absent { score: 0.8 },
         ];
         let validation = Validation::from_outcomes(&outcomes);
         assert_eq!((validation.positives, validation.hits), (3, 1));
         assert_eq!((validation.negatives, validation.false_alarms), (2, 1));
         assert_eq!(validation.median_error_px, 2.0);
+        // Without a hit there is nothing to compare with.
+        let nothing_hit = Validation::from_outcomes(&[Outcome::Absent { score: 0.6 }, Outcome::Absent { score: 0.4 }]);
+        assert_eq!(nothing_hit.false_alarms, 1);
     }
 
     #[test]

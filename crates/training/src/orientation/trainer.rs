@@ -38,7 +38,7 @@ pub enum OrientationEvent {
     Validated {
         /// Steps done before.
         steps_done: usize,
-        /// Errors of the angle.
+        /// Errors of the angle on the held-back crops, in degrees.
         errors: AngleErrors,
         /// Since the start of the run.
         elapsed_secs: f64,

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::taught::{Made, array, detect};
 use crate::{assert_quiet, choose, open_model, open_page, repository, screenshots, site};
 
-/// What the issue allows between page and command line.
+/// Largest differences between page and command line.
 const MAX_PX: f64 = 0.5;
 const MAX_DEGREES: f64 = 0.5;
 /// Scores are sums of products that each instruction set rounds in its own order.

@@ -6,8 +6,10 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
+use nalgebra::Point2;
 use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
 use sdg_camera::{Address, OpenOptions};
+use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
 use super::AnnotateArgs;
@@ -52,6 +54,14 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;
+    // Where the photo's middle shows the marks' plane; nearly the same all over a table that is seen from above.
+    let max_opening_px = camera.as_ref().and_then(|(file, [mark_height_m, _])| {
+        let [width, height] = file.size_px();
+        let middle = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+        let over_table = &file.over_table;
+        let scale = over_table.camera.metres_per_pixel(&middle, over_table.table_height_m + mark_height_m)?;
+        Some(HAND_OPENING_MAX_M / scale)
+    });
     let options = SessionOptions {
         images,
         trial_pictures: args.trial_pictures.clone(),
@@ -59,6 +69,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         live,
         project,
         token,
+        max_opening_px,
     };
     let session = Session::open(&options, Arc::new(PageTeacher { preset, camera }))?;
     let server = Server::bind(session, args.port)?;

@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 4 << 20;
 /// Which board.
 #[derive(Debug, Args)]
 pub struct BoardInUse {
-    /// The board's SVG or PDF, which tells its squares
+    /// The board's SVG or PDF, which names its squares
     #[arg(long, value_name = "FILE", conflicts_with_all = ["squares", "square_mm"])]
     board: Option<PathBuf>,
     /// Squares of the board, across and up
@@ -27,7 +27,7 @@ pub struct BoardInUse {
     /// A square's side as drawn, in millimetres
     #[arg(long, default_value_t = 25.0, value_name = "MM")]
     square_mm: f64,
-    /// What a ruler says of the printed 100 mm line; printers scale
+    /// The length of the printed 100 mm line by a ruler; printers scale
     #[arg(long, default_value_t = 100.0, hide_default_value = true, value_name = "MM")]
     measured_mm: f64,
 }

@@ -73,7 +73,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
         };
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
         write_png(&path, &frame)?;
-        tell(&path, &frame, args.json)?;
+        print_frame(&path, &frame, args.json)?;
         num_written += 1;
     }
     if num_written == 0 {
@@ -106,7 +106,7 @@ fn write_png(path: &Path, frame: &Frame) -> Result<()> {
     Ok(write_atomically(path, &png.into_inner())?)
 }
 
-fn tell(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {
+fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {
     let unix_secs = frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64();
     let (width, height) = frame.picture.dimensions();
     let mut stdout = std::io::stdout().lock();

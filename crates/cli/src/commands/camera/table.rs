@@ -80,8 +80,8 @@ pub struct TableArgs {
 /// A focal length taken from the sheet's perspective must be known to this share.
 const MAX_FOCAL_SIGMA: f64 = 0.1;
 /// Pictures of webcams and phones are about so wide.
-const USUAL_VIEW_DEG: f64 = 60.0;
-/// The error of the focal length of which the cost is told.
+const ASSUMED_VIEW_DEG: f64 = 60.0;
+/// The error of the focal length whose cost is reported.
 const FOCAL_ERROR: f64 = 0.1;
 /// A straight lens explains corners to this; more is the lens's distortion.
 const MAX_STRAIGHT_PX: f64 = 1.0;
@@ -177,7 +177,7 @@ fn guessed(
         (None, Some(found)) => (found.focal_px, Source::Perspective(found.relative_sigma())),
         (None, None) => {
             let half = 0.5 * f64::from(width.max(height));
-            (half / (0.5 * USUAL_VIEW_DEG).to_radians().tan(), Source::Guess)
+            (half / (0.5 * ASSUMED_VIEW_DEG).to_radians().tan(), Source::Guess)
         }
     };
     let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
@@ -247,7 +247,7 @@ fn report(
         Source::Guess => {
             writeln!(
                 stdout,
-                "  focal length {focal:.0} px guessed for a view of {USUAL_VIEW_DEG} degrees: the sheet is tilted too little to tell it"
+                "  focal length {focal:.0} px guessed for a view of {ASSUMED_VIEW_DEG} degrees: the sheet is tilted too little to tell it"
             )?;
         }
     }

@@ -69,7 +69,7 @@ pub fn run(args: &WatchArgs) -> Result<Outcome> {
     Ok(if num_frames > 0 { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// What one line tells.
+/// The content of one line.
 struct Period {
     start: Instant,
     num_frames: u64,

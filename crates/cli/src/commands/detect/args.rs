@@ -1,4 +1,4 @@
-//! What `sdg detect` takes.
+//! The arguments of `sdg detect`.
 
 use std::path::PathBuf;
 
@@ -9,8 +9,21 @@ use crate::found_text::DEFAULT_MIN_SCORE;
 use crate::live_pictures::RequestArgs;
 use crate::shared_args::{ComputeArgs, SizeTolerance, share, size_tolerance};
 
+/// Where an angle is zero and which way it grows, drawn.
+const ANGLES_HELP: &str = "\
+Angles:
+  The angle of a grasp is the direction from the first marked point to the second; the jaws close across it.
+
+              -90
+               |
+      +-180 ---+---> 0 degrees, to the right of the picture
+               |
+               v     angles grow clockwise, as seen
+          90, down";
+
 /// `sdg detect`
 #[derive(Debug, ClapArgs)]
+#[command(after_long_help = ANGLES_HELP)]
 pub struct DetectArgs {
     /// A grasp model that `sdg teach` wrote
     #[arg(long, value_name = "FILE")]

@@ -10,7 +10,7 @@ use sdg_demonstration::IMAGE_EXTENSIONS;
 use crate::exit::Usage;
 use crate::files::{self, STANDARD_INPUT, UNREADABLE_EXTENSIONS};
 
-/// How many names of skipped files are told.
+/// How many names of skipped files are printed.
 const MAX_NAMED: usize = 20;
 
 /// A picture before it is read.
@@ -59,7 +59,7 @@ pub struct Inputs {
 }
 
 /// The pictures of an argument: of a folder all that end like pictures, those that are not read (HEIC) with the others, so that
-/// their error is told; folders in it are left out.
+/// their error is printed; folders in it are left out.
 ///
 /// # Errors
 /// A folder that cannot be listed or has no pictures.

@@ -26,7 +26,7 @@ use crate::pictures;
 use crate::tracking::{LiveTracker, SearchTime};
 
 /// How long the newest frame is waited for before Ctrl-C is looked at again.
-const PATIENCE: Duration = Duration::from_millis(200);
+const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Reads frames until the camera ends, `--frames` are read or Ctrl-C is pressed.
 pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> Result<Outcome> {
@@ -43,7 +43,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         }
     };
     let mut frames = Frames::open(address, args, detector.picture_size())?;
-    let mut finder = Finder::new(args, detector)?;
+    let mut finder = FrameDetector::new(args, detector)?;
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
     let mut found_any = false;
@@ -106,7 +106,7 @@ impl Frames {
 
     fn next(&mut self) -> Next {
         match self {
-            Self::Newest(newest) => match newest.take(PATIENCE) {
+            Self::Newest(newest) => match newest.take(MAX_WAIT) {
                 Ok(Some(frame)) => Next::Frame(frame),
                 Ok(None) if newest.has_ended() => Next::End,
                 Ok(None) => Next::None,
@@ -138,7 +138,7 @@ impl Part {
 }
 
 /// Parts of a frame, with or without those of the frames before.
-struct Finder {
+struct FrameDetector {
     detector: PictureDetector,
     verification: Verification,
     tracker: Option<LiveTracker>,
@@ -146,7 +146,7 @@ struct Finder {
     first: Option<SystemTime>,
 }
 
-impl Finder {
+impl FrameDetector {
     fn new(args: &DetectArgs, detector: PictureDetector) -> Result<Self> {
         let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
         let tracker = match args.every_frame || args.no_verify {

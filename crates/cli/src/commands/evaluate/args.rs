@@ -1,4 +1,4 @@
-//! What `sdg evaluate` takes.
+//! The arguments of `sdg evaluate`.
 
 use std::path::PathBuf;
 

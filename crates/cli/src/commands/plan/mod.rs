@@ -1,4 +1,4 @@
-//! `sdg plan`: a motion around the obstacles of a workcell, told and drawn; nothing moves.
+//! `sdg plan`: a motion around the obstacles of a workcell, described and drawn; nothing moves.
 
 mod arguments;
 #[cfg(feature = "simulation")]
@@ -64,7 +64,7 @@ pub struct PlanArgs {
     pub json: bool,
 }
 
-/// Plans, tells and draws.
+/// Plans, prints the plan and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = robots::read_workcell(&args.workcell)?;

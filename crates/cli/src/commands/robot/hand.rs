@@ -1,12 +1,16 @@
 //! `sdg robot open` and `close`.
 
+use std::path::{Path, PathBuf};
+
 use anyhow::Result;
 use clap::Args;
 use sdg_kinematics::HAND_OPENING_MAX_M;
-use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load, Watch};
+use sdg_robot::{Arm, FrankaArm, HandCommand, HandState, Load};
 
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
+use crate::interrupt::Interrupt;
+use crate::robots::{self, write_states};
 
 /// Speed of the fingers against each other, m/s.
 const SPEED_M_S: f64 = 0.05;
@@ -23,6 +27,9 @@ pub struct OpenArgs {
     /// Distance between the fingers, 0 to 80
     #[arg(long, value_name = "MM", default_value_t = 80.0)]
     width_mm: f64,
+    /// Where the arm's last second is written after an error, as CSV
+    #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
+    states: PathBuf,
 }
 
 /// `sdg robot close`
@@ -33,6 +40,9 @@ pub struct CloseArgs {
     /// Force of each finger, 1 to 70
     #[arg(long, value_name = "N", default_value_t = 20.0)]
     force_n: f64,
+    /// Where the arm's last second is written after an error, as CSV
+    #[arg(long, value_name = "FILE", default_value = "robot-states.csv")]
+    states: PathBuf,
 }
 
 pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
@@ -42,7 +52,7 @@ pub(super) fn open(args: &OpenArgs) -> Result<Outcome> {
         return Err(Usage(format!("--width-mm: expected 0 to {:.0}, found {found}", HAND_OPENING_MAX_M * 1e3)).into());
     }
     let (mut arm, _) = args.arm.connect()?;
-    let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S })?;
+    let hand = command(&mut arm, HandCommand::Move { opening_m, speed_m_s: SPEED_M_S }, &args.states)?;
     // What the hand carried is not there any more.
     arm.set_load(Load::NONE)?;
     eprintln!("the hand is {:.1} mm open", hand.opening_m * 1e3);
@@ -55,13 +65,19 @@ pub(super) fn close(args: &CloseArgs) -> Result<Outcome> {
     }
     let (mut arm, _) = args.arm.connect()?;
     let close = HandCommand::Grasp { width_m: ANY_WIDTH_M, speed_m_s: SPEED_M_S, force_n: args.force_n };
-    let hand = command(&mut arm, close)?;
+    let hand = command(&mut arm, close, &args.states)?;
     let holds = if hand.is_grasping { "and holds something" } else { "and holds nothing" };
     eprintln!("the hand is closed to {:.1} mm {holds}", hand.opening_m * 1e3);
     Ok(Outcome::Done)
 }
 
-fn command(arm: &mut FrankaArm, command: HandCommand) -> Result<HandState> {
+/// Moves the fingers; Ctrl-C stops them.
+fn command(arm: &mut FrankaArm, command: HandCommand, states: &Path) -> Result<HandState> {
+    let mut watch = robots::watch(&Interrupt::watch());
     arm.start_hand(command)?;
-    Ok(arm.finish_hand(&mut Watch::default())?)
+    let finished = arm.finish_hand(&mut watch);
+    if finished.is_err() {
+        write_states(states, &watch)?;
+    }
+    Ok(finished?)
 }

@@ -61,6 +61,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     if confirm(&format!("Move the arm at {address} home, in {secs:.1} s?"), args.yes)? == Consent::Refused {
         return Ok(Outcome::Done);
     }
+    eprintln!("moving home, {secs:.1} s; Ctrl-C stops the arm");
     let moved = robot.follow(motion);
     if moved.is_err() {
         write_states(&args.states, robot.watch())?;

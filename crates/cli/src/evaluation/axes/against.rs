@@ -60,7 +60,6 @@ impl Against {
         Ok(Self { folder: folder.to_owned() })
     }
 
-    /// The folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -115,7 +114,7 @@ impl Against {
         Ok(counts)
     }
 
-    /// What the other run's model said, checked to be of the same pictures.
+    /// The detections of the other run's model, checked to be of the same pictures.
     fn record(&self, cell: Cell, axis: Axis, settings: &AxisSettings) -> Result<Option<AxisRecord>> {
         /// What decides the pictures; teaching and search may differ, and are what is compared.
         #[derive(Serialize)]

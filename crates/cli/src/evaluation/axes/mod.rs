@@ -13,6 +13,7 @@
 
 mod against;
 mod jitter;
+mod known_from_simulator;
 mod matching;
 mod page;
 mod paired;
@@ -21,7 +22,6 @@ mod selection;
 mod settings;
 mod summary;
 mod tables;
-mod told;
 mod units;
 mod way;
 mod work;

@@ -22,7 +22,7 @@ pub struct PlacedDetection {
     pub found: Option<usize>,
 }
 
-/// What a model says of a picture: all that it accepts, best first; the best that it refuses where it accepts nothing.
+/// A model's detections in a picture: all that it accepts, best first; the best that it refuses where it accepts nothing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// Where there is at most one instance, the best alone.
@@ -30,7 +30,7 @@ pub struct Answer {
 }
 
 impl PlacedDetection {
-    /// Whether it says that the part is there.
+    /// Whether the part was detected.
     pub fn is_accepted(&self) -> bool {
         self.score >= 0.5
     }
@@ -62,7 +62,7 @@ pub struct LookAlike {
     pub differs_in_size_alone: bool,
 }
 
-/// A picture of an axis and what a model said of it.
+/// A picture of an axis and a model's detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxisPicture {
     /// Which of the axis' pictures.
@@ -94,7 +94,7 @@ pub struct AxisRecord {
 pub type Case = (u64, usize);
 
 impl AxisPicture {
-    /// What was said in one way.
+    /// The detections made in one way.
     fn answer(&self, way: Way) -> Option<&Answer> {
         match way {
             Way::WithCheck => Some(&self.verified),
@@ -104,7 +104,7 @@ impl AxisPicture {
 }
 
 impl AxisRecord {
-    /// What was said of each picture in one way; nothing for a model that cannot be asked so.
+    /// The detections in each picture made in one way; none for a model without that way.
     pub fn answers(&self, way: Way) -> impl Iterator<Item = &Answer> {
         self.pictures.iter().filter_map(move |picture| picture.answer(way))
     }

@@ -1,4 +1,4 @@
-//! What decides the results of axes and of grasps under errors.
+//! The settings on which the results of axes and of grasps under errors depend.
 
 use serde::{Deserialize, Serialize};
 

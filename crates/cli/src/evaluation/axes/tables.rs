@@ -3,15 +3,15 @@
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell, Column, Table, Tone};
 
+use super::known_from_simulator::known_from_simulator;
 use super::summary::{AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, lowest};
-use super::told::told_from_truth;
 use super::way::Way;
 use crate::evaluation::records::AttemptRecord;
 use crate::evaluation::tables::{Titled, document, incomplete, number, share};
 use crate::statistics::Share;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
 
-/// All tables, group by group, then what the robot is told.
+/// All tables, group by group, then the quantities that the robot is given.
 pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
     let mut tables = Vec::new();
     for group in &summary.groups {
@@ -42,7 +42,7 @@ pub fn tables(summary: &AxesSummary) -> Vec<Titled> {
             tables.push(titled(grasps_by_part(group)));
         }
     }
-    tables.push(told());
+    tables.push(quantities_from_simulator());
     tables
 }
 
@@ -92,7 +92,7 @@ fn part_name(object: &str) -> String {
 }
 
 /// The lowest share and its part.
-fn told_lowest(parts: &[PartShare]) -> String {
+fn lowest_shares(parts: &[PartShare]) -> String {
     lowest(parts).map_or("–".to_owned(), |part| format!("{}, {}", part.share, part_name(&part.object)))
 }
 
@@ -153,7 +153,7 @@ fn lowest_parts(group: &GroupSummary) -> (String, String, Table) {
         let mut row = vec![Cell::text(axis)];
         for way in Way::ALL {
             row.extend(models_of(group, way).iter().map(|model| {
-                figures_of(group, axis, *model, way).map_or(Cell::missing(), |f| Cell::text(told_lowest(&f.parts)))
+                figures_of(group, axis, *model, way).map_or(Cell::missing(), |f| Cell::text(lowest_shares(&f.parts)))
             }));
         }
         table = table.row(row);
@@ -255,7 +255,7 @@ fn grasps(group: &GroupSummary) -> (String, String, Table) {
             Cell::text(with_interval(figures.held, figures.held_interval)),
             share(figures.held_at_first_look, Tone::Plain),
             share(figures.held_after_further_looks, Tone::Plain),
-            Cell::text(told_lowest(&figures.parts)),
+            Cell::text(lowest_shares(&figures.parts)),
             Cell::text(figures.distance_mm.map_or("–".to_owned(), |[a, b]| format!("{a:.2} / {b:.2}"))),
         ]);
     }
@@ -335,13 +335,13 @@ fn share_of(parts: &[PartShare], object: &str) -> Option<Share> {
     parts.iter().find(|part| part.object == object).map(|part| part.share)
 }
 
-fn told() -> Titled {
+fn quantities_from_simulator() -> Titled {
     let mut table = Table::new(vec![
         Column::text("what"),
         Column::text("where it comes from"),
         Column::text("measured with an error"),
     ]);
-    for row in told_from_truth() {
+    for row in known_from_simulator() {
         table = table.row([row.what, row.source, row.error].map(Cell::text).into());
     }
     Titled {
@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn grasps_tell_first_from_further_looks_and_what_is_told_from_truth() {
+    fn grasps_tell_first_from_further_looks_and_what_is_known_from_simulator() {
         let text = markdown(&summary(2), Vec::new(), &[], "");
         let row = "| hand-eye wrong by 2 mm and 0.5° | C | 18 of 20 | 90.0 (69.9 to 97.2) | 15 of 20 | 3 of 20 |";
         assert!(text.contains(row), "{text}");

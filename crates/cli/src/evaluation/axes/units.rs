@@ -70,21 +70,21 @@ impl AxesEvaluation<'_> {
         }
     }
 
-    /// What a model said of a part's pictures of an axis, if it was shown them.
+    /// A model's detections in a part's pictures of an axis, if it was run on them.
     pub fn axis_record(&self, cell: Cell, axis: Axis) -> Result<Option<AxisRecord>> {
         self.store.read_made_with(&axis_file(cell, axis), &self.axis_settings())
     }
 
     /// The attempts of a model on a part under an error so far.
     pub fn grasps(&self, cell: Cell, condition: GraspCondition) -> Result<Vec<AttemptRecord>> {
-        match self.is_the_protocol_s(condition) {
+        match self.is_in_protocol(condition) {
             true => cell.attempts(Verification::ByShape, self.store),
             false => read_attempts(self.store, &grasps_file(cell, condition), &self.grasp_settings()),
         }
     }
 
     /// Whether attempts are the same as the paper's protocol makes: then they are shared.
-    pub(super) fn is_the_protocol_s(&self, condition: GraspCondition) -> bool {
+    pub(super) fn is_in_protocol(&self, condition: GraspCondition) -> bool {
         condition == GraspCondition::NoError && self.search_points.is_none()
     }
 
@@ -184,7 +184,7 @@ impl std::fmt::Display for Unit<'_> {
     }
 }
 
-/// Where it stands what a model said of an axis' pictures.
+/// The file of a model's detections in the pictures of an axis.
 pub(super) fn axis_file(cell: Cell, axis: Axis) -> String {
     format!("axes/{cell}.{}.json", axis.name())
 }
@@ -209,19 +209,7 @@ mod tests {
     use super::super::summary::AxesSummary;
     use super::super::way::Way;
 
-    fn settings() -> Settings {
-        Settings {
-            protocol: Settings::PROTOCOL,
-            preset: "edge".into(),
-            steps: None,
-            seed: 1,
-            attempts: 2,
-            views: 1,
-            scenes: 1,
-        }
-    }
-
-    fn told(evaluation: &AxesEvaluation) -> Vec<String> {
+    fn listed(evaluation: &AxesEvaluation) -> Vec<String> {
         evaluation.tasks().unwrap().iter().map(|task| format!("{} {:?}", task.unit, task.after)).collect()
     }
 
@@ -249,7 +237,7 @@ mod tests {
     #[test]
     fn teachings_are_shared_and_what_is_there_is_not_done_again() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path(), &settings()).unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
         let objects = ["pendulum", "key"].map(|name| ObjectSpec::by_name(name).unwrap());
         let selection = Selection {
             axes: vec![Axis::Tilt],
@@ -267,7 +255,7 @@ mod tests {
         };
         // B reads C's network; B does not grasp under errors; jittered marks have a teaching of their own.
         assert_eq!(
-            told(&evaluation)[..6],
+            listed(&evaluation)[..6],
             [
                 "teach C pendulum []",
                 "tilt pendulum [0, 0]",
@@ -277,7 +265,7 @@ mod tests {
                 "grasp C pendulum, shake [0]"
             ]
         );
-        assert_eq!(told(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
+        assert_eq!(listed(&evaluation)[6..8], ["teach C key []", "tilt key [6, 6]"]);
 
         // The protocol's attempts are the control's, and a part whose teaching failed needs nothing more.
         let attempt = |number| AttemptRecord::failed(number, "detect", "not found".into());
@@ -294,7 +282,7 @@ mod tests {
             store.write_made_with(&file, &evaluation.axis_settings(), &record).unwrap();
         }
         assert_eq!(
-            told(&evaluation),
+            listed(&evaluation),
             [
                 "teach C pendulum from jittered marks []",
                 "grasp C pendulum, marks [0]",
@@ -322,7 +310,7 @@ mod tests {
     #[test]
     fn other_pictures_are_refused_by_name() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path(), &settings()).unwrap();
+        let store = Store::open(folder.path(), &Settings::for_test(1, 2, 1)).unwrap();
         let cell = Cell { model: ModelKind::S, object: "pendulum" };
         let selection = Selection::parse(&["tilt".to_owned()]).unwrap();
         let evaluation = |axis_views, search_points| AxesEvaluation {

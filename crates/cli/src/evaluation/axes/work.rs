@@ -38,8 +38,8 @@ pub struct RunEnd {
 }
 
 impl AxesEvaluation<'_> {
-    /// Does what is not in the store yet, until `is_interrupted` says so; everything is kept that has ended. A unit that
-    /// fails does not end the others, so that hours of work do not wait for one part: it is told, and tried again next time.
+    /// Does what is not in the store yet, until `is_interrupted` is true; everything is kept that has ended. A unit that
+    /// fails does not end the others, so that hours of work do not wait for one part: its error is printed, and it is tried again next time.
     ///
     /// # Errors
     /// A store that cannot be read. A teaching that leads to no model is a result.
@@ -150,7 +150,7 @@ impl AxesEvaluation<'_> {
             errors: errors_of(condition),
             camera: None,
         };
-        let attempts = if self.is_the_protocol_s(condition) {
+        let attempts = if self.is_in_protocol(condition) {
             let file = cell.file(&attempts_of(Verification::ByShape));
             go_on(&rehearsal, self.store, &file, settings, is_interrupted)?
         } else {
@@ -188,7 +188,7 @@ pub(in crate::evaluation) fn draw(object: &ObjectSpec, axis: Axis, number: u64, 
         .with_context(|| format!("picture {number}, drawn {MAX_DRAWINGS} times"))
 }
 
-/// What a model says of a picture, both ways.
+/// A model's detections in a picture, both ways.
 fn ask(model: &GraspModel, object: &ObjectSpec, number: u64, view: &AxisView) -> Result<AxisPicture> {
     let instances: Vec<Isometry3<f64>> = view.truths.iter().map(|truth| truth.grasp.base_from_object).collect();
     let answer = |verification| -> Result<_> {

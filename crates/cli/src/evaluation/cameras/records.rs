@@ -10,15 +10,15 @@ pub struct MetricAnswer {
     pub error_mm: Option<f64>,
     /// Turn beside the instance, in degrees, modulo the part's symmetry.
     pub error_deg: Option<f64>,
-    /// What the detection says of its own place: one standard deviation of each coordinate, in millimetres.
+    /// The standard deviation of each coordinate that the detection expects, in millimetres.
     pub sigma_mm: f64,
-    /// What it says of its turn, in degrees.
+    /// The one of its turn, in degrees.
     pub sigma_deg: f64,
     /// The instance that it found: within 10 mm and 10°, and found by no better detection.
     pub found: Option<usize>,
 }
 
-/// A picture and what a model said of it.
+/// A picture and a model's detections in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraPicture {
     /// Which of the set's pictures.
@@ -33,7 +33,7 @@ pub struct CameraPicture {
     pub answers: Vec<MetricAnswer>,
 }
 
-/// What a model said of all pictures of a part and set.
+/// A model's detections in all pictures of a part and set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraRecord {
     pub pictures: Vec<CameraPicture>,

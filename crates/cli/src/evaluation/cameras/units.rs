@@ -54,7 +54,7 @@ struct CameraSettings {
 }
 
 impl CamerasEvaluation<'_> {
-    /// Does what is not in the store yet, until `is_interrupted` says so.
+    /// Does what is not in the store yet, until `is_interrupted` is true.
     ///
     /// # Errors
     /// The first error of a unit; a store that cannot be read. A teaching that leads to no model is a result.
@@ -71,7 +71,7 @@ impl CamerasEvaluation<'_> {
         Ok(self.tasks()?.len())
     }
 
-    /// What a model said of a part's pictures of a set, if it was shown them.
+    /// A model's detections in a part's pictures of a set, if it was run on them.
     pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
         self.store.read_made_with(&file(cell, set), &self.settings())
     }

@@ -1,4 +1,4 @@
-//! Pictures: how far beside the truth detections are, and how often they see what is not there.
+//! Pictures: how far beside the truth detections are, and how many false alarms there are.
 
 use sdg_report::{Cell, Column, Table, Tone};
 

@@ -138,18 +138,9 @@ mod tests {
             verified: figures(9, 10),
             alone: Some(Figures::default()),
         };
-        let settings = Settings {
-            protocol: Settings::PROTOCOL,
-            preset: "edge".into(),
-            steps: None,
-            seed: 1,
-            attempts: 10,
-            views: 25,
-            scenes: 25,
-        };
         Summary {
             group: PartGroup::Paper,
-            settings,
+            settings: Settings::for_test(1, 10, 25),
             remaining: 0,
             unverified: false,
             models: vec![model],

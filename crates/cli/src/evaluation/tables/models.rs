@@ -93,12 +93,16 @@ pub(super) fn models(summary: &Summary) -> Titled {
 
 /// Network and output for the place, network and method for the turn, human input.
 fn description(model: ModelKind) -> [&'static str; 5] {
-    match model.letter() {
-        "A" => ["Faster R-CNN", "box", "CNN on the box's crop", "classes of the angle", "box, grasp line"],
-        "B" => ["Keypoint R-CNN", "box", "the same", "line through twelve keypoints", "box, grasp line"],
-        "C" => ["Keypoint R-CNN", "twelve keypoints", "the same", "line through twelve keypoints", "box, grasp line"],
-        "D" => ["Mask R-CNN", "mask", "the same", "mask and SIFT", "outline, grasp line"],
-        _ => ["none", "place and turn", "none", "demonstration searched for over all poses", "outline, grasp line"],
+    match model {
+        ModelKind::A => ["Faster R-CNN", "box", "CNN on the box's crop", "classes of the angle", "box, grasp line"],
+        ModelKind::B => ["Keypoint R-CNN", "box", "the same", "line through twelve keypoints", "box, grasp line"],
+        ModelKind::C => {
+            ["Keypoint R-CNN", "twelve keypoints", "the same", "line through twelve keypoints", "box, grasp line"]
+        }
+        ModelKind::D => ["Mask R-CNN", "mask", "the same", "mask and SIFT", "outline, grasp line"],
+        ModelKind::S => {
+            ["none", "place and turn", "none", "demonstration searched for over all poses", "outline, grasp line"]
+        }
     }
 }
 

@@ -57,7 +57,7 @@ pub(super) unsafe fn filter_transform(
     step: usize,
 ) {
     assert!(gathered.len() >= channels * 9 * PANEL && width.is_multiple_of(LANES) && width <= PANEL);
-    // SAFETY: asserted above; the target is the caller's promise.
+    // SAFETY: the panel's length was asserted; the target is the caller's promise.
     unsafe { filter_panel(isa, gathered, channels, width, flipped, target, step) };
 }
 
@@ -123,7 +123,7 @@ pub(super) unsafe fn filter_transform_adjoint(
     target: &mut [f32],
 ) {
     assert!(target.len() >= channels * 9 * LANES);
-    // SAFETY: asserted above; the source is the caller's promise.
+    // SAFETY: the panel's length was asserted; the source is the caller's promise.
     unsafe { filter_gradient_panel(isa, source, step, channels, channel_step, target.as_mut_ptr()) };
 }
 

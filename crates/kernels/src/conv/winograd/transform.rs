@@ -121,7 +121,7 @@ pub(super) unsafe fn output_transform_adjoint(
     assert!(gradient.values.len() >= gradient.num_images * gradient.size[0] * gradient.size[1] * gradient.channels);
     let mut zeros = Scratch::take(gradient.channels);
     zeros.fill(0.0);
-    // SAFETY: as in `input_transform`.
+    // SAFETY: pixels of the gradient are inside the maps or the zeros; the target is the caller's promise.
     unsafe { output_transform_adjoint_tiles(isa, gradient, [0, 0], tiling, tiles, target, step, &zeros) };
 }
 
@@ -288,7 +288,7 @@ pub(super) unsafe fn output_transform(
     for vector in [place.epilogue.scale, place.epilogue.bias].into_iter().flatten() {
         assert!(vector.len() >= place.channels);
     }
-    // SAFETY: asserted above.
+    // SAFETY: the asserted lengths hold every element of products, output and epilogue.
     unsafe { output_transform_tiles(isa, products, step, place, tiles, finite) };
 }
 

@@ -6,7 +6,7 @@ use super::transform::{input_transform, output_transform_adjoint};
 use crate::conv::direct::Maps;
 use crate::conv::shape::ConvShape;
 use crate::parallel::{Raw, SharedSlice, for_each_unit, for_each_unit_if};
-use crate::product::{Ahead, Epilogue, Operand, PANEL, PanelProduct};
+use crate::product::{Epilogue, Operand, PANEL, PanelProduct, Prefetch};
 use crate::scratch::Scratch;
 use crate::simd::lanes::LANES;
 use crate::simd::{Isa, transpose};
@@ -47,7 +47,7 @@ pub(in crate::conv) fn weight_gradient(
             // SAFETY: every unit has its own frequency, of all chunks.
             let total = unsafe { shared.range(start, sums.step()) };
             for chunk in 1..chunks {
-                // SAFETY: as above; another chunk than `total`.
+                // SAFETY: the unit's frequency of another chunk than `total`'s.
                 let other = unsafe { shared.range(chunk * len + start, sums.step()) };
                 for (total, other) in total.iter_mut().zip(other) {
                     *total += *other;
@@ -148,7 +148,7 @@ impl Sums<'_> {
                         first_column: 0,
                         epilogue: Epilogue::default(),
                         accumulate: start > tiles.start,
-                        ahead: Ahead::default(),
+                        prefetch: Prefetch::default(),
                     };
                     // SAFETY: a unit has its own frequency and rows.
                     unsafe { product.run(self.isa, sums) };

@@ -179,3 +179,38 @@ fn a_stop_after_a_loss_ends_at_rest_within_the_limits() {
         assert!(dq.amax() < 1e-3 && robot.state.message_id < begin + 1500, "{dq}");
     }
 }
+
+#[test]
+fn a_state_that_cannot_be_changes_no_command() {
+    let motion = motion();
+    for value in [f64::NAN, f64::INFINITY, 1.0] {
+        let mut follower = Follower::new(Playback::new(&motion), Version::V5);
+        let mut robot = SimulatedRobot::at(*motion.start());
+        let mut last_id = 0;
+        loop {
+            let mut state = robot.state.clone();
+            if (300..340).contains(&state.message_id) {
+                state.q_desired[3] += value;
+                state.dq_desired[3] += value * 1e3;
+            }
+            let next = follower.next(&state, state.message_id - last_id);
+            last_id = state.message_id;
+            let Next::Position(q) = next else { break };
+            robot.cycle(Some(&q));
+            assert!(state.message_id < 20_000);
+        }
+        assert!(robot.is_within_limits(), "{value}: {:?}", robot.max_shares);
+        assert_ends_at(&robot, &motion);
+    }
+}
+
+#[test]
+fn a_number_of_a_state_that_leapt_ahead_takes_no_time() {
+    let motion = motion();
+    let mut follower = Follower::new(Playback::new(&motion), Version::V5);
+    let robot = SimulatedRobot::at(*motion.start());
+    follower.next(&robot.state, 0);
+    let begun = std::time::Instant::now();
+    follower.next(&robot.state, 1 << 60);
+    assert!(begun.elapsed() < std::time::Duration::from_secs(10));
+}

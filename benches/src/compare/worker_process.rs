@@ -1,4 +1,4 @@
-//! A worker's process: started, asked, its peak memory read, ended.
+//! The process of one side of a work: start, requests, peak memory, end.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -14,13 +14,13 @@ use crate::protocol::{Answer, Ready, Request};
 use crate::registry::{Side, WorkSpec};
 
 /// Between turns: time for the other side's threads to block, some of which spin for a while after their work.
-const BREATH: Duration = Duration::from_millis(100);
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// One side of a work, ready to run.
-pub struct Contestant {
+pub struct WorkerProcess {
     /// Whose program it is.
     pub side: Side,
-    /// What it said of itself.
+    /// What it reported when it was ready.
     pub ready: Ready,
     child: Child,
     requests: Option<ChildStdin>,
@@ -28,7 +28,7 @@ pub struct Contestant {
     log: PathBuf,
 }
 
-impl Contestant {
+impl WorkerProcess {
     /// Starts a worker and waits until it has warmed up.
     pub fn start(work: &WorkSpec, side: Side, files: &Files, threads: usize, paths: &Paths) -> Result<Self> {
         let mut command = match side {
@@ -58,18 +58,18 @@ impl Contestant {
         let requests = child.stdin.take();
         let answers = BufReader::new(child.stdout.take().context("the worker's output was asked for")?);
         let nothing = Ready { seconds: None, facts: Default::default(), gflop: None, version: String::new() };
-        let mut contestant = Self { side, ready: nothing, child, requests, answers, log };
-        match contestant.answer()? {
-            Answer::Ready(ready) => contestant.ready = ready,
+        let mut worker = Self { side, ready: nothing, child, requests, answers, log };
+        match worker.answer()? {
+            Answer::Ready(ready) => worker.ready = ready,
             other => bail!("expected a worker to be ready, found {other:?}"),
         }
-        contestant.forget_peak_memory();
-        Ok(contestant)
+        worker.forget_peak_memory();
+        Ok(worker)
     }
 
     /// Lets it run `repeat` times and gives the seconds of each.
     pub fn run(&mut self, repeat: usize) -> Result<Vec<f64>> {
-        sleep(BREATH);
+        sleep(PAUSE);
         let request = serde_json::to_string(&Request { repeat })?;
         let requests = self.requests.as_mut().context("a worker that was ended does not run")?;
         if writeln!(requests, "{request}").and_then(|()| requests.flush()).is_err() {
@@ -110,7 +110,7 @@ impl Contestant {
     }
 }
 
-impl Drop for Contestant {
+impl Drop for WorkerProcess {
     fn drop(&mut self) {
         // The end of its input ends a worker; one that is busy or hangs is killed.
         self.requests = None;

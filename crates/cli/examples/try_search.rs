@@ -1,4 +1,4 @@
-//! The search without a network on unseen pictures: `try_instant OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]`.
+//! The search without a network on unseen pictures: `try_search OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]`.
 //!
 //! Reports how many of WITH pictures of the part are right, at the default least agreement and where the threshold is
 //! the best agreement in any of WITHOUT pictures without it.
@@ -10,7 +10,7 @@ use sdg_cli::shipped;
 use sdg_cli::trial::{RIGHT_DEGREES, RIGHT_MM};
 use sdg_geometry::median;
 use sdg_grasp::TaughtDemonstration;
-use sdg_shape::{InstantSearch, Match, SearchConfig};
+use sdg_shape::{Match, SearchConfig, ShapeSearch};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{TestView, test_views};
 
@@ -33,7 +33,7 @@ impl Seen {
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, name, with, without, seed, scales @ ..] = &arguments[..] else {
-        return Err("usage: try_instant OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]".into());
+        return Err("usage: try_search OBJECT WITH WITHOUT SEED [MIN_SCALE LARGEST_SCALE]".into());
     };
     let object = ObjectSpec::by_name(name)?;
     let demonstration = TaughtDemonstration::new(&shipped::demonstration(name)?)?;
@@ -48,7 +48,7 @@ fn main() -> Result<()> {
     // All are wanted, to see how far right and wrong are apart.
     let mut config = default;
     (config.scales, config.min_agreement) = (scales, 0.0);
-    let search = InstantSearch::new(&demonstration.cutout, &outline, &config)?;
+    let search = ShapeSearch::new(&demonstration.cutout, &outline, &config)?;
     println!("taught in {:.1} ms", 1e3 * start.elapsed().as_secs_f64());
 
     let seed: u64 = seed.parse()?;

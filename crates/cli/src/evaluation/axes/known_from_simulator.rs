@@ -1,0 +1,43 @@
+//! Quantities that the simulated robot takes from the simulator and a real one would have to measure.
+
+/// A quantity that the simulated robot is given.
+pub(super) struct Given {
+    /// The quantity that the simulator hands over.
+    pub what: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// The error under which grasps are tried, if any.
+    pub error: &'static str,
+}
+
+/// All of them, in the order in which an attempt uses it.
+pub(super) fn known_from_simulator() -> [Given; 13] {
+    let given = |what, source, error| Given { what, source, error };
+    [
+        given(
+            "box, outline, grasp marks of the demonstration",
+            "projected and drawn from the part's own geometry, vertices as a careful person clicks them",
+            "jittered by 3 px",
+        ),
+        given("the part's rotational symmetry, at teaching", "its description (object.json)", "none"),
+        given("camera intrinsics: focal length, middle, no distortion", "the simulated camera itself", "none"),
+        given(
+            "height of the camera in the demonstration, 0.58 m",
+            "the demonstration was photographed from there, and both looks are from there",
+            "none in grasps; the axis of heights in pictures",
+        ),
+        given("pose of the arm at each picture", "the simulated joints, without encoder errors", "none"),
+        given("camera in the hand (hand-eye)", "the model of the arm", "2 mm and 0.5°"),
+        given("height of the table", "the simulated table, flat and level at z = 0", "none"),
+        given("height of the marks over the table", "the part's description (object.json)", "3 mm"),
+        given("height of the grasp over the table", "the part's description (object.json)", "none"),
+        given("the area where parts lie", "scenes place the part where the look-out pose shows it whole", "none"),
+        given("that the part rests on the face it was shown on", "scenes place it so", "none"),
+        given("dynamics of the arm for its controller", "the simulated arm's own mass matrix", "none"),
+        given(
+            "friction of the pads",
+            "rubber, 1.0, whatever it touches (priority)",
+            "0.6 to 0.8, without priority; a shake after lifting",
+        ),
+    ]
+}

@@ -1,0 +1,180 @@
+//! Programs and robots that end in a motion: the arm stops, one line says why, and nothing moves until a person has said so.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used)]
+
+mod simulated_arm;
+mod support;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use serde_json::Value;
+use simulated_arm::Simulated;
+use support::sdg;
+
+/// The shipped workcell, whose home is where joint 1 stands at 50 degrees.
+fn workcell(folder: &Path) -> PathBuf {
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/workcell");
+    let whole = fs::read_to_string(shipped.join("workcell.toml")).unwrap();
+    let head = whole.split("[[look_out]]").next().unwrap().replace("mounting = \"hand\"", "mounting = \"base\"");
+    let path = folder.join("workcell.toml");
+    fs::write(&path, format!("{head}[[look_out]]\njoints_deg = [50, -45, 0, -135, 0, 90, 45]\n")).unwrap();
+    path
+}
+
+/// How long a motion goes on before something happens to it. A program that had not begun to move by then is tried again with the
+/// next: how soon it begins depends on the machine.
+const MOVING: [Duration; 5] = [
+    Duration::from_millis(500),
+    Duration::from_secs(1),
+    Duration::from_secs(2),
+    Duration::from_secs(4),
+    Duration::from_secs(8),
+];
+
+/// The first of these times after which a motion was under way.
+fn once_moving<T>(attempt: impl FnMut(Duration) -> Option<T>) -> T {
+    MOVING.into_iter().find_map(attempt).expect("the arm moves within 8 s")
+}
+
+/// `sdg robot home`, in motion.
+struct Moving {
+    child: Child,
+    stderr: BufReader<ChildStderr>,
+}
+
+impl Moving {
+    /// At a hundredth of the speed the motion takes a minute of simulated time.
+    fn start(simulated: &Simulated, workcell: &Path, states: &Path, moving_for: Duration) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+            .args(["robot", "home", "--robot", &simulated.address, "--yes", "--no-realtime", "--speed", "0.01"])
+            .args(["--workcell".as_ref(), workcell.as_os_str(), "--states".as_ref(), states.as_os_str()])
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut stderr = BufReader::new(child.stderr.take().unwrap());
+        let mut line = String::new();
+        stderr.read_line(&mut line).unwrap();
+        assert!(line.starts_with("moving home, "), "{line}");
+        thread::sleep(moving_for);
+        Self { child, stderr }
+    }
+
+    fn signal(&self, name: &str) {
+        let sent = Command::new("kill").args([format!("-{name}"), self.child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+    }
+
+    /// What it writes to its end, and its exit code.
+    fn finish(mut self) -> (String, Option<i32>) {
+        let mut text = String::new();
+        self.stderr.read_to_string(&mut text).unwrap();
+        (text, self.child.wait().unwrap().code())
+    }
+}
+
+/// Joint positions in rad, and the mode.
+fn state(simulated: &Simulated) -> (Vec<f64>, String) {
+    let output = sdg(&["robot", "state", "--robot", &simulated.address, "--json"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let line: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let joints = line["joints_rad"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect();
+    (joints, line["mode"].as_str().unwrap().to_owned())
+}
+
+/// Whether the arm is beside where it began, and not at the end.
+fn is_on_its_way(simulated: &Simulated) -> bool {
+    (1e-4..0.8).contains(&state(simulated).0[0])
+}
+
+/// It stands where it stands at the next look, too.
+fn assert_stands(simulated: &Simulated) -> Vec<f64> {
+    let (joints, _) = state(simulated);
+    thread::sleep(Duration::from_millis(200));
+    let (later, _) = state(simulated);
+    assert!(joints.iter().zip(&later).all(|(one, other)| (one - other).abs() < 2e-3), "{joints:?} {later:?}");
+    later
+}
+
+/// The number of states of the last second in a file.
+fn num_states(path: &Path) -> usize {
+    let text = fs::read_to_string(path).unwrap();
+    assert!(text.starts_with("time_secs,mode,q_rad_1,"), "{text}");
+    text.lines().count() - 1
+}
+
+#[test]
+fn a_program_that_is_killed_leaves_the_arm_standing_until_a_person_recovers_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
+    let simulated = once_moving(|moving_for| {
+        let simulated = Simulated::start(&[]);
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
+        moving.signal("KILL");
+        moving.finish();
+        is_on_its_way(&simulated).then_some(simulated)
+    });
+    let stopped = assert_stands(&simulated);
+    assert_eq!(state(&simulated).1, "reflex");
+    let home = ["robot", "home", "--robot", &simulated.address, "--yes", "--no-realtime", "--speed", "0.6"];
+    let home = [&home[..], &["--workcell", workcell.to_str().unwrap(), "--states", states.to_str().unwrap()]].concat();
+    let refused = sdg(&home);
+    let stderr = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("nothing moves until a person has looked and runs `sdg robot recover`"), "{stderr}");
+
+    // Nobody at the terminal has not agreed.
+    let recover = ["robot", "recover", "--robot", &simulated.address];
+    assert!(sdg(&recover).status.success());
+    assert_eq!(state(&simulated).1, "reflex");
+    assert!(sdg(&[&recover[..], &["--yes"]].concat()).status.success());
+    let (joints, mode) = state(&simulated);
+    assert_eq!(mode, "idle");
+    assert!(joints.iter().zip(&stopped).all(|(one, other)| (one - other).abs() < 2e-3), "{joints:?} {stopped:?}");
+
+    let moved = sdg(&home);
+    assert!(moved.status.success(), "{}", String::from_utf8_lossy(&moved.stderr));
+    assert!((state(&simulated).0[0] - 50_f64.to_radians()).abs() < 2e-3);
+}
+
+#[test]
+fn ctrl_c_stops_the_arm_on_its_path_and_keeps_the_last_second() {
+    let folder = tempfile::tempdir().unwrap();
+    let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
+    let (simulated, stderr, code) = once_moving(|moving_for| {
+        let simulated = Simulated::start(&[]);
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
+        moving.signal("INT");
+        let (stderr, code) = moving.finish();
+        is_on_its_way(&simulated).then_some((simulated, stderr, code))
+    });
+    assert_eq!(code, Some(1), "{stderr}");
+    let expected =
+        format!("the arm's last second: {}\nsdg: the arm was stopped: a person asked for it\n", states.display());
+    assert_eq!(stderr, expected);
+    assert!((600..=1002).contains(&num_states(&states)), "{}", num_states(&states));
+    assert_stands(&simulated);
+    assert_eq!(state(&simulated).1, "idle");
+}
+
+#[test]
+fn a_robot_that_goes_in_a_motion_is_one_line_and_its_last_second_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let (workcell, states) = (workcell(folder.path()), folder.path().join("states.csv"));
+    let (address, stderr, code) = once_moving(|moving_for| {
+        let simulated = Simulated::start(&[]);
+        let address = simulated.address.clone();
+        let moving = Moving::start(&simulated, &workcell, &states, moving_for);
+        drop(simulated);
+        let (stderr, code) = moving.finish();
+        (states.exists() && num_states(&states) > 100).then_some((address, stderr, code))
+    });
+    assert_eq!(code, Some(1), "{stderr}");
+    let lines: Vec<_> = stderr.lines().collect();
+    assert_eq!(lines.len(), 2, "{stderr}");
+    assert!(lines[1].starts_with(&format!("sdg: the connection to the robot at {address} is lost: ")), "{stderr}");
+}

@@ -1,0 +1,42 @@
+//! `sdg simulate --fci` for the tests of commands that drive an arm on the network.
+
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU16, Ordering};
+
+static NUM_STARTED: AtomicU16 = AtomicU16::new(0);
+
+/// A simulated Panda on the network, as another program would start it; ended when dropped.
+pub struct Simulated {
+    child: Child,
+    pub address: String,
+}
+
+impl Simulated {
+    pub fn start(further: &[&str]) -> Self {
+        // Two neighbouring ports that are free now, and that no other test of this process is about to take.
+        let begin = 20_000 + std::process::id() as u16 % 20_000 + NUM_STARTED.fetch_add(1, Ordering::Relaxed) * 50;
+        let port = (begin..60_000)
+            .find(|&port| (port..port + 2).all(|port| TcpListener::bind(("127.0.0.1", port)).is_ok()))
+            .unwrap()
+            .to_string();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_sdg"))
+            .args(["simulate", "--fci", "--lockstep", "--json", "--port", &port])
+            .args(further)
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        assert!(line.contains(&port), "{line}");
+        Self { child, address: format!("127.0.0.1:{port}") }
+    }
+}
+
+impl Drop for Simulated {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,175 @@
+//! The box and its surroundings, small enough to be cut in time.
+
+use image::{RgbImage, imageops};
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, Mask, Polygon};
+
+use super::click::{Click, OutlineClick};
+use super::color_mixture::ColorMixture;
+use super::lab::Lab;
+use super::minimal_cut::{self, Edges, minimal_cut};
+
+/// Surroundings around the box, as a share of its longer side …
+const MARGIN_SHARE: f64 = 0.2;
+/// … and at least, in pixels of the photo.
+const MIN_MARGIN_PX: f64 = 12.0;
+/// No pixel's colour alone decides: shadows, highlights and noise have the colours of the other side.
+const MAX_EVIDENCE: f32 = 10.0;
+
+/// The box and its surroundings, in pixels of their own.
+pub(crate) struct Frame {
+    pub width: usize,
+    pub colors: Vec<Lab>,
+    /// The pixels that may be the part's: those whose centres lie in the box. The others are surroundings.
+    pub candidates: Vec<bool>,
+    /// Colours of the whole photo outside the box, thinned out.
+    pub elsewhere: Vec<Lab>,
+    pub edges: Edges,
+    /// Upper left corner in the photo.
+    origin: [f64; 2],
+    /// Pixels of the photo for one of the frame, across and down.
+    scale: [f64; 2],
+}
+
+impl Frame {
+    /// `None` for a box of less than a few pixels.
+    pub fn cut_out(image: &RgbImage, bbox: &BoundingBox, max_pixels: f64) -> Option<Self> {
+        const MIN_SIDE_PX: f64 = 4.0;
+        if bbox.width() < MIN_SIDE_PX || bbox.height() < MIN_SIDE_PX {
+            return None;
+        }
+        let margin = (MARGIN_SHARE * bbox.width().max(bbox.height())).max(MIN_MARGIN_PX);
+        let left = (bbox.x1 - margin).floor().max(0.0) as u32;
+        let top = (bbox.y1 - margin).floor().max(0.0) as u32;
+        let right = ((bbox.x2 + margin).ceil() as u32).min(image.width());
+        let bottom = ((bbox.y2 + margin).ceil() as u32).min(image.height());
+        let view = imageops::crop_imm(image, left, top, right - left, bottom - top).to_image();
+        let shrink = (max_pixels / (f64::from(view.width()) * f64::from(view.height()))).sqrt().min(1.0);
+        let small = |side: u32| ((f64::from(side) * shrink).round() as u32).max(1);
+        let (width, height) = (small(view.width()), small(view.height()));
+        let shrunk = if shrink < 1.0 { imageops::thumbnail(&view, width, height) } else { view };
+
+        let scale = [f64::from(right - left) / f64::from(width), f64::from(bottom - top) / f64::from(height)];
+        let origin = [f64::from(left), f64::from(top)];
+        let mut in_box = Vec::with_capacity((width * height) as usize);
+        for y in 0..height {
+            let photo_y = origin[1] + (f64::from(y) + 0.5) * scale[1];
+            in_box.extend((0..width).map(|x| {
+                let photo_x = origin[0] + (f64::from(x) + 0.5) * scale[0];
+                bbox.contains(&Point2::new(photo_x, photo_y))
+            }));
+        }
+        // Every n-th pixel each way: some ten thousand of them.
+        let step = (image.width().max(image.height()) / 128).max(1) as usize;
+        let mut elsewhere = Vec::new();
+        for y in (0..image.height()).step_by(step) {
+            for x in (0..image.width()).step_by(step) {
+                if !bbox.contains(&Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5)) {
+                    elsewhere.push(Lab::from_srgb(image.get_pixel(x, y).0));
+                }
+            }
+        }
+        let colors: Vec<Lab> = shrunk.pixels().map(|pixel| Lab::from_srgb(pixel.0)).collect();
+        Some(Self {
+            width: width as usize,
+            edges: Edges::new(&colors, width as usize),
+            colors,
+            candidates: without_edge_of_photo(in_box, width as usize),
+            elsewhere,
+            origin,
+            scale,
+        })
+    }
+
+    pub fn height(&self) -> usize {
+        self.colors.len() / self.width
+    }
+
+    /// The click in pixels of the frame; `None` beside the box.
+    pub fn click(&self, click: &OutlineClick) -> Option<Click> {
+        let x = (click.at.x - self.origin[0]) / self.scale[0];
+        let y = (click.at.y - self.origin[1]) / self.scale[1];
+        let lies_in = (0.0..self.width as f64).contains(&x) && (0.0..self.height() as f64).contains(&y);
+        let click = lies_in.then_some(Click { x: x as usize, y: y as usize, is_inside: click.is_inside })?;
+        self.candidates[click.y * self.width + click.x].then_some(click)
+    }
+
+    pub fn mask(&self, in_part: &[bool]) -> Mask {
+        Mask::from_fn(self.width as u32, self.height() as u32, |x, y| in_part[y as usize * self.width + x as usize])
+    }
+
+    /// Learns colours from a division into part and surroundings, cuts by them, and so on; what is pinned stays on its side.
+    /// `elsewhere` has colours of surroundings beyond the frame. `None` for too few colours.
+    pub fn cut(
+        &self,
+        mut in_part: Vec<bool>,
+        elsewhere: &[Lab],
+        pinned: &[Option<bool>],
+        rounds: usize,
+    ) -> Option<Vec<bool>> {
+        let mut share: Vec<f32> = self.candidates.iter().map(|&candidate| if candidate { 0.5 } else { 0.0 }).collect();
+        let mut mixtures: Option<[ColorMixture; 2]> = None;
+        for _ in 0..rounds {
+            let (part, mut surroundings) = self.colors_of(&in_part);
+            surroundings.extend_from_slice(elsewhere);
+            let [part, surroundings] = match &mixtures {
+                None => [ColorMixture::learn(&part)?, ColorMixture::learn(&surroundings)?],
+                Some([known, around]) => [known.relearn(&part)?, around.relearn(&surroundings)?],
+            };
+            let evidence: Vec<f32> = self
+                .colors
+                .iter()
+                .zip(&self.candidates)
+                .zip(pinned)
+                .map(|((color, &candidate), pinned)| match pinned {
+                    _ if !candidate => minimal_cut::SURELY_OUTSIDE,
+                    Some(true) => -minimal_cut::SURELY_OUTSIDE,
+                    Some(false) => minimal_cut::SURELY_OUTSIDE,
+                    None => {
+                        let evidence = surroundings.log_density(color) - part.log_density(color);
+                        evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE)
+                    }
+                })
+                .collect();
+            minimal_cut(&evidence, &self.edges, &mut share);
+            in_part = share.iter().zip(&self.candidates).map(|(&share, &candidate)| candidate && share > 0.5).collect();
+            mixtures = Some([part, surroundings]);
+        }
+        Some(in_part)
+    }
+
+    /// The colours of the marked pixels, and those of the others.
+    pub fn colors_of(&self, marked: &[bool]) -> (Vec<Lab>, Vec<Lab>) {
+        let mut colors = (Vec::new(), Vec::new());
+        for (color, &marked) in self.colors.iter().zip(marked) {
+            if marked { colors.0.push(*color) } else { colors.1.push(*color) }
+        }
+        colors
+    }
+
+    pub fn in_photo(&self, outline: &Polygon, bbox: &BoundingBox) -> Polygon {
+        let vertices = outline
+            .vertices
+            .iter()
+            .map(|v| {
+                let x = self.origin[0] + v.x * self.scale[0];
+                let y = self.origin[1] + v.y * self.scale[1];
+                Point2::new(x.clamp(bbox.x1, bbox.x2), y.clamp(bbox.y1, bbox.y2))
+            })
+            .collect();
+        Polygon { vertices }
+    }
+}
+
+/// Where the box is the whole photo, what touches its edge stands for the surroundings.
+fn without_edge_of_photo(mut in_box: Vec<bool>, width: usize) -> Vec<bool> {
+    if in_box.iter().all(|&inside| inside) {
+        let height = in_box.len() / width;
+        let edge = 1 + width.min(height) / 40;
+        for (at, candidate) in in_box.iter_mut().enumerate() {
+            let (x, y) = (at % width, at / width);
+            *candidate = x.min(y).min(width - 1 - x).min(height - 1 - y) >= edge;
+        }
+    }
+    in_box
+}

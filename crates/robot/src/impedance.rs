@@ -1,0 +1,194 @@
+//! Cartesian impedance: joint torques that let the tcp yield like a spring, where contact is wanted.
+//!
+//! ```text
+//! τ = Jᵀ (-K e - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
+//!     └ spring and damper of the tcp    └ of the elbow, without moving the tcp
+//! ```
+//! J is the tcp's Jacobian in the base frame, e how far the tcp is from where it is wanted (m, and a rotation vector's half, rad),
+//! v_d the twist that is wanted, D = 2 √K. Gravity is not in it: the robot adds it, of what it was told to carry, too.
+//!
+//! A spring is not exact: at 150 N/m a part of 0.7 kg that the robot was not told of pulls the tcp down by 46 mm, and joint friction of
+//! 1 Nm costs some 20 mm. Free air is for joint motions.
+//!
+//! # Source
+//! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as franka_ros has them.
+
+use nalgebra::{Isometry3, SMatrix, Vector6};
+use sdg_kinematics::{JointVector, Panda};
+
+/// Keeps the pseudoinverse bounded near singular poses.
+const DAMPING: f64 = 1e-2;
+
+/// How stiff the tcp is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impedance {
+    /// Along x, y and z of the base, N/m, and about them, N·m/rad.
+    pub stiffness: Vector6<f64>,
+    /// Of the elbow about its configuration at the start, N·m/rad.
+    pub null_stiffness: f64,
+    /// A joint's torque changes by at most so much in a cycle, N·m; the robot stops for more.
+    pub max_torque_step_nm: f64,
+}
+
+impl Impedance {
+    /// libfranka's example in all directions: 150 N/m and 10 N·m/rad.
+    pub const SOFT: Self = Self {
+        stiffness: Vector6::new(150.0, 150.0, 150.0, 10.0, 10.0, 10.0),
+        null_stiffness: 10.0,
+        max_torque_step_nm: 0.9,
+    };
+    /// Soft along z, held to the sides and in its turn: for coming down on something.
+    pub const SOFT_DOWN: Self = Self {
+        stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
+        null_stiffness: 10.0,
+        max_torque_step_nm: 0.9,
+    };
+}
+
+/// Where the tcp is wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TcpReference {
+    /// The pose.
+    pub base_from_tcp: Isometry3<f64>,
+    /// Its velocity, m/s and rad/s in the base frame.
+    pub twist: Vector6<f64>,
+}
+
+/// The law with what it remembers from cycle to cycle.
+#[derive(Debug, Clone)]
+pub struct ImpedanceControl {
+    impedance: Impedance,
+    q_null: JointVector,
+    torque: JointVector,
+}
+
+impl ImpedanceControl {
+    /// Begins at joint positions (rad), which are the elbow's, after this torque (N·m, without gravity).
+    pub fn new(impedance: Impedance, q: JointVector, torque: JointVector) -> Self {
+        Self { impedance, q_null: q, torque }
+    }
+
+    /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s); `coriolis` is zero where the
+    /// robot does not tell it, which at the speeds of contact is less than friction.
+    pub fn torque(
+        &mut self,
+        panda: &Panda,
+        q: &JointVector,
+        dq: &JointVector,
+        reference: &TcpReference,
+        coriolis: &JointVector,
+    ) -> JointVector {
+        let (base_from_tcp, jacobian) = panda.forward_and_jacobian(q);
+        let Impedance { stiffness, null_stiffness, max_torque_step_nm } = self.impedance;
+        let error = pose_error(&base_from_tcp, &reference.base_from_tcp);
+        let damping = stiffness.map(|value| 2.0 * value.sqrt());
+        let force = -stiffness.component_mul(&error) - damping.component_mul(&(jacobian * dq - reference.twist));
+        let wanted_null = (self.q_null - q) * null_stiffness - dq * (2.0 * null_stiffness.sqrt());
+        let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
+        // What of the elbow's torque would press with the tcp is taken out; the sum is positive definite, so there is a factor.
+        let pressing = square.cholesky().map_or_else(Vector6::zeros, |factor| factor.solve(&(jacobian * wanted_null)));
+        let wanted = jacobian.transpose() * (force - pressing) + wanted_null + coriolis;
+        self.torque = JointVector::from_fn(|joint, _| {
+            let last = self.torque[joint];
+            wanted[joint].clamp(last - max_torque_step_nm, last + max_torque_step_nm)
+        });
+        self.torque
+    }
+
+    /// The torques of the last cycle, N·m.
+    pub fn last_torque(&self) -> &JointVector {
+        &self.torque
+    }
+}
+
+/// How far a pose is from the one that is wanted: m, and the vector part of the quaternion between them, in the base frame.
+fn pose_error(base_from_tcp: &Isometry3<f64>, wanted: &Isometry3<f64>) -> Vector6<f64> {
+    let translation = base_from_tcp.translation.vector - wanted.translation.vector;
+    let tcp_from_wanted = base_from_tcp.rotation.inverse() * wanted.rotation;
+    // Of the two quaternions of a turn the one of the shorter way.
+    let sign = if tcp_from_wanted.w < 0.0 { -1.0 } else { 1.0 };
+    let rotation = base_from_tcp.rotation * (tcp_from_wanted.imag() * -sign);
+    Vector6::new(translation.x, translation.y, translation.z, rotation.x, rotation.y, rotation.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use sdg_kinematics::ready_pose;
+
+    fn still(base_from_tcp: Isometry3<f64>) -> TcpReference {
+        TcpReference { base_from_tcp, twist: Vector6::zeros() }
+    }
+
+    /// The torques once their rate is no longer limited, of an arm that is held at `q`.
+    fn settled(impedance: Impedance, q_null: JointVector, q: &JointVector, wanted: Isometry3<f64>) -> JointVector {
+        let mut control = ImpedanceControl::new(impedance, q_null, JointVector::zeros());
+        let zero = JointVector::zeros();
+        for _ in 0..200 {
+            control.torque(&Panda::new(), q, &zero, &still(wanted), &zero);
+        }
+        *control.last_torque()
+    }
+
+    #[test]
+    fn a_tcp_beside_its_place_is_pressed_back_by_its_stiffness() {
+        let (panda, q) = (Panda::new(), ready_pose());
+        let (here, jacobian) = panda.forward_and_jacobian(&q);
+        assert!(settled(Impedance::SOFT, q, &q, here).amax() < 1e-12);
+        // 10 mm too low at 150 N/m: 1.5 N up.
+        let mut wanted = here;
+        wanted.translation.z += 0.010;
+        let torque = settled(Impedance::SOFT, q, &q, wanted);
+        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, 1.5, 0.0, 0.0, 0.0);
+        assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
+        // Other directions have other stiffnesses: 10 mm to the side at 1000 N/m.
+        let mut wanted = here;
+        wanted.translation.y += 0.010;
+        let torque = settled(Impedance::SOFT_DOWN, q, &q, wanted);
+        let expected = jacobian.transpose() * Vector6::new(0.0, 10.0, 0.0, 0.0, 0.0, 0.0);
+        assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
+        // A turn of 0.1 rad: the sine of half of it, at 10 N·m/rad.
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.1);
+        let wanted = Isometry3::from_parts(here.translation, turn * here.rotation);
+        let torque = settled(Impedance::SOFT, q, &q, wanted);
+        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * 0.05_f64.sin());
+        assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
+    }
+
+    #[test]
+    fn the_elbows_spring_does_not_press_with_the_tcp() {
+        let (panda, q) = (Panda::new(), ready_pose());
+        let (here, jacobian) = panda.forward_and_jacobian(&q);
+        let mut q_null = q;
+        q_null[2] += 0.5;
+        let torque = settled(Impedance::SOFT, q_null, &q, here);
+        assert!(torque.amax() > 0.1, "{torque}");
+        // The tcp's force that these torques are balanced by.
+        let square = jacobian * jacobian.transpose();
+        let force = square.cholesky().unwrap().solve(&(jacobian * torque));
+        assert!(force.amax() < 0.02, "{force}");
+    }
+
+    #[test]
+    fn velocity_is_damped_and_torques_change_by_steps() {
+        let (panda, q) = (Panda::new(), ready_pose());
+        let here = panda.forward(&q);
+        let (zero, mut dq) = (JointVector::zeros(), JointVector::zeros());
+        dq[3] = 0.5;
+        let mut control = ImpedanceControl::new(Impedance::SOFT, q, zero);
+        let mut last = zero;
+        for _ in 0..50 {
+            let torque = control.torque(&panda, &q, &dq, &still(here), &zero);
+            assert!((torque - last).amax() <= Impedance::SOFT.max_torque_step_nm + 1e-12);
+            last = torque;
+        }
+        // It takes power from the motion.
+        assert!(last.dot(&dq) < 0.0, "{last}");
+        // What is known of Coriolis torques is added.
+        let mut coriolis = zero;
+        coriolis[1] = 0.3;
+        let with = ImpedanceControl::new(Impedance::SOFT, q, zero).torque(&panda, &q, &zero, &still(here), &coriolis);
+        assert!((with - coriolis).amax() < 1e-12);
+    }
+}

@@ -1,0 +1,231 @@
+//! Coming down on something with a soft tcp, until its force is felt.
+//!
+//! ```text
+//! stand, to learn what is felt in free air ─> down at a constant speed ─> felt: press with a force ─> stand, told
+//!                                               └ nothing felt: the way's end
+//! ```
+//! What is felt is the robot's own estimate of the external force; the height that counts is the measured one, since a soft tcp is
+//! beside its reference by what friction takes.
+
+use nalgebra::{Isometry3, Vector6};
+use sdg_kinematics::{JointVector, Panda};
+
+use crate::arm_state::PERIOD_SECS;
+use crate::error::{Result, RobotError};
+use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
+
+/// How long the arm stands to learn what is felt in free air, s, and the time over which force and height are told at the end.
+const STANDING_SECS: f64 = 0.2;
+/// The reference reaches its speed within this time, s.
+const RAMP_SECS: f64 = 0.2;
+/// Joint friction lets the reference run ahead of the tcp; by more than this it does not, m: 15 N at 150 N/m.
+const MAX_LEAD_M: f64 = 0.1;
+/// The reference gives way by so much for each newton too much, m/(N s): pressing settles within a few tenths of a second.
+const YIELDING_M_PER_NS: f64 = 0.02;
+
+/// How to come down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TouchDown {
+    /// How soft the tcp is on the way.
+    pub impedance: Impedance,
+    /// Speed of the reference, m/s.
+    pub speed_m_s: f64,
+    /// The longest way down, as measured, m.
+    pub max_way_m: f64,
+    /// How far below the table of the limits the way may lead, m: what the table's height is not known to.
+    pub below_table_m: f64,
+    /// A change of the vertical force by so much is a contact, N.
+    pub contact_n: f64,
+    /// What is then pressed with, N.
+    pub press_n: f64,
+    /// For how long, s.
+    pub press_secs: f64,
+}
+
+impl Default for TouchDown {
+    /// 15 mm/s, softly, at most 30 mm and 10 mm below where the table is told to be; 3 N are a contact.
+    fn default() -> Self {
+        Self {
+            impedance: Impedance::SOFT_DOWN,
+            speed_m_s: 0.015,
+            max_way_m: 0.030,
+            below_table_m: 0.010,
+            contact_n: 3.0,
+            press_n: 4.0,
+            press_secs: 1.0,
+        }
+    }
+}
+
+impl TouchDown {
+    /// Refuses what makes no sense.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`].
+    pub(crate) fn validate(&self) -> Result<()> {
+        /// Faster than this, contact is a blow.
+        const MAX_SPEED_M_S: f64 = 0.05;
+        const MAX_WAY_M: f64 = 0.2;
+        const MAX_FORCE_N: f64 = 15.0;
+        for (what, found, max) in [
+            ("speed of coming down in m/s", self.speed_m_s, MAX_SPEED_M_S),
+            ("way down in m", self.max_way_m, MAX_WAY_M),
+            ("force of a contact in N", self.contact_n, MAX_FORCE_N),
+            ("force of pressing in N", self.press_n, MAX_FORCE_N),
+            ("time of pressing in s", self.press_secs, 10.0),
+        ] {
+            if !(found > 0.0 && found <= max) {
+                let expected = format!("above 0 and at most {max}");
+                return Err(RobotError::Configuration { what: what.to_owned(), expected, found: found.to_string() });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What was touched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touched {
+    /// Whether anything was felt before the way's end.
+    pub is_contact: bool,
+    /// Measured height of the tcp in the base frame at the end, m.
+    pub tcp_height_m: f64,
+    /// What was pressed with at the end, N.
+    pub force_n: f64,
+    /// The largest force on the way and at the end, N.
+    pub peak_n: f64,
+}
+
+/// What coming down is at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Standing,
+    Down,
+    Pressing,
+}
+
+/// The torques of coming down, cycle by cycle.
+#[derive(Debug)]
+pub(crate) struct Descent {
+    touch_down: TouchDown,
+    control: ImpedanceControl,
+    start: Isometry3<f64>,
+    phase: Phase,
+    phase_cycles: u32,
+    /// How far the reference is below the start, m, and how fast it goes down, m/s.
+    down_m: f64,
+    speed_m_s: f64,
+    free_air_n: f64,
+    is_contact: bool,
+    peak_n: f64,
+    force_sum_n: f64,
+    height_sum_m: f64,
+    num_summed: u32,
+}
+
+impl Descent {
+    /// Begins where the arm stands (rad), after this torque (N·m, without gravity).
+    pub(crate) fn new(touch_down: TouchDown, panda: &Panda, q: JointVector, torque: JointVector) -> Self {
+        Self {
+            touch_down,
+            control: ImpedanceControl::new(touch_down.impedance, q, torque),
+            start: panda.forward(&q),
+            phase: Phase::Standing,
+            phase_cycles: 0,
+            down_m: 0.0,
+            speed_m_s: 0.0,
+            free_air_n: 0.0,
+            is_contact: false,
+            peak_n: 0.0,
+            force_sum_n: 0.0,
+            height_sum_m: 0.0,
+            num_summed: 0,
+        }
+    }
+
+    /// The torques of the next cycle (N·m); and whether they are the last.
+    ///
+    /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
+    /// part of unknown weight, or a robot that counts the other way round, makes no difference.
+    pub(crate) fn next(
+        &mut self,
+        panda: &Panda,
+        q: &JointVector,
+        dq: &JointVector,
+        force_n: f64,
+    ) -> (JointVector, bool) {
+        let pressed_n = (force_n - self.free_air_n).abs();
+        let height_m = panda.forward(q).translation.z;
+        let way_m = self.start.translation.z - height_m;
+        self.phase_cycles += 1;
+        let phase_secs = f64::from(self.phase_cycles) * PERIOD_SECS;
+        let mut is_last = false;
+        match self.phase {
+            Phase::Standing => {
+                self.force_sum_n += force_n;
+                if phase_secs >= STANDING_SECS {
+                    self.free_air_n = self.force_sum_n / f64::from(self.phase_cycles);
+                    self.enter(Phase::Down);
+                }
+            }
+            Phase::Down => {
+                self.speed_m_s = self.touch_down.speed_m_s * (phase_secs / RAMP_SECS).min(1.0);
+                self.peak_n = self.peak_n.max(pressed_n);
+                self.is_contact = pressed_n >= self.touch_down.contact_n;
+                let is_at_end = way_m >= self.touch_down.max_way_m || self.down_m - way_m >= MAX_LEAD_M;
+                if self.is_contact || is_at_end {
+                    self.enter(Phase::Pressing);
+                }
+                if is_at_end {
+                    // The tcp stays where it is.
+                    self.down_m = way_m;
+                }
+            }
+            Phase::Pressing => {
+                self.peak_n = self.peak_n.max(pressed_n);
+                self.speed_m_s = match self.is_contact {
+                    true => self.yielding(pressed_n),
+                    false => 0.0,
+                };
+                if phase_secs > self.touch_down.press_secs - STANDING_SECS {
+                    self.force_sum_n += pressed_n;
+                    self.height_sum_m += height_m;
+                    self.num_summed += 1;
+                }
+                is_last = phase_secs >= self.touch_down.press_secs.max(STANDING_SECS);
+            }
+        }
+        self.down_m += self.speed_m_s * PERIOD_SECS;
+        let mut base_from_tcp = self.start;
+        base_from_tcp.translation.z -= self.down_m;
+        let twist = Vector6::new(0.0, 0.0, -self.speed_m_s, 0.0, 0.0, 0.0);
+        let reference = TcpReference { base_from_tcp, twist };
+        (self.control.torque(panda, q, dq, &reference, &JointVector::zeros()), is_last)
+    }
+
+    /// How fast the reference goes on down while less is felt than is to be pressed with, or up while more is, m/s.
+    fn yielding(&self, pressed_n: f64) -> f64 {
+        let too_little_n = self.touch_down.press_n - pressed_n;
+        (YIELDING_M_PER_NS * too_little_n).clamp(-self.touch_down.speed_m_s, self.touch_down.speed_m_s)
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        (self.phase, self.phase_cycles, self.force_sum_n, self.speed_m_s) = (phase, 0, 0.0, 0.0);
+    }
+
+    /// The torques of the last cycle, N·m.
+    pub(crate) fn last_torque(&self) -> &JointVector {
+        self.control.last_torque()
+    }
+
+    /// What was found, once the last torques are told.
+    pub(crate) fn touched(&self) -> Touched {
+        let num = f64::from(self.num_summed.max(1));
+        Touched {
+            is_contact: self.is_contact,
+            tcp_height_m: self.height_sum_m / num,
+            force_n: self.force_sum_n / num,
+            peak_n: self.peak_n,
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! A line between a robot and its client that passes everything on, but for the states and commands that a test changes.
+
+use std::io::Write;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::sync::{Arc, Mutex};
+use std::thread;
+
+use sdg_fci::read_message;
+use sdg_fci::server::Server;
+use sdg_fci::wire::{HEADER_SIZE, Header, HeaderKind, Request, RobotMode, RobotState, STATE_SIZE_V5, Version};
+use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
+
+/// What the line makes of a state of a moving arm: the datagrams that arrive in its place. The number counts those states.
+pub type ChangeState = Box<dyn FnMut(u64, &RobotState) -> Vec<Vec<u8>> + Send>;
+/// Whether a command of a moving arm gets through; the number counts them.
+pub type PassCommand = Box<dyn FnMut(u64) -> bool + Send>;
+
+/// The datagram of a state as it is.
+pub fn unchanged(state: &RobotState) -> Vec<u8> {
+    state.encode(Version::V5)
+}
+
+/// Connects an arm to a server through a line; the hand is reached directly.
+pub fn connect(server: &Server, change: ChangeState, pass: PassCommand) -> sdg_robot::Result<FrankaArm> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let robot = server.robot_address();
+    thread::spawn(move || relay(&listener, robot, change, pass));
+    let (host, hand_port) = (Ipv4Addr::LOCALHOST.to_string(), server.hand_address().port());
+    FrankaArm::connect(&RobotAddress { host, port, hand_port }, Scheduling::Ordinary)
+}
+
+/// Serves one client; its threads end with the connections, those of the datagrams with the test's process.
+fn relay(listener: &TcpListener, robot: SocketAddr, change: ChangeState, pass: PassCommand) {
+    let (mut client, _) = listener.accept().unwrap();
+    let mut server = TcpStream::connect(robot).unwrap();
+    client.set_nodelay(true).unwrap();
+    server.set_nodelay(true).unwrap();
+    let [to_client, to_server] = [(); 2].map(|()| Arc::new(UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap()));
+    // Where the client listens, and where the robot sends from.
+    let (client_port, robot_udp) = (Arc::new(Mutex::new(0)), Arc::new(Mutex::new(None)));
+
+    let (states, sends, port, source) = (to_server.clone(), to_client.clone(), client_port.clone(), robot_udp.clone());
+    thread::spawn(move || pass_states(&states, &sends, &port, &source, change));
+    let (commands, sends) = (to_client, to_server.clone());
+    thread::spawn(move || pass_commands(&commands, &sends, &robot_udp, pass));
+    let (mut answers, mut to) = (server.try_clone().unwrap(), client.try_clone().unwrap());
+    thread::spawn(move || {
+        let _ = std::io::copy(&mut answers, &mut to);
+        let _ = to.shutdown(std::net::Shutdown::Both);
+    });
+
+    while let Ok(Ok((header, payload))) = read_message(&mut client, HeaderKind::Robot) {
+        let message = match Request::decode(&header, &payload, Version::V5) {
+            Ok(Request::Connect { version, udp_port }) => {
+                *client_port.lock().unwrap() = udp_port;
+                let udp_port = to_server.local_addr().unwrap().port();
+                Request::Connect { version, udp_port }.encode(header.command_id, Version::V5).unwrap()
+            }
+            _ => Header::message(HeaderKind::Robot, header.command, header.command_id, &payload),
+        };
+        assert_eq!(message.len(), HEADER_SIZE + payload.len());
+        if server.write_all(&message).is_err() {
+            break;
+        }
+    }
+    let _ = server.shutdown(std::net::Shutdown::Both);
+}
+
+fn pass_states(
+    from: &UdpSocket,
+    sends: &UdpSocket,
+    client_port: &Mutex<u16>,
+    source: &Mutex<Option<SocketAddr>>,
+    mut change: ChangeState,
+) {
+    let (mut buffer, mut num_moving) = ([0; STATE_SIZE_V5], 0);
+    while let Ok((length, robot)) = from.recv_from(&mut buffer) {
+        *source.lock().unwrap() = Some(robot);
+        let state = RobotState::decode(&buffer[..length], Version::V5).unwrap();
+        let datagrams = match state.robot_mode {
+            RobotMode::Move => {
+                num_moving += 1;
+                change(num_moving, &state)
+            }
+            _ => vec![unchanged(&state)],
+        };
+        let client = SocketAddr::from((Ipv4Addr::LOCALHOST, *client_port.lock().unwrap()));
+        for datagram in datagrams {
+            // A client that has gone gets nothing.
+            let _ = sends.send_to(&datagram, client);
+        }
+    }
+}
+
+fn pass_commands(from: &UdpSocket, sends: &UdpSocket, robot: &Mutex<Option<SocketAddr>>, mut pass: PassCommand) {
+    let (mut buffer, mut num_commands) = ([0; 1024], 0);
+    while let Ok((length, _)) = from.recv_from(&mut buffer) {
+        num_commands += 1;
+        if let (true, Some(robot)) = (pass(num_commands), *robot.lock().unwrap()) {
+            let _ = sends.send_to(&buffer[..length], robot);
+        }
+    }
+}
