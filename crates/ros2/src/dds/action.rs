@@ -1,10 +1,16 @@
 //! Actions, as a client: a goal, its acceptance, feedback, result, and its cancellation.
+//!
+//! The first request of a writer may be lost: a Cyclone reader that has just matched the writer asks it once a second for its state, until the
+//! writer has sent something. If RustDDS gets that question while it sends its first sample, it answers first, with a heartbeat that counts
+//! the sample, and the reader takes the sample for an old one. Later requests are not affected. So a cancellation and a question for a
+//! result are sent again where no answer comes. A goal is sent again only after the server has said that it does not know it.
 
 use std::pin::pin;
 use std::time::{Duration, Instant};
 
 use futures_util::StreamExt;
 use ros2_client::action::{GoalId, GoalStatusEnum};
+use ros2_client::action_msgs::{CancelGoalResponse, CancelGoalResponseEnum};
 
 use super::failure::network;
 use super::wait::wait_for;
@@ -35,6 +41,11 @@ pub enum GoalEnd {
     Unknown,
 }
 
+/// A question for a result is sent again after this, once.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
+/// How often a cancellation is sent.
+const MAX_CANCELLATIONS: u32 = 3;
+
 /// Sends goals to an action's server, one at a time.
 pub struct ActionClient<G, R, F>
 where
@@ -51,6 +62,8 @@ where
 pub struct Goal {
     id: GoalId,
     result: ros2_client::RmwRequestId,
+    /// When the question for the result is sent again.
+    ask_again: Option<Instant>,
 }
 
 impl<G, R, F> ActionClient<G, R, F>
@@ -75,27 +88,53 @@ where
         &self.inner
     }
 
-    /// Sends a goal and asks for its result; `None` where the server refuses it.
+    /// Sends a goal and asks for its result; `None` where the server refuses it. What is not answered is cancelled, and sent again where the
+    /// server does not know it.
     ///
     /// # Errors
     /// No answer in time, and what the network reports.
     pub fn send(&self, goal: G, timeout: Duration) -> Result<Option<Goal>, RosError> {
-        let sent = wait_for(self.inner.async_send_goal(Wire(Ok(goal))), Some(Instant::now() + timeout));
-        let (id, response) = sent
-            .ok_or_else(|| network(&self.name, format!("no answer to a goal within {:.1} s", timeout.as_secs_f64())))?
-            .map_err(|error| network(&self.name, error))?;
-        if !response.accepted {
-            return Ok(None);
+        match self.send_once(goal.clone(), timeout / 2)? {
+            Sent::Accepted(goal) => Ok(Some(goal)),
+            Sent::Refused => Ok(None),
+            Sent::Unanswered(id) => match self.ask_to_cancel(id, timeout)?.return_code {
+                CancelGoalResponseEnum::UnknownGoal => match self.send_once(goal, timeout)? {
+                    Sent::Accepted(goal) => Ok(Some(goal)),
+                    Sent::Refused => Ok(None),
+                    Sent::Unanswered(id) => {
+                        self.ask_to_cancel(id, timeout)?;
+                        Err(self.unanswered("a goal", timeout))
+                    }
+                },
+                _ => Err(self.unanswered("a goal", timeout)),
+            },
+        }
+    }
+
+    fn send_once(&self, goal: G, timeout: Duration) -> Result<Sent, RosError> {
+        let (request, id) = self.inner.send_goal(Wire(Ok(goal))).map_err(|error| network(&self.name, error))?;
+        let answer = self.inner.goal_client().async_receive_response(request);
+        let Some(answer) = wait_for(answer, Some(Instant::now() + timeout)) else { return Ok(Sent::Unanswered(id)) };
+        if !answer.map_err(|error| network(&self.name, error))?.accepted {
+            return Ok(Sent::Refused);
         }
         let result = self.inner.request_result(id).map_err(|error| network(&self.name, error))?;
-        Ok(Some(Goal { id, result }))
+        Ok(Sent::Accepted(Goal { id, result, ask_again: Some(Instant::now() + ASK_AGAIN) }))
+    }
+
+    fn unanswered(&self, what: &str, timeout: Duration) -> RosError {
+        network(&self.name, format!("no answer to {what} within {:.1} s", timeout.as_secs_f64()))
     }
 
     /// How a goal ended, with its result; `None` where it has not ended in time.
     ///
     /// # Errors
     /// [`RosError::Malformed`], and what the network reports.
-    pub fn result(&self, goal: &Goal, timeout: Duration) -> Result<Option<(GoalEnd, R)>, RosError> {
+    pub fn result(&self, goal: &mut Goal, timeout: Duration) -> Result<Option<(GoalEnd, R)>, RosError> {
+        if goal.ask_again.is_some_and(|time| time <= Instant::now()) {
+            goal.ask_again = None;
+            goal.result = self.inner.request_result(goal.id).map_err(|error| network(&self.name, error))?;
+        }
         let taken =
             wait_for(self.inner.result_client().async_receive_response(goal.result), Some(Instant::now() + timeout));
         let Some(taken) = taken else { return Ok(None) };
@@ -143,11 +182,25 @@ where
     /// # Errors
     /// No answer in time, and what the network reports.
     pub fn cancel(&self, goal: &Goal, timeout: Duration) -> Result<bool, RosError> {
-        let zero = ros2_client::builtin_interfaces::Time::ZERO;
-        let answered = wait_for(self.inner.async_cancel_goal(goal.id, zero), Some(Instant::now() + timeout));
-        let response = answered
-            .ok_or_else(|| network(&self.name, "no answer to a cancellation"))?
-            .map_err(|error| network(&self.name, error))?;
+        let response = self.ask_to_cancel(goal.id, timeout)?;
         Ok(response.goals_canceling.iter().any(|info| info.goal_id == goal.id))
     }
+
+    fn ask_to_cancel(&self, id: GoalId, timeout: Duration) -> Result<CancelGoalResponse, RosError> {
+        let zero = ros2_client::builtin_interfaces::Time::ZERO;
+        for _ in 0..MAX_CANCELLATIONS {
+            let deadline = Instant::now() + timeout / MAX_CANCELLATIONS;
+            if let Some(answer) = wait_for(self.inner.async_cancel_goal(id, zero), Some(deadline)) {
+                return answer.map_err(|error| network(&self.name, error));
+            }
+        }
+        Err(self.unanswered("a cancellation", timeout))
+    }
+}
+
+/// What became of a goal that was sent.
+enum Sent {
+    Accepted(Goal),
+    Refused,
+    Unanswered(GoalId),
 }

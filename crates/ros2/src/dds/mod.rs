@@ -7,6 +7,7 @@ mod action_server;
 mod arm;
 mod camera;
 mod failure;
+mod joint_states;
 mod node;
 mod service;
 mod topic;
@@ -15,8 +16,9 @@ mod wire;
 
 pub use action::{ActionClient, ActionType, Goal, GoalEnd};
 pub use action_server::{ActionServer, Asked};
-pub use arm::{ArmConfig, TrajectoryArm};
+pub use arm::TrajectoryArm;
 pub use camera::{RosCamera, TopicAddress, domain_of_environment, stamp_or_now};
+pub use joint_states::ArmConfig;
 pub use node::{Node, NodeConfig, Rmw};
 pub use service::{RequestId, Server, ServiceType};
 pub use topic::{Publisher, Qos, Received, Subscription};

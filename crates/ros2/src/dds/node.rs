@@ -59,6 +59,12 @@ pub(super) const MAX_DOMAIN: u16 = 232;
 /// Larger than the system's: a picture is a burst of hundreds of packets. The kernel gives what it allows.
 const SOCKET_BUFFER_BYTES: usize = 8 << 20;
 
+/// `wait_for_service` looks at what is matched when it is called and then at events, of which `ros2-client` keeps eight and drops the rest:
+/// when the endpoints of two actions are matched within a millisecond, that of the last one may be dropped. So it is called again.
+const MATCH_AGAIN: Duration = Duration::from_millis(100);
+/// Cyclone's readers ask a writer that they have just matched for its state, and leave out what it sends before the answer; see action.rs.
+const SETTLE: Duration = Duration::from_millis(200);
+
 /// A node, before it joins.
 #[derive(Debug, Clone)]
 pub struct NodeConfig {
@@ -256,14 +262,20 @@ impl Node {
     {
         let Some(node) = &self.node else { return Err(network(client.name(), "the node has left")) };
         let inner = client.inner();
-        let all = async {
-            inner.goal_client().wait_for_service(node).await;
-            inner.result_client().wait_for_service(node).await;
-            inner.cancel_client().wait_for_service(node).await;
-        };
-        wait_for(all, Some(Instant::now() + timeout)).ok_or_else(|| {
-            network(client.name(), format!("nobody serves this action within {:.0} s", timeout.as_secs_f64()))
-        })
+        let deadline = Instant::now() + timeout;
+        while Instant::now() < deadline {
+            let all = async {
+                inner.goal_client().wait_for_service(node).await;
+                inner.result_client().wait_for_service(node).await;
+                inner.cancel_client().wait_for_service(node).await;
+            };
+            if wait_for(all, Some(Instant::now() + MATCH_AGAIN)).is_some() {
+                std::thread::sleep(SETTLE);
+                return Ok(());
+            }
+        }
+        let secs = timeout.as_secs_f64();
+        Err(network(client.name(), format!("nobody serves this action within {secs:.0} s")))
     }
 
     /// How many readers a topic of this node has.

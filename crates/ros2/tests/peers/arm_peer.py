@@ -16,6 +16,7 @@ READY = [0.0, -0.785398, 0.0, -2.356194, 0.0, 1.570796, 0.785398]
 JOINTS = [f"panda_joint{joint}" for joint in range(1, 8)]
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+UNKNOWN_GOAL, GOAL_TERMINATED = 2, 3
 done = []
 
 
@@ -29,7 +30,7 @@ class Action:
         self.results = Server(participant, at + "/get_result", "control_msgs", name + "_GetResult", "action")
         self.feedback = peer.writer(at + "/feedback", f"control_msgs/action/{name}_FeedbackMessage", reliable(10))
         self.status = peer.writer(at + "/status", "action_msgs/msg/GoalStatusArray", transient_local(1))
-        self.asked = {}
+        self.asked, self.ended = [], {}
 
     def accept(self, head, accepted):
         stamp = stamp_now()
@@ -41,22 +42,31 @@ class Action:
     def end(self, goal, status, result):
         """The status is one byte, and what follows is aligned behind it: the result begins with padding."""
         self.tell(goal, status)
-        limit = time.monotonic() + 10
-        while time.monotonic() < limit:
-            for head, content in self.results.requests():
-                self.asked[content[:16]] = head
-            if goal in self.asked:
-                self.results.answer(self.asked[goal], bytes([status]) + result)
-                return
-            time.sleep(0.005)
+        self.ended[goal] = bytes([status]) + result
+        self.serve()
 
-    def cancelled(self, goal):
+    def serve(self):
+        """Answers questions for results of goals that have ended, and cancellations of goals that do not run."""
+        self.asked += [(content[:16], head) for head, content in self.results.requests()]
+        for goal, head in self.asked:
+            if goal in self.ended:
+                self.results.answer(head, self.ended[goal])
+        self.asked = [(goal, head) for goal, head in self.asked if goal not in self.ended]
+        self.cancelled(None)
+
+    def cancelled(self, running):
+        """Whether the goal that runs is cancelled."""
+        found = False
         for head, content in self.cancels.requests():
-            if content[:16] == goal:
+            goal = content[:16]
+            if goal == running:
                 self.cancels.answer(head, bytes([0, 0, 0, 0]) + (1).to_bytes(4, "little") + goal + bytes(8))
                 done.append("cancel")
-                return True
-        return False
+                found = True
+            else:
+                code = GOAL_TERMINATED if goal in self.ended else UNKNOWN_GOAL
+                self.cancels.answer(head, bytes([code, 0, 0, 0]) + (0).to_bytes(4, "little"))
+        return found
 
 
 def main(program):
@@ -97,6 +107,8 @@ def main(program):
     goals, hands, silent_at = 0, 0, None
     limit = time.monotonic() + 120
     while client.poll() is None and time.monotonic() < limit:
+        arm.serve()
+        hand.serve()
         for head, content in arm.goals.requests():
             goal, wanted = content[:16], unpack(content[16:], "control_msgs/msg/FollowJointTrajectoryGoal")
             goals += 1
