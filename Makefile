@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -52,6 +52,9 @@ test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB
 
 test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated Panda, our client drives franka-sim
 	@scripts/test-peers.sh
+
+test-ros2: setup ## Tests ROS 2 against Cyclone DDS and Fast DDS on loopback (burn is compiled once more; TESTS=latency: one of them)
+	@scripts/test-ros2.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)

@@ -20,6 +20,7 @@ use crate::http::Url;
 /// | `dir:FOLDER` | its pictures (PNG, JPEG, PPM, WebP, BMP, TIFF) in the order of their names; options as below |
 /// | `file:PATH` | one picture, once; with `?loop` again and again |
 /// | `sim:REST` | the simulated camera, which another crate opens |
+/// | `ros2:TOPIC`, `ros2:TOPIC?OPTIONS` | a topic of ROS 2 with sensor_msgs/Image or CompressedImage, which another crate opens |
 ///
 /// Options of `dir:` and `file:` follow the last `?`, joined by `&`: `fps=10` (pictures a second; without it as fast as they are
 /// read), `loop` (begins again after the last), `follow` (`dir:` alone: waits for new files). A path that contains `?` itself
@@ -48,6 +49,8 @@ pub enum Address {
     },
     /// The simulated camera: what follows `sim:`.
     Sim(String),
+    /// A topic of ROS 2: what follows `ros2:`.
+    Ros2(String),
 }
 
 /// Which V4L2 node.
@@ -81,7 +84,7 @@ impl Address {
 
 /// What [`Address::from_str`] expects.
 const EXPECTED: &str = "an address of a camera: v4l:, v4l:/dev/video0, http://HOST/PATH, cmd:PROGRAM ARGUMENTS, dir:FOLDER, \
-                        file:PATH or sim:";
+                        file:PATH, sim: or ros2:TOPIC";
 /// Frames a second that `fps=` takes.
 const FPS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
@@ -120,6 +123,8 @@ impl FromStr for Address {
                 Ok(Self::File { path, playback })
             }
             "sim" => Ok(Self::Sim(rest.to_owned())),
+            "ros2" if rest.is_empty() => Err(refused("a topic after ros2:, as in ros2:/camera/image_raw")),
+            "ros2" => Ok(Self::Ros2(rest.to_owned())),
             _ => Err(refused(EXPECTED)),
         }
     }
@@ -160,6 +165,7 @@ impl fmt::Display for Address {
             Self::Folder { path, playback } => write!(f, "dir:{}{playback}", path.display()),
             Self::File { path, playback } => write!(f, "file:{}{playback}", path.display()),
             Self::Sim(rest) => write!(f, "sim:{rest}"),
+            Self::Ros2(rest) => write!(f, "ros2:{rest}"),
         }
     }
 }
@@ -207,6 +213,7 @@ mod tests {
             "dir:pictures?follow",
             "file:a.png?fps=0.5&loop",
             "sim:rod-end",
+            "ros2:/camera/image_raw?compressed&domain=7",
         ] {
             assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
         }
@@ -229,6 +236,7 @@ mod tests {
             ("https://camera/", "TLS is not spoken"),
             ("http://", "HOST"),
             ("cmd:", "a program"),
+            ("ros2:", "a topic after ros2:"),
             ("dir:", "a path"),
             ("dir:?loop", "a path"),
             ("dir:a?fps=0", "0.1 to 1000"),

@@ -20,7 +20,7 @@ pub(crate) const PNG_START: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 ///
 /// # Errors
 /// In words, what was found instead of a whole picture.
-pub(crate) fn decode(bytes: &[u8]) -> Result<RgbImage, String> {
+pub fn decode(bytes: &[u8]) -> Result<RgbImage, String> {
     match bytes {
         [0xff, 0xd8, ..] => decode_limited(&whole_jpeg(bytes)?, ImageFormat::Jpeg),
         _ if bytes.starts_with(&PNG_START) => decode_limited(bytes, ImageFormat::Png),

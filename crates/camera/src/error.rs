@@ -15,7 +15,7 @@ pub enum CameraError {
         found: String,
     },
     /// An address that another crate opens.
-    #[error("{address}: expected a caller that opens simulated cameras; the crate camera does not")]
+    #[error("{address}: expected a caller that opens simulated cameras and topics of ROS 2; the crate camera does not")]
     OpenedElsewhere { address: String },
     /// The camera does not open.
     #[error("{address}: {why}")]

@@ -51,6 +51,7 @@ mod yuv;
 
 pub use address::{Address, NodeName, Playback};
 pub use command_line::CommandLine;
+pub use decode::decode as decode_picture;
 pub use error::CameraError;
 pub use fault::Fault;
 pub use frame::{Camera, Frame, mean_brightness};
@@ -60,3 +61,4 @@ pub use open::open;
 pub use options::{Encoding, OpenOptions};
 pub use server::MjpegServer;
 pub use watched::Watched;
+pub use yuv::yuyv_to_rgb;

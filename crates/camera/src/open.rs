@@ -24,7 +24,7 @@ const STALL_TIMEOUTS: std::ops::RangeInclusive<Duration> = Duration::from_millis
 ///
 /// # Errors
 /// [`CameraError::Open`] and [`CameraError::Setting`] where it does not open or take its settings, [`CameraError::OpenedElsewhere`] for
-/// [`Address::Sim`].
+/// [`Address::Sim`] and [`Address::Ros2`].
 pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>, CameraError> {
     let name: Arc<str> = address.to_string().into();
     let refused = |expected: &str, found: String| {
@@ -36,7 +36,7 @@ pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>,
     if !STALL_TIMEOUTS.contains(&options.stall_timeout) {
         return refused("a stall timeout of 0.01 to 3600 s", format!("{} s", options.stall_timeout.as_secs_f64()));
     }
-    if let Address::Sim(_) = address {
+    if let Address::Sim(_) | Address::Ros2(_) = address {
         return Err(CameraError::OpenedElsewhere { address: name.to_string() });
     }
     let frozen_frames = address.is_live().then_some(options.frozen_frames);
@@ -52,6 +52,6 @@ fn opener(address: Address, options: OpenOptions) -> Opener {
         Address::Command(line) => Ok(Box::new(Program::start(line)?)),
         Address::Folder { path, playback } => Folder::open(path, *playback, &address.to_string()).map(boxed),
         Address::File { path, playback } => Folder::open_file(path, *playback, &address.to_string()).map(boxed),
-        Address::Sim(_) => Err(CameraError::OpenedElsewhere { address: address.to_string() }),
+        Address::Sim(_) | Address::Ros2(_) => Err(CameraError::OpenedElsewhere { address: address.to_string() }),
     })
 }

@@ -7,7 +7,7 @@ use image::RgbImage;
 ///
 /// # Errors
 /// In words, what is found where there are fewer bytes than the rows need.
-pub(crate) fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
+pub fn yuyv_to_rgb(bytes: &[u8], width: u32, height: u32, bytes_per_row: usize) -> Result<RgbImage, String> {
     if width == 0 || width % 2 == 1 {
         return Err(format!("an odd width of {width} pixels"));
     }

@@ -47,6 +47,9 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Grasp a part with a real or a simulated arm, from the picture to the lifted part
     Grasp(GraspArgs),
+    /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teach and grasp as services
+    #[cfg(feature = "ros2")]
+    Ros2(Box<crate::commands::ros2::args::Ros2Args>),
     /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
     Plan(PlanArgs),
     /// Show the state of a real arm, bring it home, recover it after an error, open and close its hand

@@ -54,6 +54,8 @@ mod progress;
 #[cfg(feature = "simulation")]
 pub mod rehearsal;
 pub mod robots;
+#[cfg(feature = "ros2")]
+mod ros_node;
 #[cfg(feature = "simulation")]
 mod run_page;
 mod shared_args;
@@ -108,6 +110,8 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Grasp(grasp) => commands::grasp::run(grasp),
         Command::Plan(plan) => commands::plan::run(plan),
         Command::Robot(robot) => commands::robot::run(robot),
+        #[cfg(feature = "ros2")]
+        Command::Ros2(ros2) => commands::ros2::run(ros2),
         Command::Augment(augment) => commands::augment::run(augment),
         Command::Annotation(annotation) => commands::annotation::run(annotation),
         Command::Weights(weights) => commands::weights::run(weights),

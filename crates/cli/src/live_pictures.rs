@@ -7,7 +7,7 @@ use sdg_camera::{Address, Camera, Encoding, OpenOptions};
 /// A camera and what is asked of it.
 #[derive(Debug, Args)]
 pub struct LiveArgs {
-    /// Where pictures come from: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH or sim:
+    /// Where pictures come from: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS', dir:FOLDER, file:PATH, sim: or ros2:TOPIC
     ///
     /// Of folders and files, options follow a question mark: dir:FOLDER?fps=10&loop, dir:FOLDER?follow.
     #[arg(long, value_name = "ADDRESS")]
@@ -104,6 +104,18 @@ pub(crate) fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn C
         Address::Sim(_) => Err(crate::exit::Usage(
             "--from sim: this sdg was built without the simulator: expected a build with cargo's feature \"simulation\""
                 .to_owned(),
+        )
+        .into()),
+        #[cfg(feature = "ros2")]
+        Address::Ros2(text) => {
+            use sdg_ros2::dds::{RosCamera, TopicAddress};
+            let topic: TopicAddress = text.parse().map_err(|why| crate::exit::Usage(format!("--from ros2: {why}")))?;
+            let camera = RosCamera::open(&topic, &address.to_string(), options.stall_timeout).context("--from")?;
+            Ok(Box::new(sdg_camera::Watched::new(camera, Some(options.frozen_frames))))
+        }
+        #[cfg(not(feature = "ros2"))]
+        Address::Ros2(_) => Err(crate::exit::Usage(
+            "--from ros2: this sdg was built without ROS 2: expected a build with cargo's feature \"ros2\"".to_owned(),
         )
         .into()),
         address => sdg_camera::open(address, options).context("--from"),

@@ -50,6 +50,7 @@ pub struct Watch {
     request: StopRequest,
     states: VecDeque<ArmState>,
     stop: Option<StopReason>,
+    max_silence_secs: f64,
 }
 
 impl fmt::Debug for Watch {
@@ -68,7 +69,12 @@ impl Default for Watch {
 impl Watch {
     /// Asks `request` in every cycle.
     pub fn new(request: StopRequest) -> Self {
-        Self { request, states: VecDeque::new(), stop: None }
+        Self { request, states: VecDeque::new(), stop: None, max_silence_secs: MAX_SILENCE_SECS }
+    }
+
+    /// Allows longer gaps between states than [`MAX_SILENCE_SECS`], for an arm whose driver sends fewer.
+    pub fn allow_silence(&mut self, max_silence_secs: f64) {
+        self.max_silence_secs = max_silence_secs;
     }
 
     /// Begins another motion: a gap since the last state is none.
@@ -107,11 +113,11 @@ impl Watch {
         }
         let before = self.states.back().filter(|before| before.mode == ArmMode::Moving)?;
         let elapsed_secs = state.time_secs - before.time_secs;
-        if elapsed_secs > MAX_SILENCE_SECS + ROUNDING_SECS {
+        if elapsed_secs > self.max_silence_secs + ROUNDING_SECS {
             return Some(StopReason::Watchdog(format!(
                 "no state of the arm for {:.0} ms, at most {:.0} ms are allowed",
                 elapsed_secs * 1e3,
-                MAX_SILENCE_SECS * 1e3
+                self.max_silence_secs * 1e3
             )));
         }
         let allowed = JointVector::from(VELOCITY_MAX_RAD_S) * (MAX_SPEED_SHARE * elapsed_secs.max(0.0));
@@ -186,6 +192,15 @@ mod tests {
             // What comes later does not make it good.
             assert!(watch.observe(&state(0.051, ready_pose())).is_some());
         }
+    }
+
+    #[test]
+    fn longer_gaps_are_allowed_where_a_driver_sends_few_states() {
+        let mut watch = Watch::default();
+        watch.allow_silence(0.1);
+        assert_eq!(watch.observe(&state(0.0, ready_pose())), None);
+        assert_eq!(watch.observe(&state(0.1, ready_pose())), None);
+        assert!(watch.observe(&state(0.25, ready_pose())).unwrap().to_string().contains("at most 100 ms"));
     }
 
     #[test]

@@ -49,6 +49,7 @@ mod panda;
 mod perception;
 mod planning_problem;
 mod record;
+mod reference;
 mod render;
 pub mod scene;
 mod self_distance;

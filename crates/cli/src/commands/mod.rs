@@ -14,6 +14,8 @@ pub mod man;
 pub mod plan;
 pub mod rehearse;
 pub mod robot;
+#[cfg(feature = "ros2")]
+pub mod ros2;
 #[cfg(feature = "simulation")]
 pub mod simulate;
 pub mod teach;

@@ -22,6 +22,8 @@ pub(crate) use confirm::{Consent, confirm};
 pub(crate) use dry_run::DryRun;
 #[cfg(feature = "simulation")]
 pub(crate) use finder::SimulatedPictures;
+#[cfg(feature = "ros2")]
+pub(crate) use finder::TakenPicture;
 pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
 #[cfg(feature = "simulation")]
 pub(crate) use motion_drawing::MotionDrawing;

@@ -1,0 +1,70 @@
+//! `sdg ros2`: detection, teaching and grasping as a node of ROS 2.
+
+pub mod args;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use sdg_ros2::Naming;
+use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment};
+
+use crate::exit::{Outcome, Usage};
+use crate::interrupt::Interrupt;
+use crate::ros_node::{self, GraspSettings, Settings};
+use args::{ArmArgs, Ros2Args};
+
+/// How long the arm's topic and actions are waited for.
+const ARM_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// Joins ROS 2 and works until Ctrl-C.
+pub fn run(args: &Ros2Args) -> Result<Outcome> {
+    let naming = Naming::new(&args.ros.namespace, &args.ros.node_name, &args.ros.remappings).map_err(usage)?;
+    let settings = Settings::read(args)?;
+    let grasp = args.arm.allow_motion.then(|| GraspSettings::read(args)).transpose()?;
+    let interrupt = Interrupt::watch();
+    let mut node = Node::join(NodeConfig {
+        naming,
+        domain_id: args.ros.domain_id.map_or_else(domain_of_environment, Ok).map_err(Usage)?,
+        rmw: args.ros.rmw,
+        is_loopback_only: args.ros.loopback,
+        parameters: parameters(args),
+    })?;
+    let arm = match grasp {
+        Some(grasp) => {
+            let arm = TrajectoryArm::connect(&mut node, arm_config(&args.arm), ARM_TIMEOUT).context("sdg ros2")?;
+            Some((grasp, arm))
+        }
+        None => None,
+    };
+    ros_node::run(node, settings, arm, &interrupt)?;
+    Ok(Outcome::Done)
+}
+
+fn usage(error: sdg_ros2::RosError) -> Usage {
+    Usage(error.to_string())
+}
+
+fn arm_config(args: &ArmArgs) -> ArmConfig {
+    let joint = |name: String| format!("{}{name}", args.joint_prefix);
+    ArmConfig {
+        trajectory_action: args.trajectory_action.clone(),
+        gripper_action: args.gripper_action.clone(),
+        joint_states: args.joint_states.clone(),
+        joints: std::array::from_fn(|idx| joint(format!("joint{}", idx + 1))),
+        finger_joints: (1..=2).map(|finger| joint(format!("finger_joint{finger}"))).collect(),
+        gripper_position_per_m: args.gripper_ratio,
+    }
+}
+
+/// What `ros2 param get` tells.
+fn parameters(args: &Ros2Args) -> Vec<(String, String)> {
+    let path = |path: &Option<PathBuf>| path.as_ref().map_or(String::new(), |path| path.display().to_string());
+    vec![
+        ("grasp_model".to_owned(), path(&args.grasp_model)),
+        ("camera".to_owned(), path(&args.camera)),
+        ("workcell".to_owned(), path(&args.arm.workcell)),
+        ("base_frame".to_owned(), args.base_frame.clone().unwrap_or_default()),
+        ("min_score".to_owned(), args.min_score.to_string()),
+    ]
+}

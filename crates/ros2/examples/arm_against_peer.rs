@@ -1,0 +1,60 @@
+//! The arm behind ROS 2 against an action server of others: one line for each thing that was tried.
+//!
+//! `make test-ros2` runs it beside crates/ros2/tests/peers/arm_peer.py, which plays the arm: what the peer does with the next goal
+//! follows from the motion's length.
+
+use std::time::{Duration, Instant};
+
+use sdg_kinematics::{JointLimits, Trajectory, ready_pose};
+use sdg_robot::{Arm, HandCommand, Robot, RobotError, SafetyLimits, StopReason, Watch};
+use sdg_ros2::Naming;
+use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, Rmw, TrajectoryArm};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let domain_id: u16 = arguments.next().ok_or("expected a domain")?.parse()?;
+    let rmw: Rmw = arguments.next().unwrap_or("cyclonedds".to_owned()).parse()?;
+    let naming = Naming::new("/", "arm_against_peer", &[])?;
+    let mut node = Node::join(NodeConfig { domain_id, rmw, is_loopback_only: true, ..NodeConfig::new(naming) })?;
+    let mut arm = TrajectoryArm::connect(&mut node, ArmConfig::default(), Duration::from_secs(20))?;
+    println!("connected, {}", arm.state()?.mode.name());
+
+    // The peer reaches this goal, aborts the next, refuses the third, and plays the fourth until it is cancelled.
+    println!("first: {}", told(&follow(&mut arm, 0.1, Watch::default())));
+    println!("feedback: {}", arm.num_feedback());
+    println!("second: {}", told(&follow(&mut arm, 0.2, Watch::default())));
+    println!("third: {}", told(&follow(&mut arm, 0.3, Watch::default())));
+    let begun = Instant::now();
+    let stop = move || (begun.elapsed() > Duration::from_millis(700)).then_some(StopReason::Interrupted);
+    println!("fourth: {}", told(&follow(&mut arm, 0.4, Watch::new(Box::new(stop)))));
+    for (name, command) in [
+        ("open", HandCommand::Move { opening_m: 0.08, speed_m_s: 0.1 }),
+        ("grasp", HandCommand::Grasp { width_m: 0.03, speed_m_s: 0.1, force_n: 40.0 }),
+    ] {
+        arm.start_hand(command)?;
+        let hand = arm.finish_hand(&mut Watch::default())?;
+        println!(
+            "{name}: {:.0} mm, {}",
+            hand.opening_m * 1e3,
+            if hand.is_grasping { "holds" } else { "holds nothing" }
+        );
+    }
+    // The peer now stops its joint states.
+    std::thread::sleep(Duration::from_secs(2));
+    println!("silent: {}", arm.state().map_or_else(|error| error.to_string(), |state| state.mode.name().to_owned()));
+    Ok(())
+}
+
+/// Moves the last joint so far, from where the arm is, through the limits that every motion is checked by.
+fn follow(arm: &mut TrajectoryArm, by_rad: f64, watch: Watch) -> Result<(), RobotError> {
+    let mut robot = Robot::new(arm, SafetyLimits::default(), watch);
+    let start = robot.commanded()?;
+    let mut end = ready_pose();
+    end[6] += by_rad;
+    let limits = JointLimits::franka().scaled(0.1, 0.1, 0.1)?;
+    robot.follow(Trajectory::point_to_point(&start, &end, &limits)?)
+}
+
+fn told(result: &Result<(), RobotError>) -> String {
+    result.as_ref().map_or_else(ToString::to_string, |()| "arrived".to_owned())
+}

@@ -1,0 +1,206 @@
+//! Actions, as a client: a goal, its acceptance, feedback, result, and its cancellation.
+//!
+//! The first request of a writer may be lost: a Cyclone reader that has just matched the writer asks it once a second for its state, until the
+//! writer has sent something. If RustDDS gets that question while it sends its first sample, it answers first, with a heartbeat that counts
+//! the sample, and the reader takes the sample for an old one. Later requests are not affected. So a cancellation and a question for a
+//! result are sent again where no answer comes. A goal is sent again only after the server has said that it does not know it.
+
+use std::pin::pin;
+use std::time::{Duration, Instant};
+
+use futures_util::StreamExt;
+use ros2_client::action::{GoalId, GoalStatusEnum};
+use ros2_client::action_msgs::{CancelGoalResponse, CancelGoalResponseEnum};
+
+use super::failure::network;
+use super::wait::wait_for;
+use super::wire::Wire;
+use crate::cdr::Cdr;
+use crate::error::RosError;
+use crate::messages::AfterStatus;
+
+/// An action's type, as in `control_msgs/action/FollowJointTrajectory`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ActionType {
+    /// `control_msgs`
+    pub package: &'static str,
+    /// `FollowJointTrajectory`
+    pub name: &'static str,
+}
+
+/// How a goal ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GoalEnd {
+    /// It was reached.
+    Succeeded,
+    /// It was cancelled.
+    Cancelled,
+    /// The server gave it up.
+    Aborted,
+    /// The server knows no such goal, as after it was restarted.
+    Unknown,
+}
+
+/// A question for a result is sent again after this, once.
+const ASK_AGAIN: Duration = Duration::from_secs(1);
+/// How often a cancellation is sent.
+const MAX_CANCELLATIONS: u32 = 3;
+
+/// Sends goals to an action's server, one at a time.
+pub struct ActionClient<G, R, F>
+where
+    G: Cdr + Clone + 'static,
+    R: Cdr + Clone + 'static,
+    F: Cdr + Clone + 'static,
+{
+    name: String,
+    inner: ros2_client::dds::ActionClient<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
+}
+
+/// A goal that the server took.
+#[derive(Debug, Clone, Copy)]
+pub struct Goal {
+    id: GoalId,
+    result: ros2_client::RmwRequestId,
+    /// When the question for the result is sent again.
+    ask_again: Option<Instant>,
+}
+
+impl<G, R, F> ActionClient<G, R, F>
+where
+    G: Cdr + Clone + 'static,
+    R: Cdr + Clone + 'static,
+    F: Cdr + Clone + 'static,
+{
+    pub(super) fn new(
+        name: String,
+        inner: ros2_client::dds::ActionClient<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
+    ) -> Self {
+        Self { name, inner }
+    }
+
+    /// The action's absolute name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn inner(&self) -> &ros2_client::dds::ActionClient<Wire<G>, Wire<AfterStatus<R>>, Wire<F>> {
+        &self.inner
+    }
+
+    /// Sends a goal and asks for its result; `None` where the server refuses it. What is not answered is cancelled, and sent again where the
+    /// server does not know it.
+    ///
+    /// # Errors
+    /// No answer in time, and what the network reports.
+    pub fn send(&self, goal: G, timeout: Duration) -> Result<Option<Goal>, RosError> {
+        match self.send_once(goal.clone(), timeout / 2)? {
+            Sent::Accepted(goal) => Ok(Some(goal)),
+            Sent::Refused => Ok(None),
+            Sent::Unanswered(id) => match self.ask_to_cancel(id, timeout)?.return_code {
+                CancelGoalResponseEnum::UnknownGoal => match self.send_once(goal, timeout)? {
+                    Sent::Accepted(goal) => Ok(Some(goal)),
+                    Sent::Refused => Ok(None),
+                    Sent::Unanswered(id) => {
+                        self.ask_to_cancel(id, timeout)?;
+                        Err(self.unanswered("a goal", timeout))
+                    }
+                },
+                _ => Err(self.unanswered("a goal", timeout)),
+            },
+        }
+    }
+
+    fn send_once(&self, goal: G, timeout: Duration) -> Result<Sent, RosError> {
+        let (request, id) = self.inner.send_goal(Wire(Ok(goal))).map_err(|error| network(&self.name, error))?;
+        let answer = self.inner.goal_client().async_receive_response(request);
+        let Some(answer) = wait_for(answer, Some(Instant::now() + timeout)) else { return Ok(Sent::Unanswered(id)) };
+        if !answer.map_err(|error| network(&self.name, error))?.accepted {
+            return Ok(Sent::Refused);
+        }
+        let result = self.inner.request_result(id).map_err(|error| network(&self.name, error))?;
+        Ok(Sent::Accepted(Goal { id, result, ask_again: Some(Instant::now() + ASK_AGAIN) }))
+    }
+
+    fn unanswered(&self, what: &str, timeout: Duration) -> RosError {
+        network(&self.name, format!("no answer to {what} within {:.1} s", timeout.as_secs_f64()))
+    }
+
+    /// How a goal ended, with its result; `None` where it has not ended in time.
+    ///
+    /// # Errors
+    /// [`RosError::Malformed`], and what the network reports.
+    pub fn result(&self, goal: &mut Goal, timeout: Duration) -> Result<Option<(GoalEnd, R)>, RosError> {
+        if goal.ask_again.is_some_and(|time| time <= Instant::now()) {
+            goal.ask_again = None;
+            goal.result = self.inner.request_result(goal.id).map_err(|error| network(&self.name, error))?;
+        }
+        let taken =
+            wait_for(self.inner.result_client().async_receive_response(goal.result), Some(Instant::now() + timeout));
+        let Some(taken) = taken else { return Ok(None) };
+        let response = taken.map_err(|error| network(&self.name, error))?;
+        let Wire(result) = response.result;
+        let AfterStatus(result) = result.map_err(|source| RosError::Malformed { topic: self.name.clone(), source })?;
+        let end = match response.status {
+            GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
+            GoalStatusEnum::Canceled => GoalEnd::Cancelled,
+            GoalStatusEnum::Aborted => GoalEnd::Aborted,
+            _ => GoalEnd::Unknown,
+        };
+        Ok(Some((end, result)))
+    }
+
+    /// The next feedback of a goal; `None` where none comes in time.
+    ///
+    /// # Errors
+    /// [`RosError::Malformed`], and what the network reports.
+    pub fn feedback(&self, goal: &Goal, timeout: Duration) -> Result<Option<F>, RosError> {
+        let next = async {
+            let mut stream = pin!(self.inner.feedback_stream(goal.id));
+            stream.next().await
+        };
+        let Some(Some(taken)) = wait_for(next, Some(Instant::now() + timeout)) else { return Ok(None) };
+        let Wire(feedback) = taken.map_err(|error| network(&self.name, error))?;
+        feedback.map(Some).map_err(|source| RosError::Malformed { topic: self.name.clone(), source })
+    }
+
+    /// The last status that the server told of a goal, 1 to 6 as in `action_msgs/msg/GoalStatus`; `None` where it told none.
+    ///
+    /// # Errors
+    /// What the network reports.
+    pub fn status(&self, goal: &Goal) -> Result<Option<i8>, RosError> {
+        let mut status = None;
+        while let Some(all) = self.inner.receive_status().map_err(|error| network(&self.name, error))? {
+            let of_goal = all.status_list.iter().find(|one| one.goal_info.goal_id == goal.id);
+            status = of_goal.map(|one| one.status as i8).or(status);
+        }
+        Ok(status)
+    }
+
+    /// Asks the server to give a goal up; whether it will.
+    ///
+    /// # Errors
+    /// No answer in time, and what the network reports.
+    pub fn cancel(&self, goal: &Goal, timeout: Duration) -> Result<bool, RosError> {
+        let response = self.ask_to_cancel(goal.id, timeout)?;
+        Ok(response.goals_canceling.iter().any(|info| info.goal_id == goal.id))
+    }
+
+    fn ask_to_cancel(&self, id: GoalId, timeout: Duration) -> Result<CancelGoalResponse, RosError> {
+        let zero = ros2_client::builtin_interfaces::Time::ZERO;
+        for _ in 0..MAX_CANCELLATIONS {
+            let deadline = Instant::now() + timeout / MAX_CANCELLATIONS;
+            if let Some(answer) = wait_for(self.inner.async_cancel_goal(id, zero), Some(deadline)) {
+                return answer.map_err(|error| network(&self.name, error));
+            }
+        }
+        Err(self.unanswered("a cancellation", timeout))
+    }
+}
+
+/// What became of a goal that was sent.
+enum Sent {
+    Accepted(Goal),
+    Refused,
+    Unanswered(GoalId),
+}

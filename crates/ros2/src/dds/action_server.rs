@@ -1,0 +1,148 @@
+//! Actions, as a server that has one goal at a time: a simulated arm's controllers.
+
+use ros2_client::RmwRequestId;
+use ros2_client::action::{GetResultResponse, GoalId, GoalStatusEnum, SendGoalResponse};
+use ros2_client::action_msgs::{
+    CancelGoalResponse, CancelGoalResponseEnum, GoalInfo, GoalStatus as StatusMessage, GoalStatusArray,
+};
+use ros2_client::builtin_interfaces::Time;
+
+use super::action::GoalEnd;
+use super::failure::network;
+use super::wire::Wire;
+use crate::cdr::Cdr;
+use crate::error::RosError;
+use crate::messages::AfterStatus;
+
+/// Results of ended goals that clients may still ask for.
+const MAX_ENDED: usize = 16;
+
+/// What a client asked.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Asked<G> {
+    /// A goal, which was accepted; one before it was given up.
+    Goal(G),
+    /// The goal is to be given up.
+    Cancel,
+}
+
+/// Serves an action.
+pub struct ActionServer<G, R, F>
+where
+    G: Cdr + Clone + 'static,
+    R: Cdr + Clone + Default + 'static,
+    F: Cdr + Clone + 'static,
+{
+    name: String,
+    inner: ros2_client::dds::ActionServer<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
+    running: Option<GoalId>,
+    ended: Vec<(GoalId, GoalEnd, R)>,
+    waiting: Vec<(GoalId, RmwRequestId)>,
+}
+
+impl<G, R, F> ActionServer<G, R, F>
+where
+    G: Cdr + Clone + 'static,
+    R: Cdr + Clone + Default + 'static,
+    F: Cdr + Clone + 'static,
+{
+    pub(super) fn new(
+        name: String,
+        inner: ros2_client::dds::ActionServer<Wire<G>, Wire<AfterStatus<R>>, Wire<F>>,
+    ) -> Self {
+        Self { name, inner, running: None, ended: Vec::new(), waiting: Vec::new() }
+    }
+
+    /// What was asked since the last call, without waiting; `accepts` says of a goal that is well formed whether it is taken.
+    ///
+    /// # Errors
+    /// What the network reports.
+    pub fn asked(&mut self, accepts: impl Fn(&G) -> bool) -> Result<Option<Asked<G>>, RosError> {
+        self.answer_results()?;
+        let failed = |error: ros2_client::ReadError| network(&self.name, error);
+        if let Some((request, _)) = self.inner.receive_cancel_request().map_err(failed)? {
+            let canceling: Vec<GoalInfo> =
+                self.running.iter().map(|goal| GoalInfo { goal_id: *goal, stamp: Time::ZERO }).collect();
+            let return_code = match canceling.is_empty() {
+                true => CancelGoalResponseEnum::Rejected,
+                false => CancelGoalResponseEnum::None,
+            };
+            let response = CancelGoalResponse { return_code, goals_canceling: canceling };
+            self.inner.send_cancel_response(request, response).map_err(|error| network(&self.name, error))?;
+            return Ok(self.running.map(|_| Asked::Cancel));
+        }
+        let Some((request, message)) = self.inner.receive_goal().map_err(failed)? else { return Ok(None) };
+        let Wire(goal) = message.goal;
+        let goal = goal.ok().filter(|goal| accepts(goal));
+        let response = SendGoalResponse { accepted: goal.is_some(), stamp: Time::ZERO };
+        self.inner.send_goal_response(request, response).map_err(|error| network(&self.name, error))?;
+        let Some(goal) = goal else { return Ok(None) };
+        if self.running.is_some() {
+            self.end(GoalEnd::Aborted, R::default())?;
+        }
+        self.running = Some(message.goal_id);
+        self.tell(message.goal_id, GoalStatusEnum::Executing)?;
+        Ok(Some(Asked::Goal(goal)))
+    }
+
+    /// Tells how the running goal is getting on.
+    ///
+    /// # Errors
+    /// What the network reports.
+    pub fn feedback(&self, feedback: F) -> Result<(), RosError> {
+        let Some(goal) = self.running else { return Ok(()) };
+        self.inner.send_feedback(goal, Wire(Ok(feedback))).map_err(|error| network(&self.name, error.forget_data()))
+    }
+
+    /// Ends the running goal.
+    ///
+    /// # Errors
+    /// What the network reports.
+    pub fn end(&mut self, end: GoalEnd, result: R) -> Result<(), RosError> {
+        let Some(goal) = self.running.take() else { return Ok(()) };
+        if self.ended.len() >= MAX_ENDED {
+            self.ended.remove(0);
+        }
+        self.ended.push((goal, end, result));
+        self.tell(goal, status(end))?;
+        self.answer_results()
+    }
+
+    /// Answers who asked for the result of a goal that has ended.
+    fn answer_results(&mut self) -> Result<(), RosError> {
+        while let Some((request, message)) =
+            self.inner.receive_result_request().map_err(|error| network(&self.name, error))?
+        {
+            self.waiting.push((message.goal_id, request));
+        }
+        for (goal, request) in std::mem::take(&mut self.waiting) {
+            let ended = self.ended.iter().find(|(ended, ..)| *ended == goal);
+            let (end, result) = match ended {
+                Some((_, end, result)) => (*end, result.clone()),
+                None if self.running == Some(goal) => {
+                    self.waiting.push((goal, request));
+                    continue;
+                }
+                None => (GoalEnd::Unknown, R::default()),
+            };
+            let response = GetResultResponse { status: status(end), result: Wire(Ok(AfterStatus(result))) };
+            self.inner.send_result(request, response).map_err(|error| network(&self.name, error))?;
+        }
+        Ok(())
+    }
+
+    fn tell(&self, goal: GoalId, status: GoalStatusEnum) -> Result<(), RosError> {
+        let goal_info = GoalInfo { goal_id: goal, stamp: Time::ZERO };
+        let statuses = GoalStatusArray { status_list: vec![StatusMessage { goal_info, status }] };
+        self.inner.send_goal_statuses(statuses).map_err(|error| network(&self.name, error.forget_data()))
+    }
+}
+
+fn status(end: GoalEnd) -> GoalStatusEnum {
+    match end {
+        GoalEnd::Succeeded => GoalStatusEnum::Succeeded,
+        GoalEnd::Cancelled => GoalStatusEnum::Canceled,
+        GoalEnd::Aborted => GoalStatusEnum::Aborted,
+        GoalEnd::Unknown => GoalStatusEnum::Unknown,
+    }
+}

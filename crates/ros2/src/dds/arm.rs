@@ -1,0 +1,330 @@
+//! An arm behind ROS 2: motions as FollowJointTrajectory, the hand as GripperCommand, states from joint_states.
+//!
+//! ```text
+//! CheckedMotion ─ sampled at 100 Hz ─ FollowJointTrajectory ─► ros2_control's joint_trajectory_controller
+//! Watch ◄─ ArmState ─ joint_states                 cancelled where Watch asks to stop
+//! HandCommand ─ GripperCommand ─► gripper_action_controller
+//! ```
+//! The planner knows Franka's Panda and FR3, so the arm behind it must have their geometry. Contact thresholds and loads are the
+//! driver's own. Nothing recovers the arm from here.
+
+use std::time::{Duration, Instant};
+
+use sdg_robot::{
+    Arm, ArmMode, ArmState, CheckedMotion, ContactSensitivity, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
+    MotionEnd, RobotError, StopReason, Watch,
+};
+
+use super::action::{ActionClient, ActionType, Goal, GoalEnd};
+use super::joint_states::{ArmConfig, Joints, Known, StateReader};
+use super::node::Node;
+use super::topic::Qos;
+use crate::error::RosError;
+use crate::messages::{
+    FollowJointTrajectoryFeedback, FollowJointTrajectoryGoal, FollowJointTrajectoryResult, GripperCommandFeedback,
+    GripperCommandGoal, GripperCommandResult, Header, JointTrajectory, JointTrajectoryPoint,
+};
+
+type Result<T> = sdg_robot::Result<T>;
+
+/// Time between a trajectory's points, s: the controller's splines between them are then those of the motion.
+const POINT_SECS: f64 = 0.01;
+/// Bounds the answers of the actions' servers.
+const ANSWER: Duration = Duration::from_secs(5);
+/// A motion that takes so much longer than planned has failed, s.
+const MAX_DELAY_SECS: f64 = 5.0;
+/// A hand that takes longer has failed.
+const MAX_HAND: Duration = Duration::from_secs(15);
+/// No joint states for so long: the driver is gone.
+const MAX_STATE_AGE: Duration = Duration::from_millis(500);
+/// Gaps between two states of a moving arm, s: drivers publish 20 to 1000 of them a second, and networks delay them.
+const MAX_SILENCE_SECS: f64 = 0.5;
+/// While a hand or an arm moves its states are looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(5);
+
+/// An arm behind ROS 2.
+pub struct TrajectoryArm {
+    states: StateReader,
+    motions: ActionClient<FollowJointTrajectoryGoal, FollowJointTrajectoryResult, FollowJointTrajectoryFeedback>,
+    gripper: ActionClient<GripperCommandGoal, GripperCommandResult, GripperCommandFeedback>,
+    config: ArmConfig,
+    /// Where the last motion was to end: the controller holds it, whatever is measured.
+    commanded: Option<Joints>,
+    hand: Option<(HandCommand, Goal)>,
+    is_grasping: bool,
+    num_feedback: u64,
+}
+
+impl TrajectoryArm {
+    /// Waits for the arm's topic and actions.
+    ///
+    /// # Errors
+    /// [`RobotError::Unreachable`] for what does not answer.
+    pub fn connect(node: &mut Node, config: ArmConfig, timeout: Duration) -> Result<Self> {
+        let unreachable =
+            |error: RosError| RobotError::Unreachable { peer: "the arm on ROS 2".to_owned(), why: error.to_string() };
+        let sensors = Qos { depth: 20, ..Qos::SENSORS };
+        let states = node.subscribe(&config.joint_states, sensors).map_err(unreachable)?;
+        let follow = ActionType { package: "control_msgs", name: "FollowJointTrajectory" };
+        let grip = ActionType { package: "control_msgs", name: "GripperCommand" };
+        let motions = node.action_client(&config.trajectory_action, follow).map_err(unreachable)?;
+        let gripper = node.action_client(&config.gripper_action, grip).map_err(unreachable)?;
+        node.wait_for_server(&motions, timeout).map_err(unreachable)?;
+        node.wait_for_server(&gripper, timeout).map_err(unreachable)?;
+        let states = StateReader::spawn(states, &config);
+        let arm =
+            Self { states, motions, gripper, config, commanded: None, hand: None, is_grasping: false, num_feedback: 0 };
+        let deadline = Instant::now() + timeout;
+        while arm.states.latest().is_none() {
+            if Instant::now() > deadline {
+                let joints = arm.config.joints.join(", ");
+                let why = format!("expected the joints {joints} on {}, found none of them", arm.states.topic);
+                return Err(RobotError::Unreachable { peer: "the arm on ROS 2".to_owned(), why });
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+        Ok(arm)
+    }
+
+    /// Messages of feedback that came with motions.
+    pub fn num_feedback(&self) -> u64 {
+        self.num_feedback
+    }
+
+    fn lost(&self, why: impl ToString) -> RobotError {
+        RobotError::Lost { peer: "the arm on ROS 2".to_owned(), why: why.to_string() }
+    }
+
+    fn known(&self) -> Result<Known> {
+        let known = self.states.latest().ok_or_else(|| self.lost("no joint states"))?;
+        let age = known.arrived.elapsed();
+        if age > MAX_STATE_AGE {
+            let topic = &self.states.topic;
+            return Err(self.lost(format!("no joint states on {topic} for {:.1} s", age.as_secs_f64())));
+        }
+        Ok(known)
+    }
+
+    fn arm_state(&self, mode: ArmMode) -> Result<ArmState> {
+        let known = self.known()?;
+        Ok(ArmState {
+            time_secs: known.stamp_secs,
+            q: known.q,
+            dq: known.dq,
+            q_commanded: self.commanded.unwrap_or(known.q),
+            tau_external_nm: Joints::zeros(),
+            mode,
+        })
+    }
+
+    /// Why the arm is to stop, seen by `watch`; a state that was seen already says nothing new.
+    fn observe(&self, watch: &mut Watch, seen_secs: &mut f64) -> Result<Option<StopReason>> {
+        let state = self.arm_state(ArmMode::Moving)?;
+        if state.time_secs == *seen_secs {
+            return Ok(watch.is_stop_requested());
+        }
+        *seen_secs = state.time_secs;
+        Ok(watch.observe(&state).cloned())
+    }
+
+    fn cancel(&mut self, goal: &mut Goal) -> Result<()> {
+        self.motions.cancel(goal, ANSWER).map_err(|error| self.lost(error))?;
+        self.motions.result(goal, ANSWER).map_err(|error| self.lost(error))?;
+        // Where it came to rest is where the controller holds it.
+        self.commanded = None;
+        Ok(())
+    }
+}
+
+/// The motion's positions, velocities and accelerations at regular times, its end among them.
+fn trajectory(motion: &CheckedMotion, joints: &[String]) -> JointTrajectory {
+    let duration_secs = motion.duration_secs();
+    let num_points = (duration_secs / POINT_SECS).ceil().max(1.0) as usize;
+    let point = |idx: usize| {
+        let secs = (idx as f64 * POINT_SECS).min(duration_secs);
+        let (q, dq, ddq) = motion.sample(secs);
+        JointTrajectoryPoint {
+            positions: q.as_slice().to_vec(),
+            velocities: dq.as_slice().to_vec(),
+            accelerations: ddq.as_slice().to_vec(),
+            effort: Vec::new(),
+            time_from_start: crate::messages::Duration::from_secs(secs),
+        }
+    };
+    JointTrajectory {
+        header: Header::default(),
+        joint_names: joints.to_vec(),
+        points: (1..=num_points).map(point).collect(),
+    }
+}
+
+/// What an error code of FollowJointTrajectory means.
+fn error_name(code: i32) -> &'static str {
+    match code {
+        0 => "no error code",
+        -1 => "invalid goal",
+        -2 => "invalid joints",
+        -3 => "old header timestamp",
+        -4 => "path tolerance violated",
+        -5 => "goal tolerance violated",
+        _ => "an unknown error code",
+    }
+}
+
+impl Arm for TrajectoryArm {
+    fn state(&mut self) -> Result<ArmState> {
+        self.arm_state(ArmMode::Idle)
+    }
+
+    fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        watch.allow_silence(MAX_SILENCE_SECS);
+        let goal =
+            FollowJointTrajectoryGoal { trajectory: trajectory(motion, &self.config.joints), ..Default::default() };
+        let sent = self.motions.send(goal, ANSWER).map_err(|error| self.lost(error))?;
+        let Some(mut goal) = sent else {
+            let action = self.motions.name();
+            return Err(RobotError::Device(format!("{action} refused the trajectory").into()));
+        };
+        self.commanded = None;
+        let deadline = Instant::now() + Duration::from_secs_f64(motion.duration_secs() + MAX_DELAY_SECS);
+        let mut seen_secs = f64::NAN;
+        let (end, result) = loop {
+            if let Some(ended) = self.motions.result(&mut goal, LOOK_EVERY).map_err(|error| self.lost(error))? {
+                break ended;
+            }
+            while let Ok(Some(_)) = self.motions.feedback(&goal, Duration::ZERO) {
+                self.num_feedback += 1;
+            }
+            let stop = match self.observe(watch, &mut seen_secs) {
+                Ok(None) if Instant::now() > deadline => {
+                    Some(StopReason::Watchdog(format!("the motion did not end {MAX_DELAY_SECS:.0} s after its time")))
+                }
+                Ok(stop) => stop,
+                Err(error) => {
+                    // It must not go on unseen.
+                    let _ = self.cancel(&mut goal);
+                    return Err(error);
+                }
+            };
+            if let Some(reason) = stop {
+                self.cancel(&mut goal)?;
+                return Err(RobotError::Stopped(reason));
+            }
+        };
+        let said = format!("{}: {} {}", self.motions.name(), error_name(result.error_code), result.error_string);
+        match end {
+            GoalEnd::Succeeded if result.error_code == 0 => {
+                self.commanded = Some(*motion.end());
+                Ok(MotionEnd::Arrived)
+            }
+            GoalEnd::Succeeded | GoalEnd::Aborted => Err(RobotError::Reflex(said.trim_end().to_owned())),
+            GoalEnd::Cancelled => Err(RobotError::Stopped(StopReason::Interrupted)),
+            GoalEnd::Unknown => Err(self.lost(format!("{} forgot the motion: was it restarted?", self.motions.name()))),
+        }
+    }
+
+    fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        watch.allow_silence(MAX_SILENCE_SECS);
+        let deadline = Instant::now() + Duration::from_secs_f64(duration_secs.max(0.0));
+        let mut seen_secs = f64::NAN;
+        while Instant::now() < deadline {
+            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
+                return Err(RobotError::Stopped(reason));
+            }
+            std::thread::sleep(LOOK_EVERY);
+        }
+        Ok(())
+    }
+
+    fn hand(&mut self) -> Result<HandState> {
+        let known = self.known()?;
+        let opening_m = known.opening_m.ok_or_else(|| {
+            let joints = self.config.finger_joints.join(", ");
+            RobotError::Hand(format!("expected the joints {joints} on {}, found none of them", self.states.topic))
+        })?;
+        Ok(HandState { opening_m, is_grasping: self.is_grasping, force_n: None })
+    }
+
+    fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        let per_m = self.config.gripper_position_per_m;
+        let goal = match command {
+            HandCommand::Move { opening_m, .. } => GripperCommandGoal { position: opening_m * per_m, max_effort: 0.0 },
+            HandCommand::Grasp { force_n, .. } => GripperCommandGoal { position: 0.0, max_effort: force_n },
+        };
+        let failed = |error: RosError| RobotError::Hand(error.to_string());
+        let Some(goal) = self.gripper.send(goal, ANSWER).map_err(failed)? else {
+            return Err(RobotError::Hand(format!("{} refused the command", self.gripper.name())));
+        };
+        self.is_grasping = false;
+        self.hand = Some((command, goal));
+        Ok(())
+    }
+
+    fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
+        watch.allow_silence(MAX_SILENCE_SECS);
+        let Some((command, mut goal)) = self.hand.take() else { return self.hand() };
+        let deadline = Instant::now() + MAX_HAND;
+        let mut seen_secs = f64::NAN;
+        let failed = |error: RosError| RobotError::Hand(error.to_string());
+        let (end, result) = loop {
+            if let Some(ended) = self.gripper.result(&mut goal, LOOK_EVERY).map_err(failed)? {
+                break ended;
+            }
+            if let Some(reason) = self.observe(watch, &mut seen_secs)? {
+                self.gripper.cancel(&goal, ANSWER).map_err(failed)?;
+                return Err(RobotError::Stopped(reason));
+            }
+            if Instant::now() > deadline {
+                let secs = MAX_HAND.as_secs();
+                return Err(RobotError::Hand(format!("{} did not end within {secs} s", self.gripper.name())));
+            }
+        };
+        let opening_m = result.position / self.config.gripper_position_per_m;
+        match (command, end) {
+            // Controllers abort where something resists: that is what a grasp is.
+            (HandCommand::Grasp { .. }, GoalEnd::Succeeded | GoalEnd::Aborted) => {
+                self.is_grasping = result.stalled && opening_m > MIN_HELD_WIDTH_M;
+                let known = self.known()?;
+                Ok(HandState {
+                    opening_m: known.opening_m.unwrap_or(opening_m),
+                    is_grasping: self.is_grasping,
+                    force_n: None,
+                })
+            }
+            (HandCommand::Move { .. }, GoalEnd::Succeeded) => self.hand(),
+            (HandCommand::Move { opening_m: told_m, .. }, GoalEnd::Aborted) => Err(RobotError::Hand(format!(
+                "it was to open to {:.0} mm and stands at {:.0} mm",
+                told_m * 1e3,
+                opening_m * 1e3
+            ))),
+            (_, GoalEnd::Cancelled) => Err(RobotError::Stopped(StopReason::Interrupted)),
+            (_, GoalEnd::Unknown) => Err(RobotError::Hand(format!("{} forgot the command", self.gripper.name()))),
+        }
+    }
+
+    /// The driver has thresholds of its own.
+    fn set_contact_sensitivity(&mut self, _sensitivity: ContactSensitivity) -> Result<()> {
+        Ok(())
+    }
+
+    /// The driver is told the load by other means.
+    fn set_load(&mut self, _load: Load) -> Result<()> {
+        Ok(())
+    }
+
+    /// A motion ends with the call that began it; what may still move is the hand.
+    fn stop(&mut self) -> Result<()> {
+        match self.hand.take() {
+            Some((_, goal)) => {
+                self.gripper.cancel(&goal, ANSWER).map(drop).map_err(|error| RobotError::Hand(error.to_string()))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Nothing is recovered over ROS 2: that is done where the arm's driver is.
+    fn recover(&mut self) -> Result<()> {
+        self.commanded = None;
+        self.known().map(drop)
+    }
+}

@@ -1,0 +1,213 @@
+//! A topic with pictures as a camera.
+
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use image::RgbImage;
+use sdg_camera::{Camera, CameraError, Fault, Frame};
+
+use super::node::{MAX_DOMAIN, Node, NodeConfig, Rmw};
+use super::topic::{Qos, Subscription};
+use crate::encoding;
+use crate::error::RosError;
+use crate::messages::{CompressedImage, Header, Image, Time};
+use crate::names::Naming;
+
+/// A stamp this far from now is of another clock, as a simulation's or a recording's; the time of arrival then counts.
+const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
+
+/// What follows `ros2:` in a camera's address: `TOPIC?compressed&reliable&domain=7&rmw=cyclonedds&loopback`, each option where it is wanted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TopicAddress {
+    /// The topic.
+    pub topic: String,
+    /// Whether it has CompressedImage instead of Image, as one that ends with `/compressed` has.
+    pub is_compressed: bool,
+    /// Whether lost pictures are sent again.
+    pub is_reliable: bool,
+    /// `ROS_DOMAIN_ID`, unless the option says another.
+    pub domain_id: u16,
+    /// Whether only this computer is heard.
+    pub is_loopback_only: bool,
+}
+
+impl FromStr for TopicAddress {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (topic, options) = text.split_once('?').unwrap_or((text, ""));
+        let mut address = Self {
+            topic: topic.to_owned(),
+            is_compressed: topic.ends_with("/compressed"),
+            is_reliable: false,
+            domain_id: 0,
+            is_loopback_only: false,
+        };
+        let mut has_domain = false;
+        for option in options.split('&').filter(|option| !option.is_empty()) {
+            match option.split_once('=') {
+                None if option == "compressed" => address.is_compressed = true,
+                None if option == "reliable" => address.is_reliable = true,
+                None if option == "loopback" => address.is_loopback_only = true,
+                Some(("domain", number)) => {
+                    let parsed = number.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
+                    address.domain_id =
+                        parsed.ok_or_else(|| format!("expected domain=0 to {MAX_DOMAIN}, found \"{number}\""))?;
+                    has_domain = true;
+                }
+                _ => {
+                    return Err(format!(
+                        "expected the options compressed, reliable, loopback or domain=NUMBER after ?, found \"{option}\""
+                    ));
+                }
+            }
+        }
+        if !has_domain {
+            address.domain_id = domain_of_environment()?;
+        }
+        Ok(address)
+    }
+}
+
+/// `ROS_DOMAIN_ID`, 0 where it is not set.
+///
+/// # Errors
+/// What is no domain.
+pub fn domain_of_environment() -> Result<u16, String> {
+    match std::env::var("ROS_DOMAIN_ID") {
+        Err(_) => Ok(0),
+        Ok(text) => {
+            let parsed = text.parse().ok().filter(|domain| *domain <= MAX_DOMAIN);
+            parsed.ok_or_else(|| format!("ROS_DOMAIN_ID: expected 0 to {MAX_DOMAIN}, found \"{text}\""))
+        }
+    }
+}
+
+enum Pictures {
+    Raw(Subscription<Image>),
+    Compressed(Subscription<CompressedImage>),
+}
+
+/// A topic's pictures.
+pub struct RosCamera {
+    // Kept alive: its topics end with it.
+    _node: Node,
+    pictures: Pictures,
+    name: Arc<str>,
+    stall_timeout: Duration,
+    num_frames: u64,
+    silent_secs: f64,
+}
+
+impl RosCamera {
+    /// Subscribes to a topic; `name` is the camera's address in frames and errors.
+    ///
+    /// # Errors
+    /// What is no topic, and no network.
+    pub fn open(address: &TopicAddress, name: &str, stall_timeout: Duration) -> Result<Self, RosError> {
+        // Nodes need names of their own.
+        let naming = Naming::new("", &format!("sdg_camera_{}", std::process::id()), &[])?;
+        let mut node = Node::join(NodeConfig {
+            domain_id: address.domain_id,
+            rmw: Rmw::default(),
+            is_loopback_only: address.is_loopback_only,
+            ..NodeConfig::new(naming)
+        })?;
+        let qos = Qos { is_reliable: address.is_reliable, ..Qos::SENSORS };
+        let pictures = match address.is_compressed {
+            true => Pictures::Compressed(node.subscribe(&address.topic, qos)?),
+            false => Pictures::Raw(node.subscribe(&address.topic, qos)?),
+        };
+        Ok(Self { _node: node, pictures, name: name.into(), stall_timeout, num_frames: 0, silent_secs: 0.0 })
+    }
+
+    fn fault(&self, fault: Fault) -> CameraError {
+        CameraError::Fault { camera: self.name.to_string(), fault }
+    }
+
+    /// The next picture with its header; `None` where none comes in time.
+    fn take(&self) -> Result<Option<(Header, Result<RgbImage, String>)>, RosError> {
+        let timeout = self.stall_timeout;
+        Ok(match &self.pictures {
+            Pictures::Raw(images) => images.receive(timeout)?.map(|received| {
+                let picture = encoding::read_image(&received.message).map_err(|why| why.found_in_words());
+                (received.message.header, picture)
+            }),
+            Pictures::Compressed(images) => images.receive(timeout)?.map(|received| {
+                let picture = encoding::read_compressed(&received.message).map_err(|why| why.found_in_words());
+                (received.message.header, picture)
+            }),
+        })
+    }
+
+    fn num_lost(&self) -> u64 {
+        match &self.pictures {
+            Pictures::Raw(images) => images.num_lost(),
+            Pictures::Compressed(images) => images.num_lost(),
+        }
+    }
+}
+
+impl Camera for RosCamera {
+    fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
+        match self.take() {
+            Ok(Some((header, Ok(picture)))) => {
+                self.silent_secs = 0.0;
+                let number = self.num_frames + self.num_lost();
+                self.num_frames += 1;
+                let captured = stamp_or_now(header.stamp);
+                Ok(Some(Frame { captured, ..Frame::new(picture, number, Arc::clone(&self.name)) }))
+            }
+            Ok(Some((_, Err(found)))) => {
+                self.num_frames += 1;
+                Err(self.fault(Fault::Torn { found }))
+            }
+            Ok(None) => {
+                self.silent_secs += self.stall_timeout.as_secs_f64();
+                Err(self.fault(Fault::Stale { silent_secs: self.silent_secs }))
+            }
+            Err(RosError::Malformed { source, .. }) => Err(self.fault(Fault::Torn { found: source.to_string() })),
+            Err(error) => Err(CameraError::Ended { camera: self.name.to_string(), why: error.to_string() }),
+        }
+    }
+}
+
+/// When a picture was taken; now, where the stamp is of another clock.
+pub fn stamp_or_now(stamp: Time) -> SystemTime {
+    let now = SystemTime::now();
+    let is_near = |time: &SystemTime| {
+        let apart = now.duration_since(*time).or_else(|_| time.duration_since(now));
+        apart.is_ok_and(|apart| apart < MAX_STAMP_AGE)
+    };
+    stamp.to_system().filter(is_near).unwrap_or(now)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_has_a_topic_and_options() {
+        let address: TopicAddress = "/camera/image?reliable&loopback&domain=7".parse().unwrap();
+        assert_eq!(address.topic, "/camera/image");
+        assert!(address.is_reliable && address.is_loopback_only && !address.is_compressed && address.domain_id == 7);
+        assert!("/camera/image/compressed".parse::<TopicAddress>().unwrap().is_compressed);
+        for (text, expected) in
+            [("/a?domain=233", "0 to 232"), ("/a?x", "compressed, reliable"), ("/a?domain", "found")]
+        {
+            assert!(text.parse::<TopicAddress>().unwrap_err().contains(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn stamps_of_another_clock_are_the_time_of_arrival() {
+        let now = SystemTime::now();
+        let second_ago = now - Duration::from_secs(1);
+        let read = stamp_or_now(Time::from_system(second_ago));
+        assert!(second_ago.duration_since(read).unwrap_or_default() < Duration::from_millis(1));
+        for other in [Time { sec: 5, nanosec: 0 }, Time { sec: -1, nanosec: 0 }, Time { sec: 5, nanosec: u32::MAX }] {
+            assert!(stamp_or_now(other) >= now);
+        }
+    }
+}

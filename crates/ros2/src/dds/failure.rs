@@ -1,0 +1,7 @@
+//! What the network reports, as errors of this crate.
+
+use crate::error::RosError;
+
+pub(super) fn network(what: &str, why: impl ToString) -> RosError {
+    RosError::Network { what: what.to_owned(), why: why.to_string() }
+}

@@ -1,0 +1,24 @@
+//! The network: nodes, topics, services, actions; a camera and an arm behind them.
+//!
+//! Calls block up to a time that is given; there is no runtime. Everything but [`Node`] may be moved to another thread.
+
+mod action;
+mod action_server;
+mod arm;
+mod camera;
+mod failure;
+mod joint_states;
+mod node;
+mod service;
+mod topic;
+mod wait;
+mod wire;
+
+pub use action::{ActionClient, ActionType, Goal, GoalEnd};
+pub use action_server::{ActionServer, Asked};
+pub use arm::TrajectoryArm;
+pub use camera::{RosCamera, TopicAddress, domain_of_environment, stamp_or_now};
+pub use joint_states::ArmConfig;
+pub use node::{Node, NodeConfig, Rmw};
+pub use service::{RequestId, Server, ServiceType};
+pub use topic::{Publisher, Qos, Received, Subscription};

@@ -1,0 +1,295 @@
+//! A node: a participant on the network with a name.
+
+use std::net::Ipv4Addr;
+use std::str::FromStr;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use ros2_client::action::{ActionClientQosPolicies, ActionServerQosPolicies};
+use ros2_client::dds::ServiceMapping;
+use ros2_client::dds::rustdds::DomainParticipantBuilder;
+use ros2_client::{
+    ActionTypeName, Context, MessageTypeName, Name, NodeName, NodeOptions, ParameterValue, ServiceTypeName,
+};
+
+use super::action::{ActionClient, ActionType};
+use super::action_server::ActionServer;
+use super::failure::network;
+use super::service::{Server, ServiceType};
+use super::topic::{Publisher, Qos, Subscription};
+use super::wait::wait_for;
+use crate::cdr::Cdr;
+use crate::error::RosError;
+use crate::messages::Message;
+use crate::names::Naming;
+
+/// Whose services are spoken: they differ between ROS 2's two usual middlewares, topics do not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Rmw {
+    /// `rmw_fastrtps_cpp`, ROS 2's default.
+    #[default]
+    FastRtps,
+    /// `rmw_cyclonedds_cpp`.
+    CycloneDds,
+}
+
+impl FromStr for Rmw {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "fastrtps" | "rmw_fastrtps_cpp" => Ok(Self::FastRtps),
+            "cyclonedds" | "rmw_cyclonedds_cpp" => Ok(Self::CycloneDds),
+            _ => Err(format!("expected fastrtps or cyclonedds, found \"{text}\"")),
+        }
+    }
+}
+
+impl Rmw {
+    fn mapping(self) -> ServiceMapping {
+        match self {
+            Self::FastRtps => ServiceMapping::Enhanced,
+            Self::CycloneDds => ServiceMapping::Cyclone,
+        }
+    }
+}
+
+/// The highest domain whose ports there are.
+pub(super) const MAX_DOMAIN: u16 = 232;
+/// Larger than the system's: a picture is a burst of hundreds of packets. The kernel gives what it allows.
+const SOCKET_BUFFER_BYTES: usize = 8 << 20;
+
+/// `wait_for_service` looks at what is matched when it is called and then at events, of which `ros2-client` keeps eight and drops the rest:
+/// when the endpoints of two actions are matched within a millisecond, that of the last one may be dropped. So it is called again.
+const MATCH_AGAIN: Duration = Duration::from_millis(100);
+/// Cyclone's readers ask a writer that they have just matched for its state, and leave out what it sends before the answer; see action.rs.
+const SETTLE: Duration = Duration::from_millis(200);
+
+/// A node, before it joins.
+#[derive(Debug, Clone)]
+pub struct NodeConfig {
+    /// Its name, namespace and remappings.
+    pub naming: Naming,
+    /// `ROS_DOMAIN_ID`.
+    pub domain_id: u16,
+    /// Whose services.
+    pub rmw: Rmw,
+    /// Whether only this computer is heard and spoken to.
+    pub is_loopback_only: bool,
+    /// What `ros2 param get` tells, under these names.
+    pub parameters: Vec<(String, String)>,
+}
+
+impl NodeConfig {
+    /// In domain 0 on every network, without parameters.
+    pub fn new(naming: Naming) -> Self {
+        Self { naming, domain_id: 0, rmw: Rmw::default(), is_loopback_only: false, parameters: Vec::new() }
+    }
+}
+
+/// A node on the network, until it is dropped.
+pub struct Node {
+    // Dropped first: it tells the spinner to end.
+    node: Option<ros2_client::Node>,
+    naming: Naming,
+    rmw: Rmw,
+    spinner: Option<JoinHandle<()>>,
+}
+
+impl Node {
+    /// Joins.
+    ///
+    /// # Errors
+    /// No socket, or a name that is none.
+    pub fn join(config: NodeConfig) -> Result<Self, RosError> {
+        let NodeConfig { naming, domain_id, rmw, is_loopback_only, parameters } = config;
+        if domain_id > MAX_DOMAIN {
+            return Err(network("domain id", format!("expected 0 to {MAX_DOMAIN}, found {domain_id}")));
+        }
+        let mut builder = DomainParticipantBuilder::new(domain_id).socket_receive_buffer_size(SOCKET_BUFFER_BYTES);
+        if is_loopback_only {
+            builder = builder.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let participant = builder.build().map_err(|error| network("ROS 2", error))?;
+        let context = Context::from_domain_participant(participant).map_err(|error| network("ROS 2", error))?;
+        let name = NodeName::new(naming.namespace(), naming.node()).map_err(|error| network("node", error))?;
+        // The parameter services speak Fast DDS's way of calling only: nobody else could use them.
+        let mut options = NodeOptions::new().enable_rosout(true).start_parameter_services(rmw == Rmw::FastRtps);
+        for (parameter, value) in &parameters {
+            options = options.declare_parameter(parameter, ParameterValue::String(value.clone()));
+        }
+        // The first values are checked by it too, and that of use_sim_time, which every node has.
+        let is_fixed = move |name: &str, value: &ParameterValue| match value {
+            ParameterValue::String(text) if parameters.iter().any(|(known, told)| known == name && told == text) => {
+                Ok(())
+            }
+            ParameterValue::Boolean(false) if name == "use_sim_time" => Ok(()),
+            _ => Err("it is set on the command line of sdg ros2".to_owned()),
+        };
+        options = options.parameter_validator(Box::new(is_fixed));
+        let mut node = context.new_node(name, options).map_err(|error| network("node", error))?;
+        let spinner = node.spinner().map_err(|error| network("node", error))?;
+        let spinner = std::thread::Builder::new()
+            .name("ros2 node".to_owned())
+            .spawn(move || drop(wait_for(spinner.spin(), None)))
+            .map_err(|error| network("node", error))?;
+        Ok(Self { node: Some(node), naming, rmw, spinner: Some(spinner) })
+    }
+
+    /// Names as this node has them.
+    pub fn naming(&self) -> &Naming {
+        &self.naming
+    }
+
+    /// Receives a topic's messages.
+    ///
+    /// # Errors
+    /// What is no name, and what the network reports.
+    pub fn subscribe<T: Message + 'static>(&mut self, topic: &str, qos: Qos) -> Result<Subscription<T>, RosError> {
+        let (absolute, name) = self.name(topic)?;
+        let profile = qos.profile();
+        let node = self.node()?;
+        let topic = node
+            .create_topic(&name, MessageTypeName::new(T::PACKAGE, T::NAME), &profile)
+            .map_err(|error| network(&absolute, error))?;
+        let inner = node.create_subscription(&topic, Some(profile)).map_err(|error| network(&absolute, error))?;
+        Ok(Subscription::new(absolute, inner))
+    }
+
+    /// Sends messages to a topic.
+    ///
+    /// # Errors
+    /// As [`Self::subscribe`].
+    pub fn publish<T: Message>(&mut self, topic: &str, qos: Qos) -> Result<Publisher<T>, RosError> {
+        let (absolute, name) = self.name(topic)?;
+        let profile = qos.profile();
+        let node = self.node()?;
+        let topic = node
+            .create_topic(&name, MessageTypeName::new(T::PACKAGE, T::NAME), &profile)
+            .map_err(|error| network(&absolute, error))?;
+        let inner = node.create_publisher(&topic, Some(profile)).map_err(|error| network(&absolute, error))?;
+        Ok(Publisher::new(absolute, inner))
+    }
+
+    /// Answers a service's requests.
+    ///
+    /// # Errors
+    /// As [`Self::subscribe`].
+    pub fn serve<Q: Cdr + Clone + 'static, A: Cdr + 'static>(
+        &mut self,
+        service: &str,
+        of: ServiceType,
+    ) -> Result<Server<Q, A>, RosError> {
+        let (absolute, name) = self.name(service)?;
+        let (mapping, profile) = (self.rmw.mapping(), Qos::SERVICES.profile());
+        let type_name = ServiceTypeName::new(of.package, of.name);
+        let inner = self
+            .node()?
+            .create_server(mapping, &name, &type_name, profile.clone(), profile)
+            .map_err(|error| network(&absolute, error))?;
+        Ok(Server::new(absolute, inner))
+    }
+
+    /// Uses an action: its three services and two topics.
+    ///
+    /// # Errors
+    /// As [`Self::subscribe`].
+    pub fn action_client<G, R, F>(&mut self, action: &str, of: ActionType) -> Result<ActionClient<G, R, F>, RosError>
+    where
+        G: Cdr + Clone + 'static,
+        R: Cdr + Clone + 'static,
+        F: Cdr + Clone + 'static,
+    {
+        let (absolute, name) = self.name(action)?;
+        let (mapping, qos) = (self.rmw.mapping(), Qos::SERVICES.profile());
+        let qos = ActionClientQosPolicies {
+            goal_service: qos.clone(),
+            result_service: qos.clone(),
+            cancel_service: qos.clone(),
+            feedback_subscription: qos,
+            status_subscription: Qos::STATUSES.profile(),
+        };
+        let of = ActionTypeName::new(of.package, of.name);
+        let inner =
+            self.node()?.create_action_client(mapping, &name, &of, qos).map_err(|error| network(&absolute, error))?;
+        Ok(ActionClient::new(absolute, inner))
+    }
+
+    /// Serves an action.
+    ///
+    /// # Errors
+    /// As [`Self::subscribe`].
+    pub fn action_server<G, R, F>(&mut self, action: &str, of: ActionType) -> Result<ActionServer<G, R, F>, RosError>
+    where
+        G: Cdr + Clone + 'static,
+        R: Cdr + Clone + Default + 'static,
+        F: Cdr + Clone + 'static,
+    {
+        let (absolute, name) = self.name(action)?;
+        let (mapping, qos) = (self.rmw.mapping(), Qos::SERVICES.profile());
+        let qos = ActionServerQosPolicies {
+            goal_service: qos.clone(),
+            result_service: qos.clone(),
+            cancel_service: qos.clone(),
+            feedback_publisher: qos,
+            status_publisher: Qos::STATUSES.profile(),
+        };
+        let of = ActionTypeName::new(of.package, of.name);
+        let inner =
+            self.node()?.create_action_server(mapping, &name, &of, qos).map_err(|error| network(&absolute, error))?;
+        Ok(ActionServer::new(absolute, inner))
+    }
+
+    fn name(&self, name: &str) -> Result<(String, Name), RosError> {
+        let absolute = self.naming.resolve(name)?;
+        let name = Name::parse(&absolute).map_err(|error| network(&absolute, error))?;
+        Ok((absolute, name))
+    }
+
+    fn node(&mut self) -> Result<&mut ros2_client::Node, RosError> {
+        self.node.as_mut().ok_or_else(|| network("node", "it has left"))
+    }
+
+    /// Waits until somebody serves an action.
+    ///
+    /// # Errors
+    /// Nobody in time.
+    pub fn wait_for_server<G, R, F>(&self, client: &ActionClient<G, R, F>, timeout: Duration) -> Result<(), RosError>
+    where
+        G: Cdr + Clone + 'static,
+        R: Cdr + Clone + 'static,
+        F: Cdr + Clone + 'static,
+    {
+        let Some(node) = &self.node else { return Err(network(client.name(), "the node has left")) };
+        let inner = client.inner();
+        let deadline = Instant::now() + timeout;
+        while Instant::now() < deadline {
+            let all = async {
+                inner.goal_client().wait_for_service(node).await;
+                inner.result_client().wait_for_service(node).await;
+                inner.cancel_client().wait_for_service(node).await;
+            };
+            if wait_for(all, Some(Instant::now() + MATCH_AGAIN)).is_some() {
+                std::thread::sleep(SETTLE);
+                return Ok(());
+            }
+        }
+        let secs = timeout.as_secs_f64();
+        Err(network(client.name(), format!("nobody serves this action within {secs:.0} s")))
+    }
+
+    /// How many readers a topic of this node has.
+    pub fn num_readers<T: Cdr>(&self, publisher: &Publisher<T>) -> usize {
+        self.node.as_ref().map_or(0, |node| publisher.inner().get_subscription_count(node))
+    }
+}
+
+impl Drop for Node {
+    fn drop(&mut self) {
+        self.node = None;
+        if let Some(spinner) = self.spinner.take() {
+            // A panic of it was printed by its own thread.
+            let _ = spinner.join();
+        }
+    }
+}

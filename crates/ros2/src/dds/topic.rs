@@ -1,0 +1,148 @@
+//! Messages to and from topics.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use ros2_client::Gid;
+use ros2_client::qos::{Durability, History, QosProfile, Reliability, WhenFull};
+
+use super::failure::network;
+use super::wait::wait_for;
+use super::wire::Wire;
+use crate::cdr::Cdr;
+use crate::error::RosError;
+
+/// What is asked of a topic's delivery.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Qos {
+    /// Whether what is lost is sent again.
+    pub is_reliable: bool,
+    /// Whether who comes later gets the last messages.
+    pub is_transient_local: bool,
+    /// How many messages are kept for a reader that is slow.
+    pub depth: usize,
+}
+
+impl Qos {
+    /// Of sensors: best effort, as ROS's `SensorDataQoS`.
+    pub const SENSORS: Self = Self { is_reliable: false, is_transient_local: false, depth: 5 };
+    /// Of results: reliable.
+    pub const RESULTS: Self = Self { is_reliable: true, is_transient_local: false, depth: 10 };
+    /// Of services: reliable.
+    pub const SERVICES: Self = Self::RESULTS;
+    /// Of `/tf`.
+    pub const TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: false, depth: 100 };
+    /// Of `/tf_static`: who comes later gets it.
+    pub const STATIC_TRANSFORMS: Self = Self { is_reliable: true, is_transient_local: true, depth: 100 };
+    /// Of actions' statuses.
+    pub(super) const STATUSES: Self = Self { is_reliable: true, is_transient_local: true, depth: 1 };
+
+    pub(super) fn profile(self) -> QosProfile {
+        let reliability = match self.is_reliable {
+            true => Reliability::Reliable { when_full: WhenFull::Wait(Duration::from_millis(100)) },
+            false => Reliability::BestEffort,
+        };
+        let durability = if self.is_transient_local { Durability::TransientLocal } else { Durability::Volatile };
+        QosProfile::subscription_default()
+            .reliability(reliability)
+            .durability(durability)
+            .history(History::KeepLast { depth: self.depth })
+    }
+}
+
+/// Senders whose counts are remembered.
+const MAX_SENDERS: usize = 64;
+
+/// A topic's messages.
+pub struct Subscription<T: Cdr + 'static> {
+    topic: String,
+    inner: ros2_client::Subscription<Wire<T>>,
+    last_numbers: Mutex<HashMap<Gid, i64>>,
+    num_lost: AtomicU64,
+}
+
+/// A message, and when it arrived.
+#[derive(Debug, Clone)]
+pub struct Received<T> {
+    /// The message.
+    pub message: T,
+    /// When it was taken from the network.
+    pub arrived: Instant,
+}
+
+impl<T: Cdr + 'static> Subscription<T> {
+    pub(super) fn new(topic: String, inner: ros2_client::Subscription<Wire<T>>) -> Self {
+        Self { topic, inner, last_numbers: Mutex::default(), num_lost: AtomicU64::new(0) }
+    }
+
+    /// The topic's absolute name.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    /// The next message; `None` where none comes in time.
+    ///
+    /// # Errors
+    /// [`RosError::Malformed`] for what is no message of this type; the next call goes on.
+    pub fn receive(&self, timeout: Duration) -> Result<Option<Received<T>>, RosError> {
+        let Some(taken) = wait_for(self.inner.async_take(), Some(Instant::now() + timeout)) else { return Ok(None) };
+        let arrived = Instant::now();
+        let (Wire(message), info) = taken.map_err(|error| network(&self.topic, error))?;
+        self.count(info.publisher_gid(), info.sequence_number());
+        match message {
+            Ok(message) => Ok(Some(Received { message, arrived })),
+            Err(source) => Err(RosError::Malformed { topic: self.topic.clone(), source }),
+        }
+    }
+
+    /// Messages that were sent after the first that arrived, and did not arrive.
+    pub fn num_lost(&self) -> u64 {
+        self.num_lost.load(Ordering::Relaxed)
+    }
+
+    /// Senders number their messages one by one.
+    fn count(&self, sender: Gid, number: i64) {
+        let mut last_numbers = self.last_numbers.lock().unwrap_or_else(PoisonError::into_inner);
+        if last_numbers.len() >= MAX_SENDERS && !last_numbers.contains_key(&sender) {
+            last_numbers.clear();
+        }
+        if let Some(last) = last_numbers.insert(sender, number) {
+            self.num_lost.fetch_add(
+                u64::try_from(number.saturating_sub(last).saturating_sub(1)).unwrap_or(0),
+                Ordering::Relaxed,
+            );
+        }
+    }
+}
+
+/// Sends messages to a topic.
+pub struct Publisher<T: Cdr> {
+    topic: String,
+    inner: ros2_client::Publisher<Wire<T>>,
+}
+
+impl<T: Cdr> Publisher<T> {
+    pub(super) fn new(topic: String, inner: ros2_client::Publisher<Wire<T>>) -> Self {
+        Self { topic, inner }
+    }
+
+    /// The topic's absolute name.
+    pub fn topic(&self) -> &str {
+        &self.topic
+    }
+
+    pub(super) fn inner(&self) -> &ros2_client::Publisher<Wire<T>> {
+        &self.inner
+    }
+
+    /// Sends a message.
+    ///
+    /// # Errors
+    /// A reader that is reliable and takes nothing.
+    pub fn send(&self, message: T) -> Result<(), RosError> {
+        self.inner.publish(Wire(Ok(message))).map_err(|error| network(&self.topic, error.forget_data()))
+    }
+}

@@ -1,0 +1,174 @@
+//! geometry_msgs.
+
+use nalgebra::{Isometry3, Quaternion as Quat, Translation3, UnitQuaternion};
+
+use super::{Header, message, structure};
+
+structure! {
+    /// `geometry_msgs/msg/Point`, m.
+    Point {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/Vector3`.
+    Vector3 {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/Quaternion`; all zeros as it is created, which is no rotation.
+    Quaternion {
+        /// x.
+        x: f64,
+        /// y.
+        y: f64,
+        /// z.
+        z: f64,
+        /// w.
+        w: f64,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/Pose`.
+    Pose {
+        /// Where.
+        position: Point,
+        /// Turned how.
+        orientation: Quaternion,
+    }
+}
+
+message! { "geometry_msgs",
+    /// `geometry_msgs/msg/PoseStamped`.
+    PoseStamped {
+        /// When, and in which frame.
+        header: Header,
+        /// The pose.
+        pose: Pose,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/PoseWithCovariance`.
+    PoseWithCovariance {
+        /// The pose.
+        pose: Pose,
+        /// Row by row: x, y, z, and rotations about them; zeros where nothing is known.
+        covariance: Covariance,
+    }
+}
+
+/// A matrix of 6 × 6, row by row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Covariance(pub [f64; 36]);
+
+impl Default for Covariance {
+    fn default() -> Self {
+        Self([0.0; 36])
+    }
+}
+
+impl crate::cdr::Cdr for Covariance {
+    const MIN_BYTES: usize = 36 * 8;
+
+    fn write(&self, to: &mut crate::cdr::Writer) {
+        self.0.iter().for_each(|value| value.write(to));
+    }
+
+    fn read(from: &mut crate::cdr::Reader<'_>) -> Result<Self, crate::cdr::CdrError> {
+        let mut values = [0.0; 36];
+        for value in &mut values {
+            *value = f64::read(from)?;
+        }
+        Ok(Self(values))
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/Transform`.
+    Transform {
+        /// Along.
+        translation: Vector3,
+        /// And turned.
+        rotation: Quaternion,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/TransformStamped`: the pose of the child's frame in the header's.
+    TransformStamped {
+        /// When, and the parent's frame.
+        header: Header,
+        /// The child's frame.
+        child_frame_id: String,
+        /// parent_from_child.
+        transform: Transform,
+    }
+}
+
+structure! {
+    /// `geometry_msgs/msg/Twist`.
+    Twist {
+        /// m/s.
+        linear: Vector3,
+        /// rad/s.
+        angular: Vector3,
+    }
+}
+
+/// A quaternion this far from length 1 is no rotation.
+const MAX_LENGTH_ERROR: f64 = 1e-2;
+
+impl Quaternion {
+    /// The rotation; `None` for what is none.
+    pub fn rotation(&self) -> Option<UnitQuaternion<f64>> {
+        let quaternion = Quat::new(self.w, self.x, self.y, self.z);
+        ((quaternion.norm() - 1.0).abs() < MAX_LENGTH_ERROR).then(|| UnitQuaternion::from_quaternion(quaternion))
+    }
+}
+
+impl From<UnitQuaternion<f64>> for Quaternion {
+    fn from(rotation: UnitQuaternion<f64>) -> Self {
+        Self { x: rotation.i, y: rotation.j, z: rotation.k, w: rotation.w }
+    }
+}
+
+impl Transform {
+    /// As an isometry; `None` where a number is none or the rotation is none.
+    pub fn isometry(&self) -> Option<Isometry3<f64>> {
+        let Vector3 { x, y, z } = self.translation;
+        let rotation = self.rotation.rotation()?;
+        [x, y, z]
+            .iter()
+            .all(|value| value.is_finite())
+            .then(|| Isometry3::from_parts(Translation3::new(x, y, z), rotation))
+    }
+}
+
+impl From<Isometry3<f64>> for Transform {
+    fn from(isometry: Isometry3<f64>) -> Self {
+        let vector = isometry.translation.vector;
+        Self { translation: Vector3 { x: vector.x, y: vector.y, z: vector.z }, rotation: isometry.rotation.into() }
+    }
+}
+
+impl From<Isometry3<f64>> for Pose {
+    fn from(isometry: Isometry3<f64>) -> Self {
+        let vector = isometry.translation.vector;
+        Self { position: Point { x: vector.x, y: vector.y, z: vector.z }, orientation: isometry.rotation.into() }
+    }
+}

@@ -1,0 +1,248 @@
+//! tf: where frames are in others, over the last seconds.
+//!
+//! ```text
+//! /tf, /tf_static ─ TfMessage ─ Transforms: of each frame its parent, and when it was where in it ─ target_from_source at a time
+//! ```
+
+use std::collections::{HashMap, VecDeque};
+
+use nalgebra::Isometry3;
+
+use crate::error::RosError;
+use crate::messages::{TfMessage, Time};
+
+/// How far back a frame's motion is kept, s.
+const HISTORY_SECS: f64 = 10.0;
+/// And how many of its poses: 10 s at 400 Hz.
+const MAX_POSES: usize = 4000;
+/// More frames than any cell has: what comes from the network is bounded.
+const MAX_FRAMES: usize = 2000;
+/// Longer chains have a loop.
+const MAX_DEPTH: usize = 100;
+
+/// Where frames are.
+#[derive(Debug, Clone)]
+pub struct Transforms {
+    frames: HashMap<String, Placed>,
+    max_age_secs: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Placed {
+    parent: String,
+    motion: Motion,
+}
+
+#[derive(Debug, Clone)]
+enum Motion {
+    Static(Isometry3<f64>),
+    /// Seconds and parent_from_child, the oldest first.
+    Moving(VecDeque<(f64, Isometry3<f64>)>),
+}
+
+impl Transforms {
+    /// Nothing is known yet. A moving frame's last pose serves for so many seconds before and after it was sent.
+    pub fn new(max_age_secs: f64) -> Self {
+        Self { frames: HashMap::new(), max_age_secs }
+    }
+
+    /// Adds what a message says; how many of its transforms were of no use.
+    pub fn add(&mut self, message: &TfMessage, is_static: bool) -> usize {
+        message.transforms.iter().filter(|transform| !self.add_one(transform, is_static)).count()
+    }
+
+    fn add_one(&mut self, transform: &crate::messages::TransformStamped, is_static: bool) -> bool {
+        // tf 1 wrote a slash before names.
+        let name = |text: &str| text.strip_prefix('/').unwrap_or(text).to_owned();
+        let (parent, child) = (name(&transform.header.frame_id), name(&transform.child_frame_id));
+        let Some(parent_from_child) = transform.transform.isometry() else { return false };
+        let is_full = self.frames.len() >= MAX_FRAMES && !self.frames.contains_key(&child);
+        if parent.is_empty() || child.is_empty() || parent == child || is_full {
+            return false;
+        }
+        if is_static {
+            self.frames.insert(child, Placed { parent, motion: Motion::Static(parent_from_child) });
+            return true;
+        }
+        let secs = transform.header.stamp.secs();
+        let placed = self
+            .frames
+            .entry(child)
+            .or_insert_with(|| Placed { parent: parent.clone(), motion: Motion::Moving(VecDeque::new()) });
+        if placed.parent != parent || matches!(placed.motion, Motion::Static(_)) {
+            *placed = Placed { parent, motion: Motion::Moving(VecDeque::new()) };
+        }
+        if let Motion::Moving(poses) = &mut placed.motion {
+            // A clock that was set back begins again.
+            if poses.back().is_some_and(|(newest, _)| secs < newest - HISTORY_SECS) {
+                poses.clear();
+            }
+            let at = poses.partition_point(|(known, _)| *known < secs);
+            poses.insert(at, (secs, parent_from_child));
+            let newest = poses.back().map_or(secs, |(newest, _)| *newest);
+            while poses.len() > MAX_POSES || poses.front().is_some_and(|(oldest, _)| *oldest < newest - HISTORY_SECS) {
+                poses.pop_front();
+            }
+        }
+        true
+    }
+
+    /// The pose of a frame in another at a time.
+    ///
+    /// # Errors
+    /// Frames that nothing connects, and a pose that is too old or too new for the time.
+    pub fn lookup(&self, target: &str, source: &str, time: Time) -> Result<Isometry3<f64>, RosError> {
+        let refused =
+            |why: String| RosError::Transform { target_frame: target.into(), source_frame: source.into(), why };
+        let of_target = self.ancestors(target);
+        let of_source = self.ancestors(source);
+        let common = of_source.iter().find(|frame| of_target.contains(frame));
+        let Some(common) = common else {
+            let is_known = |frame: &str| {
+                self.frames.contains_key(frame) || self.frames.values().any(|placed| placed.parent == frame)
+            };
+            let unknown = [source, target].into_iter().find(|frame| !is_known(frame));
+            return Err(refused(match unknown {
+                Some(frame) => format!("nothing was heard of \"{frame}\" on /tf and /tf_static"),
+                None => "nothing connects them".to_owned(),
+            }));
+        };
+        let common_from = |frames: &[String]| {
+            let below = frames.iter().take_while(|frame| *frame != common);
+            below.map(|frame| self.in_parent(frame, time.secs())).try_fold(Isometry3::identity(), |inner, outer| {
+                outer.map(|parent_from_child| parent_from_child * inner)
+            })
+        };
+        let common_from_source = common_from(&of_source).map_err(refused)?;
+        let common_from_target = common_from(&of_target).map_err(refused)?;
+        Ok(common_from_target.inverse() * common_from_source)
+    }
+
+    /// A frame and all above it.
+    fn ancestors(&self, frame: &str) -> Vec<String> {
+        let mut frames = vec![frame.to_owned()];
+        while let Some(placed) = frames.last().and_then(|frame| self.frames.get(frame))
+            && frames.len() < MAX_DEPTH
+        {
+            frames.push(placed.parent.clone());
+        }
+        frames
+    }
+
+    fn in_parent(&self, frame: &str, secs: f64) -> Result<Isometry3<f64>, String> {
+        let Some(placed) = self.frames.get(frame) else { return Err(format!("\"{frame}\" has no parent")) };
+        let poses = match &placed.motion {
+            Motion::Static(pose) => return Ok(*pose),
+            Motion::Moving(poses) => poses,
+        };
+        let after = poses.partition_point(|(known, _)| *known < secs);
+        let stale = |known: f64| {
+            let (apart, side) = if known < secs { (secs - known, "before") } else { (known - secs, "after") };
+            let limit = self.max_age_secs;
+            (apart > limit).then(|| {
+                format!("stale: \"{frame}\" was last heard of {apart:.2} s {side} the picture, at most {limit:.2} s are allowed")
+            })
+        };
+        match (after.checked_sub(1).and_then(|before| poses.get(before)), poses.get(after)) {
+            (Some((from, pose)), Some((to, next))) => {
+                let share = (secs - from) / (to - from);
+                let between = pose.try_lerp_slerp(next, share, 1e-9);
+                Ok(between.unwrap_or(if share < 0.5 { *pose } else { *next }))
+            }
+            (Some((known, pose)), None) | (None, Some((known, pose))) => stale(*known).map_or(Ok(*pose), Err),
+            (None, None) => Err(format!("nothing is known of \"{frame}\"")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::{Header, TransformStamped};
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+
+    fn transform(parent: &str, child: &str, secs: f64, pose: Isometry3<f64>) -> TfMessage {
+        let stamp = Time { sec: secs as i32, nanosec: (secs.fract() * 1e9).round() as u32 };
+        let header = Header { stamp, frame_id: parent.to_owned() };
+        TfMessage {
+            transforms: vec![TransformStamped { header, child_frame_id: child.to_owned(), transform: pose.into() }],
+        }
+    }
+
+    fn along(x: f64, yaw: f64) -> Isometry3<f64> {
+        Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), UnitQuaternion::from_euler_angles(0.0, 0.0, yaw))
+    }
+
+    fn at(secs: f64) -> Time {
+        Time { sec: secs as i32, nanosec: (secs.fract() * 1e9).round() as u32 }
+    }
+
+    fn known() -> Transforms {
+        let mut transforms = Transforms::new(0.5);
+        transforms.add(&transform("base", "hand", 10.0, along(1.0, 0.0)), false);
+        transforms.add(&transform("base", "hand", 11.0, along(3.0, 1.0)), false);
+        transforms.add(&transform("hand", "camera", 0.0, along(0.1, 0.0)), true);
+        transforms.add(&transform("base", "table", 0.0, along(-1.0, 0.0)), true);
+        transforms
+    }
+
+    #[test]
+    fn chains_are_followed_up_and_down_and_motions_interpolated() {
+        let transforms = known();
+        let halfway = transforms.lookup("base", "hand", at(10.5)).unwrap();
+        assert!((halfway.translation.x - 2.0).abs() < 1e-6 && (halfway.rotation.angle() - 0.5).abs() < 1e-6);
+        let camera = transforms.lookup("base", "camera", at(10.0)).unwrap();
+        assert!((camera.translation.vector - Vector3::new(1.1, 0.0, 0.0)).norm() < 1e-9);
+        let from_table = transforms.lookup("table", "camera", at(10.0)).unwrap();
+        assert!((from_table.translation.x - 2.1).abs() < 1e-9);
+        let back = transforms.lookup("camera", "table", at(10.0)).unwrap();
+        assert!((back * from_table).translation.vector.norm() < 1e-9);
+        assert_eq!(transforms.lookup("hand", "hand", at(10.0)).unwrap(), Isometry3::identity());
+    }
+
+    #[test]
+    fn old_poses_and_unknown_frames_are_refused() {
+        let transforms = known();
+        assert!(transforms.lookup("base", "camera", at(11.4)).is_ok());
+        let error = transforms.lookup("base", "camera", at(12.0)).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "no transform from \"camera\" to \"base\": stale: \"hand\" was last heard of 1.00 s before the picture, at most \
+             0.50 s are allowed"
+        );
+        assert!(transforms.lookup("base", "camera", at(9.0)).unwrap_err().to_string().contains("after the picture"));
+        let error = transforms.lookup("base", "lidar", at(10.0)).unwrap_err().to_string();
+        assert!(error.contains("nothing was heard of \"lidar\""), "{error}");
+        let mut apart = known();
+        apart.add(&transform("map", "odom", 0.0, along(0.0, 0.0)), true);
+        assert!(apart.lookup("odom", "hand", at(10.0)).unwrap_err().to_string().contains("nothing connects them"));
+    }
+
+    #[test]
+    fn what_is_no_transform_is_counted_and_left_out() {
+        let mut transforms = known();
+        let mut bad = transform("base", "hand", 12.0, along(f64::NAN, 0.0));
+        assert_eq!(transforms.add(&bad, false), 1);
+        bad.transforms[0].transform = Default::default();
+        assert_eq!(transforms.add(&bad, false), 1, "a quaternion of zeros");
+        assert_eq!(transforms.add(&transform("a", "a", 0.0, along(0.0, 0.0)), true), 1);
+        // A loop ends.
+        transforms.add(&transform("hand", "base", 10.0, along(0.0, 0.0)), false);
+        assert!(transforms.lookup("base", "lidar", at(10.0)).is_err());
+        for frame in 0..3000 {
+            transforms.add(&transform("base", &format!("f{frame}"), 0.0, along(0.0, 0.0)), true);
+        }
+        assert!(transforms.frames.len() <= MAX_FRAMES);
+    }
+
+    #[test]
+    fn ten_seconds_are_kept() {
+        let mut transforms = Transforms::new(0.5);
+        for tick in 0..3000 {
+            transforms.add(&transform("base", "hand", f64::from(tick) * 0.01, along(0.0, 0.0)), false);
+        }
+        let Motion::Moving(poses) = &transforms.frames["hand"].motion else { panic!() };
+        assert!((1000..=1002).contains(&poses.len()), "{}", poses.len());
+        assert!(transforms.lookup("base", "hand", at(12.0)).unwrap_err().to_string().contains("stale"));
+    }
+}

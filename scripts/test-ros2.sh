@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# ROS 2 of others against ours on loopback: Cyclone DDS (PyPI) and Fast DDS (Debian), with rosbags' bytes.
+# `make test-ros2` runs this; everything is installed below target/ros2. TESTS="pictures latency" runs some only.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+target=${CARGO_TARGET_DIR:-target}
+peers=$target/ros2
+mkdir -p "$peers"
+scripts/install.sh libfastrtps-dev g++
+[ -x "$peers/venv/bin/python" ] || python3 -m venv "$peers/venv"
+"$peers/venv/bin/pip" install --quiet --disable-pip-version-check cyclonedds==11.0.1 rosbags==0.11.9 pillow
+source=crates/ros2/tests/peers
+if [ ! -x "$peers/fast_peer" ] || [ "$source/fast_peer.cpp" -nt "$peers/fast_peer" ]; then
+    g++ -O1 -std=c++17 "$source/fast_peer.cpp" -o "$peers/fast_peer" -lfastrtps -lfastcdr
+fi
+
+# The whole workspace with the feature: burn is compiled once more, since some crates below it have other features with it.
+cargo=${CARGO:-cargo}
+$cargo build --release --locked --workspace --bins --features sdg-cli/ros2 --example cdr_round_trip --example arm_against_peer --example ros2_cell --example try_views
+examples=$target/release/examples
+
+failed=0
+fail() {
+    echo "FAIL $1"
+    failed=1
+}
+
+python=$peers/venv/bin/python
+tests=${TESTS:-bytes arm pictures services faults latency memory fast}
+for name in $tests; do
+    case $name in
+    bytes)
+        echo "== bytes of rosbags"
+        "$python" $source/message_bytes.py "$examples/cdr_round_trip" || fail bytes
+        ;;
+    arm)
+        echo "== an arm behind actions, over Cyclone DDS"
+        "$python" $source/arm_peer.py "$examples/arm_against_peer" || fail arm
+        ;;
+    fast)
+        echo "== Fast DDS"
+        "$python" $source/fast_tests.py "$target/release/sdg" "$peers/models" "$peers/fast_peer" || fail "Fast DDS"
+        ;;
+    *) "$python" $source/node_tests.py "$target/release/sdg" "$peers/models" "$name" || fail "$name" ;;
+    esac
+done
+
+[ "$failed" = 0 ] && echo "all peers agree"
+exit "$failed"
