@@ -37,7 +37,8 @@ fn the_pendulum_is_taught_found_and_grasped() {
     assert!(alarms_alone <= 5, "network alone: {alarms_alone} false alarms on 50 pictures without the part");
 
     let right = tried(true, 100, Verification::ByShape).iter().filter(|trial| trial.is_right()).count();
-    let false_alarms = tried(false, 50, Verification::ByShape).iter().filter(|trial| Trial::is_false_alarm(trial)).count();
+    let false_alarms =
+        tried(false, 50, Verification::ByShape).iter().filter(|trial| Trial::is_false_alarm(trial)).count();
     println!("right on {right} of 100 pictures, {false_alarms} false alarms on 50 without the part");
     assert!(right >= 95, "right on {right} of 100 unseen pictures");
     assert_eq!(false_alarms, 0, "false alarms on 50 pictures without the part");

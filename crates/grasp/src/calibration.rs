@@ -39,7 +39,7 @@ const WRONG_PER_RIGHT_DEVIATION: f64 = 1.2836;
 const SLOPE_BOUNDS: (f64, f64) = (0.5, 4.0);
 
 /// The log-odds of a raw score.
-fn log_odds(raw: f64) -> f64 {
+pub(crate) fn log_odds(raw: f64) -> f64 {
     let probability = raw.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
     (probability / (1.0 - probability)).ln()
 }

@@ -11,39 +11,48 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, log_odds};
+
+/// A score this far below the threshold, in log-odds, does not speak against the part: by so much pictures score lower than
+/// held-back samples (the housing's right places 3.7 in the median, and 5.5; docs/decisions/013-base-weights.md).
+const PICTURES_SCORE_LOWER_BY: f64 = 2.0;
 
 /// How often the network was silent, unsure and sure, on the part and on other things.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct NetworkEvidence {
     on_part: [u32; 3],
     elsewhere: [u32; 3],
-}
-
-/// The network's output at a place: nothing, something below its threshold, or something above it.
-fn class(score: f64, calibration: &Calibration) -> usize {
-    match score {
-        0.0 => 0,
-        score if score < calibration.threshold => 1,
-        _ => 2,
-    }
+    /// How far below the threshold the network counts as sure, in log-odds; 0 in files of earlier versions.
+    #[serde(default)]
+    margin: f64,
 }
 
 impl NetworkEvidence {
     /// From the network's scores on the part and on other things, 0 where it proposes nothing.
     #[cfg(any(feature = "teach", test))]
     pub(crate) fn new(on_part: &[f64], elsewhere: &[f64], calibration: &Calibration) -> Self {
-        let count = |scores: &[f64]| {
-            let mut counts = [0; 3];
-            scores.iter().for_each(|&score| counts[class(score, calibration)] += 1);
-            counts
-        };
-        Self { on_part: count(on_part), elsewhere: count(elsewhere) }
+        let mut evidence = Self { margin: PICTURES_SCORE_LOWER_BY, ..Self::default() };
+        for &score in on_part {
+            evidence.on_part[evidence.class(score, calibration)] += 1;
+        }
+        for &score in elsewhere {
+            evidence.elsewhere[evidence.class(score, calibration)] += 1;
+        }
+        evidence
+    }
+
+    /// The network's output at a place: nothing, something, or something not far below its threshold at least.
+    fn class(&self, score: f64, calibration: &Calibration) -> usize {
+        match score {
+            0.0 => 0,
+            score if log_odds(score) < log_odds(calibration.threshold) - self.margin => 1,
+            _ => 2,
+        }
     }
 
     /// ln of how much likelier such a score is on the part than elsewhere. Every class counts as seen once more than it was.
     pub(crate) fn log_likelihood_ratio(&self, score: f64, calibration: &Calibration) -> f64 {
-        let class = class(score, calibration);
+        let class = self.class(score, calibration);
         let share = |counts: &[u32; 3]| f64::from(counts[class] + 1) / f64::from(counts.iter().sum::<u32>() + 3);
         (share(&self.on_part) / share(&self.elsewhere)).ln()
     }
@@ -60,9 +69,11 @@ mod tests {
         let good = NetworkEvidence::new(&[0.9; 30], &[0.0; 30], &CALIBRATION);
         assert!((good.log_likelihood_ratio(0.95, &CALIBRATION) - 31f64.ln()).abs() < 1e-12);
         assert!((good.log_likelihood_ratio(0.0, &CALIBRATION) + 31f64.ln()).abs() < 1e-12);
-        assert_eq!(good.log_likelihood_ratio(0.5, &CALIBRATION), 0.0);
-        let poor = NetworkEvidence::new(&[0.9, 0.5, 0.0], &[0.9, 0.5, 0.0], &CALIBRATION);
-        for score in [0.0, 0.5, 0.9] {
+        // Half a log-odds more than the margin below the threshold, and less.
+        assert_eq!(good.log_likelihood_ratio(0.25, &CALIBRATION), 0.0);
+        assert!(good.log_likelihood_ratio(0.4, &CALIBRATION) > 3.0);
+        let poor = NetworkEvidence::new(&[0.9, 0.25, 0.0], &[0.9, 0.25, 0.0], &CALIBRATION);
+        for score in [0.0, 0.25, 0.9] {
             assert_eq!(poor.log_likelihood_ratio(score, &CALIBRATION), 0.0);
             assert_eq!(NetworkEvidence::default().log_likelihood_ratio(score, &CALIBRATION), 0.0);
         }

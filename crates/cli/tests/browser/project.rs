@@ -85,7 +85,8 @@ fn several_found_ones_have_numbers() {
     page.settle_frames();
     let found = page.text("#found");
     assert!(found.contains("1: Found the part") && found.contains("2: Found the part"), "{found}");
-    let tags = "return [...document.querySelectorAll('#overlay .tag')].map((tag) => tag.textContent.slice(0, 2)).sort()";
+    let tags =
+        "return [...document.querySelectorAll('#overlay .tag')].map((tag) => tag.textContent.slice(0, 2)).sort()";
     assert_eq!(page.browser.run(tags, &[]).unwrap(), json!(["1:", "2:"]));
     page.screenshot("project-11-two");
     page.assert_accessible("two found");

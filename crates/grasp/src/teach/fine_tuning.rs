@@ -34,7 +34,7 @@ impl FineTuning {
                     hit_rate: 0.8,
                     median_error_px: 3.0,
                     median_error_degrees: 2.0,
-                    false_alarm_rate: 0.1,
+                    false_alarm_rate: 0.2,
                     cool_down: 15,
                 }),
                 ..TrainingConfig::edge(seed)
