@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-slurm slurm-image network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -52,6 +52,12 @@ test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB
 
 test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated Panda, our client drives franka-sim
 	@scripts/test-peers.sh
+
+test-slurm: build ## An evaluation as Slurm's job arrays beside the serial one: a node dies, the controller is restarted, a unit fails (root)
+	@scripts/test-slurm.sh
+
+slurm-image: build ## An OCI image of sdg by mmdebstrap and umoci, run without network where namespaces are allowed (root)
+	@scripts/slurm/image.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)

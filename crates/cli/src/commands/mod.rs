@@ -17,4 +17,5 @@ pub mod robot;
 #[cfg(feature = "simulation")]
 pub mod simulate;
 pub mod teach;
+pub mod teach_folder;
 pub mod weights;
