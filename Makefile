@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -55,6 +55,12 @@ test-peers: setup ## Tests the robot's protocol: libfranka drives our simulated 
 
 test-ros2: setup ## Tests ROS 2 against Cyclone DDS and Fast DDS on loopback (burn is compiled once more; TESTS=latency: one of them)
 	@scripts/test-ros2.sh
+
+test-slurm: build ## An evaluation as Slurm's job arrays beside the serial one: a node dies, the controller is restarted, a unit fails (root)
+	@scripts/test-slurm.sh
+
+slurm-image: build ## An OCI image of sdg by mmdebstrap and umoci, run without network where namespaces are allowed (root)
+	@scripts/slurm/image.sh
 
 # burn is compiled once more, with the device's backend; the tests are those that compare devices with flex.
 DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p sdg-cli --features sdg-cli/$(1)

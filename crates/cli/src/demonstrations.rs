@@ -16,10 +16,18 @@ pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
 
 fn read(argument: &str) -> Result<Demonstration> {
     let (image_path, annotation_path) = photo_and_marks(argument)?;
-    let image = files::read_image(&image_path)?;
+    read_pair(&image_path, &annotation_path)
+}
+
+/// Reads a photo and the marks on it.
+///
+/// # Errors
+/// Files that cannot be read; other than one marked object.
+pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
+    let image = files::read_image(image_path)?;
     let file_name = image_path.file_name().and_then(|name| name.to_str());
     let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
-    let mut objects = AnnotationFile::read(&annotation_path)?.objects(&facts)?;
+    let mut objects = AnnotationFile::read(annotation_path)?.objects(&facts)?;
     if objects.len() != 1 {
         let labels: Vec<&str> = objects.iter().map(|object| object.label.as_str()).collect();
         bail!(

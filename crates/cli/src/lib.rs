@@ -40,6 +40,7 @@ mod interrupt;
 pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;
+mod many_parts;
 #[cfg(feature = "simulation")]
 mod own_part;
 #[cfg(feature = "annotate")]
@@ -98,7 +99,10 @@ pub fn run(args: &Args) -> ExitCode {
                 .to_owned(),
         )
         .into()),
-        Command::Teach(teach) => commands::teach::run(teach),
+        Command::Teach(teach) => match &teach.demos {
+            Some(folder) => commands::teach_folder::run(teach, folder),
+            None => commands::teach::run(teach),
+        },
         Command::Detect(detect) => commands::detect::run(detect),
         #[cfg(feature = "simulation")]
         Command::Rehearse(rehearse) => commands::rehearse::run(rehearse),

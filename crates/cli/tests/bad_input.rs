@@ -155,6 +155,7 @@ fn results_of_other_settings_are_not_mixed() {
         attempts: 10,
         views: 25,
         scenes: 25,
+        program: None,
     };
     drop(Store::open(folder.path(), &settings).unwrap());
     let out = folder.path().to_str().unwrap();

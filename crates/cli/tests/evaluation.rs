@@ -28,6 +28,7 @@ fn settings() -> Settings {
         attempts: 2,
         views: 2,
         scenes: 2,
+        program: None,
     }
 }
 

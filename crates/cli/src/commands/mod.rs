@@ -19,4 +19,5 @@ pub mod ros2;
 #[cfg(feature = "simulation")]
 pub mod simulate;
 pub mod teach;
+pub mod teach_folder;
 pub mod weights;

@@ -39,8 +39,16 @@ pub struct TeachArgs {
     pub model: String,
     /// A photo, and after a colon its annotation (COCO, LabelMe, YOLO-pose, OpenDR's boxes_*.npy) unless it stands beside the
     /// photo: .json, .txt, or in a YOLO dataset's folder of labels; repeat for several views
-    #[arg(long = "demo", required = true, value_name = "IMAGE[:ANNOTATION]")]
+    #[arg(long = "demo", required_unless_present = "demos", value_name = "IMAGE[:ANNOTATION]")]
     pub demonstrations: Vec<String>,
+    /// Instead, many parts: a folder of photos with marks beside them, each of a part, and of folders with several photos of
+    /// a part; --out is then a folder for models and a page that says which look alike and which need another photo. What is
+    /// there already is not taught again. Lines "NAME 4" or "NAME full" of symmetries.txt in it are a part's --symmetry
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["demonstrations", "negatives", "camera"])]
+    pub demos: Option<PathBuf>,
+    /// Of --demos this part alone, without the page, so that machines can share the parts; repeat for several
+    #[arg(long = "part", value_name = "NAME", requires = "demos", conflicts_with = "demonstrations")]
+    pub parts: Vec<String>,
     /// A picture without the part, above all one in which a model found it: used in teaching, and the score is set so that nothing
     /// is accepted there, as far as nine in ten parts stay accepted; repeat for several
     #[arg(long = "negative", value_name = "IMAGE")]
@@ -91,7 +99,7 @@ pub struct TeachArgs {
 }
 
 /// Equal turns in a whole one, or that no turn can be seen.
-fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
+pub(super) fn symmetry(text: &str) -> Result<RotationalSymmetry, String> {
     match (text, text.parse::<u32>()) {
         ("full", _) => Ok(RotationalSymmetry::Full),
         (_, Ok(1)) => Ok(RotationalSymmetry::None),
@@ -106,8 +114,8 @@ const SHIPPED_FILE: &str = "crates/grasp/weights/edge.safetensors";
 /// What `--base-weights` says for a start from nothing.
 const NO_BASE_WEIGHTS: &str = "none";
 
-/// Checks everything that can be wrong before it starts to take minutes.
-pub fn run(args: &TeachArgs) -> Result<Outcome> {
+/// How to teach, but for what is taught from and the weights to start from.
+pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     let mut options = TeachOptions::new(args.seed);
     options.kind = parse("--model", &args.model)?;
     options.preset = parse("--preset", &args.preset)?;
@@ -116,6 +124,12 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     options.time_budget = args.time_budget.map(Duration::from_secs_f64);
     options.steps = args.steps.map(|steps| steps as usize);
     options.device = devices::open(&args.compute)?;
+    Ok(options)
+}
+
+/// Checks everything that can be wrong before it starts to take minutes.
+pub fn run(args: &TeachArgs) -> Result<Outcome> {
+    let mut options = options(args)?;
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
     options.negatives = args.negatives.iter().map(|path| files::read_image(path)).collect::<Result<_>>()?;
     if let Some(path) = &args.camera.file {
@@ -211,7 +225,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
 }
 
 /// The command that makes the same model again.
-fn command(args: &TeachArgs) -> String {
+pub(super) fn command(args: &TeachArgs) -> String {
     let mut command = format!("sdg teach --model {} --preset {} --seed {}", args.model, args.preset, args.seed);
     let mut option = |name: &str, value: String| command += &format!(" --{name} {value}");
     if let Some(steps) = args.steps {
@@ -246,7 +260,7 @@ fn command(args: &TeachArgs) -> String {
 
 /// Puts the weights to start from into the options. What does not simply fit is refused at once, because teaching takes
 /// minutes; the whole report is part of the JSON at the end.
-fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
+pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) -> Result<Option<Value>> {
     let Some(path) = &args.base_weights else { return Ok(None) };
     if path.as_os_str() == NO_BASE_WEIGHTS {
         options.start = Start::Nothing;

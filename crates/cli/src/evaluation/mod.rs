@@ -12,6 +12,8 @@
 //! Random choices depend on the seed, the part and the attempt's number alone, so every model meets the same scenes and
 //! `sdg rehearse` with a part's seed (1000 times the evaluation's, plus the part's place in the list) meets them again.
 //!
+//! [`sharing`] has the same units done by many processes, on a cluster's machines.
+//!
 //! What is in the store is not done again, so an evaluation that was interrupted goes on where it stopped. A teaching
 //! that led to nothing is a result, too: all attempts of its cell count as failed.
 
@@ -27,6 +29,7 @@ mod paper;
 mod records;
 mod schedule;
 mod settings;
+pub mod sharing;
 mod store;
 mod summary;
 mod tables;

@@ -25,6 +25,9 @@ pub struct Settings {
     pub views: u32,
     /// Pictures for each part in which it is not.
     pub scenes: u32,
+    /// SHA-256 of the program, where many processes share the folder: then no result of another program is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
 }
 
 impl Settings {
@@ -43,6 +46,7 @@ impl Settings {
             attempts,
             views: pictures,
             scenes: pictures,
+            program: None,
         }
     }
 
@@ -53,6 +57,7 @@ impl Settings {
             steps: self.steps,
             time_budget: self.time_budget,
             seed: self.seed,
+            program: self.program.clone(),
         }
     }
 }
@@ -68,6 +73,9 @@ pub struct TeachingSettings {
     pub time_budget: Option<u32>,
     /// Decides every random choice.
     pub seed: u64,
+    /// As in [`Settings`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<String>,
 }
 
 /// How the settings that a reader asks for differ from those that a file was made with, in words; `None` when each that is
@@ -119,8 +127,14 @@ mod tests {
             attempts: 0,
             views: 0,
             scenes: 0,
+            program: None,
         };
         assert_eq!(told(&settings(), &each).unwrap().matches("expected").count(), 8);
+        // The program counts for whoever asks for one, and for nobody else.
+        let of_program = |name: &str| Settings { program: Some(name.into()), ..settings() };
+        assert_eq!(told(&of_program("a1"), &of_program("b2")).unwrap(), "program: expected a1, found b2");
+        assert_eq!(told(&of_program("a1"), &settings()).unwrap(), "program: expected a1, found none");
+        assert_eq!(told(&settings(), &of_program("a1")), None);
     }
 
     #[test]

@@ -14,7 +14,7 @@
 //! Each JSON file carries the settings that it was made with and is there whole or not at all. A teaching carries those of
 //! teachings alone, so that the protocol and the axes share it, with whatever number of attempts or pictures.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -38,6 +38,13 @@ pub struct Store {
     _lock: File,
 }
 
+/// Who else may work in a folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Access {
+    Alone,
+    Shared,
+}
+
 /// A file of the store.
 #[derive(Serialize, Deserialize)]
 struct Stored<S, T> {
@@ -51,13 +58,31 @@ impl Store {
     /// # Errors
     /// A folder that cannot be written, that another process works in, or whose models were taught with other settings.
     pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
+        Self::open_with(folder, settings, Access::Alone)
+    }
+
+    /// The same for one of many processes, which divide the units among themselves by other means.
+    ///
+    /// # Errors
+    /// As [`Self::open`], where one process works in the folder alone.
+    pub fn open_shared(folder: &Path, settings: &Settings) -> Result<Self> {
+        Self::open_with(folder, settings, Access::Shared)
+    }
+
+    fn open_with(folder: &Path, settings: &Settings, access: Access) -> Result<Self> {
         files::prepare_folder(folder)?;
         for inner in ["models", "cells", "pictures", "axes", "cameras"] {
-            files::prepare_folder(&folder.join(inner))?;
+            let inner = folder.join(inner);
+            fs::create_dir_all(&inner).with_context(|| format!("{}: cannot make this folder", inner.display()))?;
         }
         let lock_file = folder.join(".lock");
-        let lock = File::create(&lock_file).with_context(|| format!("{}: cannot write", lock_file.display()))?;
-        match lock.try_lock() {
+        let lock = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&lock_file);
+        let lock = lock.with_context(|| format!("{}: cannot write", lock_file.display()))?;
+        let locked = match access {
+            Access::Alone => lock.try_lock(),
+            Access::Shared => lock.try_lock_shared(),
+        };
+        match locked {
             // A file system without locks does not keep anyone from working alone.
             Ok(()) | Err(TryLockError::Error(_)) => {}
             Err(TryLockError::WouldBlock) => {
@@ -208,5 +233,16 @@ mod tests {
         let _first = Store::open(folder.path(), &settings(1)).unwrap();
         let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
         assert!(refused.contains("another evaluation is at work"), "{refused}");
+    }
+
+    #[test]
+    fn many_share_a_folder_and_keep_those_out_who_work_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let shared = [1, 2].map(|_| Store::open_shared(folder.path(), &settings(1)).unwrap());
+        let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
+        assert!(refused.contains("another evaluation is at work"), "{refused}");
+        drop(shared);
+        let _alone = Store::open(folder.path(), &settings(1)).unwrap();
+        assert!(Store::open_shared(folder.path(), &settings(1)).is_err());
     }
 }

@@ -51,7 +51,7 @@ impl Evaluation<'_> {
         Ok(if self.remaining()? > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
-    fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+    pub(super) fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
         match unit {
             Unit::Teach(cell) => {
                 let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
@@ -135,7 +135,7 @@ impl Evaluation<'_> {
     }
 
     /// Times detections with nothing of ours beside them, on all cores.
-    fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
+    pub(super) fn measure_speed(&self, object: &ObjectSpec, cores: usize) -> Result<()> {
         let seed = picture_seed(self.store.settings().seed, object, 0);
         let pictures: Vec<TestView> = test_views(object, true, SPEED_VIEWS, seed).collect::<Result<_, _>>()?;
         for cell in self.cells(object) {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 use sdg_grasp::ComputeBackend;
 
+use super::sharing_args::SharingArgs;
 use crate::shared_args::{backend, share};
 
 /// What `sdg evaluate --pictures` reads and writes.
@@ -166,6 +167,9 @@ pub struct EvaluateArgs {
     /// Folder for the page; without it, the folder of the results, or target/pictures-report for --pictures
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Single units for a cluster
+    #[command(flatten)]
+    pub sharing: SharingArgs,
     /// End with one JSON object on standard output
     #[arg(long)]
     pub json: bool,

@@ -1,4 +1,4 @@
-//! `sdg evaluate`: the paper's protocol, pictures along axes, other cameras, or the user's own pictures.
+//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, or the user's own pictures.
 
 mod args;
 #[cfg(feature = "simulation")]
@@ -10,6 +10,9 @@ mod pictures;
 mod protocol;
 #[cfg(feature = "simulation")]
 mod selection;
+#[cfg(feature = "simulation")]
+mod sharing;
+mod sharing_args;
 
 use anyhow::Result;
 
@@ -21,6 +24,10 @@ use crate::exit::Outcome;
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     if args.pictures.is_some() {
         return pictures::run(args);
+    }
+    #[cfg(feature = "simulation")]
+    if args.sharing.is_asked_for() {
+        return sharing::run(args);
     }
     #[cfg(feature = "simulation")]
     return match (&args.axes, &args.cameras) {

@@ -1,6 +1,7 @@
 //! The paper's protocol, and its tables.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use anyhow::{Result, bail};
 use sdg_simulation::objects::ObjectSpec;
@@ -20,8 +21,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
-    let report_folder = args.report.as_ref().unwrap_or(&args.out);
-    files::prepare_folder(report_folder)?;
+    files::prepare_folder(report_folder(args))?;
 
     let jobs = jobs(args);
     let evaluation =
@@ -32,13 +32,29 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     progress.finish();
     let interrupted = ended?.is_break();
 
-    let summaries = Summary::collect(&evaluation)?;
+    let remaining = write_tables(args, &evaluation, &settings)?;
+    if interrupted {
+        bail!("interrupted with {remaining} units of work to do: the same command goes on");
+    }
+    Ok(Outcome::Done)
+}
+
+/// Where the page goes.
+pub(super) fn report_folder(args: &EvaluateArgs) -> &Path {
+    args.report.as_ref().unwrap_or(&args.out)
+}
+
+/// Writes the tables of what there is, prints them in brief, and says how many units are still to do. `settings` are what the
+/// reader is told.
+pub(super) fn write_tables(args: &EvaluateArgs, evaluation: &Evaluation, settings: &Settings) -> Result<usize> {
+    let store = evaluation.store;
+    let summaries = Summary::collect(evaluation)?;
     let remaining = evaluation.remaining()?;
-    let command = command(args, &settings);
+    let command = command(args, settings);
     let facts = [
         ("seed", settings.seed.to_string()),
         ("preset", settings.preset.clone()),
-        ("side by side", format!("{jobs} units of work")),
+        ("side by side", format!("{} units of work", evaluation.jobs)),
         ("machine", machine()),
         ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
     ];
@@ -55,7 +71,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         "command": command,
     });
     store.write_bytes("tables.json", format!("{json:#}\n").as_bytes())?;
-    let report = page(&summaries, &store, &facts, &command)?.write(report_folder)?;
+    let report = page(&summaries, store, &facts, &command)?.write(report_folder(args))?;
 
     let tables = store.path("tables.md");
     if args.json {
@@ -81,14 +97,11 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         }
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
-    if interrupted {
-        bail!("interrupted with {remaining} units of work to do: the same command goes on");
-    }
-    Ok(Outcome::Done)
+    Ok(remaining)
 }
 
 /// The command that gives the same results.
-fn command(args: &EvaluateArgs, settings: &Settings) -> String {
+pub(super) fn command(args: &EvaluateArgs, settings: &Settings) -> String {
     let mut command = "sdg evaluate".to_owned();
     let mut option = |name: &str, value: &dyn std::fmt::Display| {
         // Writing into a string cannot fail.

@@ -25,6 +25,7 @@ pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
         attempts: args.attempts,
         views: args.views,
         scenes: args.scenes,
+        program: None,
     };
     Ok((preset, settings))
 }

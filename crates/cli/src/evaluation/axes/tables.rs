@@ -422,7 +422,8 @@ mod tests {
     }
 
     fn summary(remaining: usize) -> AxesSummary {
-        let teaching = TeachingSettings { preset: "edge".into(), steps: None, time_budget: None, seed: 1 };
+        let teaching =
+            TeachingSettings { preset: "edge".into(), steps: None, time_budget: None, seed: 1, program: None };
         AxesSummary {
             axis_settings: AxisSettings { axes: 1, teaching: teaching.clone(), axis_views: 20, search_points: None },
             grasp_settings: GraspSettings { errors: 1, teaching, attempts: 10, search_points: None },

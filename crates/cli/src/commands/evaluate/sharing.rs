@@ -1,0 +1,248 @@
+//! `sdg evaluate --list-units`, `--unit`, `--collect`, `--watch` and `--submit`: the protocol's units shared by many processes.
+
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow, bail};
+use sdg_grasp::{ModelKind, Preset};
+use sdg_simulation::objects::ObjectSpec;
+use serde_json::json;
+
+use super::args::EvaluateArgs;
+use super::protocol;
+use super::selection::{models, objects, settings};
+use crate::evaluation::sharing::{
+    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
+    planned_units, submit_script,
+};
+use crate::evaluation::{Evaluation, EvaluationProgress, Settings, Store};
+use crate::exit::{Outcome, Usage, one_line};
+use crate::files;
+use crate::interrupt::Interrupt;
+
+/// How often a folder is read again.
+const WATCH_EVERY: Duration = Duration::from_secs(2);
+
+/// What the arguments name.
+struct Asked {
+    models: Vec<ModelKind>,
+    objects: Vec<ObjectSpec>,
+    preset: Preset,
+    /// Of the ordinary run: without the program's hash.
+    settings: Settings,
+    unverified: bool,
+}
+
+impl Asked {
+    fn new(args: &EvaluateArgs) -> Result<Self> {
+        let (preset, settings) = settings(args)?;
+        Ok(Self {
+            models: models(&args.models)?,
+            objects: objects(&args.objects, ObjectSpec::paper_names())?,
+            preset,
+            settings,
+            unverified: args.unverified,
+        })
+    }
+
+    fn units(&self) -> Vec<PlannedUnit<'_>> {
+        planned_units(&self.models, &self.objects, self.unverified)
+    }
+
+    /// Opens the folder as one of many.
+    fn open(&self, folder: &Path) -> Result<Store> {
+        let settings = Settings { program: Some(own_sha256()?), ..self.settings.clone() };
+        Store::open_shared(folder, &settings)
+    }
+
+    /// Units run one at a time in each process.
+    fn evaluation<'a>(&'a self, store: &'a Store) -> Evaluation<'a> {
+        Evaluation {
+            models: &self.models,
+            objects: &self.objects,
+            preset: self.preset,
+            store,
+            unverified: self.unverified,
+            jobs: 1,
+        }
+    }
+}
+
+/// Runs what the arguments ask for.
+pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
+    let sharing = &args.sharing;
+    if let Some(folder) = &sharing.watch {
+        return watch(folder, args.json);
+    }
+    let asked = Asked::new(args)?;
+    if sharing.list_units {
+        list(&asked, args)
+    } else if sharing.collect {
+        collect(&asked, args)
+    } else if sharing.submit.is_some() {
+        submit(&asked, args)
+    } else {
+        do_units(&asked, args)
+    }
+}
+
+fn list(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
+    let units = asked.units();
+    if !args.json {
+        let names: String = units.iter().map(|unit| format!("{}\n", unit.name)).collect();
+        std::io::stdout().write_all(names.as_bytes())?;
+        return Ok(Outcome::Done);
+    }
+    let listed = units.iter().map(|unit| {
+        let done = !UnitFolder::of(&args.out, &unit.name).read()?.receipts.is_empty();
+        Ok(json!({ "name": unit.name, "after": unit.after, "done": done }))
+    });
+    println!("{}", json!({ "units": listed.collect::<Result<Vec<_>>>()? }));
+    Ok(Outcome::Done)
+}
+
+fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
+    let units = asked.units();
+    let named = args.sharing.unit.iter().map(|name| {
+        units.iter().find(|unit| unit.name == *name).ok_or_else(|| {
+            let near = near_names(name, units.iter().map(|unit| unit.name.as_str())).join(", ");
+            Usage(format!(
+                "--unit: expected a unit of this evaluation, found \"{name}\"; the nearest are {near}; --list-units prints all"
+            ))
+        })
+    });
+    let named = named.collect::<Result<Vec<_>, _>>()?;
+    let store = asked.open(&args.out)?;
+    SavedPlan::new(&units).save(&args.out)?;
+    let (evaluation, interrupt) = (asked.evaluation(&store), Interrupt::watch());
+    let progress = EvaluationProgress::new();
+    progress.expect(named.len());
+    let mut failures: Vec<anyhow::Error> = Vec::new();
+    let mut ended = Vec::new();
+    for unit in &named {
+        let done =
+            evaluation.do_planned(unit, threads(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
+        let (told, how) = match done {
+            Ok(Ended::Done(summary)) => (summary, "done"),
+            Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
+            Ok(Ended::Interrupted) => bail!("{}: interrupted; the same command goes on", unit.name),
+            Err(error) => {
+                failures.push(error);
+                continue;
+            }
+        };
+        progress.unit_done(&format!("{}: {told}", unit.name));
+        ended.push(json!({ "name": unit.name, "ended": how, "summary": told }));
+    }
+    progress.finish();
+    if args.json && failures.is_empty() {
+        println!("{}", json!({ "units": ended }));
+    }
+    match failures.len() {
+        0 => Ok(Outcome::Done),
+        1 => Err(failures.remove(0)),
+        several => {
+            failures.iter().for_each(|failure| eprintln!("sdg: {}", one_line(failure)));
+            bail!("{several} of {} units failed", named.len())
+        }
+    }
+}
+
+/// The cores that Slurm gave, or those of the machine.
+fn threads() -> usize {
+    let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
+    given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
+    let store = asked.open(&args.out)?;
+    let _collecting = Collecting::begin(&args.out)?;
+    let (evaluation, units) = (asked.evaluation(&store), asked.units());
+    let faults = faults(&evaluation, &units)?;
+    if !faults.is_empty() {
+        faults.iter().for_each(|fault| eprintln!("{fault}"));
+        bail!("{} of {} units cannot be counted; no tables were written", faults.len(), units.len());
+    }
+    files::prepare_folder(protocol::report_folder(args))?;
+    let remaining = protocol::write_tables(args, &evaluation, &asked.settings)?;
+    if remaining > 0 {
+        bail!("{}: {remaining} units have a receipt and no result", args.out.display());
+    }
+    Ok(Outcome::Done)
+}
+
+fn watch(folder: &Path, json: bool) -> Result<Outcome> {
+    let mut watch = Watch::new(folder)?;
+    let is_terminal = std::io::stdout().is_terminal();
+    let mut told = String::new();
+    loop {
+        let progress = watch.progress()?;
+        if json {
+            println!("{}", serde_json::to_string(&progress)?);
+            return Ok(Outcome::Done);
+        }
+        let screen = progress.to_string();
+        let line = screen.lines().next().unwrap_or_default();
+        if is_terminal {
+            // From the upper left corner, with what was there removed.
+            print!("\x1b[H\x1b[J{screen}");
+        } else if progress.is_settled {
+            print!("{screen}");
+        } else if line.split(';').next() != told.split(';').next() {
+            println!("{line}");
+        }
+        line.clone_into(&mut told);
+        std::io::stdout().flush()?;
+        if progress.is_settled {
+            return match progress.units - progress.done {
+                0 => Ok(Outcome::Done),
+                missing => Err(anyhow!("{}: {missing} of {} units came to nothing", folder.display(), progress.units)),
+            };
+        }
+        std::thread::sleep(WATCH_EVERY);
+    }
+}
+
+fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
+    let sharing = &args.sharing;
+    let folder = std::path::absolute(&args.out)?;
+    let program = std::env::current_exe().context("the program's own path")?;
+    let arguments = protocol::command(args, &asked.settings);
+    // No argument of an evaluation has a space.
+    let arguments = arguments.split(' ').skip(1).map(str::to_owned);
+    let command: Vec<String> = [program.display().to_string()].into_iter().chain(arguments).collect();
+    let job = SlurmJob {
+        command: &command,
+        folder: &folder,
+        cores: sharing.cores,
+        memory_mb: sharing.memory_mb,
+        limit_mins: sharing.limit_mins,
+        sbatch: &sharing.sbatch,
+    };
+    let units = asked.units();
+    let script = submit_script(&job, &units);
+    if !sharing.yes {
+        match args.json {
+            true => println!("{}", json!({ "units": units.len(), "script": script })),
+            false => std::io::stdout().write_all(script.as_bytes())?,
+        }
+        return Ok(Outcome::Done);
+    }
+    files::prepare_folder(&folder)?;
+    SavedPlan::new(&units).save(&folder)?;
+    let mut bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).spawn().context("bash: cannot run")?;
+    bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;
+    let status = bash.wait()?;
+    if !status.success() {
+        bail!("the script that hands units to Slurm ended with {status}: is sbatch here, and does Slurm run?");
+    }
+    println!(
+        "then: sdg evaluate --watch {}; {} --out {} --collect",
+        folder.display(),
+        command.join(" "),
+        folder.display()
+    );
+    Ok(Outcome::Done)
+}

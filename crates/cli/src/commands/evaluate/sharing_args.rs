@@ -1,0 +1,93 @@
+//! The arguments of `sdg evaluate` for units that many processes share.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+/// The heading of these options in the help.
+const SHARING: &str = "Units for a cluster (docs/slurm.md)";
+
+/// Single units in a folder that many machines see, and the tables of what they left there.
+#[derive(Debug, ClapArgs)]
+pub struct SharingArgs {
+    /// List the units of work by name and do nothing; with --json what each waits for, and whether it is done
+    #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
+    pub list_units: bool,
+    /// Do these units alone, in the folder of --out, in which other processes may do others; what is done is left
+    #[arg(
+        long,
+        value_name = "NAME",
+        num_args = 1..,
+        value_delimiter = ',',
+        group = "sharing",
+        conflicts_with_all = ["pictures", "sheet"],
+        help_heading = SHARING
+    )]
+    pub unit: Vec<String>,
+    /// Check that every unit was done once, by this program with these settings, and write the tables; otherwise say what
+    /// is wrong with which
+    #[arg(long, group = "sharing", conflicts_with_all = ["pictures", "sheet"], help_heading = SHARING)]
+    pub collect: bool,
+    /// Show how far the units of a folder are until nothing changes any more; with --json once, as one object
+    #[arg(
+        long,
+        value_name = "DIR",
+        group = "sharing",
+        conflicts_with_all = ["pictures", "sheet"],
+        help_heading = SHARING
+    )]
+    pub watch: Option<PathBuf>,
+    /// Print a script that hands all units to this scheduler as job arrays
+    #[arg(
+        long,
+        value_name = "SCHEDULER",
+        value_parser = ["slurm"],
+        group = "sharing",
+        conflicts_with_all = ["pictures", "sheet"],
+        help_heading = SHARING
+    )]
+    pub submit: Option<String>,
+    /// Run that script instead of printing it
+    #[arg(long, requires = "submit", help_heading = SHARING)]
+    pub yes: bool,
+    /// Cores that a unit asks for
+    #[arg(
+        long,
+        default_value_t = 2,
+        value_name = "N",
+        value_parser = clap::value_parser!(u32).range(1..=1024),
+        requires = "submit",
+        help_heading = SHARING
+    )]
+    pub cores: u32,
+    /// Memory that a unit asks for
+    #[arg(
+        long,
+        default_value_t = 3000,
+        value_name = "MB",
+        value_parser = clap::value_parser!(u32).range(1..),
+        requires = "submit",
+        help_heading = SHARING
+    )]
+    pub memory_mb: u32,
+    /// How long a unit may take
+    #[arg(
+        long,
+        default_value_t = 60,
+        value_name = "MINS",
+        value_parser = clap::value_parser!(u32).range(1..=100_000),
+        requires = "submit",
+        help_heading = SHARING
+    )]
+    pub limit_mins: u32,
+    /// A further argument for sbatch, such as --sbatch=--partition=cpu; repeat for several
+    #[arg(long, value_name = "ARG", allow_hyphen_values = true, requires = "submit", help_heading = SHARING)]
+    pub sbatch: Vec<String>,
+}
+
+impl SharingArgs {
+    /// Whether any of these was asked for instead of the whole evaluation.
+    pub fn is_asked_for(&self) -> bool {
+        self.list_units || !self.unit.is_empty() || self.collect || self.watch.is_some() || self.submit.is_some()
+    }
+}

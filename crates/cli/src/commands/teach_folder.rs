@@ -1,0 +1,172 @@
+//! `sdg teach --demos DIR`: many parts taught, checked against each other, and one page.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use image::RgbImage;
+use sdg_grasp::{GraspModel, TeachOptions, TeachingEvent, teach};
+use serde_json::{Value, json};
+
+use super::teach::{TeachArgs, options, read_base_weights, symmetry};
+use crate::exit::{Outcome, Usage, one_line};
+use crate::held_back::HeldBackFigures;
+use crate::interrupt::Interrupt;
+use crate::many_parts::{
+    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page,
+};
+use crate::progress::EvaluationProgress;
+
+/// Teaches what is not taught yet; then, unless single parts were asked for, runs each model on every photo.
+pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
+    let mut options = options(args)?;
+    read_base_weights(args, &mut options)?;
+    let options = &options;
+    let demonstrations = DemonstrationFolder::read(folder, symmetry)?;
+    let asked = asked_for(args, &demonstrations.parts)?;
+    let store = PartStore::open(&args.out)?;
+    let (interrupt, progress) = (Interrupt::watch(), EvaluationProgress::new());
+    let checks = if args.parts.is_empty() { asked.len() } else { 0 };
+    progress.expect(asked.len() + checks);
+    let mut outcomes = Vec::with_capacity(asked.len());
+    for part in &asked {
+        let key = key(args, part, options)?;
+        let outcome = match store.read(&part.name, &key)? {
+            Some(outcome) => outcome,
+            None => {
+                let Some((model, outcome)) = teach_part(part, options, &interrupt) else {
+                    bail!("interrupted: the same command goes on with {}", part.name);
+                };
+                store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
+                outcome
+            }
+        };
+        progress.unit_done(&format!("teach {}: {}", part.name, in_words(&outcome)));
+        outcomes.push((part.name.clone(), outcome));
+    }
+    if checks == 0 {
+        progress.finish();
+        return told(args, outcomes);
+    }
+    let is_taught = |name: &str| {
+        outcomes.iter().any(|(known, outcome)| known == name && matches!(outcome, PartOutcome::Taught { .. }))
+    };
+    let taught: Vec<&&PartDemonstrations> = asked.iter().filter(|part| is_taught(&part.name)).collect();
+    let names: Vec<&str> = taught.iter().map(|part| part.name.as_str()).collect();
+    let photos: Vec<RgbImage> = taught.iter().map(|part| part.first_photo()).collect::<Result<_>>()?;
+    let done = |name: &str| progress.unit_done(&format!("{name}: run on {} photos", photos.len()));
+    let check = CrossCheck::run(&store, &names, &photos, &done)?;
+    progress.finish();
+    let findings = Findings::new(outcomes, check, demonstrations.left_out);
+    let report = page(&findings, &photos, &command(args, folder)).write(args.report.as_ref().unwrap_or(&args.out))?;
+    if args.json {
+        let mut line = findings.to_json();
+        line["report"] = json!(report.display().to_string());
+        println!("{line}");
+    } else {
+        println!("taught {} of {} parts", findings.taught.len(), findings.parts.len());
+        for pair in &findings.look_alikes {
+            let ([first, second], [there, back]) = (findings.names(pair), pair.scores);
+            println!("look alike: {first} and {second} ({there:.2}, {back:.2})");
+        }
+        for (name, why) in findings.need_photo.iter().chain(&findings.left_out) {
+            println!("needs another photo: {name}: {why}");
+        }
+        println!("report: {}", report.display());
+    }
+    Ok(Outcome::Done)
+}
+
+/// The parts that `--part` names, or all.
+fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Vec<&'a PartDemonstrations>> {
+    if args.parts.is_empty() {
+        return Ok(parts.iter().collect());
+    }
+    let named = |name: &String| {
+        parts.iter().find(|part| part.name == *name).ok_or_else(|| {
+            let known: Vec<&str> = parts.iter().map(|part| part.name.as_str()).take(20).collect();
+            Usage(format!("--part: expected a part of the folder, such as {}, found \"{name}\"", known.join(", ")))
+                .into()
+        })
+    };
+    args.parts.iter().map(named).collect()
+}
+
+/// Teaches a part; its failure is a result. `None` when interrupted.
+fn teach_part(
+    part: &PartDemonstrations,
+    options: &TeachOptions,
+    interrupt: &Interrupt,
+) -> Option<(Option<Vec<u8>>, PartOutcome)> {
+    let mut options = options.clone();
+    if let Some(symmetry) = part.symmetry {
+        options.symmetry = symmetry;
+    }
+    let attempt = || -> Result<(Vec<u8>, PartOutcome)> {
+        let demonstrations = part.read()?;
+        let mut observe = |_: &TeachingEvent| {
+            if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let taught = teach(&demonstrations, &options, &mut observe)?;
+        let bytes = taught.model.to_bytes()?;
+        let written = GraspModel::from_bytes(&bytes, &options.device)?;
+        let figures = HeldBackFigures::of(&written, &demonstrations, options.seed)?;
+        Ok((bytes, PartOutcome::taught(taught.model.facts().seconds, &figures)))
+    };
+    let ended = attempt();
+    if interrupt.is_requested() {
+        return None;
+    }
+    Some(match ended {
+        Ok((bytes, outcome)) => (Some(bytes), outcome),
+        Err(error) => (None, PartOutcome::Failed { why: one_line(&error) }),
+    })
+}
+
+/// What a part's model depends on.
+fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> Result<Value> {
+    let symmetry = part.symmetry.unwrap_or(options.symmetry);
+    Ok(json!({
+        "files": part.sha256()?,
+        "model": options.kind,
+        "preset": options.preset.name(),
+        "seed": args.seed,
+        "steps": args.steps,
+        "time_budget": args.time_budget,
+        "symmetry": symmetry,
+        "size_tolerance": [args.size_tolerance.low, args.size_tolerance.high],
+        "base_weights": args.base_weights,
+        "version": env!("CARGO_PKG_VERSION"),
+    }))
+}
+
+fn in_words(outcome: &PartOutcome) -> String {
+    match outcome {
+        PartOutcome::Taught { seconds, found, parts, .. } => {
+            format!("finds {found} of {parts} held-back samples ({seconds:.1} s)")
+        }
+        PartOutcome::Failed { why } => format!("failed: {why}"),
+    }
+}
+
+/// What became of single parts: one that has no model is a failure of the call, as for a single teaching.
+fn told(args: &TeachArgs, outcomes: Vec<(String, PartOutcome)>) -> Result<Outcome> {
+    if args.json {
+        let parts: Vec<Value> =
+            outcomes.iter().map(|(name, outcome)| json!({ "name": name, "outcome": outcome })).collect();
+        println!("{}", json!({ "parts": parts }));
+    }
+    for (name, outcome) in outcomes {
+        if let PartOutcome::Failed { why } = outcome {
+            bail!("{name}: {why}");
+        }
+    }
+    Ok(Outcome::Done)
+}
+
+/// The command that makes the same page again.
+fn command(args: &TeachArgs, folder: &Path) -> String {
+    let rest = super::teach::command(args);
+    let rest = rest.strip_prefix("sdg teach").unwrap_or(&rest);
+    format!("sdg teach --demos {}{rest}", folder.display())
+}

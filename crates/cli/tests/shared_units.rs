@@ -1,0 +1,325 @@
+//! An evaluation's units shared by several processes, with model S on one part: the tables are those of the ordinary run, and
+//! whatever is missing, failed, stale or doubled keeps a table from being made.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+use support::{Folder, sdg};
+
+const TEACH: &str = "teach-S-rod_end";
+const LOOK: &str = "look-rod_end";
+const GRASP: &str = "grasp-S-rod_end";
+const TIME: &str = "time-rod_end";
+
+/// The smallest evaluation that there is, in a folder.
+fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    const SMALLEST: [&str; 14] = [
+        "evaluate",
+        "--models",
+        "S",
+        "--objects",
+        "rod_end",
+        "--attempts",
+        "1",
+        "--views",
+        "1",
+        "--scenes",
+        "1",
+        "--seed",
+        "3",
+        "--json",
+    ];
+    [&SMALLEST[..], &["--out", out], more].concat()
+}
+
+fn evaluate(out: &str, more: &[&str]) -> Output {
+    sdg(&arguments(out, more))
+}
+
+/// The one JSON object that a call prints which succeeds.
+fn json(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", error_of(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn error_of(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Standard error of a call that fails with this code; it holds all of `parts`.
+fn refused(output: &Output, code: i32, parts: &[&str]) -> String {
+    let error = error_of(output);
+    assert_eq!(output.status.code(), Some(code), "{error}");
+    for part in parts {
+        assert!(error.contains(part), "expected {part} in {error}");
+    }
+    error
+}
+
+/// A JSON object without what differs from run to run: times, and sizes of files that have times in them.
+fn timeless(value: Value) -> Value {
+    const TIMES: [&str; 6] =
+        ["seconds", "teaching_secs", "longest_teaching_secs", "frames_per_second", "bytes", "largest_bytes"];
+    match value {
+        Value::Object(fields) => fields
+            .into_iter()
+            .filter(|(name, _)| !TIMES.contains(&name.as_str()))
+            .map(|(k, v)| (k, timeless(v)))
+            .collect(),
+        Value::Array(values) => values.into_iter().map(timeless).collect(),
+        other => other,
+    }
+}
+
+/// Markdown without the columns of times.
+fn without_times(text: &str) -> String {
+    let (mut times, mut lines): (Vec<usize>, Vec<String>) = (Vec::new(), Vec::new());
+    let mut last_was_row = false;
+    for line in text.lines() {
+        let cells: Vec<&str> = line.split('|').collect();
+        if cells.len() > 1 {
+            if !last_was_row {
+                let is_time = |cell: &str| ["images a second", "teaching, "].iter().any(|time| cell.contains(time));
+                times = (0..cells.len()).filter(|&i| is_time(cells[i])).collect();
+            }
+            let kept = cells.iter().enumerate().filter(|(i, _)| !times.contains(i)).map(|(_, cell)| *cell);
+            lines.push(kept.collect::<Vec<_>>().join("|"));
+        } else {
+            lines.push(line.to_owned());
+        }
+        last_was_row = cells.len() > 1;
+    }
+    lines.join("\n")
+}
+
+fn tables(out: &str) -> (Value, String) {
+    let json = serde_json::from_slice(&fs::read(Path::new(out).join("tables.json")).unwrap()).unwrap();
+    (timeless(json), without_times(&fs::read_to_string(Path::new(out).join("tables.md")).unwrap()))
+}
+
+fn record(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// The only file of a unit whose name begins so.
+fn file_of(out: &str, unit: &str, begins: &str) -> std::path::PathBuf {
+    let entries = fs::read_dir(Path::new(out).join("units").join(unit)).unwrap().map(|entry| entry.unwrap().path());
+    let found: Vec<_> =
+        entries.filter(|path| path.file_name().unwrap().to_str().unwrap().starts_with(begins)).collect();
+    assert_eq!(found.len(), 1, "{found:?}");
+    found[0].clone()
+}
+
+#[test]
+fn units_done_by_several_processes_make_the_tables_of_one() {
+    let (serial, shared) = (Folder::new(), Folder::new());
+    let (serial, shared) = (serial.path("run"), shared.path("run"));
+    json(&evaluate(&serial, &["--jobs", "1"]));
+
+    let listed = json(&evaluate(&shared, &["--list-units"]));
+    let names: Vec<&str> = listed["units"].as_array().unwrap().iter().map(|u| u["name"].as_str().unwrap()).collect();
+    assert_eq!(names, [TEACH, LOOK, GRASP, TIME]);
+    assert_eq!(listed["units"][2]["after"], serde_json::json!([TEACH]));
+    assert!(!Path::new(&shared).exists(), "listing makes nothing");
+
+    json(&evaluate(&shared, &["--unit", TEACH]));
+    // Nothing may be counted before all is there, and each that is missing is told.
+    let error =
+        refused(&evaluate(&shared, &["--collect"]), 1, &["3 of 4 units cannot be counted", "look-rod_end: missing"]);
+    assert!(error.contains("grasp-S-rod_end: missing") && error.contains("time-rod_end: missing"), "{error}");
+    assert!(!Path::new(&shared).join("tables.md").exists());
+    let watched = json(&sdg(&["evaluate", "--watch", &shared, "--json"]));
+    assert_eq!((&watched["units"], &watched["done"], &watched["waiting"]), (&4.into(), &1.into(), &3.into()));
+    assert!(watched["seconds_left"].as_f64().unwrap() > 0.0 && watched["is_settled"] == false);
+
+    // Two processes at once in one folder.
+    let begin = |unit: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+        command.args(arguments(&shared, &["--unit", unit])).stdout(Stdio::null()).stderr(Stdio::piped());
+        command.spawn().unwrap()
+    };
+    for process in [begin(LOOK), begin(GRASP)] {
+        let output = process.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", error_of(&output));
+    }
+    let receipt = record(&file_of(&shared, GRASP, "done-"));
+    let before = fs::read(Path::new(&shared).join("cells/S-rod_end.attempts-verified.json")).unwrap();
+    // What is done is left, among what is not.
+    let ended = json(&evaluate(&shared, &["--unit", GRASP, TIME]));
+    assert_eq!((&ended["units"][0]["ended"], &ended["units"][1]["ended"]), (&"already".into(), &"done".into()));
+    assert_eq!(fs::read(Path::new(&shared).join("cells/S-rod_end.attempts-verified.json")).unwrap(), before);
+    assert_eq!(record(&file_of(&shared, GRASP, "done-")), receipt);
+
+    json(&evaluate(&shared, &["--collect"]));
+    assert_eq!(tables(&shared), tables(&serial));
+    let finished = sdg(&["evaluate", "--watch", &shared]);
+    assert!(finished.status.success());
+    let screen = String::from_utf8(finished.stdout).unwrap();
+    assert!(
+        screen.starts_with("4 of 4 units done, 0 running, 0 failed, 0 waiting\nteach 1 of 1, look 1 of 1,"),
+        "{screen}"
+    );
+    // The ordinary run takes what is there.
+    assert_eq!(json(&evaluate(&shared, &["--jobs", "1"]))["remaining"], 0);
+    damaged_results_are_refused(&shared);
+}
+
+/// Everything that can be wrong with a folder in which all units are done.
+fn damaged_results_are_refused(shared: &str) {
+    let at = |name: &str| Path::new(shared).join(name);
+    let is_refused = |parts: &[&str]| refused(&evaluate(shared, &["--collect"]), 1, parts);
+
+    // Other settings: the pictures' number is no matter of the teaching.
+    let with_two_views = |more: &[&str]| {
+        let mut arguments = arguments(shared, more);
+        let views = arguments.iter().position(|argument| *argument == "--views").unwrap();
+        arguments[views + 1] = "2";
+        sdg(&arguments)
+    };
+    let error = refused(&with_two_views(&["--collect"]), 1, &["stale", "views: expected 2, found 1"]);
+    assert!(!error.contains(TEACH), "{error}");
+    refused(&with_two_views(&["--unit", LOOK]), 1, &["done with other settings", "--out"]);
+
+    // A receipt twice.
+    let receipt = file_of(shared, LOOK, "done-");
+    let second = receipt.with_file_name("done-elsewhere-7-1.json");
+    fs::copy(&receipt, &second).unwrap();
+    is_refused(&["look-rod_end: duplicate: done by", "1 of 4 units"]);
+    fs::remove_file(second).unwrap();
+
+    // A file that is not the one that the receipt tells of, and one that is gone.
+    let (file, kept) = (at("cells/S-rod_end.look.json"), at("cells/kept"));
+    fs::copy(&file, &kept).unwrap();
+    fs::write(&file, fs::read_to_string(&file).unwrap() + "\n").unwrap();
+    is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is not the file"]);
+    fs::remove_file(&file).unwrap();
+    is_refused(&["look-rod_end: stale: cells/S-rod_end.look.json is gone"]);
+    fs::rename(&kept, &file).unwrap();
+
+    // Another program's results, one of them and all.
+    let whole = fs::read_to_string(&receipt).unwrap();
+    let program = record(&receipt)["settings"]["program"].as_str().unwrap().to_owned();
+    assert_eq!(program.len(), 64);
+    fs::write(&receipt, whole.replace(&program, "0ther")).unwrap();
+    is_refused(&["look-rod_end: stale: done with other settings (program: expected", "found 0ther"]);
+    fs::write(&receipt, &whole).unwrap();
+    let settings = fs::read_to_string(at("settings.json")).unwrap();
+    fs::write(at("settings.json"), settings.replace(&program, "0ther")).unwrap();
+    is_refused(&["settings.json: made with other settings (program: expected"]);
+    fs::write(at("settings.json"), settings).unwrap();
+
+    // Two collectors at once, and one beside a run of the ordinary kind.
+    let lock = File::create(at(".collect.lock")).unwrap();
+    lock.lock().unwrap();
+    is_refused(&["another --collect is at work in this folder"]);
+    drop(lock);
+    let lock = File::open(at(".lock")).unwrap();
+    lock.lock().unwrap();
+    is_refused(&["another evaluation is at work in this folder"]);
+    drop(lock);
+    json(&evaluate(shared, &["--collect"]));
+}
+
+#[test]
+fn failures_are_recorded_and_told() {
+    let folder = Folder::new();
+    let out = folder.path("run");
+    // Without its teaching a unit has nothing to work with.
+    refused(&evaluate(&out, &["--unit", GRASP]), 1, &["expected teach-S-rod_end to be done before", "is it shared"]);
+    // A folder where a file should be: even root cannot write it.
+    let obstacle = Path::new(&out).join("cells/S-rod_end.teaching.json");
+    fs::create_dir(&obstacle).unwrap();
+    for _ in 0..2 {
+        refused(&evaluate(&out, &["--unit", TEACH]), 1, &["teach-S-rod_end", "S-rod_end.teaching.json"]);
+    }
+    refused(
+        &evaluate(&out, &["--collect"]),
+        1,
+        &["teach-S-rod_end: missing: failed 2 times", "grasp-S-rod_end: missing: failed once", "4 of 4 units"],
+    );
+    let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
+    let teach = watched["failed"].as_array().unwrap().iter().find(|failed| failed["unit"] == TEACH).unwrap();
+    assert!(teach["tries"] == 2 && teach["why"].as_str().unwrap().contains("teaching.json"), "{teach}");
+    // Twice is the last time, and nothing else can begin: the watch ends.
+    let ended = sdg(&["evaluate", "--watch", &out]);
+    refused(&ended, 1, &["4 of 4 units came to nothing"]);
+    assert!(String::from_utf8(ended.stdout).unwrap().contains("\nfailed:\n  teach-S-rod_end  2 times, last on "));
+
+    // A unit at work, and one whose process went away without a word.
+    fs::remove_dir(&obstacle).unwrap();
+    let unit = Path::new(&out).join("units").join(LOOK);
+    fs::create_dir_all(&unit).unwrap();
+    let running = r#"{"by": {"host": "n7", "pid": 12, "job": "31"}, "started_secs": 1700000000}"#;
+    fs::write(unit.join("running.json"), running).unwrap();
+    let lock = File::create(unit.join("lock")).unwrap();
+    lock.lock().unwrap();
+    refused(&evaluate(&out, &["--collect"]), 1, &["look-rod_end: still at work on n7 (process 12, job 31)"]);
+    let watched = json(&sdg(&["evaluate", "--watch", &out, "--json"]));
+    assert_eq!((&watched["running"][0]["unit"], &watched["running"][0]["by"]["host"]), (&LOOK.into(), &"n7".into()));
+    // Whoever wants to do it, too, waits until it is free.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+    command.args(arguments(&out, &["--unit", LOOK])).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut waiting = command.spawn().unwrap();
+    let mut told = String::new();
+    BufReader::new(waiting.stderr.as_mut().unwrap()).read_line(&mut told).unwrap();
+    assert!(told.starts_with("look-rod_end: at work elsewhere, by n7 (process 12, job 31); waiting"), "{told}");
+    assert!(waiting.try_wait().unwrap().is_none());
+    drop(lock);
+    // Then it begins, and says what it misses.
+    assert_eq!(waiting.wait().unwrap().code(), Some(1));
+    fs::write(unit.join("running.json"), running).unwrap();
+    let gone = "look-rod_end: missing: n7 (process 12, job 31) ended without a result";
+    refused(&evaluate(&out, &["--collect"]), 1, &[gone]);
+    // Tried again, it is done.
+    json(&evaluate(&out, &["--unit", TEACH, LOOK]));
+}
+
+#[test]
+fn wrong_usage_and_folders_are_told() {
+    let folder = Folder::new();
+    let out = folder.path("run");
+    refused(
+        &evaluate(&out, &["--unit", "grasp-rod_end"]),
+        2,
+        &["found \"grasp-rod_end\"", "grasp-S-rod_end", "--list-units"],
+    );
+    assert!(!Path::new(&out).exists());
+    refused(&sdg(&["evaluate", "--watch", &folder.path("none")]), 1, &["found no plan"]);
+    refused(&evaluate("/proc/evaluation", &["--unit", TEACH]), 1, &["/proc/evaluation"]);
+    refused(&evaluate(&out, &["--collect", "--list-units"]), 2, &["--list-units"]);
+    refused(&evaluate(&out, &["--yes"]), 2, &["--submit"]);
+
+    // A disk that takes no more: files of a kilobyte at most. Nothing is half-written, and the reason is kept.
+    let words: Vec<String> = arguments(&out, &["--unit", TEACH]).iter().map(|word| format!("'{word}'")).collect();
+    let line = format!("trap '' XFSZ; ulimit -f 1; exec '{}' {}", env!("CARGO_BIN_EXE_sdg"), words.join(" "));
+    let full = Command::new("bash").args(["-c", &line]).output().unwrap();
+    refused(&full, 1, &["teach-S-rod_end", "S-rod_end.sdg"]);
+    assert_eq!(fs::read_dir(Path::new(&out).join("models")).unwrap().count(), 0);
+    assert!(record(&file_of(&out, TEACH, "failed-"))["why"].as_str().unwrap().contains("S-rod_end.sdg"));
+}
+
+#[test]
+fn the_submit_script_is_one_that_bash_reads() {
+    let folder = Folder::new();
+    let out = folder.path("a run");
+    let printed = json(&evaluate(&out, &["--submit", "slurm", "--sbatch=--partition=cpu", "--memory-mb", "1500"]));
+    let script = printed["script"].as_str().unwrap();
+    for part in ["--requeue", "--mem=1500M", "--partition=cpu", "--dependency=\"afterany:", "--seed 3", LOOK] {
+        assert!(script.contains(part), "expected {part} in {script}");
+    }
+    let path = folder.text("submit.sh", script);
+    assert!(Command::new("bash").args(["-n", &path]).status().unwrap().success());
+    assert!(!Path::new(&out).exists(), "printing makes nothing");
+    // Without Slurm it says so.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sdg"));
+    command.args(arguments(&out, &["--submit", "slurm", "--yes"])).env("PATH", "/bin/nothing:/usr/bin");
+    if !Path::new("/usr/bin/sbatch").exists() {
+        refused(&command.output().unwrap(), 1, &["sbatch"]);
+    }
+}

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# An OCI image with sdg and the Debian packages that it runs on: mmdebstrap makes the system, umoci the image; no daemon.
+# It lies in target/oci (a layout) and, for Apptainer and others, in target/oci.tar. Then the program is run from the unpacked
+# image in namespaces without network; where those are not allowed, that is said and left out.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+scripts/install.sh mmdebstrap umoci
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+sdg=$(realpath "${SDG:-$target/release/sdg}")
+work=$target/oci-work
+layout=$target/oci
+rm -rf "$work" "$layout" "$layout.tar"
+mkdir -p "$work/layer/usr/local/bin"
+
+# As Debian of this machine has it, with its sources; packages' documentation and manual pages are left out.
+mmdebstrap --quiet --variant=minbase --include=libmujoco2.2.2,libegl1,libgl1-mesa-dri,ca-certificates \
+    --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' \
+    --aptopt='APT::Install-Recommends "false"' bookworm "$work/system.tar"
+cp "$sdg" "$work/layer/usr/local/bin/sdg"
+tar --create --owner=0 --group=0 --file "$work/sdg.tar" -C "$work/layer" usr
+
+umoci init --layout "$layout"
+umoci new --image "$layout:sdg"
+umoci raw add-layer --image "$layout:sdg" "$work/system.tar"
+umoci raw add-layer --image "$layout:sdg" "$work/sdg.tar"
+umoci config --image "$layout:sdg" --config.entrypoint /usr/local/bin/sdg --config.cmd --help
+tar --create --file "$layout.tar" -C "$layout" .
+echo "image: $layout:sdg and $layout.tar ($(du -sh "$layout" | cut -f 1))"
+
+if ! unshare --mount --net --pid --fork true 2>/dev/null; then
+    echo "not run: this machine allows no namespaces" >&2
+    exit 0
+fi
+umoci unpack --image "$layout:sdg" "$work/bundle"
+root=$work/bundle/rootfs
+mkdir -p "$root/run-test"
+# The part that needs MuJoCo and EGL, too: a unit of an evaluation, in a network of its own that has nothing.
+unshare --mount --net --pid --fork bash -euc '
+    mount --bind /dev "$1/dev"
+    mount -t proc proc "$1/proc"
+    [ "$(ls /sys/class/net | grep -vc "^lo$" || true)" = 0 ] || [ "$(ip -o link 2>/dev/null | grep -vc " lo:" || true)" = 0 ]
+    chroot "$1" /usr/local/bin/sdg evaluate --models S --objects rod_end --attempts 1 --views 1 --scenes 1 \
+        --out /run-test --unit teach-S-rod_end grasp-S-rod_end --json
+' unshare "$root"
+echo "the image does units without network"
