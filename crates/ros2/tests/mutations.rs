@@ -1,4 +1,5 @@
 //! Messages that were changed on the way: a hundred thousand of them, none of which may panic.
+#![allow(clippy::unwrap_used)]
 
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;

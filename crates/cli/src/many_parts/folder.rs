@@ -75,9 +75,11 @@ impl DemonstrationFolder {
         for entry in files::entries(folder)? {
             if entry.is_dir() {
                 let name = name_of(&entry, false)?;
-                let photos =
-                    files::entries(&entry)?.into_iter().filter(|path| files::has_extension(path, &IMAGE_EXTENSIONS));
-                photos.map(|photo| add(name.clone(), photo, false)).collect::<Result<()>>()?;
+                for photo in files::entries(&entry)? {
+                    if files::has_extension(&photo, &IMAGE_EXTENSIONS) {
+                        add(name.clone(), photo, false)?;
+                    }
+                }
             } else if files::has_extension(&entry, &IMAGE_EXTENSIONS) {
                 add(name_of(&entry, true)?, entry, true)?;
             }
