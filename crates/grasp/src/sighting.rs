@@ -31,7 +31,7 @@ pub(crate) fn sightings<'a>(proposals: &Proposals, image: &SearchedImage<'a>) ->
 }
 
 /// The same, but of what the network proposes only the candidates down to the first that is right: verifying the others takes
-/// longer than the search, and says nothing of the network's score on the part.
+/// longer than the search and does not change the network's score on the part.
 #[cfg(feature = "teach")]
 pub(crate) fn sightings_to_first<'a>(
     proposals: &Proposals,

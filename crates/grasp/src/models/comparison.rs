@@ -14,7 +14,7 @@ use super::consistency::ComparisonEvidence;
 use super::placing::fill_box;
 use crate::taught::TaughtDemonstration;
 
-/// Candidates of an image that are compared: those for which class and box say most. Each takes four or five views. In the
+/// Candidates of an image that are compared: those for which class and box say most. Each takes three to five views. In the
 /// protocol's pictures 16 of them found not one part more, and 616 of the 3200 pictures had five or more.
 const MAX_COMPARED: usize = 5;
 /// Candidates of an image whose poses are corrected before their features are compared finely: the likeliest. Four found not

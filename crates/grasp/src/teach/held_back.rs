@@ -68,13 +68,13 @@ impl HeldBack<'_> {
     }
 
     /// Calibrates a network by what it proposes in each sample, laid over by the demonstration as in use. `other_parts` are
-    /// its highest scores in pictures of other parts alone.
+    /// its highest scores in pictures of other parts alone, `usual_threshold` is [`Network::usual_threshold`].
     ///
     /// # Errors
     /// An image that cannot be searched.
     pub(super) fn calibrate(
         &self,
-        network: &Network,
+        usual_threshold: Option<f64>,
         proposals: &[Proposals],
         demonstrations: &[TaughtDemonstration],
         other_parts: &[f64],
@@ -92,7 +92,7 @@ impl HeldBack<'_> {
         Ok(Calibrated {
             positives: self.samples.iter().filter(|sample| !sample.objects.is_empty()).count(),
             hits: right_scores.len(),
-            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG, network.usual_threshold())
+            network: Calibration::fit(&right_scores, &wrong_scores, NO_WRONG, usual_threshold)
                 .unwrap_or(Calibration::NEUTRAL),
             on_part,
             elsewhere,

@@ -279,7 +279,8 @@ pub(crate) fn teach_network(
     let Some((_, proposals)) = history.validations.iter().zip(&proposed).find(is_kept) else {
         panic!("the network that is kept was validated")
     };
-    let calibrated = held_back.calibrate(&network, proposals, &of_any_size, &on_other_parts.highest)?;
+    let calibrated =
+        held_back.calibrate(network.usual_threshold(), proposals, &of_any_size, &on_other_parts.highest)?;
     let (hits, positives) = (calibrated.hits, calibrated.positives);
     if (hits as f64) < plan.min_hit_rate * positives as f64 {
         return Err(GraspError::NotLearnt { hits, positives, steps: history.steps.len() });

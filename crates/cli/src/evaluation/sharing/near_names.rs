@@ -1,29 +1,15 @@
 //! The names that a misspelt one may have meant.
 
+use strsim::levenshtein;
+
 /// At most this many are told.
 const MAX_NAMES: usize = 3;
 
 /// Those of `known` that `name` resembles most, the nearest first.
 pub fn near_names<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
-    let mut near: Vec<(usize, &str)> = known.into_iter().map(|known| (edits(name, known), known)).collect();
+    let mut near: Vec<(usize, &str)> = known.into_iter().map(|known| (levenshtein(name, known), known)).collect();
     near.sort_by_key(|(edits, _)| *edits);
     near.into_iter().take(MAX_NAMES).map(|(_, known)| known).collect()
-}
-
-/// Letters to insert, remove or replace until one text is the other (Levenshtein's distance).
-fn edits(from: &str, to: &str) -> usize {
-    let to: Vec<char> = to.chars().collect();
-    let mut row: Vec<usize> = (0..=to.len()).collect();
-    for (i, letter) in from.chars().enumerate() {
-        let mut before = row[0];
-        row[0] = i + 1;
-        for (j, other) in to.iter().enumerate() {
-            let replaced = before + usize::from(letter != *other);
-            before = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(before + 1);
-        }
-    }
-    row[to.len()]
 }
 
 #[cfg(test)]
@@ -32,9 +18,9 @@ mod tests {
 
     #[test]
     fn edits_are_counted() {
-        assert_eq!(edits("kitten", "sitting"), 3);
-        assert_eq!(edits("", "abc"), 3);
-        assert_eq!(edits("grasp-C-pendulum", "grasp-C-pendulum"), 0);
+        assert_eq!(levenshtein("kitten", "sitting"), 3);
+        assert_eq!(levenshtein("", "abc"), 3);
+        assert_eq!(levenshtein("grasp-C-pendulum", "grasp-C-pendulum"), 0);
     }
 
     #[test]
