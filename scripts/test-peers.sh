@@ -94,6 +94,7 @@ in_real_time() {
 # Further arguments are those of franka-sim.
 serve_franka_sim() {
     mkdir -p "$peers/model"
+    : >"$peers/franka-sim.log"
     "$peers/fr3/bin/python" scripts/franka_sim_model.py crates/simulation/assets/panda.xml "$peers/model"
     FR3_MJCF=$(realpath "$peers/model/fr3.xml") $realtime "$peers/fr3/bin/run-franka-sim-server" --port 11337 \
         --enforce-comm-constraints --enforce-motion-limits "$@" >"$peers/franka-sim.log" 2>&1 &
