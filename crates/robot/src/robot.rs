@@ -13,7 +13,7 @@ use crate::watch::{StopReason, Watch};
 
 /// A motion must begin this near to the controller's reference, rad: a difference that a person cannot see.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
-/// How often a motion is slowed down so that the tcp keeps to its limits, and to which share of its speed each time.
+/// How often a motion is slowed down so that joints and tcp keep to their limits, and to which share of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
 const SLOWDOWN: f64 = 0.8;
 
@@ -84,9 +84,14 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// [`RobotError::Planning`].
     pub fn plan_free(&mut self, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
         let start = self.commanded()?;
+        self.plan_between(&start, q, joints)
+    }
+
+    /// As [`Robot::plan_free`] from another start.
+    pub(crate) fn plan_between(&self, start: &JointVector, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
         self.slowed(|share| {
             let slowed = joints.scaled(share, share, share)?;
-            Ok(Trajectory::point_to_point(&start, q, &slowed)?)
+            Ok(Trajectory::point_to_point(start, q, &slowed)?)
         })
     }
 
@@ -97,18 +102,21 @@ impl<'a, A: Arm> Robot<'a, A> {
     pub fn plan_along(&mut self, path: &JointPath, cartesian: &CartesianLimits) -> Result<Trajectory> {
         let joints = self.limits.joints.clone();
         self.slowed(|share| {
-            let slowed = cartesian.scaled(share, share, share)?;
-            Ok(Trajectory::along_path(path.clone(), &joints, &slowed)?)
+            let (joints, cartesian) = (joints.scaled(share, share, share)?, cartesian.scaled(share, share, share)?);
+            Ok(Trajectory::along_path(path.clone(), &joints, &cartesian)?)
         })
     }
 
-    /// The first motion that keeps to the tcp's limits; the slowest one tried where none does.
+    /// The first motion that keeps to the limits of speed; the slowest one tried where none does.
+    ///
+    /// A path is timed at samples of it; what a joint needs between two of them may be a little more than its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
             let trajectory = plan(share)?;
             match self.limits.check(trajectory.clone()) {
                 Err(Violation::Cartesian { .. }) => share *= SLOWDOWN,
+                Err(Violation::Joint { quantity, .. }) if quantity != "position" => share *= SLOWDOWN,
                 _ => return Ok(trajectory),
             }
         }

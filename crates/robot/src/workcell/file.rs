@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
+use super::place::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
 use super::{Mounting, RobotModel, Workcell};
 use crate::franka::RobotAddress;
@@ -42,7 +43,11 @@ struct File {
     #[serde(default)]
     obstacle: Vec<Spanned<ObstacleSection>>,
     #[serde(default)]
-    tray: Vec<Spanned<toml::Value>>,
+    place: Vec<Spanned<PlaceSection>>,
+    #[serde(default)]
+    tray: Vec<Spanned<TraySection>>,
+    #[serde(default)]
+    bin: Vec<Spanned<BinSection>>,
 }
 
 #[derive(Deserialize)]
@@ -71,6 +76,8 @@ struct Camera {
 #[serde(deny_unknown_fields)]
 struct Table {
     height_mm: Spanned<f64>,
+    x_mm: Option<Spanned<Numbers<2>>>,
+    y_mm: Option<Spanned<Numbers<2>>>,
 }
 
 #[derive(Deserialize)]
@@ -133,11 +140,6 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
             ));
         }
     };
-    if let Some(section) = file.tray.first() {
-        let why =
-            "tray: nothing is placed yet, and the arm might run into it; take it out of the cell and of this file";
-        return Err(source.error(section.span().start, why));
-    }
     let option = |value: &Option<Spanned<f64>>, name: &str, range: [f64; 2]| {
         value.as_ref().map(|value| source.number(value, name, range)).transpose()
     };
@@ -152,6 +154,17 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     if look_outs.is_empty() {
         return Err(source.expected(&file.look_out, "look_out", "at least one", "none"));
     }
+    let table_height_m = source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3;
+    let table_m = match (&file.table.x_mm, &file.table.y_mm) {
+        (None, None) => None,
+        (Some(x), Some(y)) => Some([source.range_m(x, "x_mm")?, source.range_m(y, "y_mm")?]),
+        (Some(one), None) | (None, Some(one)) => {
+            return Err(source.error(one.span().start, "table: expected x_mm and y_mm, or neither"));
+        }
+    };
+    let workspace = WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) };
+    let room = Room { table_height_m, table_m, workspace: &workspace };
+    let places = places(&source, &file.place, &file.tray, &file.bin, &room)?;
     Ok(Workcell {
         robot,
         address: file.robot.address.map(Spanned::into_inner),
@@ -160,8 +173,10 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         part_mass_kg: option(&tool.part_mass_kg, "part_mass_kg", [0.0, MAX_LOAD_KG])?,
         camera_file: file.camera.file.map(Spanned::into_inner),
         mounting,
-        table_height_m: source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3,
-        workspace: WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) },
+        table_height_m,
+        table_m,
+        workspace,
+        places,
         obstacles: obstacles(&source, &file.obstacle)?,
         look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
     })
