@@ -373,7 +373,7 @@ fn fails(why: String) -> Stop {
 }
 
 fn told(error: &PlaceError) -> String {
-    format!("{:.1} mm and {:.1}°", error.distance_m() * 1e3, error.angle_rad.to_degrees())
+    format!("{:.1} mm and {:.1}°", error.distance_m() * 1e3, error.angle_rad.abs().to_degrees())
 }
 
 fn yaw(base_from_tcp: &Isometry3<f64>) -> Angle {

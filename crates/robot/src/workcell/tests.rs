@@ -142,7 +142,7 @@ fn places_that_cannot_be_name_the_line() {
         (43, "[60, 50]", "[60, nan]", "pitch_mm: expected lengths"),
         (47, "[700, 200]", "[790, 480]", "\"bin\" reaches over the table's edge"),
         (48, "size_mm", "size", "unknown field `size`"),
-        (19, "y_mm = [-500, 500]", "", "table: expected x_mm and y_mm, or neither"),
+        (18, "y_mm = [-500, 500]", "", "table: expected x_mm and y_mm, or neither"),
     ] {
         let whole = placing();
         assert!(whole.contains(from), "{from}");
