@@ -5,7 +5,7 @@
 //!     └ spring, its integral and damper of the tcp   └ of the elbow, without moving the tcp
 //! ```
 //! J is the tcp's Jacobian in the base frame, e how far the tcp is from where it is wanted (m, and a rotation vector's half, rad),
-//! v_d the twist that is wanted, D = 2 √K. Gravity is not in it: the robot adds it, of what it was told to carry, too.
+//! v_d the twist that is wanted, D = 2 √(K m) for a mass m of the tcp. Gravity is not in it: the robot adds it, of what it was told to carry, too.
 //!
 //! A spring is not exact: at 150 N/m a part of 0.7 kg that the robot was not told of pulls the tcp down by 46 mm, and joint friction of
 //! 1 Nm costs some 20 mm. In free air the integral makes up for both; where something is touched it would press ever more, and is held.
@@ -26,6 +26,8 @@ const DAMPING: f64 = 1e-2;
 pub struct Impedance {
     /// Along x, y and z of the base, N/m, and about them, N·m/rad.
     pub stiffness: Vector6<f64>,
+    /// What the damper takes the tcp's mass to be, kg along and kg·m² about each direction: libfranka's example has 1 for all.
+    pub mass: Vector6<f64>,
     /// In each direction the spring's force grows by so many times itself in a second, 1/s.
     pub integral_per_sec: Vector6<f64>,
     /// Of the elbow about its configuration at the start, N·m/rad.
@@ -38,20 +40,24 @@ impl Impedance {
     /// libfranka's example in all directions: 150 N/m and 10 N·m/rad.
     pub const SOFT: Self = Self {
         stiffness: Vector6::new(150.0, 150.0, 150.0, 10.0, 10.0, 10.0),
+        mass: Vector6::new(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
         integral_per_sec: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Held in all directions, with integral action: for free air. It may be as strong as damping over mass, some 15/s.
+    /// Held in all directions, with integral action: for free air. The damping is for the arm's own mass at the tcp, some 5 kg; without it
+    /// integral action makes the tcp swing.
     pub const FREE_AIR: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 1000.0, 50.0, 50.0, 50.0),
-        integral_per_sec: Vector6::new(8.0, 8.0, 8.0, 8.0, 8.0, 8.0),
+        mass: Vector6::new(5.0, 5.0, 5.0, 1.0, 1.0, 1.0),
+        integral_per_sec: Vector6::new(5.0, 5.0, 5.0, 5.0, 5.0, 5.0),
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
     /// Soft along z, held to the sides and in its turn: for pressing on something.
     pub const SOFT_DOWN: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
+        mass: Vector6::new(5.0, 5.0, 1.0, 1.0, 1.0, 1.0),
         integral_per_sec: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
@@ -102,11 +108,11 @@ impl ImpedanceControl {
         coriolis: &JointVector,
     ) -> JointVector {
         let (base_from_tcp, jacobian) = panda.forward_and_jacobian(q);
-        let Impedance { stiffness, integral_per_sec, null_stiffness, max_torque_step_nm } = self.impedance;
+        let Impedance { stiffness, mass, integral_per_sec, null_stiffness, max_torque_step_nm } = self.impedance;
         let spring = stiffness.component_mul(&pose_error(&base_from_tcp, &reference.base_from_tcp));
         self.integral += spring.component_mul(&integral_per_sec) * PERIOD_SECS;
         self.integral = self.integral.sup(&-MAX_INTEGRAL).inf(&MAX_INTEGRAL);
-        let damping = stiffness.map(|value| 2.0 * value.sqrt());
+        let damping = stiffness.component_mul(&mass).map(|value| 2.0 * value.sqrt());
         let force = -spring - self.integral - damping.component_mul(&(jacobian * dq - reference.twist));
         let wanted_null = (self.q_null - q) * null_stiffness - dq * (2.0 * null_stiffness.sqrt());
         let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
@@ -191,10 +197,10 @@ mod tests {
         for _ in 0..500 {
             control.torque(&panda, &q, &zero, &still(wanted), &zero);
         }
-        // 1 mm at 1000 N/m is 1 N; at 8/s the integral has 4 N more after half a second.
-        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, -5.0, 0.0, 0.0, 0.0);
+        // 1 mm at 1000 N/m is 1 N; at 5/s the integral has 2.5 N more after half a second.
+        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, -3.5, 0.0, 0.0, 0.0);
         assert!((control.last_torque() - expected).amax() < 1e-6, "{}", control.last_torque());
-        for _ in 0..5000 {
+        for _ in 0..8000 {
             control.torque(&panda, &q, &zero, &still(wanted), &zero);
         }
         control.change(Impedance::SOFT_DOWN);

@@ -1,5 +1,7 @@
 //! An arm with its limits: every motion is planned and checked here.
 
+use std::borrow::Cow;
+
 use sdg_kinematics::{
     CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, Panda, Trajectory,
 };
@@ -16,6 +18,8 @@ const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 /// How often a motion is slowed down so that joints and tcp keep to their limits, and to which share of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
 const SLOWDOWN: f64 = 0.8;
+/// A hand that goes up from what it touched may be so much lower for the first instants, m: a straight way in joint space is bent.
+const LEAVING_M: f64 = 0.5e-3;
 
 /// An arm, the limits of its motions, and whether it may move at all.
 ///
@@ -28,12 +32,14 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
+    /// How far below the table's told height something may have been touched, m.
+    below_table_m: f64,
 }
 
 impl<'a, A: Arm> Robot<'a, A> {
     /// Puts an arm behind limits; `watch` sees every state and may stop it.
     pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
-        Self { arm, panda: Panda::new(), limits, watch, latched: None }
+        Self { arm, panda: Panda::new(), limits, watch, latched: None, below_table_m: 0.0 }
     }
 
     /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
@@ -114,13 +120,26 @@ impl<'a, A: Arm> Robot<'a, A> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
             let trajectory = plan(share)?;
-            match self.limits.check(trajectory.clone()) {
+            match self.limits_from(trajectory.start()).check(trajectory.clone()) {
                 Err(Violation::Cartesian { .. }) => share *= SLOWDOWN,
                 Err(Violation::Joint { quantity, .. }) if quantity != "position" => share *= SLOWDOWN,
                 _ => return Ok(trajectory),
             }
         }
         plan(share)
+    }
+
+    /// The limits of a motion from a configuration. Where the hand came down on something lower than the table is told to be, it may go
+    /// up from there, and not lower.
+    pub(crate) fn limits_from(&self, start: &JointVector) -> Cow<'_, SafetyLimits> {
+        let SafetyLimits { table_height_m, min_table_clearance_m, fingertip_beyond_tcp_m, .. } = self.limits;
+        let here_m = self.panda.clearance(start, table_height_m).lowest_m - fingertip_beyond_tcp_m;
+        let lower_m = min_table_clearance_m - here_m;
+        if lower_m <= 0.0 || lower_m > self.below_table_m {
+            return Cow::Borrowed(&self.limits);
+        }
+        let table_height_m = table_height_m - lower_m - LEAVING_M;
+        Cow::Owned(SafetyLimits { table_height_m, ..self.limits.clone() })
     }
 
     /// Checks a motion and follows it to its end.
@@ -135,7 +154,7 @@ impl<'a, A: Arm> Robot<'a, A> {
             let (joint, apart_rad, max_rad) = (joint_idx + 1, apart[joint_idx], MAX_START_DISTANCE_RAD);
             return Err(Violation::StartsElsewhere { joint, apart_rad, max_rad }.into());
         }
-        let motion = self.limits.check(trajectory)?;
+        let motion = self.limits_from(trajectory.start()).check(trajectory)?;
         self.watch.begin();
         let ended = match self.arm.follow(&motion, &mut self.watch) {
             Ok(MotionEnd::Arrived) => Ok(()),
@@ -263,6 +282,7 @@ impl<A: CompliantArm> Robot<'_, A> {
         let table_height_m = self.limits.table_height_m - touch_down.below_table_m;
         SafetyLimits { table_height_m, ..self.limits.clone() }.check(way)?;
         self.watch.begin();
+        self.below_table_m = touch_down.below_table_m;
         let touched = self.arm.touch_down(touch_down, &mut self.watch);
         self.note(touched)
     }

@@ -162,7 +162,8 @@ impl<A: Arm> Robot<'_, A> {
                 .filter(|pair| pair[0] != pair[1])
                 .map(|pair| self.plan_between(&pair[0], &pair[1], joints))
                 .collect::<Result<Vec<_>>>()?;
-            match motions.iter().find_map(|motion| self.limits().check(motion.clone()).err()) {
+            let refuse = |motion: &Trajectory| self.limits_from(motion.start()).check(motion.clone()).err();
+            match motions.iter().find_map(refuse) {
                 None => return Ok(Way { motions, approach, goal_idx }),
                 Some(violation) => refused = refused.or(Some(violation)),
             }

@@ -59,6 +59,7 @@ fn a_soft_tcp_finds_a_table_that_is_higher_than_told_and_presses_little() {
         let told = TouchDown::default();
         let touched = robot.touch_down(&told).unwrap();
         assert!(touched.is_contact, "friction {friction_nm}: {touched:?}");
+        println!("friction {friction_nm}: {touched:?}");
         let beside_m = touched.tcp_height_m - FINGERTIP_BEYOND_TCP_M;
         assert!(beside_m.abs() < 1e-3, "friction {friction_nm}: {touched:?}");
         assert!((touched.force_n - told.press_n).abs() < 2.0, "friction {friction_nm}: {touched:?}");
