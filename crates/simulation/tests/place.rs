@@ -24,7 +24,7 @@ const MAX_PEAK_N: f64 = 25.0;
 fn fill(at: Where, cells: &[u32]) {
     let spec = ObjectSpec::by_name("spring_clip").unwrap();
     let mut lying: Vec<Isometry3<f64>> = Vec::new();
-    let mut placing = PlacingConfig { symmetry: spec.symmetry, ..PlacingConfig::default() };
+    let placing = PlacingConfig { symmetry: spec.symmetry, ..PlacingConfig::default() };
     for &number in cells {
         let goal = tray().goal(number).unwrap();
         let placed = place(cell(&spec, u64::from(number), &lying), at, &goal, &config(&spec), &placing);
@@ -38,7 +38,6 @@ fn fill(at: Where, cells: &[u32]) {
             assert!(touched.force_n < MAX_STATIC_N && touched.peak_n < MAX_PEAK_N, "{number}: {touched:?}");
         }
         lying.push(placed.base_from_object);
-        placing.slip = report.slip;
     }
 }
 

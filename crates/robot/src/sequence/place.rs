@@ -56,9 +56,6 @@ pub struct PlacingConfig {
     pub tolerance_rad: f64,
     /// How often a part that lies beside its place is taken again.
     pub max_corrections: usize,
-    /// How the part is known to slide in its own frame (x along the marked line) when the hand closes: that of
-    /// [`PlaceReport::slip`] of a part of its kind. The identity where nothing is known.
-    pub slip: Isometry3<f64>,
 }
 
 impl Default for PlacingConfig {
@@ -72,7 +69,6 @@ impl Default for PlacingConfig {
             tolerance_m: 0.003,
             tolerance_rad: 3_f64.to_radians(),
             max_corrections: 1,
-            slip: Isometry3::identity(),
         }
     }
 }
@@ -102,8 +98,6 @@ pub struct PlaceReport {
     pub touched: Vec<Touched>,
     /// How far the part lay beside its place by each look; for a bin from its middle. None where the part was not seen in a bin.
     pub errors: Vec<PlaceError>,
-    /// How the part slid in its own frame when the hand closed, by the last look.
-    pub slip: Isometry3<f64>,
 }
 
 /// Grasps the part once and puts it down.
@@ -125,17 +119,16 @@ pub fn grasp_and_place<A: CompliantArm>(
     sequence.touch = Some(touch);
     let outcome = sequence.grasp()?;
     let grasp = sequence.grasp_report(outcome);
-    let mut placed = Placed { errors: Vec::new(), slip: placing.slip };
+    let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
         GraspOutcome::Failed { step, why } => PlaceOutcome::Failed { step: *step, why: why.clone() },
-        GraspOutcome::Held => match sequence.place(goal, placing, touch, &mut placed) {
+        GraspOutcome::Held => match sequence.place(goal, placing, touch, &mut errors) {
             Ok(()) => PlaceOutcome::Placed,
             Err(Stop::Failed(step, why)) => PlaceOutcome::Failed { step, why },
             Err(Stop::Error(error)) => return Err(error),
         },
     };
-    let Placed { errors, slip } = placed;
-    Ok(PlaceReport { grasp, outcome, touched: std::mem::take(&mut sequence.touched), errors, slip })
+    Ok(PlaceReport { grasp, outcome, touched: std::mem::take(&mut sequence.touched), errors })
 }
 
 impl PlaceOutcome {
@@ -145,23 +138,17 @@ impl PlaceOutcome {
     }
 }
 
-/// What the looks at the placed part tell.
-struct Placed {
-    errors: Vec<PlaceError>,
-    slip: Isometry3<f64>,
-}
-
 impl<A: Arm> Sequence<'_, '_, A> {
     fn place(
         &mut self,
         goal: &PlaceGoal,
         placing: &PlacingConfig,
         touch: super::Touch<A>,
-        placed: &mut Placed,
+        errors: &mut Vec<PlaceError>,
     ) -> Steps<()> {
-        let mut num_corrections = 0;
+        let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
-            let aim = self.carry(goal, placing, &placed.slip)?;
+            let aim = self.carry(goal, placing, &slid)?;
             self.put_down(&aim, placing, touch)?;
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
@@ -173,14 +160,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 (None, None) => return Err(fails("the part is not seen where it was put down".to_owned())),
             };
             let error = beside(&aim.base_from_part, &found.base_from_tcp, placing.symmetry);
-            placed.errors.push(error);
+            errors.push(error);
             if let Some(size_m) = goal.bin_m {
                 return match inside(goal, &found.base_from_tcp, size_m) {
                     true => Ok(()),
                     false => Err(fails(format!("the part lies beside the bin {}", told(&error)))),
                 };
             }
-            placed.slip = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             if error.distance_m() <= placing.tolerance_m && error.angle_rad.abs() <= placing.tolerance_rad {
                 return Ok(());
             }
@@ -192,6 +178,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
+            slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // Perception takes the part to lie on the table.
             let mut target = found;
             target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
@@ -301,6 +288,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.robot.set_load(Load::NONE)?;
         }
         self.robot.wait(RELEASED_SECS)?;
+        self.passed(GraspStep::Release)?;
         let start = self.robot.commanded()?;
         let path = self.way_up(&start, placing.retreat_m)?;
         let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());

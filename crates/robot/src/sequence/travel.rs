@@ -1,6 +1,6 @@
 //! Free motions: straight in joint space over an empty table, or around what stands in the cell.
 
-use sdg_kinematics::{JointPath, JointVector};
+use sdg_kinematics::{JointLimits, JointPath, JointVector};
 
 use super::{FREE_CLEARANCE_M, Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
@@ -26,7 +26,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let held = self.held.as_ref().map_or(&[][..], |held| &held.in_tcp);
         let surroundings =
             Surroundings { obstacles: &self.config.obstacles, held, table_clearance_m: FREE_CLEARANCE_M };
-        self.robot.plan_around(&surroundings, to, &self.config.pace.free_limits())
+        self.robot.plan_around(&surroundings, to, &self.free_limits())
+    }
+
+    /// Joint limits of free motions, with a part in the hand and without.
+    fn free_limits(&self) -> JointLimits {
+        match self.held {
+            Some(_) => self.config.pace.carry_limits(),
+            None => self.config.pace.free_limits(),
+        }
     }
 
     /// Goes along a way; its approach, where it has one, is left to go.
@@ -45,7 +53,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let way = fails_at(step, planned)?;
             return self.travel(way, step).map(|_| ());
         }
-        let limits = self.config.pace.free_limits();
+        let limits = self.free_limits();
         let planned = self.robot.plan_free(q, &limits);
         let motion = fails_at(step, planned)?;
         let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
