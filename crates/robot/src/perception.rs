@@ -68,8 +68,22 @@ pub enum GraspStep {
 }
 
 impl GraspStep {
-    /// The steps of a grasp in their order; those of placing come after them.
+    /// The steps of a grasp in their order.
     pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
+
+    /// The steps of a grasp and of placing in their order.
+    pub const WITH_PLACING: [Self; 10] = [
+        Self::Detect,
+        Self::Hover,
+        Self::Approach,
+        Self::Close,
+        Self::Lift,
+        Self::Hold,
+        Self::Carry,
+        Self::PutDown,
+        Self::Release,
+        Self::Check,
+    ];
 
     /// The name in messages and in JSON.
     pub fn name(self) -> &'static str {

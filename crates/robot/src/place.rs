@@ -117,6 +117,26 @@ impl Place {
         [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(|p| self.at(p)).to_vec()
     }
 
+    /// Whether a part there belongs to this place.
+    pub fn covers(&self, at_m: [f64; 2]) -> bool {
+        /// Around the point of a pose.
+        const POSE_RADIUS_M: f64 = 0.03;
+        let apart = Point2::from(at_m) - Point2::from(self.at_m);
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let [along, across] = [apart.x * cos + apart.y * sin, apart.y * cos - apart.x * sin];
+        let within = |value: f64, low: f64, high: f64| value >= low && value <= high;
+        match self.kind {
+            PlaceKind::Pose => apart.norm() <= POSE_RADIUS_M,
+            PlaceKind::Bin { size_m: [length, width] } => {
+                within(along, -0.5 * length, 0.5 * length) && within(across, -0.5 * width, 0.5 * width)
+            }
+            PlaceKind::Tray { cells: [columns, rows], pitch_m: [a, b] } => {
+                within(along, -0.5 * a, (f64::from(columns) - 0.5) * a)
+                    && within(across, -0.5 * b, (f64::from(rows) - 0.5) * b)
+            }
+        }
+    }
+
     fn at(&self, [along, across]: [f64; 2]) -> Point2<f64> {
         let (sin, cos) = self.yaw_rad.sin_cos();
         Point2::new(self.at_m[0] + along * cos - across * sin, self.at_m[1] + along * sin + across * cos)
@@ -164,6 +184,8 @@ mod tests {
         for (corner, expected) in corners.iter().zip(expected) {
             assert!((corner - Point2::from(expected)).norm() < 1e-12, "{corners:?}");
         }
+        assert!(tray().covers([0.42, 0.44]) && tray().covers([0.33, 0.16]));
+        assert!(!tray().covers([0.43, 0.3]) && !tray().covers([0.4, 0.14]));
     }
 
     #[test]

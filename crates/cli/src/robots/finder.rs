@@ -16,7 +16,7 @@ use sdg_geometry::PosedCamera;
 use sdg_grasp::{CameraOverTable, GraspModel, PlanDetector, Verification};
 use sdg_kinematics::Panda;
 use sdg_robot::workcell::Mounting;
-use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, RobotError};
+use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, Place, RobotError};
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const MAX_WAIT: Duration = Duration::from_secs(5);
@@ -164,16 +164,49 @@ pub(crate) struct ModelFinder<P> {
     pub(crate) last: Option<RgbImage>,
     /// The best part of the last picture.
     pub(crate) seen: Option<SeenOutline>,
+    /// Parts that lie there are not to be taken: where parts are put down.
+    pub(crate) places: Vec<Place>,
 }
 
 impl<P> ModelFinder<P> {
     pub(crate) fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
-        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None }
+        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None, places: Vec::new() }
     }
 }
 
 impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
     fn find(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>> {
+        let found = self.find_all(arm)?;
+        let is_placed = |target: &GraspTarget| {
+            let p = target.base_from_tcp.translation;
+            self.places.iter().any(|place| place.covers([p.x, p.y]))
+        };
+        Ok(found.into_iter().find(|target| !is_placed(target)))
+    }
+
+    fn find_nearest(
+        &mut self,
+        arm: &mut A,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> sdg_robot::Result<Option<GraspTarget>> {
+        let apart_m = |target: &GraspTarget| {
+            (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
+        };
+        let sure = self.find_all(arm)?.into_iter().filter(|target| target.score >= sdg_robot::SURE);
+        Ok(sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b))))
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        self.taken
+    }
+}
+
+impl<P> ModelFinder<P> {
+    /// All that is found in a picture, the best first.
+    fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
+    where
+        P: Pictures<A>,
+    {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
@@ -201,14 +234,11 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
             let outline_in_base = outline.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
             Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
         });
-        Ok(found.first().map(|best| GraspTarget {
-            base_from_tcp: best.pose.frame_from_tcp(),
-            jaw_width_m: best.pose.opening_m,
-            score: best.detection.score,
-        }))
-    }
-
-    fn picture_time(&self) -> Option<Instant> {
-        self.taken
+        let targets = found.iter().map(|found| GraspTarget {
+            base_from_tcp: found.pose.frame_from_tcp(),
+            jaw_width_m: found.pose.opening_m,
+            score: found.detection.score,
+        });
+        Ok(targets.collect())
     }
 }
