@@ -8,11 +8,11 @@ import { figuresText, gradeOf } from "./versions.js";
 const by = (id) => document.getElementById(id);
 const POLL_MS = 400;
 const MODELS = [
-  ["C", "Keypoints", "The best all-round. Half a minute on two cores."],
-  ["S", "Shape", "No network: searches for the photo’s part itself. Ready in seconds; weaker when the part is partly hidden."],
-  ["A", "Crop", "A box, and the part’s turn from the crop in it. About a minute."],
-  ["B", "Box", "As C, but the gripper goes to the middle of the box. Half a minute."],
-  ["D", "Mask", "Texture or outline of what a mask shows. About a minute; needs the outline."],
+  ["C", "Keypoints", "The best all-round. Half a minute."],
+  ["S", "Shape", "No network. Ready in seconds; weaker when the part is partly hidden."],
+  ["A", "Crop", "Box, and the turn from the crop in it. About a minute."],
+  ["B", "Box", "As C, but grips the middle of the box."],
+  ["D", "Mask", "Texture or outline within a mask. About a minute; needs the outline."],
 ];
 
 /** How often a part looks the same in a whole turn, each with a part that does. */
@@ -141,7 +141,7 @@ function renderOutcome(news) {
   for (const name of ["good", "doubtful", "poor"]) outcome.classList.toggle(name, name === grade);
   let text = "";
   if (news.status === "done" && summary) {
-    const better = grade === "good" ? "" : " Try it on your own pictures: what is right or wrong there, said on the page, teaches it better, and so does a second photo.";
+    const better = grade === "good" ? "" : " Try it on your own pictures: each one you call right or wrong teaches it better, and so does a second photo.";
     text = `Taught “${summary.object}” in ${seconds(summary.seconds)}. ${figuresText(summary)}${better} Written to ${news.written_to}`;
   }
   if (outcome.textContent !== text) outcome.textContent = text;

@@ -10,13 +10,21 @@ const percent = (share) => `${Math.round(share * 100)}\u00a0%`;
 /** Chosen to be compared. */
 let chosen = [];
 
+/** The same without intervals and errors, for a list of models. */
+function briefFigures({ figures }) {
+  if (!figures) return "";
+  const { found, wrong, false_alarms: alarms } = figures;
+  return `${found[0]} of ${found[1]} found, ${wrong} wrong, ${alarms[0]} of ${alarms[1]} false alarms`;
+}
+
 /** What the finished model made of held-back samples, in words. */
 export function figuresText({ figures, negatives }) {
   if (!figures) return "";
-  const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees } = figures;
+  const { found, found_interval: [low, high], wrong, false_alarms: alarms, error, error_degrees: degrees, others_in_photo: others } = figures;
   const off = error ? `, off by ${error[0].toFixed(1)}\u00a0${error[1]} and ${degrees.toFixed(1)}° (median)` : "";
+  const more = others ? ` ${others} more of it found in the photo were taken out of the samples.` : "";
   const said = negatives ? ` It refuses ${negatives.refused} of your ${negatives.pictures} pictures without the part.` : "";
-  return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0%: ${percent(low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]} without the part.${said}`;
+  return `On new samples it finds ${found[0]} of ${found[1]} parts (95\u00a0%: ${percent(low)} to ${percent(high)})${off}; ${wrong} wrong, false alarms in ${alarms[0]} of ${alarms[1]} without the part.${more}${said}`;
 }
 
 /** Whether that is good, to be doubted, or poor. Chosen by hand: nine of ten, and seven of ten. */
@@ -89,7 +97,7 @@ export function renderVersions() {
     const marks = [model.is_current && "in use", model.is_stale && "stale: photos, marks or negatives have changed since"].filter(Boolean);
     const note = Object.assign(document.createElement("span"), { className: "stale", textContent: marks.join("; ") });
     const of = `${model.photos} photo${model.photos === 1 ? "" : "s"}${model.negatives ? `, ${model.negatives} without the part` : ""}. `;
-    const figures = Object.assign(document.createElement("small"), { textContent: of + figuresText(model.summary) });
+    const figures = Object.assign(document.createElement("small"), { textContent: of + briefFigures(model.summary) });
     const row = Object.assign(document.createElement("div"), { className: "row" });
     if (!model.is_current) row.append(button("Use this one", () => use(model.id)));
     if (models.length > 1) {

@@ -2,6 +2,8 @@
 //!
 //! Requests name pictures by their index in a list made here. No path comes from the page.
 
+mod tried;
+
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -14,14 +16,14 @@ use crate::guard::new_token;
 use crate::live::{LiveDesk, LiveOptions};
 use crate::marks::Marks;
 use crate::model_versions::{ModelVersions, Version, now_secs};
-use crate::names::{file_name, free_name, free_numbered, safe_stem};
+use crate::names::{file_name, free_numbered, safe_stem};
 use crate::picture::{Picture, pictures_in, png};
 use crate::preview::{Previews, SampleKey};
 use crate::project_file::{ProjectFile, TRIED_FOLDER};
 use crate::session_state::{MarkedPicture, State, TrialPicture};
 use crate::teacher::{GraspTeacher, TaughtModel, TeachRequest, TeachingMaterial};
 use crate::teaching::{News, Teaching};
-use crate::views::{ComparedPicture, ImageView, Saved, SessionView, TrialPictureView};
+use crate::views::{ImageView, Saved, SessionView};
 
 /// Pictures to try that one session keeps.
 const MAX_TRIAL_PICTURES: usize = 500;
@@ -263,60 +265,6 @@ impl Session {
         Ok(self.state().image(id)?.marks.clone())
     }
 
-    /// A picture to try.
-    ///
-    /// # Errors
-    /// No such picture.
-    pub(crate) fn trial_picture(&self, id: usize) -> Result<TrialPicture> {
-        Ok(self.state().trial_picture(id)?.clone())
-    }
-
-    /// Takes a picture that came from the page; it is kept in a folder of this session.
-    ///
-    /// # Errors
-    /// Bytes that are no picture, more pictures than a session keeps.
-    pub fn add_trial_picture(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
-        let count = self.state().trial_pictures.len();
-        if count >= MAX_TRIAL_PICTURES {
-            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
-        }
-        // The name is for people; the file's own is ours.
-        let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
-        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
-        std::fs::create_dir_all(&self.uploads).map_err(Error::file(&self.uploads, "cannot make this folder"))?;
-        // Held until the picture is written: the next one finds its name taken.
-        let mut state = self.state();
-        let path = free_name(&self.uploads.join("picture"), &shown, extension);
-        sdg_report::write_atomically(&path, bytes)?;
-        let picture = Picture::open(&path).map_err(|error| {
-            // What is no picture is not kept.
-            let _ = std::fs::remove_file(&path);
-            match error {
-                Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
-                other => other,
-            }
-        })?;
-        state.trial_pictures.push(TrialPicture::new(Picture { name: shown, ..picture }, true));
-        state.save_project()?;
-        let id = state.trial_pictures.len() - 1;
-        Ok(state.trial_picture_view(id))
-    }
-
-    /// Says that the part is not in a tried picture, which then is a negative of the next teaching; or takes that back.
-    ///
-    /// # Errors
-    /// No such picture, one that is a demonstration, a project that cannot be written.
-    pub fn set_absent(&self, trial_id: usize, is_absent: bool) -> Result<TrialPictureView> {
-        let mut state = self.state();
-        state.trial_picture(trial_id)?;
-        if state.became(trial_id).is_some() {
-            return Err(Error::Busy("this picture is a demonstration: remove that first"));
-        }
-        state.trial_pictures[trial_id].is_absent = is_absent;
-        state.save_project()?;
-        Ok(state.trial_picture_view(trial_id))
-    }
-
     /// Takes a photo out of the session. Its file and its marks stay where they are.
     ///
     /// # Errors
@@ -340,28 +288,6 @@ impl Session {
         state.save_project()
     }
 
-    /// Takes a picture to try out of the session. Its file stays.
-    ///
-    /// # Errors
-    /// No such picture, a project that cannot be written.
-    pub fn remove_trial_picture(&self, id: usize) -> Result<()> {
-        let mut state = self.state();
-        state.trial_picture(id)?;
-        state.trial_pictures[id].is_removed = true;
-        state.save_project()
-    }
-
-    /// Puts a picture to try back that was taken out in this session.
-    ///
-    /// # Errors
-    /// No such picture, a project that cannot be written.
-    pub fn put_back_trial_picture(&self, id: usize) -> Result<()> {
-        let mut state = self.state();
-        let count = state.trial_pictures.len();
-        state.trial_pictures.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
-        state.save_project()
-    }
-
     /// Uses a version of the model: for the pictures to try, and as the file under the model's own name.
     ///
     /// # Errors
@@ -375,67 +301,6 @@ impl Session {
         state.models.use_version(&path, id)?;
         self.teaching.set_model(Arc::from(model));
         state.save_project()
-    }
-
-    /// What two versions of the model find in every picture to try.
-    ///
-    /// # Errors
-    /// No such version, files that cannot be read.
-    pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
-        let (models, pictures) = {
-            let state = self.state();
-            let read = |id: usize| Ok::<_, Error>((state.models.read(id)?, state.models.get(id)?.summary.clone()));
-            let tried = |id: usize| (id, state.trial_pictures[id].clone(), state.became(id).is_some());
-            let pictures: Vec<_> = state.trial_ids().map(tried).collect();
-            ([read(one)?, read(other)?], pictures)
-        };
-        let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
-        let models = [one?, other?];
-        let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
-            let pixels = trial.picture.pixels()?;
-            let found = |model: &dyn TaughtModel| {
-                let found = model.detect(&pixels).map_err(Error::Teacher)?;
-                let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
-                Ok::<_, Error>((found.iter().filter(|one| one.is_accepted).count(), best))
-            };
-            let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
-            Ok(ComparedPicture {
-                id,
-                name: trial.picture.name,
-                is_there,
-                found: [found(&*models[0])?, found(&*models[1])?],
-            })
-        });
-        compared.collect()
-    }
-
-    /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
-    /// picture, under a name of its own.
-    ///
-    /// # Errors
-    /// No such picture, one that is a demonstration already, a file that cannot be written.
-    pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
-        let mut state = self.state();
-        let trial = state.trial_picture(trial_id)?.clone();
-        if state.became(trial_id).is_some() {
-            return Err(Error::Busy("this picture is a demonstration already"));
-        }
-        let is_in_project = state.project.is_some();
-        let mut picture = trial.picture;
-        if trial.uploaded || (is_in_project && picture.path.parent() == Some(&self.uploads)) {
-            let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
-            let target = free_name(&self.home, &picture.name, &extension);
-            let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
-            sdg_report::write_atomically(&target, &bytes)?;
-            picture.name = file_name(&target);
-            picture.path = target;
-        }
-        let id = state.add_image(picture, marks)?;
-        state.trial_pictures[trial_id].became = Some(id);
-        state.trial_pictures[trial_id].is_absent = false;
-        state.save(id);
-        state.save_project()?;
-        Ok(state.image_view(id))
     }
 
     /// The camera.
@@ -470,15 +335,6 @@ impl Session {
         let id = state.add_image(picture, Marks::default())?;
         state.save_project()?;
         Ok(state.image_view(id))
-    }
-
-    /// Makes a frame that was shown a picture to try.
-    ///
-    /// # Errors
-    /// No camera, a frame that is not kept any more, more pictures than a session keeps.
-    pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
-        let bytes = png(&*self.live_desk()?.frame(number)?)?;
-        self.add_trial_picture(&format!("live-{number}.png"), &bytes)
     }
 
     /// One picture with its marks, as teaching takes it.

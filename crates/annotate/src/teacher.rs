@@ -157,7 +157,7 @@ pub struct TaughtSummary {
     pub model: ModelKind,
     /// The object's name.
     pub object: String,
-    /// Wall-clock time of the teaching.
+    /// Wall-clock time of the teaching, with that of trying the model on held-back samples.
     pub seconds: f64,
     /// What the finished model made of held-back samples; `None` where it was not tried on any.
     pub figures: Option<Figures>,
@@ -182,6 +182,9 @@ pub struct Figures {
     pub error: Option<(f64, String)>,
     /// Median error of the turn.
     pub error_degrees: Option<f64>,
+    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    #[serde(default)]
+    pub others_in_photo: usize,
 }
 
 /// How many of the person's pictures without the part are refused.

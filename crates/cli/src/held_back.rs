@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
 };
-use sdg_grasp::{GraspModel, Verification};
+use sdg_geometry::Polygon;
+use sdg_grasp::{GraspDetection, GraspModel, Verification};
 use serde_json::{Value, json};
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
@@ -56,6 +57,26 @@ pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
     annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
 }
 
+/// The photos without what the model takes for further parts beside the marked one, and how many these are.
+///
+/// Such a photo is the samples' background, and parts in it would count as wrong. What is marked in a photo was taken out before.
+fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
+    let mut num_others = 0;
+    let mut alone = Vec::with_capacity(demonstrations.len());
+    for demonstration in demonstrations {
+        let detections = model.detect(&demonstration.image, Verification::ByShape)?;
+        let marked = demonstration.annotation.bbox;
+        let others = detections.iter().filter(|found| found.is_accepted() && !marked.contains(&found.bbox.center()));
+        let region = |found: &GraspDetection| {
+            found.outline.clone().unwrap_or_else(|| Polygon { vertices: found.bbox.corners().to_vec() })
+        };
+        let regions: Vec<Polygon> = others.map(region).collect();
+        num_others += regions.len();
+        alone.push(demonstration.clone().without(&regions));
+    }
+    Ok((alone, num_others))
+}
+
 /// What a model made of its held-back samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldBackFigures {
@@ -64,6 +85,8 @@ pub struct HeldBackFigures {
     totals: Totals,
     /// Pixels of the photo for one of a sample's.
     photo_px: f64,
+    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    others_in_photo: usize,
 }
 
 impl HeldBackFigures {
@@ -74,7 +97,8 @@ impl HeldBackFigures {
     pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
         let facts = model.facts();
         let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
-        let samples = HeldBackSamples::new(demonstrations, &sizes, seed)?;
+        let (alone, others_in_photo) = without_others(model, demonstrations)?;
+        let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
         let detector = PictureDetector::AnyCamera(Box::new(model.clone()));
         let judged = (0..COUNT).into_par_iter().map(|number| {
@@ -105,7 +129,7 @@ impl HeldBackFigures {
             Ok(judge(&tested, facts.symmetry, DEFAULT_MIN_SCORE))
         });
         let judged = judged.collect::<Result<Vec<_>>>()?;
-        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px })
+        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
     }
 
     /// The share of parts that it found.
@@ -134,6 +158,11 @@ impl HeldBackFigures {
         millimetres.or(self.median_errors().map(|[px, _]| (px, "px")))
     }
 
+    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    pub fn others_in_photo(&self) -> usize {
+        self.others_in_photo
+    }
+
     /// One line for people.
     pub fn in_words(&self) -> String {
         let interval = |share: Share| {
@@ -143,13 +172,16 @@ impl HeldBackFigures {
         let (found, false_alarms) = (self.found(), self.false_alarms());
         let errors = self.median_distance().zip(self.median_errors());
         let errors = errors.map(|((off, unit), [_, deg])| format!("; median {off:.1} {unit} and {deg:.1}°"));
+        let others = self.others_in_photo;
+        let others = (others > 0).then(|| format!("; {others} more found in the photo were taken out of the samples"));
         format!(
-            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}",
+            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
             self.samples,
             interval(found),
             self.wrong(),
             interval(false_alarms),
-            errors.unwrap_or_default()
+            errors.unwrap_or_default(),
+            others.unwrap_or_default()
         )
     }
 
@@ -163,6 +195,7 @@ impl HeldBackFigures {
             "false_alarms": self.totals.false_alarms,
             "false_alarms_interval": wilson_interval(self.totals.false_alarms),
             "errors": self.totals.errors,
+            "others_in_photo": self.others_in_photo,
         })
     }
 }

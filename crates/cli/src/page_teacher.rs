@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 use image::RgbImage;
 use sdg_annotate::{
@@ -34,6 +35,7 @@ impl GraspTeacher for PageTeacher {
         request: &TeachRequest,
         observe: &mut dyn FnMut(TeachingStep) -> ControlFlow<()>,
     ) -> Result<Box<dyn TaughtModel>, TeacherError> {
+        let start = Instant::now();
         let mut options = TeachOptions::new(request.seed);
         options.kind = request.model;
         options.preset = self.preset;
@@ -57,7 +59,7 @@ impl GraspTeacher for PageTeacher {
         let bytes = model.to_bytes()?;
         let model = GraspModel::from_bytes(&bytes, &options.device)?;
         let figures = HeldBackFigures::of(&model, &demonstrations, request.seed)?;
-        let summary = summary(&model, Some(page_figures(&figures)));
+        let summary = summary(&model, page_figures(&figures), start.elapsed().as_secs_f64());
         Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
     }
 
@@ -77,10 +79,12 @@ impl PageTeacher {
     }
 }
 
-fn summary(model: &GraspModel, figures: Option<Figures>) -> TaughtSummary {
-    let facts = model.facts();
-    let negatives = facts.negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
-    TaughtSummary { model: model.kind(), object: model.object().to_owned(), seconds: facts.seconds, figures, negatives }
+/// `seconds` is what the person waited: teaching, and trying the model on held-back samples.
+fn summary(model: &GraspModel, figures: Figures, seconds: f64) -> TaughtSummary {
+    let negatives =
+        model.facts().negatives.map(|said| NegativesRefused { refused: said.refused, pictures: said.pictures });
+    let object = model.object().to_owned();
+    TaughtSummary { model: model.kind(), object, seconds, figures: Some(figures), negatives }
 }
 
 fn page_figures(figures: &HeldBackFigures) -> Figures {
@@ -94,6 +98,7 @@ fn page_figures(figures: &HeldBackFigures) -> Figures {
         false_alarms_interval: wilson_interval(false_alarms),
         error: figures.median_distance().map(|(error, unit)| (error, unit.to_owned())),
         error_degrees: figures.median_errors().map(|[_, degrees]| degrees),
+        others_in_photo: figures.others_in_photo(),
     }
 }
 

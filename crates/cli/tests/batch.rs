@@ -199,3 +199,21 @@ fn the_figures_of_a_teaching_are_those_of_an_evaluation_on_the_same_samples() {
         assert!((of_teaching - of_evaluation).abs() < 1e-9, "{name}: {of_teaching} {of_evaluation}");
     }
 }
+
+#[test]
+fn another_of_the_part_in_the_photo_does_not_count_as_wrong() {
+    let folder = Folder::new();
+    let photo = photo();
+    let (width, height) = photo.dimensions();
+    let twice = RgbImage::from_fn(2 * width, height, |x, y| *photo.get_pixel(x % width, y));
+    twice.save(folder.path("photo.png")).unwrap();
+    let mut marks: Value = serde_json::from_slice(&fs::read(shipped("pendulum", "annotation.json")).unwrap()).unwrap();
+    marks["imageWidth"] = (2 * width).into();
+    fs::write(folder.path("photo.json"), marks.to_string()).unwrap();
+    let (photo, model) = (folder.path("photo.png"), folder.path("model.sdg"));
+    let taught = stdout(&["teach", "--model", "S", "--demo", &photo, "--seed", "5", "--out", &model, "--json"]);
+    let held_back = &serde_json::from_str::<Value>(&taught).unwrap()["held_back"];
+    assert_eq!(held_back["others_in_photo"], 1, "{held_back}");
+    // With the other part among the background every sample has something wrong.
+    assert!(held_back["wrong"].as_u64().unwrap() <= 2, "{held_back}");
+}

@@ -2,7 +2,8 @@
 //! (`make walk SETS="FOLDER …"`; a folder has demo.* and further pictures with LabelMe marks beside them).
 //!
 //! What the page makes a person wait for is measured. What a person takes is added by the keystroke-level model (Card, Moran,
-//! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page says for the first time.
+//! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
+//! A line in which only numbers or its full stop have changed is not read again, and what is there for screen readers alone is not shown.
 #![allow(clippy::unwrap_used)]
 
 #[path = "browser/page.rs"]
@@ -30,7 +31,7 @@ struct StopWatch {
     page: Page,
     set: String,
     actions: usize,
-    /// Lines that were shown so far.
+    /// The letters of lines that were shown so far.
     lines: BTreeSet<String>,
     words: usize,
     waited: f64,
@@ -46,8 +47,9 @@ impl StopWatch {
         }
         let waited = start.elapsed().as_secs_f64();
         self.page.settle_frames();
-        let text = self.page.text("body");
-        let new: Vec<_> = text.lines().filter(|line| self.lines.insert(line.trim().to_owned())).collect();
+        let text = visible_text(&self.page);
+        let letters = |line: &str| line.chars().filter(|c| c.is_alphabetic()).collect::<String>();
+        let new: Vec<_> = text.lines().filter(|line| self.lines.insert(letters(line))).collect();
         let words = new.iter().map(|line| line.split_whitespace().count()).sum::<usize>();
         self.actions += actions;
         self.words += words;
@@ -59,6 +61,13 @@ impl StopWatch {
     fn seconds(&self) -> f64 {
         self.waited + self.actions as f64 * ACTION_SECONDS + self.words as f64 / WORDS_PER_SECOND
     }
+}
+
+/// What is seen of the page; `.sr` is for screen readers.
+fn visible_text(page: &Page) -> String {
+    let script = "const sheet = document.styleSheets[0]; sheet.insertRule('.sr { display: none !important }', 0);
+        const text = document.body.innerText; sheet.deleteRule(0); return text";
+    page.browser.run(script, &[]).unwrap().as_str().unwrap().to_owned()
 }
 
 fn demonstration_of(set: &Path) -> (PathBuf, Annotation) {

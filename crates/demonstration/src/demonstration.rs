@@ -49,14 +49,19 @@ impl Demonstration {
             .map(|(i, annotation)| {
                 let others: Vec<Polygon> =
                     annotations.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, other)| other.region()).collect();
-                let image = if others.is_empty() {
-                    image.clone()
-                } else {
-                    erase_parts(&image, &others, Some(&annotation.region()))
-                };
-                Self { image, annotation: annotation.clone() }
+                Self { image: image.clone(), annotation: annotation.clone() }.without(&others)
             })
             .collect())
+    }
+
+    /// The same with what lies in these regions of the photo (pixels) removed, but nothing of the part.
+    #[must_use]
+    pub fn without(self, others: &[Polygon]) -> Self {
+        if others.is_empty() {
+            return self;
+        }
+        let image = erase_parts(&self.image, others, Some(&self.annotation.region()));
+        Self { image, ..self }
     }
 
     /// Checks a demonstration that was put together by hand.

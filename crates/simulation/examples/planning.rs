@@ -1,9 +1,13 @@
-//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning serve`.
+//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning length [COUNT] [FIRST_SEED] [SECONDS]`,
+//! `planning serve`.
 //!
 //! - `rate`: configurations that the collision model checks in a second on one core.
 //! - `proof`: plans COUNT problems, and follows each path in MuJoCo at steps of 1 ms.
 //!
-//!   Both are timed by the clock and by the time that Linux gave the thread, which other programs on the machine do not change.
+//! - `length`: how long a plan takes to follow against the best that SECONDS (60) of optimising find: the same planner again and again with other
+//!   seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose goal no straight motion reaches.
+//!
+//!   The first two are timed by the clock and by the time that Linux gave the thread, which other programs on the machine do not change.
 //! - `serve`: answers collision checks on standard input, for planners of others (benches/peers/ompl_planning.py): a problem's seed as u64
 //!   (u64::MAX ends), answered by start and goal configuration (14 f64); then any number of configurations (7 f64), each answered by a byte (1 free),
 //!   until seven NaN. Little-endian.
@@ -25,8 +29,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     match args.first().map(String::as_str) {
         Some("rate") => rate(),
         Some("proof") => proof(number(1, 1000)?, number(2, 0)?),
+        Some("length") => length(number(1, 50)?, number(2, 0)?, number(3, 60)?),
         Some("serve") => serve(),
-        _ => Err("expected rate, proof [COUNT] [FIRST_SEED] or serve".into()),
+        _ => Err("expected rate, proof [COUNT] [FIRST_SEED], length [COUNT] [FIRST_SEED] [SECONDS] or serve".into()),
     }
 }
 
@@ -126,6 +131,47 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         println!("{name}: median {median:.1}, mean {mean:.1}, 99 % {p99:.1}, most {max:.1}");
     }
+    Ok(())
+}
+
+fn length(count: u64, first_seed: u64, seconds: u64) -> Result<(), Box<dyn Error>> {
+    const MAX_RATIO: f64 = 1.3;
+    let panda = Panda::new();
+    let mut ratios = Vec::new();
+    for seed in first_seed.. {
+        if ratios.len() as u64 == count {
+            break;
+        }
+        let problem = PlanningProblem::obstructed(seed);
+        let plan = |options: &PlanOptions| {
+            panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, options)
+        };
+        let Ok(first) = plan(&PlanOptions::default()) else { continue };
+        if first.waypoints.len() == 2 {
+            continue;
+        }
+        let mut best_secs = first.cost_secs[1];
+        let watch = Stopwatch::start();
+        let mut num_plans = 0;
+        while watch.elapsed_ms()[1] < seconds as f64 * 1e3 {
+            num_plans += 1;
+            let mut options = PlanOptions::default();
+            (options.seed, options.num_searches, options.num_shortcuts) = (num_plans, 8, 6000);
+            if let Ok(plan) = plan(&options) {
+                best_secs = best_secs.min(plan.cost_secs[1]);
+            }
+        }
+        let ratio = first.cost_secs[1] / best_secs;
+        println!(
+            "problem {seed}: {:.2} s, best of {num_plans} plans {best_secs:.2} s, ratio {ratio:.3}",
+            first.cost_secs[1]
+        );
+        ratios.push(ratio);
+    }
+    ratios.sort_by(f64::total_cmp);
+    let within = ratios.iter().filter(|ratio| **ratio <= MAX_RATIO).count();
+    let [median, max] = [ratios[ratios.len() / 2], ratios[ratios.len() - 1]];
+    println!("at most {MAX_RATIO} times the best in {within} of {}; median {median:.3}, most {max:.3}", ratios.len());
     Ok(())
 }
 

@@ -143,7 +143,7 @@ fn teach(page: &Page) {
     page.click("#teach-start");
     // Both are kept, and the figures are those of the finished model, without a network as well.
     let instant = "const models = [...document.querySelectorAll('#version-list li')].map((li) => li.innerText);
-        return models.length === 2 && models[1].includes('2: S') && models[1].includes('On new samples')
+        return models.length === 2 && models[1].includes('2: S') && / of \\d+ found/.test(models[1])
             && models[1].includes('in use')";
     patiently(page, "a model without a network", instant);
     assert!(page.folder.path().join("pendulum.sdg").exists());

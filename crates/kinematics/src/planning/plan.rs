@@ -9,8 +9,8 @@ use rand_pcg::Pcg64Mcg;
 use super::error::PlanError;
 use super::goals::{GoalConfiguration, free_configurations, free_of};
 use super::line::checked_line;
-use super::rrt::{Found, Growth, Stops, rrt_connect};
-use super::shortcut::{cost_secs, shorten};
+use super::rrt::{Found, Growth, Samples, Stops, rrt_connect};
+use super::shortcut::{cost_secs, motion_secs, shorten};
 use crate::check::check_joints;
 use crate::collision::{Checker, CollisionModel};
 use crate::error::KinematicsError;
@@ -40,7 +40,7 @@ pub struct PlanOptions {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 2 }
+        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 5 }
     }
 }
 
@@ -154,8 +154,11 @@ impl Panda {
         let mut growth = Growth { step_rad: options.step_rad, max_checks: options.max_checks };
         let first = match straight(&mut checker, start, &goals) {
             Some(found) => found,
-            None => rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops)
-                .ok_or_else(|| not_found(&checker, &stops))?,
+            None => {
+                let samples = Samples::everywhere(&self.limits);
+                rrt_connect(&mut checker, &samples, start, &roots(&goals), growth, &mut rng, &mut stops)
+                    .ok_or_else(|| not_found(&checker, &stops))?
+            }
         };
         let num_search_checks = checker.num_checked();
         let first_secs = cost_secs(&first.waypoints, &self.limits);
@@ -165,10 +168,18 @@ impl Panda {
         // A further search may take some times as long as the first: it is for a better way, not for any.
         growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
         for _ in 1..if is_straight { 1 } else { options.num_searches } {
-            let further = rrt_connect(&mut checker, &self.limits, start, &roots(&goals), growth, &mut rng, &mut stops);
+            let best_secs = cost_secs(&best.waypoints, &self.limits);
+            // Goals come the quickest first: of those that take longer even straight nothing is to be had.
+            let num_quicker = goals.partition_point(|goal| motion_secs(start, &goal.q, &self.limits) < best_secs);
+            if num_quicker == 0 {
+                break;
+            }
+            let quicker = roots(&goals[..num_quicker]);
+            let samples = Samples::on_quicker_ways(&self.limits, start, &quicker, best_secs);
+            let further = rrt_connect(&mut checker, &samples, start, &quicker, growth, &mut rng, &mut stops);
             let Some(mut further) = further else { continue };
             shorten(&mut checker, &self.limits, &mut further.waypoints, options.num_shortcuts, &mut rng);
-            if cost_secs(&further.waypoints, &self.limits) < cost_secs(&best.waypoints, &self.limits) {
+            if cost_secs(&further.waypoints, &self.limits) < best_secs {
                 best = further;
             }
         }

@@ -20,6 +20,45 @@ pub(super) struct Growth {
     pub(super) max_checks: usize,
 }
 
+/// Where random configurations are drawn from.
+///
+/// # Source
+/// J. Gammell, S. Srinivasa, T. Barfoot, "Informed RRT*: optimal sampling-based path planning focused via direct sampling of an admissible
+/// ellipsoidal heuristic", IROS 2014. The slowest joint's time is the cost here, so that boxes stand for the ellipsoids.
+#[derive(Debug, Clone)]
+pub(super) struct Samples(Vec<[JointVector; 2]>);
+
+impl Samples {
+    /// All that the joints reach.
+    pub(super) fn everywhere(limits: &JointLimits) -> Self {
+        Self(vec![[limits.position_min, limits.position_max]])
+    }
+
+    /// Only configurations that can be on a way to one of the goals which takes less than `max_secs` at full speed.
+    ///
+    /// On such a way a joint leaves the range between its start and its goal by at most half of what it could travel besides. Every goal must
+    /// be reachable straight within that time, were nothing in between.
+    pub(super) fn on_quicker_ways(
+        limits: &JointLimits,
+        start: &JointVector,
+        goals: &[JointVector],
+        max_secs: f64,
+    ) -> Self {
+        let range = |goal: &JointVector| {
+            let spare = (limits.velocity_max * max_secs - (goal - start).abs()) * 0.5;
+            let lowest = (start.inf(goal) - spare).sup(&limits.position_min);
+            let highest = (start.sup(goal) + spare).inf(&limits.position_max);
+            [lowest, highest]
+        };
+        Self(goals.iter().map(range).collect())
+    }
+
+    fn draw(&self, rng: &mut Pcg64Mcg) -> JointVector {
+        let [lowest, highest] = &self.0[rng.random_range(0..self.0.len())];
+        JointVector::from_fn(|joint, _| rng.random_range(lowest[joint]..=highest[joint]))
+    }
+}
+
 /// A way from the start to a goal.
 #[derive(Debug, Clone)]
 pub(super) struct Found {
@@ -95,7 +134,7 @@ enum Extension {
 /// Looks for a way from the start to any of the goals, all of them free; `None` once the checks are used up.
 pub(super) fn rrt_connect(
     checker: &mut Checker<'_>,
-    limits: &JointLimits,
+    samples: &Samples,
     start: &JointVector,
     goals: &[JointVector],
     growth: Growth,
@@ -109,8 +148,7 @@ pub(super) fn rrt_connect(
         let is_start_growing = from_start.nodes.len() <= from_goals.nodes.len();
         let (growing, other) =
             if is_start_growing { (&mut from_start, &mut from_goals) } else { (&mut from_goals, &mut from_start) };
-        let towards =
-            JointVector::from_fn(|joint, _| rng.random_range(limits.position_min[joint]..=limits.position_max[joint]));
+        let towards = samples.draw(rng);
         let nearest = growing.nearest(&towards);
         let (Extension::Reached(new) | Extension::Advanced(new)) =
             extend(checker, growing, nearest, &towards, growth.step_rad, stops)

@@ -23,7 +23,8 @@ pub(super) fn motion_secs(from: &JointVector, to: &JointVector, limits: &JointLi
     (to - from).abs().component_div(&limits.velocity_max).max()
 }
 
-/// Replaces parts of a way by straight motions as long as `attempts` last: first from waypoint to waypoint, then between random places.
+/// Replaces parts of a way by straight motions as long as `attempts` last, first from waypoint to waypoint, then between random places; and
+/// moves waypoints.
 pub(super) fn shorten(
     checker: &mut Checker<'_>,
     limits: &JointLimits,
@@ -51,6 +52,36 @@ pub(super) fn shorten(
             *waypoints = shorter;
             skip_waypoints(checker, waypoints);
         }
+        move_waypoint(checker, limits, waypoints, rng);
+    }
+}
+
+/// Moves a random waypoint to a random place nearby where that makes the way quicker: past an edge it is pulled tight.
+fn move_waypoint(checker: &mut Checker<'_>, limits: &JointLimits, waypoints: &mut [JointVector], rng: &mut Pcg64Mcg) {
+    /// How far a joint is moved at most, as the time that this takes at full speed, s.
+    const MAX_MOVE_SECS: f64 = 0.3;
+    /// Places that are compared by cost; only the best is checked for collisions.
+    const NUM_PLACES: usize = 16;
+    if waypoints.len() <= 2 {
+        return;
+    }
+    let moved = rng.random_range(1..waypoints.len() - 1);
+    let [before, here, after] = [moved - 1, moved, moved + 1].map(|index| waypoints[index]);
+    let secs = |place: &JointVector| motion_secs(&before, place, limits) + motion_secs(place, &after, limits);
+    let reach_secs = MAX_MOVE_SECS * rng.random_range(0.0..1.0f64).powi(2);
+    let mut best = (secs(&here) - MIN_GAIN_SECS, None);
+    for _ in 0..NUM_PLACES {
+        let offset = JointVector::from_fn(|joint, _| limits.velocity_max[joint] * rng.random_range(-1.0..=1.0));
+        let place = (here + offset * reach_secs).sup(&limits.position_min).inf(&limits.position_max);
+        if secs(&place) < best.0 {
+            best = (secs(&place), Some(place));
+        }
+    }
+    if let Some(place) = best.1
+        && checker.is_edge_free(&before, &place)
+        && checker.is_edge_free(&place, &after)
+    {
+        waypoints[moved] = place;
     }
 }
 

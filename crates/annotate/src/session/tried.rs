@@ -1,0 +1,158 @@
+//! Pictures to try: taken in, accepted as demonstrations, said to be without the part, compared.
+
+use super::{MAX_LABEL_CHARS, MAX_TRIAL_PICTURES, Session};
+use crate::error::{Error, Result};
+use crate::marks::Marks;
+use crate::names::{file_name, free_name};
+use crate::picture::{Picture, png};
+use crate::session_state::TrialPicture;
+use crate::teacher::TaughtModel;
+use crate::views::{ComparedPicture, ImageView, TrialPictureView};
+
+impl Session {
+    /// A picture to try.
+    ///
+    /// # Errors
+    /// No such picture.
+    pub(crate) fn trial_picture(&self, id: usize) -> Result<TrialPicture> {
+        Ok(self.state().trial_picture(id)?.clone())
+    }
+
+    /// Takes a picture that came from the page; it is kept in a folder of this session.
+    ///
+    /// # Errors
+    /// Bytes that are no picture, more pictures than a session keeps.
+    pub fn add_trial_picture(&self, name: &str, bytes: &[u8]) -> Result<TrialPictureView> {
+        let count = self.state().trial_pictures.len();
+        if count >= MAX_TRIAL_PICTURES {
+            return Err(Error::TooManyPictures { most: MAX_TRIAL_PICTURES });
+        }
+        // The name is for people; the file's own is ours.
+        let extension = if bytes.starts_with(b"\x89PNG") { "png" } else { "jpg" };
+        let shown: String = name.rsplit(['/', '\\']).next().unwrap_or(name).chars().take(MAX_LABEL_CHARS).collect();
+        std::fs::create_dir_all(&self.uploads).map_err(Error::file(&self.uploads, "cannot make this folder"))?;
+        // Held until the picture is written: the next one finds its name taken.
+        let mut state = self.state();
+        let path = free_name(&self.uploads.join("picture"), &shown, extension);
+        sdg_report::write_atomically(&path, bytes)?;
+        let picture = Picture::open(&path).map_err(|error| {
+            // What is no picture is not kept.
+            let _ = std::fs::remove_file(&path);
+            match error {
+                Error::Demonstration { source, .. } => Error::Demonstration { name: shown.clone(), source },
+                other => other,
+            }
+        })?;
+        state.trial_pictures.push(TrialPicture::new(Picture { name: shown, ..picture }, true));
+        state.save_project()?;
+        let id = state.trial_pictures.len() - 1;
+        Ok(state.trial_picture_view(id))
+    }
+
+    /// Says that the part is not in a tried picture, which then is a negative of the next teaching; or takes that back.
+    ///
+    /// # Errors
+    /// No such picture, one that is a demonstration, a project that cannot be written.
+    pub fn set_absent(&self, trial_id: usize, is_absent: bool) -> Result<TrialPictureView> {
+        let mut state = self.state();
+        state.trial_picture(trial_id)?;
+        if state.became(trial_id).is_some() {
+            return Err(Error::Busy("this picture is a demonstration: remove that first"));
+        }
+        state.trial_pictures[trial_id].is_absent = is_absent;
+        state.save_project()?;
+        Ok(state.trial_picture_view(trial_id))
+    }
+
+    /// Takes a picture to try out of the session. Its file stays.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn remove_trial_picture(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        state.trial_picture(id)?;
+        state.trial_pictures[id].is_removed = true;
+        state.save_project()
+    }
+
+    /// Puts a picture to try back that was taken out in this session.
+    ///
+    /// # Errors
+    /// No such picture, a project that cannot be written.
+    pub fn put_back_trial_picture(&self, id: usize) -> Result<()> {
+        let mut state = self.state();
+        let count = state.trial_pictures.len();
+        state.trial_pictures.get_mut(id).ok_or(Error::NoSuchPicture { id, count })?.is_removed = false;
+        state.save_project()
+    }
+
+    /// What two versions of the model find in every picture to try.
+    ///
+    /// # Errors
+    /// No such version, files that cannot be read.
+    pub fn compare_versions(&self, one: usize, other: usize) -> Result<Vec<ComparedPicture>> {
+        let (models, pictures) = {
+            let state = self.state();
+            let read = |id: usize| Ok::<_, Error>((state.models.read(id)?, state.models.get(id)?.summary.clone()));
+            let tried = |id: usize| (id, state.trial_pictures[id].clone(), state.became(id).is_some());
+            let pictures: Vec<_> = state.trial_ids().map(tried).collect();
+            ([read(one)?, read(other)?], pictures)
+        };
+        let [one, other] = models.map(|(bytes, summary)| self.teacher.open(&bytes, &summary).map_err(Error::Teacher));
+        let models = [one?, other?];
+        let compared = pictures.into_iter().map(|(id, trial, is_demonstration)| {
+            let pixels = trial.picture.pixels()?;
+            let found = |model: &dyn TaughtModel| {
+                let found = model.detect(&pixels).map_err(Error::Teacher)?;
+                let best = found.iter().map(|one| one.score).fold(0.0, f64::max);
+                Ok::<_, Error>((found.iter().filter(|one| one.is_accepted).count(), best))
+            };
+            let is_there = if trial.is_absent { Some(false) } else { is_demonstration.then_some(true) };
+            Ok(ComparedPicture {
+                id,
+                name: trial.picture.name,
+                is_there,
+                found: [found(&*models[0])?, found(&*models[1])?],
+            })
+        });
+        compared.collect()
+    }
+
+    /// Makes a tried picture a demonstration with these marks. One that came from the page gets a place beside the first
+    /// picture, under a name of its own.
+    ///
+    /// # Errors
+    /// No such picture, one that is a demonstration already, a file that cannot be written.
+    pub fn accept(&self, trial_id: usize, marks: Marks) -> Result<ImageView> {
+        let mut state = self.state();
+        let trial = state.trial_picture(trial_id)?.clone();
+        if state.became(trial_id).is_some() {
+            return Err(Error::Busy("this picture is a demonstration already"));
+        }
+        let is_in_project = state.project.is_some();
+        let mut picture = trial.picture;
+        if trial.uploaded || (is_in_project && picture.path.parent() == Some(&self.uploads)) {
+            let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
+            let target = free_name(&self.home, &picture.name, &extension);
+            let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
+            sdg_report::write_atomically(&target, &bytes)?;
+            picture.name = file_name(&target);
+            picture.path = target;
+        }
+        let id = state.add_image(picture, marks)?;
+        state.trial_pictures[trial_id].became = Some(id);
+        state.trial_pictures[trial_id].is_absent = false;
+        state.save(id);
+        state.save_project()?;
+        Ok(state.image_view(id))
+    }
+
+    /// Makes a frame that was shown a picture to try.
+    ///
+    /// # Errors
+    /// No camera, a frame that is not kept any more, more pictures than a session keeps.
+    pub fn keep_frame(&self, number: u64) -> Result<TrialPictureView> {
+        let bytes = png(&*self.live_desk()?.frame(number)?)?;
+        self.add_trial_picture(&format!("live-{number}.png"), &bytes)
+    }
+}
