@@ -25,12 +25,12 @@ const MAX_WAIT: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedCamera {
     intrinsics: sdg_geometry::PinholeCamera,
-    place: Place,
+    place: CameraPose,
     table_height_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
+enum CameraPose {
     OnFlange(Isometry3<f64>),
     InBase(Isometry3<f64>),
 }
@@ -42,12 +42,12 @@ impl PlacedCamera {
     /// A file without what the mounting needs: `hand_eye:`, or `table:` in the robot's base.
     pub(crate) fn new(camera: &CalibratedCamera, mounting: Mounting, table_height_m: f64) -> Result<Self> {
         let place = match (mounting, camera.flange_from_camera, &camera.table) {
-            (Mounting::Hand, Some(flange_from_camera), _) => Place::OnFlange(flange_from_camera),
+            (Mounting::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
             (Mounting::Hand, None, _) => bail!(
                 "expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand; \
                  sdg camera hand-eye --mount hand measures it"
             ),
-            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => Place::InBase(table.frame_from_camera),
+            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => CameraPose::InBase(table.frame_from_camera),
             (Mounting::Base, ..) => bail!(
                 "expected table: with frame: base, since the workcell mounts the camera beside the robot; \
                  sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it"
@@ -64,10 +64,10 @@ impl PlacedCamera {
     /// The camera's mount, as the grasp sequence takes it.
     pub(crate) fn mount(&self) -> CameraMount {
         match self.place {
-            Place::OnFlange(flange_from_camera) => {
+            CameraPose::OnFlange(flange_from_camera) => {
                 CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
             }
-            Place::InBase(_) => CameraMount::Base,
+            CameraPose::InBase(_) => CameraMount::Base,
         }
     }
 
@@ -75,16 +75,16 @@ impl PlacedCamera {
     #[cfg(feature = "simulation")]
     pub(crate) fn simulated(&self) -> (sdg_geometry::PinholeCamera, sdg_simulation::CameraPlace) {
         let place = match self.place {
-            Place::OnFlange(flange_from_camera) => sdg_simulation::CameraPlace::OnFlange(flange_from_camera),
-            Place::InBase(base_from_camera) => sdg_simulation::CameraPlace::InBase(base_from_camera),
+            CameraPose::OnFlange(flange_from_camera) => sdg_simulation::CameraPlace::OnFlange(flange_from_camera),
+            CameraPose::InBase(base_from_camera) => sdg_simulation::CameraPlace::InBase(base_from_camera),
         };
         (self.intrinsics, place)
     }
 
     fn over_table(&self, base_from_flange: &Isometry3<f64>) -> CameraOverTable {
         let world_from_camera = match self.place {
-            Place::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
-            Place::InBase(base_from_camera) => base_from_camera,
+            CameraPose::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
+            CameraPose::InBase(base_from_camera) => base_from_camera,
         };
         let camera = PosedCamera { intrinsics: self.intrinsics, world_from_camera };
         CameraOverTable { camera, table_height_m: self.table_height_m, workspace: None }

@@ -1,7 +1,7 @@
 //! The map of a workcell: the base's x to the right, its y up.
 
 use image::{Rgb, RgbImage};
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Point2, Point3};
 use sdg_geometry::{BoundingBox, Polygon, convex_hull};
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_report::{Color, Pen, draw_box, draw_label, draw_line, draw_polygon, label_bounds, shade_polygon};
@@ -252,8 +252,8 @@ fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
     let points: Vec<Point3<f64>> = match *shape {
         Shape::Plane => return None,
         Shape::Box { half_m: [a, b, c] } => {
-            let signs = [-1.0, 1.0];
-            signs.iter().flat_map(|x| signs.iter().flat_map(move |y| signs.iter().map(move |z| Point3::new(x * a, y * b, z * c)))).collect()
+            let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+            (0..8).map(|i| Point3::new(sign(i, 0) * a, sign(i, 1) * b, sign(i, 2) * c)).collect()
         }
         Shape::Cylinder { radius_m, half_length_m } => {
             [-half_length_m, half_length_m].into_iter().flat_map(|z| ring(radius_m, z)).collect()
@@ -271,6 +271,7 @@ fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Isometry3;
 
     fn obstacle(shape: Shape, base_from_obstacle: Isometry3<f64>) -> Obstacle {
         Obstacle { name: "o".to_owned(), shape, base_from_obstacle }
