@@ -138,8 +138,17 @@ impl<'a, A: Arm> Robot<'a, A> {
         if lower_m <= 0.0 || lower_m > self.below_table_m {
             return Cow::Borrowed(&self.limits);
         }
-        let table_height_m = table_height_m - lower_m - LEAVING_M;
-        Cow::Owned(SafetyLimits { table_height_m, ..self.limits.clone() })
+        Cow::Owned(self.lowered(lower_m + LEAVING_M))
+    }
+
+    /// The limits with table and workspace so much lower.
+    fn lowered(&self, lower_m: f64) -> SafetyLimits {
+        let mut limits = self.limits.clone();
+        limits.table_height_m -= lower_m;
+        if let Some(workspace) = &mut limits.workspace {
+            workspace.min_m.z -= lower_m;
+        }
+        limits
     }
 
     /// Checks a motion and follows it to its end.
@@ -279,8 +288,7 @@ impl<A: CompliantArm> Robot<'_, A> {
         let [velocity, acceleration, jerk] = TOUCH_SHARES;
         let slow = CartesianLimits::franka().scaled(velocity, acceleration, jerk)?;
         let way = Trajectory::along_path(path, &self.limits.joints, &slow)?;
-        let table_height_m = self.limits.table_height_m - touch_down.below_table_m;
-        SafetyLimits { table_height_m, ..self.limits.clone() }.check(way)?;
+        self.lowered(touch_down.below_table_m).check(way)?;
         self.watch.begin();
         self.below_table_m = touch_down.below_table_m;
         let touched = self.arm.touch_down(touch_down, &mut self.watch);

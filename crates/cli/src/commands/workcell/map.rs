@@ -145,8 +145,10 @@ impl Map {
         let polygon = self.polygon(&outline);
         shade_polygon(image, &polygon, OBSTACLE, 0.45);
         draw_polygon(image, &polygon, &pen(OBSTACLE, 2.0));
-        let at = obstacle.base_from_obstacle.translation;
-        labels.add(self.px(Point2::new(at.x, at.y)), &obstacle.name, OBSTACLE);
+        // Above its upper edge.
+        let top = outline.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
+        let at = self.px(Point2::new(obstacle.base_from_obstacle.translation.x, top));
+        labels.add(Point2::new(at.x - 12.0, at.y - 4.0), &obstacle.name, OBSTACLE);
     }
 
     fn draw_place(&self, image: &mut RgbImage, place: &Place, labels: &mut Labels) {
@@ -172,14 +174,16 @@ impl Map {
             1 => place.name.clone(),
             num => format!("{}:1 to {num}", place.name),
         };
-        labels.add(Point2::new(at.x, at.y - 4.0), &text, PLACE);
+        // Above the mark of a pose.
+        let above_px = if corners.len() > 1 { 4.0 } else { 0.03 * PX_PER_M };
+        labels.add(Point2::new(at.x, at.y - above_px), &text, PLACE);
     }
 
     fn draw_key(&self, image: &mut RgbImage, workcell: &Workcell, most: usize) {
         let mut x = FRAME_PX;
         let y = FRAME_PX + (self.y_m[1] - self.y_m[0]) * PX_PER_M + 52.0;
         let mut entries = vec![
-            ("reached in every turn of the hand", REACHED),
+            ("reached (paler: in fewer turns of the hand)", REACHED),
             ("workspace", WORKSPACE),
             ("place", PLACE),
             ("obstacle", OBSTACLE),
