@@ -94,7 +94,12 @@ impl<'a, A: Arm> Robot<'a, A> {
     }
 
     /// As [`Robot::plan_free`] from another start.
-    pub(crate) fn plan_between(&self, start: &JointVector, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
+    pub(crate) fn plan_between(
+        &self,
+        start: &JointVector,
+        q: &JointVector,
+        joints: &JointLimits,
+    ) -> Result<Trajectory> {
         self.slowed(|share| {
             let slowed = joints.scaled(share, share, share)?;
             Ok(Trajectory::point_to_point(start, q, &slowed)?)

@@ -155,13 +155,7 @@ impl Descent {
     ///
     /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
     /// part of unknown weight, or a robot that counts the other way round, makes no difference.
-    pub fn next(
-        &mut self,
-        panda: &Panda,
-        q: &JointVector,
-        dq: &JointVector,
-        force_n: f64,
-    ) -> (JointVector, bool) {
+    pub fn next(&mut self, panda: &Panda, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
         let base_from_tcp = panda.forward(q);
         let height_m = base_from_tcp.translation.z;

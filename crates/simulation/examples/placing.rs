@@ -61,7 +61,8 @@ fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
             Err(error) => (error.to_string(), f64::NAN, 0),
         };
         let is_placed = placed.report.as_ref().is_ok_and(|report| report.outcome.is_placed());
-        let is_right = is_placed && distance_m <= MAX_BESIDE_M && angle_deg <= MAX_TURNED_DEG && placed.moved_m <= MAX_MOVED_M;
+        let is_right =
+            is_placed && distance_m <= MAX_BESIDE_M && angle_deg <= MAX_TURNED_DEG && placed.moved_m <= MAX_MOVED_M;
         println!(
             "cell {number}: {distance_mm:.2} mm, {angle_deg:.2}°, others moved {moved_mm:.2} mm, peak {peak_n:.1} N, {looks} looks, {why}"
         );
@@ -109,7 +110,9 @@ fn other_heights(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
                 Some(_) => format!(", at rest at most {static_n:.1} N, peak {peak_n:.1} N"),
                 None => String::new(),
             };
-            println!("{name} {how}: {num_held} of {num_attempts} held{forces}; the hand felt at most {felt_n:.1} N until it had closed");
+            println!(
+                "{name} {how}: {num_held} of {num_attempts} held{forces}; the hand felt at most {felt_n:.1} N until it had closed"
+            );
             if soft_approach.is_some() {
                 is_as_asked &= num_held * 10 >= num_attempts * 8 && static_n < MAX_STATIC_N && peak_n < MAX_PEAK_N;
             }

@@ -6,8 +6,8 @@ use anyhow::{Result, anyhow};
 use nalgebra::Isometry3;
 use sdg_kinematics::collision::Obstacle;
 use sdg_robot::{
-    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlannedAction, PlannedArm,
-    PlacingConfig, Robot, SafetyLimits, Watch,
+    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedAction,
+    PlannedArm, Robot, SafetyLimits, Watch,
 };
 
 use super::finder::SeenOutline;

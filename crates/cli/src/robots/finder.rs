@@ -47,7 +47,9 @@ impl PlacedCamera {
                 "expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand; \
                  sdg camera hand-eye --mount hand measures it"
             ),
-            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => CameraPose::InBase(table.frame_from_camera),
+            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => {
+                CameraPose::InBase(table.frame_from_camera)
+            }
             (Mounting::Base, ..) => bail!(
                 "expected table: with frame: base, since the workcell mounts the camera beside the robot; \
                  sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it"
@@ -184,11 +186,7 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
         Ok(found.into_iter().find(|target| !is_placed(target)))
     }
 
-    fn find_nearest(
-        &mut self,
-        arm: &mut A,
-        base_from_tcp: &Isometry3<f64>,
-    ) -> sdg_robot::Result<Option<GraspTarget>> {
+    fn find_nearest(&mut self, arm: &mut A, base_from_tcp: &Isometry3<f64>) -> sdg_robot::Result<Option<GraspTarget>> {
         let apart_m = |target: &GraspTarget| {
             (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
         };

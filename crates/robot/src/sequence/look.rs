@@ -112,7 +112,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
             |why: String| Stop::Failed(step, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"));
         if self.is_surrounded() {
             let way = self.way_to(&Destination::Poses(&poses));
-            let way = way.map_err(|error| if error.latches() { error.into() } else { unreachable(error.to_string()) })?;
+            let way =
+                way.map_err(|error| if error.latches() { error.into() } else { unreachable(error.to_string()) })?;
             self.check_age()?;
             self.travel(way, step)?;
             return Ok(self.robot.wait(SETTLE_SECS)?);
@@ -128,8 +129,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
             }
         }
-        let solution = best
-            .ok_or_else(|| unreachable(first_error.map_or_else(String::new, |error: KinematicsError| error.to_string())))?;
+        let solution = best.ok_or_else(|| {
+            unreachable(first_error.map_or_else(String::new, |error: KinematicsError| error.to_string()))
+        })?;
         self.check_age()?;
         self.move_freely(&solution.q, step)?;
         Ok(self.robot.wait(SETTLE_SECS)?)

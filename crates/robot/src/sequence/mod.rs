@@ -124,7 +124,9 @@ type Steps<T> = std::result::Result<T, Stop>;
 fn fails_at<T>(step: GraspStep, result: Result<T>) -> Steps<T> {
     result.map_err(|error| match error {
         RobotError::Planning(error) => Stop::Failed(step, error.to_string()),
-        error @ (RobotError::Unsafe(_) | RobotError::Blocked(_) | RobotError::NoWay(_)) => Stop::Failed(step, error.to_string()),
+        error @ (RobotError::Unsafe(_) | RobotError::Blocked(_) | RobotError::NoWay(_)) => {
+            Stop::Failed(step, error.to_string())
+        }
         error => Stop::Error(error),
     })
 }

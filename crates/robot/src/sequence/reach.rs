@@ -9,9 +9,9 @@ use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::{ContactSensitivity, HandCommand};
 use crate::error::RobotError;
+use crate::perception::{GraspStep, GraspTarget};
 use crate::surroundings::Destination;
 use crate::touch::TouchDown;
-use crate::perception::{GraspStep, GraspTarget};
 
 /// Least distance of the finger tips to the table when closing, m.
 const FINGERTIP_CLEARANCE_M: f64 = 0.002;
@@ -87,7 +87,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         match (self.touch, self.config.soft_approach) {
             (Some(touch), Some(touch_down)) => {
                 let end = *path.end();
-                self.go_down_to(path.start(), &above(&self.robot.panda().forward(&end), SOFT_WAY_M), GraspStep::Approach)?;
+                self.go_down_to(
+                    path.start(),
+                    &above(&self.robot.panda().forward(&end), SOFT_WAY_M),
+                    GraspStep::Approach,
+                )?;
                 let touched = touch(self.robot, &TouchDown { max_way_m: SOFT_WAY_M, ..touch_down });
                 let touched = fails_at(GraspStep::Approach, touched)?;
                 self.touched.push(touched);

@@ -99,14 +99,13 @@ impl Workcell {
         let ended = match &config.placing {
             None => sdg_robot::grasp(&mut robot, &mut finder, &mut judge, mount, &config.grasp),
             Some((goal, placing)) => {
-                sdg_robot::grasp_and_place(&mut robot, &mut finder, &mut judge, mount, &config.grasp, goal, placing).map(
-                    |PlaceReport { grasp, outcome, .. }| match outcome {
+                sdg_robot::grasp_and_place(&mut robot, &mut finder, &mut judge, mount, &config.grasp, goal, placing)
+                    .map(|PlaceReport { grasp, outcome, .. }| match outcome {
                         PlaceOutcome::Placed => grasp,
                         PlaceOutcome::Failed { step, why } => {
                             GraspReport { outcome: GraspOutcome::Failed { step, why }, ..grasp }
                         }
-                    },
-                )
+                    })
             }
         };
         let ViewFinder { views, perception_secs, .. } = finder;

@@ -52,10 +52,8 @@ pub fn cell(spec: &ObjectSpec, seed: u64, lying: &[Isometry3<f64>]) -> Workcell 
         ..VariationConfig::default()
     };
     let mut scene = SceneVariation::sample(Some(spec), &config, seed);
-    scene.instances = lying
-        .iter()
-        .map(|&base_from_object| PlacedObject { spec: spec.clone(), base_from_object })
-        .collect();
+    scene.instances =
+        lying.iter().map(|&base_from_object| PlacedObject { spec: spec.clone(), base_from_object }).collect();
     let wrist_render = RenderConfig { shadow_size: 0, samples: 0, width: 64, height: 48, ..RenderConfig::default() };
     let errors = AttemptErrors { joint_friction_nm: FRICTION_NM, ..AttemptErrors::default() };
     let mut cell = Workcell::new(&WorkcellConfig { wrist_render, errors, ..WorkcellConfig::new(scene) }).unwrap();
@@ -89,7 +87,9 @@ impl PartFinder<Workcell> for Truth {
 
 pub fn config(spec: &ObjectSpec) -> GraspConfig {
     let load = Some(Load { mass_kg: spec.mass_kg, center_in_flange_m: [0.0, 0.0, TCP_OFFSET_M] });
-    let radius = |p: &nalgebra::Point2<f64>| (p.coords - nalgebra::center(&spec.grasp_start, &spec.grasp_end).xy().coords).norm();
+    let radius = |p: &nalgebra::Point2<f64>| {
+        (p.coords - nalgebra::center(&spec.grasp_start, &spec.grasp_end).xy().coords).norm()
+    };
     GraspConfig { load, part_radius_m: spec.footprint.iter().map(radius).fold(0.0, f64::max), ..GraspConfig::default() }
 }
 

@@ -163,9 +163,8 @@ impl Map {
             // The marked line, with a cross stroke at its end.
             let ends = [-0.018, 0.018].map(|s| self.px(Point2::new(at.x + s * cos, at.y + s * sin)));
             draw_line(image, ends[0], ends[1], &pen(PLACE, 2.0));
-            let tip = [-0.006, 0.006].map(|s| {
-                self.px(Point2::new(at.x + 0.018 * cos - s * sin, at.y + 0.018 * sin + s * cos))
-            });
+            let tip = [-0.006, 0.006]
+                .map(|s| self.px(Point2::new(at.x + 0.018 * cos - s * sin, at.y + 0.018 * sin + s * cos)));
             draw_line(image, tip[0], tip[1], &pen(PLACE, 2.0));
         }
         let upper = corners.iter().copied().max_by(|a, b| (a.y - a.x * 1e-3).total_cmp(&(b.y - b.x * 1e-3)));
@@ -265,7 +264,8 @@ fn seen_from_above(obstacle: &Obstacle) -> Option<Vec<Point2<f64>>> {
         Shape::Capsule { radius_m, half_length_m } => {
             // Balls at both ends: a circle around each, whichever way it lies.
             let ends = [-half_length_m, half_length_m].map(|z| base_from_obstacle * Point3::new(0.0, 0.0, z));
-            let circles = ends.iter().flat_map(|end| ring(radius_m, 0.0).map(move |p| Point2::new(end.x + p.x, end.y + p.y)));
+            let circles =
+                ends.iter().flat_map(|end| ring(radius_m, 0.0).map(move |p| Point2::new(end.x + p.x, end.y + p.y)));
             return Some(convex_hull(circles.collect::<Vec<_>>()));
         }
     };
@@ -283,7 +283,8 @@ mod tests {
 
     #[test]
     fn obstacles_are_seen_from_above() {
-        let turned = Isometry3::new(nalgebra::Vector3::new(0.5, 0.1, 0.2), nalgebra::Vector3::z() * std::f64::consts::FRAC_PI_2);
+        let turned =
+            Isometry3::new(nalgebra::Vector3::new(0.5, 0.1, 0.2), nalgebra::Vector3::z() * std::f64::consts::FRAC_PI_2);
         let outline = seen_from_above(&obstacle(Shape::Box { half_m: [0.1, 0.02, 0.3] }, turned)).unwrap();
         let reach = |f: fn(&Point2<f64>) -> f64| outline.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
         assert!((reach(|p| p.x) - 0.52).abs() < 1e-9 && (reach(|p| p.y) - 0.2).abs() < 1e-9, "{outline:?}");

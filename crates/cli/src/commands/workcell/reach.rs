@@ -51,9 +51,8 @@ impl Reach {
     /// What there is to say.
     pub(super) fn lines(&self, workcell: &Workcell) -> Vec<String> {
         let square_m2 = self.grid_m * self.grid_m;
-        let area_m2 = |least: usize| {
-            self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2
-        };
+        let area_m2 =
+            |least: usize| self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2;
         let mut lines = vec![format!(
             "with the tcp {:.0} mm over the table and the hand straight down, {:.2} m² of it are reached, {:.2} m² in every turn of the hand",
             self.height_m * 1e3,
@@ -81,7 +80,9 @@ impl Reach {
                 (0, 1) => format!("\"{}\" is reached", place.name),
                 (0, num) => format!("\"{}\": all {num} cells are reached", place.name),
                 (_, 1) => format!("\"{}\" is not reached", place.name),
-                (_, num) => format!("\"{}\": of {num} cells these are not reached: {}", place.name, unreached.join(", ")),
+                (_, num) => {
+                    format!("\"{}\": of {num} cells these are not reached: {}", place.name, unreached.join(", "))
+                }
             });
         }
         lines

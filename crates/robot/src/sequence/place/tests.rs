@@ -226,7 +226,8 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     }
     // A place inside of it is refused with its name.
     let inside = Place { at_m: [0.5, -0.1], ..tray() };
-    let report = run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
+    let report =
+        run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
     let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("wall"), "{why}");
 }
