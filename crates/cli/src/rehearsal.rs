@@ -69,6 +69,8 @@ pub struct Rehearsed {
     pub film: Vec<RgbImage>,
     /// What the wrist camera saw last before each attempt's approach, with the detection drawn.
     pub views: Vec<RgbImage>,
+    /// Whether parts were to be put down.
+    pub is_placing: bool,
 }
 
 /// A failed attempt, as `--json` lists it (docs/command-line.md).
@@ -124,7 +126,8 @@ pub struct RehearsedAttempt {
 impl Rehearsal<'_> {
     /// Runs the attempts one after the other; `observe` is called after each and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
-        let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
+        let mut rehearsed =
+            Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
             let RehearsedAttempt { attempt, frames, view, .. } =

@@ -149,8 +149,7 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
 }
 
 fn attempts(page: &RunPage) -> Section {
-    let has_placed = page.rehearsed.attempts.iter().any(|attempt| attempt.step > GraspStep::Hold as usize);
-    let steps: Vec<&str> = match has_placed {
+    let steps: Vec<&str> = match page.rehearsed.is_placing {
         true => GraspStep::WITH_PLACING.map(GraspStep::name).to_vec(),
         false => GraspStep::ALL.map(GraspStep::name).to_vec(),
     };

@@ -13,8 +13,8 @@ use crate::robot::Robot;
 pub(crate) const TABLE: &str = "table";
 /// Searches whose ways are tried where the limits of every motion, of which the planner knows nothing, refuse one: the workspace above all.
 const NUM_SEEDS: u64 = 5;
-/// Checks of a search before it gives up: some seconds.
-const MAX_CHECKS: usize = 300_000;
+/// Checks of a search before it gives up: a second or so, and some ten times what difficult ways take.
+const MAX_CHECKS: usize = 50_000;
 /// What the start keeps of its height over the table beside the planner's margin, m.
 const START_ROOM_M: f64 = 0.002;
 /// How far the hand's capsules reach below the tcp of a hand that points down, m.

@@ -125,7 +125,6 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
     let RunPage { model, object, rehearsed, .. } = page;
     let Rehearsed { attempts, .. } = rehearsed;
     let (successes, of) = (rehearsed.successes(), attempts.len());
-    let has_placed = attempts.iter().any(|attempt| step_name(attempt) == "check");
     if json {
         let mut line = json!({
             "model": model.kind().letter(),
@@ -144,7 +143,7 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         if let Some(seconds) = teach_seconds {
             println!("taught the {} from one photo in {seconds:.0} s", object.title.to_lowercase());
         }
-        let done = if has_placed { "placed" } else { "grasped" };
+        let done = if rehearsed.is_placing { "placed" } else { "grasped" };
         println!("{done} it in {successes} of {of} attempts");
         println!("report: {}", report.display());
     }
