@@ -19,6 +19,9 @@ const MAX_MOVED_M: f64 = 0.5e-3;
 /// What a part and a table stand.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
+/// With the part in free air the tcp is no farther beside its reference.
+const MAX_FREE_AIR_M: f64 = 1.5e-3;
+const MAX_FREE_AIR_DEG: f64 = 0.5;
 
 /// Places parts into cells one after the other; those that lie already stay in the scene.
 fn fill(at: Where, cells: &[u32]) {
@@ -36,6 +39,9 @@ fn fill(at: Where, cells: &[u32]) {
         assert!(placed.moved_m < MAX_MOVED_M, "{number}: a part that lay already moved by {} m", placed.moved_m);
         for touched in &report.touched {
             assert!(touched.force_n < MAX_STATIC_N && touched.peak_n < MAX_PEAK_N, "{number}: {touched:?}");
+            let [beside_reference_m, turned_rad] = touched.free_air_error;
+            assert!(beside_reference_m < MAX_FREE_AIR_M, "{number}: {touched:?}");
+            assert!(turned_rad.to_degrees() < MAX_FREE_AIR_DEG, "{number}: {touched:?}");
         }
         lying.push(placed.base_from_object);
     }

@@ -22,6 +22,9 @@ const MAX_TABLE_MM: f64 = 1000.0;
 const MAX_FINGERTIP_MM: f64 = 100.0;
 /// What the hand holds for long, N.
 const MAX_FORCE_N: f64 = 70.0;
+/// How far a part reaches from its grasp unless told, and at most, mm.
+const PART_RADIUS_MM: f64 = 60.0;
+const MAX_PART_MM: f64 = 500.0;
 /// What a Panda may carry, kg.
 const MAX_LOAD_KG: f64 = 3.0;
 /// Heights of a camera above the table, mm.
@@ -63,6 +66,7 @@ struct Tool {
     fingertip_beyond_tcp_mm: Option<Spanned<f64>>,
     grasp_force_n: Option<Spanned<f64>>,
     part_mass_kg: Option<Spanned<f64>>,
+    part_radius_mm: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -171,6 +175,8 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
         fingertip_beyond_tcp_m: fingertip_mm.unwrap_or(FINGERTIP_MM) * 1e-3,
         grasp_force_n: option(&tool.grasp_force_n, "grasp_force_n", [1.0, MAX_FORCE_N])?.unwrap_or(40.0),
         part_mass_kg: option(&tool.part_mass_kg, "part_mass_kg", [0.0, MAX_LOAD_KG])?,
+        part_radius_m: option(&tool.part_radius_mm, "part_radius_mm", [1.0, MAX_PART_MM])?.unwrap_or(PART_RADIUS_MM)
+            * 1e-3,
         camera_file: file.camera.file.map(Spanned::into_inner),
         mounting,
         table_height_m,

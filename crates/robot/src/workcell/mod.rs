@@ -10,7 +10,8 @@
 //! [tool]                            # may be left out
 //! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
 //! grasp_force_n = 40.0
-//! part_mass_kg = 0.2                # told to the controller once the part is held
+//! part_mass_kg = 0.2                # told to the controller while the part is held
+//! part_radius_mm = 60               # the part reaches so far from its grasp: it is kept off the obstacles, too
 //!
 //! [camera]
 //! file = "camera.yaml"              # beside this file; --camera says it too
@@ -125,6 +126,8 @@ pub struct Workcell {
     pub grasp_force_n: f64,
     /// Mass of the part, kg.
     pub part_mass_kg: Option<f64>,
+    /// How far the part reaches to all sides of its grasp, m.
+    pub part_radius_m: f64,
     /// The camera's file, as it is written.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
@@ -169,6 +172,7 @@ impl Workcell {
             grasp_force_n: self.grasp_force_n,
             load,
             obstacles: self.obstacles.clone(),
+            part_radius_m: self.part_radius_m,
             ..GraspConfig::default()
         }
     }
