@@ -106,7 +106,10 @@ fn places_are_where_the_file_says() {
     let cell = Workcell::from_toml(&placing()).unwrap();
     let shelf = cell.place("shelf").unwrap();
     assert_eq!(shelf.at_m, [0.45, 0.3]);
-    assert!((shelf.surface_m - 0.0075).abs() < 1e-12 && (shelf.yaw_rad - 1.5707963).abs() < 1e-6, "{shelf:?}");
+    assert!(
+        (shelf.surface_m - 0.0075).abs() < 1e-12 && (shelf.yaw_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12,
+        "{shelf:?}"
+    );
     // The seventh cell is the second of the second row.
     let cell_7 = cell.place("tray:7").unwrap();
     assert!((cell_7.at_m[0] - 0.41).abs() < 1e-12 && (cell_7.at_m[1] + 0.35).abs() < 1e-12, "{cell_7:?}");

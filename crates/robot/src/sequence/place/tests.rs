@@ -212,7 +212,7 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
     let goal = tray().goal(1).unwrap();
     let report = run(&mut cell, &surrounded, &goal, &PlacingConfig::default());
     assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
-    let model = crate::surroundings::collision_model(-1.0, &[wall.clone()], 0.08).unwrap();
+    let model = crate::surroundings::collision_model(-1.0, std::slice::from_ref(&wall), 0.08).unwrap();
     let mut checker = sdg_kinematics::collision::Checker::new(&model, 1e-3);
     let motions = cell.arm.actions().iter().filter_map(|action| match action {
         PlannedAction::Motion(motion) => Some(motion),
