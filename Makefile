@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -67,6 +67,9 @@ DEVICE_TESTS = $(CARGO) test $(PROFILE) --locked -p sdg-kernels -p sdg-grasp -p 
 
 network-grasps: setup ## Grasps of all parts over TCP and UDP beside the same in one process, in lockstep and in real time (NETWORK_GRASPS=5: fewer)
 	@scripts/network-grasps.sh
+
+placing: setup ## 20 parts into a tray, grasps from a table 5 mm higher than told, in one process and over TCP and UDP in lockstep
+	@scripts/placing.sh
 
 test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
 	@scripts/install.sh libvulkan1 mesa-vulkan-drivers

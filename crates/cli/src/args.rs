@@ -18,6 +18,7 @@ use crate::commands::rehearse::RehearseArgs;
 use crate::commands::robot::RobotCommand;
 use crate::commands::teach::TeachArgs;
 use crate::commands::weights::WeightsArgs;
+use crate::commands::workcell::WorkcellCommand;
 
 /// Teach a robot a grasp from one photo, on an ordinary computer.
 #[derive(Debug, Parser)]
@@ -52,6 +53,9 @@ pub enum Command {
     Ros2(Box<crate::commands::ros2::args::Ros2Args>),
     /// Plan a motion around the obstacles of a workcell, and draw it; nothing moves
     Plan(PlanArgs),
+    /// Draw a workcell's file seen from above, with what the arm reaches of its table
+    #[command(subcommand)]
+    Workcell(WorkcellCommand),
     /// Show the state of a real arm, bring it home, recover it after an error, open and close its hand
     #[command(subcommand)]
     Robot(RobotCommand),

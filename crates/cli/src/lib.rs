@@ -113,6 +113,7 @@ pub fn run(args: &Args) -> ExitCode {
         Command::Evaluate(evaluate) => commands::evaluate::run(evaluate),
         Command::Grasp(grasp) => commands::grasp::run(grasp),
         Command::Plan(plan) => commands::plan::run(plan),
+        Command::Workcell(workcell) => commands::workcell::run(workcell),
         Command::Robot(robot) => commands::robot::run(robot),
         #[cfg(feature = "ros2")]
         Command::Ros2(ros2) => commands::ros2::run(ros2),

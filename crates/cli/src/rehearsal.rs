@@ -8,8 +8,9 @@ use image::RgbImage;
 use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
+use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
-use sdg_robot::{GraspOutcome, GraspStep, GraspTarget};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, GraspTarget, Place, PlaceGoal, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
@@ -35,6 +36,19 @@ pub struct Rehearsal<'a> {
     pub errors: RehearsalErrors,
     /// The wrist camera, where it is not the paper's; the model then looks in the plan view.
     pub camera: Option<PinholeCamera>,
+    /// Where parts are put down: the attempts take its cells in turn. The table is then empty but for the part.
+    pub place: Option<RehearsedPlace>,
+}
+
+/// A place of a rehearsal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RehearsedPlace {
+    /// The place.
+    pub place: Place,
+    /// One of its cells, where not all of them are taken in turn.
+    pub cell: Option<u32>,
+    /// Obstacles of the workcell.
+    pub obstacles: Vec<Obstacle>,
 }
 
 /// Errors of a rehearsal; by default there is none.
@@ -55,6 +69,8 @@ pub struct Rehearsed {
     pub film: Vec<RgbImage>,
     /// What the wrist camera saw last before each attempt's approach, with the detection drawn.
     pub views: Vec<RgbImage>,
+    /// Whether parts were to be put down.
+    pub is_placing: bool,
 }
 
 /// A failed attempt, as `--json` lists it (docs/command-line.md).
@@ -110,7 +126,8 @@ pub struct RehearsedAttempt {
 impl Rehearsal<'_> {
     /// Runs the attempts one after the other; `observe` is called after each and may end the rehearsal.
     pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
-        let mut rehearsed = Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new() };
+        let mut rehearsed =
+            Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
         let mut filmed_success = false;
         for number in 1..=self.attempts as usize {
             let RehearsedAttempt { attempt, frames, view, .. } =
@@ -137,14 +154,24 @@ impl Rehearsal<'_> {
     /// Errors of the simulation itself.
     pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
         let seed = attempt_seed(self.seed, number);
-        let scene = SceneVariation::sample(Some(self.object), &VariationConfig::default(), seed);
+        let mut variation = VariationConfig::default();
+        if self.place.is_some() {
+            variation.distractors = 0..=0;
+        }
+        let scene = SceneVariation::sample(Some(self.object), &variation, seed);
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
-        let mut workcell =
-            Workcell::new(&WorkcellConfig { errors, wrist_camera: self.camera, ..WorkcellConfig::new(scene) })?;
+        let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
+        let grasp = GraspConfig { obstacles: obstacles.clone(), ..GraspConfig::default() };
+        let mut workcell = Workcell::new(&WorkcellConfig {
+            errors,
+            wrist_camera: self.camera,
+            obstacles,
+            ..WorkcellConfig::new(scene)
+        })?;
         let mut perception =
             ModelPerception { rehearsal: self, assumed: self.assumed(number), detector: None, last: None };
-        let config = AttemptConfig { record, ..AttemptConfig::default() };
+        let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
             Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
@@ -158,6 +185,14 @@ impl Rehearsal<'_> {
         Ok(RehearsedAttempt { attempt, looks, frames, view: perception.last })
     }
 
+    /// Where an attempt puts the part down, and how.
+    fn placing(&self, number: usize) -> Result<Option<(PlaceGoal, PlacingConfig)>> {
+        let Some(RehearsedPlace { place, cell, .. }) = &self.place else { return Ok(None) };
+        let in_turn = (number as u32 - 1) % place.num_cells() + 1;
+        let goal = place.goal(cell.unwrap_or(in_turn))?;
+        Ok(Some((goal, PlacingConfig { symmetry: self.object.symmetry, ..PlacingConfig::default() })))
+    }
+
     /// The part as the robot takes it to be in an attempt, with the error of its height.
     fn assumed(&self, number: usize) -> ObjectSpec {
         let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
@@ -168,6 +203,7 @@ impl Rehearsal<'_> {
 
     fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
         let (step, why) = match &report.outcome {
+            GraspOutcome::Held if self.place.is_some() => (GraspStep::Check, String::new()),
             GraspOutcome::Held => (GraspStep::Hold, String::new()),
             GraspOutcome::Failed { step, why } => (*step, why.clone()),
         };
@@ -209,7 +245,7 @@ impl Rehearsal<'_> {
 
 /// The name of the step at which an attempt ended.
 pub fn step_name(attempt: &AttemptSummary) -> &'static str {
-    GraspStep::ALL[attempt.step].name()
+    GraspStep::WITH_PLACING[attempt.step].name()
 }
 
 fn looks_of(report: &AttemptReport) -> Looks {

@@ -149,7 +149,10 @@ fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
 }
 
 fn attempts(page: &RunPage) -> Section {
-    let steps = GraspStep::ALL.map(GraspStep::name);
+    let steps: Vec<&str> = match page.rehearsed.is_placing {
+        true => GraspStep::WITH_PLACING.map(GraspStep::name).to_vec(),
+        false => GraspStep::ALL.map(GraspStep::name).to_vec(),
+    };
     Section::new("Attempts")
         .lead(
             "Random poses of the part, of the robot at the start, of light, table and things lying about. Held means: \

@@ -3,6 +3,7 @@
 use std::error::Error;
 
 use sdg_kinematics::KinematicsError;
+use sdg_kinematics::planning::PlanError;
 
 use crate::safety::Violation;
 use crate::watch::StopReason;
@@ -18,6 +19,9 @@ pub enum RobotError {
     /// No motion can be planned.
     #[error(transparent)]
     Planning(#[from] KinematicsError),
+    /// There is no way around what stands in the cell.
+    #[error("no way through the cell: {0}")]
+    NoWay(#[from] PlanError),
     /// The arm was stopped on its path.
     #[error("the arm was stopped: {0}")]
     Stopped(StopReason),
@@ -65,6 +69,7 @@ impl RobotError {
             self,
             Self::Unsafe(_)
                 | Self::Planning(_)
+                | Self::NoWay(_)
                 | Self::Latched(_)
                 | Self::Unreachable { .. }
                 | Self::Perception(_)

@@ -1,20 +1,22 @@
 //! Cartesian impedance: joint torques that let the tcp yield like a spring, where contact is wanted.
 //!
 //! ```text
-//! τ = Jᵀ (-K e - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
-//!     └ spring and damper of the tcp    └ of the elbow, without moving the tcp
+//! τ = Jᵀ (-K e - ∫ k_i K e dt - D (J q̇ - v_d))  +  (I - Jᵀ Jᵀ⁺) (k_n (q_n - q) - 2 √k_n q̇)  +  coriolis
+//!     └ spring, its integral and damper of the tcp   └ of the elbow, without moving the tcp
 //! ```
 //! J is the tcp's Jacobian in the base frame, e how far the tcp is from where it is wanted (m, and a rotation vector's half, rad),
-//! v_d the twist that is wanted, D = 2 √K. Gravity is not in it: the robot adds it, of what it was told to carry, too.
+//! v_d the twist that is wanted, D = 2 √(K m) for a mass m of the tcp. Gravity is not in it: the robot adds it, of what it was told to carry, too.
 //!
 //! A spring is not exact: at 150 N/m a part of 0.7 kg that the robot was not told of pulls the tcp down by 46 mm, and joint friction of
-//! 1 Nm costs some 20 mm. Free air is for joint motions.
+//! 1 Nm costs some 20 mm. In free air the integral makes up for both; where something is touched it would press ever more, and is held.
 //!
 //! # Source
 //! `cartesian_impedance_control.cpp` of libfranka's examples; the null space and the limit of the torque's rate as franka_ros has them.
 
 use nalgebra::{Isometry3, SMatrix, Vector6};
 use sdg_kinematics::{JointVector, Panda};
+
+use crate::arm_state::PERIOD_SECS;
 
 /// Keeps the pseudoinverse bounded near singular poses.
 const DAMPING: f64 = 1e-2;
@@ -24,6 +26,10 @@ const DAMPING: f64 = 1e-2;
 pub struct Impedance {
     /// Along x, y and z of the base, N/m, and about them, N·m/rad.
     pub stiffness: Vector6<f64>,
+    /// What the damper takes the tcp's mass to be, kg along and kg·m² about each direction: libfranka's example has 1 for all.
+    pub mass: Vector6<f64>,
+    /// In each direction the spring's force grows by so many times itself in a second, 1/s.
+    pub integral_per_sec: Vector6<f64>,
     /// Of the elbow about its configuration at the start, N·m/rad.
     pub null_stiffness: f64,
     /// A joint's torque changes by at most so much in a cycle, N·m; the robot stops for more.
@@ -34,12 +40,25 @@ impl Impedance {
     /// libfranka's example in all directions: 150 N/m and 10 N·m/rad.
     pub const SOFT: Self = Self {
         stiffness: Vector6::new(150.0, 150.0, 150.0, 10.0, 10.0, 10.0),
+        mass: Vector6::new(1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+        integral_per_sec: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
-    /// Soft along z, held to the sides and in its turn: for coming down on something.
+    /// Held in all directions, with integral action: for free air. The damping is for the arm's own mass at the tcp, some 5 kg; without it
+    /// integral action makes the tcp swing.
+    pub const FREE_AIR: Self = Self {
+        stiffness: Vector6::new(1000.0, 1000.0, 1000.0, 50.0, 50.0, 50.0),
+        mass: Vector6::new(5.0, 5.0, 5.0, 1.0, 1.0, 1.0),
+        integral_per_sec: Vector6::new(5.0, 5.0, 5.0, 5.0, 5.0, 5.0),
+        null_stiffness: 10.0,
+        max_torque_step_nm: 0.9,
+    };
+    /// Soft along z, held to the sides and in its turn: for pressing on something.
     pub const SOFT_DOWN: Self = Self {
         stiffness: Vector6::new(1000.0, 1000.0, 150.0, 50.0, 50.0, 50.0),
+        mass: Vector6::new(5.0, 5.0, 1.0, 1.0, 1.0, 1.0),
+        integral_per_sec: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         null_stiffness: 10.0,
         max_torque_step_nm: 0.9,
     };
@@ -60,12 +79,22 @@ pub struct ImpedanceControl {
     impedance: Impedance,
     q_null: JointVector,
     torque: JointVector,
+    /// What the integral presses with, N and N·m.
+    integral: Vector6<f64>,
 }
+
+/// What the integral presses with at most, N and N·m.
+const MAX_INTEGRAL: Vector6<f64> = Vector6::new(15.0, 15.0, 15.0, 5.0, 5.0, 5.0);
 
 impl ImpedanceControl {
     /// Begins at joint positions (rad), which are the elbow's, after this torque (N·m, without gravity).
     pub fn new(impedance: Impedance, q: JointVector, torque: JointVector) -> Self {
-        Self { impedance, q_null: q, torque }
+        Self { impedance, q_null: q, torque, integral: Vector6::zeros() }
+    }
+
+    /// Goes on with another stiffness; what the integral presses with stays.
+    pub fn change(&mut self, impedance: Impedance) {
+        self.impedance = impedance;
     }
 
     /// The torques of the next cycle (N·m) for measured joint positions (rad) and velocities (rad/s); `coriolis` is zero where the
@@ -79,10 +108,12 @@ impl ImpedanceControl {
         coriolis: &JointVector,
     ) -> JointVector {
         let (base_from_tcp, jacobian) = panda.forward_and_jacobian(q);
-        let Impedance { stiffness, null_stiffness, max_torque_step_nm } = self.impedance;
-        let error = pose_error(&base_from_tcp, &reference.base_from_tcp);
-        let damping = stiffness.map(|value| 2.0 * value.sqrt());
-        let force = -stiffness.component_mul(&error) - damping.component_mul(&(jacobian * dq - reference.twist));
+        let Impedance { stiffness, mass, integral_per_sec, null_stiffness, max_torque_step_nm } = self.impedance;
+        let spring = stiffness.component_mul(&pose_error(&base_from_tcp, &reference.base_from_tcp));
+        self.integral += spring.component_mul(&integral_per_sec) * PERIOD_SECS;
+        self.integral = self.integral.sup(&-MAX_INTEGRAL).inf(&MAX_INTEGRAL);
+        let damping = stiffness.component_mul(&mass).map(|value| 2.0 * value.sqrt());
+        let force = -spring - self.integral - damping.component_mul(&(jacobian * dq - reference.twist));
         let wanted_null = (self.q_null - q) * null_stiffness - dq * (2.0 * null_stiffness.sqrt());
         let square = jacobian * jacobian.transpose() + SMatrix::<f64, 6, 6>::identity() * (DAMPING * DAMPING);
         // What of the elbow's torque would press with the tcp is taken out; the sum is positive definite, so there is a factor.
@@ -102,7 +133,7 @@ impl ImpedanceControl {
 }
 
 /// How far a pose is from the one that is wanted: m, and the vector part of the quaternion between them, in the base frame.
-fn pose_error(base_from_tcp: &Isometry3<f64>, wanted: &Isometry3<f64>) -> Vector6<f64> {
+pub(crate) fn pose_error(base_from_tcp: &Isometry3<f64>, wanted: &Isometry3<f64>) -> Vector6<f64> {
     let translation = base_from_tcp.translation.vector - wanted.translation.vector;
     let tcp_from_wanted = base_from_tcp.rotation.inverse() * wanted.rotation;
     // Of the two quaternions of a turn the one of the shorter way.
@@ -154,6 +185,30 @@ mod tests {
         let torque = settled(Impedance::SOFT, q, &q, wanted);
         let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 10.0 * 0.05_f64.sin());
         assert!((torque - expected).amax() < 1e-9, "{torque} {expected}");
+    }
+
+    #[test]
+    fn the_integral_grows_with_the_error_up_to_its_limit_and_stays_when_the_stiffness_changes() {
+        let (panda, q, zero) = (Panda::new(), ready_pose(), JointVector::zeros());
+        let (here, jacobian) = panda.forward_and_jacobian(&q);
+        let mut wanted = here;
+        wanted.translation.z -= 0.001;
+        let mut control = ImpedanceControl::new(Impedance::FREE_AIR, q, zero);
+        for _ in 0..500 {
+            control.torque(&panda, &q, &zero, &still(wanted), &zero);
+        }
+        // 1 mm at 1000 N/m is 1 N; at 5/s the integral has 2.5 N more after half a second.
+        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, -3.5, 0.0, 0.0, 0.0);
+        assert!((control.last_torque() - expected).amax() < 1e-6, "{}", control.last_torque());
+        for _ in 0..8000 {
+            control.torque(&panda, &q, &zero, &still(wanted), &zero);
+        }
+        control.change(Impedance::SOFT_DOWN);
+        for _ in 0..500 {
+            control.torque(&panda, &q, &zero, &still(here), &zero);
+        }
+        let expected = jacobian.transpose() * Vector6::new(0.0, 0.0, -15.0, 0.0, 0.0, 0.0);
+        assert!((control.last_torque() - expected).amax() < 1e-6, "{}", control.last_torque());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! One grasp sequence for every arm, and the limits that each motion is checked against.
+//! One sequence of grasping and placing for every arm, and the limits that each motion is checked against.
 //!
 //! ```text
 //! workcell file ─► SafetyLimits, GraspConfig
@@ -8,7 +8,9 @@
 //! [`Arm`] is implemented by [`FrankaArm`] here and by the simulated workcell in `simulation`. A motion reaches an arm only as a
 //! [`CheckedMotion`], and after an error nothing moves until [`Robot::recover`].
 //!
-//! Left out: planning around obstacles, cameras and detection (a [`PartFinder`] is handed in), files and terminals.
+//! [`grasp_and_place`] goes on to a [`PlaceGoal`]; [`Robot::plan_around`] finds ways around what stands in the cell.
+//!
+//! Left out: cameras and detection (a [`PartFinder`] is handed in), files and terminals.
 //!
 //! ```
 //! use sdg_kinematics::{JointLimits, Trajectory, ready_pose};
@@ -32,11 +34,13 @@ mod franka;
 mod impedance;
 mod pace;
 mod perception;
+mod place;
 mod planned_arm;
 mod playback;
 mod robot;
 mod safety;
 mod sequence;
+mod surroundings;
 mod touch;
 mod watch;
 pub mod workcell;
@@ -51,13 +55,15 @@ pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+pub use place::{Place, PlaceError, PlaceGoal, PlaceKind};
 pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, SURE,
-    camera_looking_down, grasp,
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
+    PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
-pub use touch::{TouchDown, Touched};
+pub use surroundings::{Destination, Surroundings, Way};
+pub use touch::{Descent, TouchDown, Touched};
 pub use watch::{HISTORY_SECS, MAX_SILENCE_SECS, StopReason, StopRequest, Watch};

@@ -17,6 +17,8 @@ pub const DEFAULT_SPEED: f64 = 0.1;
 pub struct Pace {
     /// Free motions, of the joints' limits.
     free: Shares,
+    /// Free motions with the part, of the joints' limits: what accelerates slowly does not slide between the fingers.
+    carry: Shares,
     /// The last way down, of the tcp's limits.
     approach: Shares,
     /// The way up with the part, of the tcp's limits.
@@ -25,8 +27,12 @@ pub struct Pace {
 
 impl Pace {
     /// Pace of rehearsals.
-    pub const REHEARSED: Self =
-        Self { free: [MAX_SPEED, 0.4, 0.2], approach: [0.18, 0.10, 0.05], lift: [0.25, 0.10, 0.05] };
+    pub const REHEARSED: Self = Self {
+        free: [MAX_SPEED, 0.4, 0.2],
+        carry: [0.3, 0.1, 0.05],
+        approach: [0.18, 0.10, 0.05],
+        lift: [0.25, 0.10, 0.05],
+    };
 
     /// Free motions at a share of the joints' velocity limits; everything else slower in the same proportion.
     ///
@@ -41,14 +47,18 @@ impl Pace {
             });
         }
         let scaled = |shares: Shares| shares.map(|share| share * (speed / MAX_SPEED));
-        let Self { free, approach, lift } = Self::REHEARSED;
-        Ok(Self { free: scaled(free), approach: scaled(approach), lift: scaled(lift) })
+        let Self { free, carry, approach, lift } = Self::REHEARSED;
+        Ok(Self { free: scaled(free), carry: scaled(carry), approach: scaled(approach), lift: scaled(lift) })
     }
 
     /// Joint limits of free motions.
     pub fn free_limits(&self) -> JointLimits {
-        let [velocity, acceleration, jerk] = self.free;
-        JointLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
+        of_joints(self.free)
+    }
+
+    /// Joint limits of free motions with the part.
+    pub fn carry_limits(&self) -> JointLimits {
+        of_joints(self.carry)
     }
 
     /// Limits of the tcp on the approach.
@@ -60,6 +70,10 @@ impl Pace {
     pub fn lift_limits(&self) -> CartesianLimits {
         scaled(self.lift)
     }
+}
+
+fn of_joints([velocity, acceleration, jerk]: Shares) -> JointLimits {
+    JointLimits::franka().scaled(velocity, acceleration, jerk).expect("shares are in (0, 1]")
 }
 
 fn scaled([velocity, acceleration, jerk]: Shares) -> CartesianLimits {

@@ -28,6 +28,14 @@ pub trait PartFinder<A: Arm> {
     /// Where no picture can be taken or perception could not do its work at all; the sequence is given up with this error.
     fn find(&mut self, arm: &mut A) -> Result<Option<GraspTarget>>;
 
+    /// As [`PartFinder::find`], where several parts are seen: the one that is nearest to a grasp (`base_from_tcp`).
+    ///
+    /// # Errors
+    /// As [`PartFinder::find`].
+    fn find_nearest(&mut self, arm: &mut A, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
+        self.find(arm)
+    }
+
     /// When the picture of the last call was taken; `None` where time does not pass by a clock.
     fn picture_time(&self) -> Option<Instant> {
         None
@@ -49,11 +57,33 @@ pub enum GraspStep {
     Lift,
     /// The part stays between the fingers.
     Hold,
+    /// The arm takes it over its place.
+    Carry,
+    /// The hand comes down with it until its place is felt.
+    PutDown,
+    /// The fingers open and the hand goes up.
+    Release,
+    /// Perception looks where the part lies.
+    Check,
 }
 
 impl GraspStep {
-    /// All steps in their order.
+    /// The steps of a grasp in their order.
     pub const ALL: [Self; 6] = [Self::Detect, Self::Hover, Self::Approach, Self::Close, Self::Lift, Self::Hold];
+
+    /// The steps of a grasp and of placing in their order.
+    pub const WITH_PLACING: [Self; 10] = [
+        Self::Detect,
+        Self::Hover,
+        Self::Approach,
+        Self::Close,
+        Self::Lift,
+        Self::Hold,
+        Self::Carry,
+        Self::PutDown,
+        Self::Release,
+        Self::Check,
+    ];
 
     /// The name in messages and in JSON.
     pub fn name(self) -> &'static str {
@@ -64,6 +94,10 @@ impl GraspStep {
             Self::Close => "close",
             Self::Lift => "lift",
             Self::Hold => "hold",
+            Self::Carry => "carry",
+            Self::PutDown => "put down",
+            Self::Release => "release",
+            Self::Check => "check",
         }
     }
 }

@@ -1,11 +1,12 @@
 //! An arm that does not move: what a sequence would do, before it is done.
 
-use crate::arm::Arm;
+use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd, PERIOD_SECS};
 use crate::error::Result;
 use crate::safety::CheckedMotion;
+use crate::touch::{TouchDown, Touched};
 use crate::watch::Watch;
-use sdg_kinematics::JointVector;
+use sdg_kinematics::{JointVector, LineOptions, Panda};
 
 /// What a planned arm did.
 #[derive(Debug, Clone)]
@@ -16,6 +17,13 @@ pub enum PlannedAction {
     Wait(f64),
     /// A command of the hand.
     Hand(HandCommand),
+    /// Coming down until something is felt: where it was expected.
+    Down {
+        /// Joint positions there, rad.
+        end: JointVector,
+        /// How long it takes, s.
+        duration_secs: f64,
+    },
 }
 
 /// Follows every motion exactly and holds after every grasp; records the commands.
@@ -61,6 +69,10 @@ impl PlannedArm {
             let (duration_secs, motion) = match action {
                 PlannedAction::Motion(motion) => (motion.duration_secs(), Some(motion)),
                 PlannedAction::Wait(duration_secs) => (*duration_secs, None),
+                PlannedAction::Down { end, duration_secs } => {
+                    q = *end;
+                    (*duration_secs, None)
+                }
                 PlannedAction::Hand(HandCommand::Move { opening_m: told_m, .. }) => {
                     opening_m = *told_m;
                     continue;
@@ -135,6 +147,23 @@ impl Arm for PlannedArm {
 
     fn recover(&mut self) -> Result<()> {
         Ok(())
+    }
+}
+
+impl CompliantArm for PlannedArm {
+    /// What is felt is where it was expected: above the last part of the way, which is there for what is not known to a millimetre.
+    fn touch_down(&mut self, touch_down: &TouchDown, _watch: &mut Watch) -> Result<Touched> {
+        let panda = Panda::new();
+        let way_m = (touch_down.max_way_m - touch_down.below_table_m).max(0.0);
+        let mut base_from_tcp = panda.forward(&self.state.q);
+        base_from_tcp.translation.z -= way_m;
+        let end = *panda.straight_path(&self.state.q, &base_from_tcp, &LineOptions::default())?.end();
+        let duration_secs = way_m / touch_down.speed_m_s + touch_down.press_secs;
+        self.state.time_secs += duration_secs;
+        (self.state.q, self.state.q_commanded) = (end, end);
+        self.actions.push(PlannedAction::Down { end, duration_secs });
+        let (tcp_height_m, force_n) = (base_from_tcp.translation.z, touch_down.press_n);
+        Ok(Touched { is_contact: true, tcp_height_m, force_n, peak_n: force_n, free_air_error: [0.0; 2] })
     }
 }
 

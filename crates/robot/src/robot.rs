@@ -1,5 +1,7 @@
 //! An arm with its limits: every motion is planned and checked here.
 
+use std::borrow::Cow;
+
 use sdg_kinematics::{
     CartesianLimits, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, Panda, Trajectory,
 };
@@ -13,9 +15,11 @@ use crate::watch::{StopReason, Watch};
 
 /// A motion must begin this near to the controller's reference, rad: a difference that a person cannot see.
 const MAX_START_DISTANCE_RAD: f64 = 1e-3;
-/// How often a motion is slowed down so that the tcp keeps to its limits, and to which share of its speed each time.
+/// How often a motion is slowed down so that joints and tcp keep to their limits, and to which share of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
 const SLOWDOWN: f64 = 0.8;
+/// A hand that goes up from what it touched may be so much lower for the first instants, m: a straight way in joint space is bent.
+const LEAVING_M: f64 = 0.5e-3;
 
 /// An arm, the limits of its motions, and whether it may move at all.
 ///
@@ -28,12 +32,14 @@ pub struct Robot<'a, A: Arm> {
     limits: SafetyLimits,
     watch: Watch,
     latched: Option<String>,
+    /// How far below the table's told height something may have been touched, m.
+    below_table_m: f64,
 }
 
 impl<'a, A: Arm> Robot<'a, A> {
     /// Puts an arm behind limits; `watch` sees every state and may stop it.
     pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
-        Self { arm, panda: Panda::new(), limits, watch, latched: None }
+        Self { arm, panda: Panda::new(), limits, watch, latched: None, below_table_m: 0.0 }
     }
 
     /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
@@ -84,9 +90,19 @@ impl<'a, A: Arm> Robot<'a, A> {
     /// [`RobotError::Planning`].
     pub fn plan_free(&mut self, q: &JointVector, joints: &JointLimits) -> Result<Trajectory> {
         let start = self.commanded()?;
+        self.plan_between(&start, q, joints)
+    }
+
+    /// As [`Robot::plan_free`] from another start.
+    pub(crate) fn plan_between(
+        &self,
+        start: &JointVector,
+        q: &JointVector,
+        joints: &JointLimits,
+    ) -> Result<Trajectory> {
         self.slowed(|share| {
             let slowed = joints.scaled(share, share, share)?;
-            Ok(Trajectory::point_to_point(&start, q, &slowed)?)
+            Ok(Trajectory::point_to_point(start, q, &slowed)?)
         })
     }
 
@@ -97,22 +113,47 @@ impl<'a, A: Arm> Robot<'a, A> {
     pub fn plan_along(&mut self, path: &JointPath, cartesian: &CartesianLimits) -> Result<Trajectory> {
         let joints = self.limits.joints.clone();
         self.slowed(|share| {
-            let slowed = cartesian.scaled(share, share, share)?;
-            Ok(Trajectory::along_path(path.clone(), &joints, &slowed)?)
+            let (joints, cartesian) = (joints.scaled(share, share, share)?, cartesian.scaled(share, share, share)?);
+            Ok(Trajectory::along_path(path.clone(), &joints, &cartesian)?)
         })
     }
 
-    /// The first motion that keeps to the tcp's limits; the slowest one tried where none does.
+    /// The first motion that keeps to the limits of speed; the slowest one tried where none does.
+    ///
+    /// A path is timed at samples of it; what a joint needs between two of them may be a little more than its limit.
     fn slowed(&self, plan: impl Fn(f64) -> Result<Trajectory>) -> Result<Trajectory> {
         let mut share = 1.0;
         for _ in 0..MAX_SLOWDOWNS {
             let trajectory = plan(share)?;
-            match self.limits.check(trajectory.clone()) {
+            match self.limits_from(trajectory.start()).check(trajectory.clone()) {
                 Err(Violation::Cartesian { .. }) => share *= SLOWDOWN,
+                Err(Violation::Joint { quantity, .. }) if quantity != "position" => share *= SLOWDOWN,
                 _ => return Ok(trajectory),
             }
         }
         plan(share)
+    }
+
+    /// The limits of a motion from a configuration. Where the hand came down on something lower than the table is told to be, it may go
+    /// up from there, and not lower.
+    pub(crate) fn limits_from(&self, start: &JointVector) -> Cow<'_, SafetyLimits> {
+        let SafetyLimits { table_height_m, min_table_clearance_m, fingertip_beyond_tcp_m, .. } = self.limits;
+        let here_m = self.panda.clearance(start, table_height_m).lowest_m - fingertip_beyond_tcp_m;
+        let lower_m = min_table_clearance_m - here_m;
+        if lower_m <= 0.0 || lower_m > self.below_table_m {
+            return Cow::Borrowed(&self.limits);
+        }
+        Cow::Owned(self.lowered(lower_m + LEAVING_M))
+    }
+
+    /// The limits with table and workspace so much lower.
+    fn lowered(&self, lower_m: f64) -> SafetyLimits {
+        let mut limits = self.limits.clone();
+        limits.table_height_m -= lower_m;
+        if let Some(workspace) = &mut limits.workspace {
+            workspace.min_m.z -= lower_m;
+        }
+        limits
     }
 
     /// Checks a motion and follows it to its end.
@@ -127,7 +168,7 @@ impl<'a, A: Arm> Robot<'a, A> {
             let (joint, apart_rad, max_rad) = (joint_idx + 1, apart[joint_idx], MAX_START_DISTANCE_RAD);
             return Err(Violation::StartsElsewhere { joint, apart_rad, max_rad }.into());
         }
-        let motion = self.limits.check(trajectory)?;
+        let motion = self.limits_from(trajectory.start()).check(trajectory)?;
         self.watch.begin();
         let ended = match self.arm.follow(&motion, &mut self.watch) {
             Ok(MotionEnd::Arrived) => Ok(()),
@@ -252,9 +293,9 @@ impl<A: CompliantArm> Robot<'_, A> {
         let [velocity, acceleration, jerk] = TOUCH_SHARES;
         let slow = CartesianLimits::franka().scaled(velocity, acceleration, jerk)?;
         let way = Trajectory::along_path(path, &self.limits.joints, &slow)?;
-        let table_height_m = self.limits.table_height_m - touch_down.below_table_m;
-        SafetyLimits { table_height_m, ..self.limits.clone() }.check(way)?;
+        self.lowered(touch_down.below_table_m).check(way)?;
         self.watch.begin();
+        self.below_table_m = touch_down.below_table_m;
         let touched = self.arm.touch_down(touch_down, &mut self.watch);
         self.note(touched)
     }

@@ -1,11 +1,10 @@
-//! Coming down on something with a soft tcp, until its force is felt.
+//! Coming down on something with a tcp that yields, until its force is felt.
 //!
 //! ```text
 //! stand, to learn what is felt in free air ─> down at a constant speed ─> felt: press with a force ─> stand, told
-//!                                               └ nothing felt: the way's end
+//!      └ stiff, with integral action ────────────────┘ └ nothing felt     └ soft along z
 //! ```
-//! What is felt is the robot's own estimate of the external force; the height that counts is the measured one, since a soft tcp is
-//! beside its reference by what friction takes.
+//! What is felt is the robot's own estimate of the external force; the height that counts is the measured one.
 
 use nalgebra::{Isometry3, Vector6};
 use sdg_kinematics::{JointVector, Panda};
@@ -17,17 +16,21 @@ use crate::impedance::{Impedance, ImpedanceControl, TcpReference};
 /// How long the arm stands to learn what is felt in free air, s, and the time over which force and height are told at the end.
 const STANDING_SECS: f64 = 0.2;
 /// The reference reaches its speed within this time, s.
-const RAMP_SECS: f64 = 0.2;
-/// Joint friction lets the reference run ahead of the tcp; by more than this it does not, m: 15 N at 150 N/m.
-const MAX_LEAD_M: f64 = 0.1;
+const RAMP_SECS: f64 = 0.5;
+/// Joint friction lets the reference run ahead of the tcp; by more than this it does not, m: 15 N at 1000 N/m.
+const MAX_LEAD_M: f64 = 0.015;
 /// The reference gives way by so much for each newton too much, m/(N s): pressing settles within a few tenths of a second.
 const YIELDING_M_PER_NS: f64 = 0.02;
+/// It gives way at this speed at most, m/s.
+const MAX_YIELDING_M_S: f64 = 0.015;
 
 /// How to come down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchDown {
-    /// How soft the tcp is on the way.
-    pub impedance: Impedance,
+    /// How the tcp is held on the way.
+    pub free_air: Impedance,
+    /// How soft it is once something is felt.
+    pub contact: Impedance,
     /// Speed of the reference, m/s.
     pub speed_m_s: f64,
     /// The longest way down, as measured, m.
@@ -43,11 +46,12 @@ pub struct TouchDown {
 }
 
 impl Default for TouchDown {
-    /// 15 mm/s, softly, at most 30 mm and 10 mm below where the table is told to be; 3 N are a contact.
+    /// 6 mm/s, at most 30 mm and 10 mm below where the table is told to be; 3 N are a contact.
     fn default() -> Self {
         Self {
-            impedance: Impedance::SOFT_DOWN,
-            speed_m_s: 0.015,
+            free_air: Impedance::FREE_AIR,
+            contact: Impedance::SOFT_DOWN,
+            speed_m_s: 0.006,
             max_way_m: 0.030,
             below_table_m: 0.010,
             contact_n: 3.0,
@@ -94,6 +98,8 @@ pub struct Touched {
     pub force_n: f64,
     /// The largest force on the way and at the end, N.
     pub peak_n: f64,
+    /// How far the tcp was beside its reference in free air at most, m and rad.
+    pub free_air_error: [f64; 2],
 }
 
 /// What coming down is at.
@@ -104,9 +110,9 @@ enum Phase {
     Pressing,
 }
 
-/// The torques of coming down, cycle by cycle.
+/// The torques of coming down, cycle by cycle: for arms that take torques.
 #[derive(Debug)]
-pub(crate) struct Descent {
+pub struct Descent {
     touch_down: TouchDown,
     control: ImpedanceControl,
     start: Isometry3<f64>,
@@ -121,14 +127,15 @@ pub(crate) struct Descent {
     force_sum_n: f64,
     height_sum_m: f64,
     num_summed: u32,
+    free_air_error: [f64; 2],
 }
 
 impl Descent {
     /// Begins where the arm stands (rad), after this torque (N·m, without gravity).
-    pub(crate) fn new(touch_down: TouchDown, panda: &Panda, q: JointVector, torque: JointVector) -> Self {
+    pub fn new(touch_down: TouchDown, panda: &Panda, q: JointVector, torque: JointVector) -> Self {
         Self {
             touch_down,
-            control: ImpedanceControl::new(touch_down.impedance, q, torque),
+            control: ImpedanceControl::new(touch_down.free_air, q, torque),
             start: panda.forward(&q),
             phase: Phase::Standing,
             phase_cycles: 0,
@@ -140,6 +147,7 @@ impl Descent {
             force_sum_n: 0.0,
             height_sum_m: 0.0,
             num_summed: 0,
+            free_air_error: [0.0; 2],
         }
     }
 
@@ -147,15 +155,10 @@ impl Descent {
     ///
     /// `force_n` is the vertical external force, upwards, as the robot estimates it. Only its change against free air counts, so that a
     /// part of unknown weight, or a robot that counts the other way round, makes no difference.
-    pub(crate) fn next(
-        &mut self,
-        panda: &Panda,
-        q: &JointVector,
-        dq: &JointVector,
-        force_n: f64,
-    ) -> (JointVector, bool) {
+    pub fn next(&mut self, panda: &Panda, q: &JointVector, dq: &JointVector, force_n: f64) -> (JointVector, bool) {
         let pressed_n = (force_n - self.free_air_n).abs();
-        let height_m = panda.forward(q).translation.z;
+        let base_from_tcp = panda.forward(q);
+        let height_m = base_from_tcp.translation.z;
         let way_m = self.start.translation.z - height_m;
         self.phase_cycles += 1;
         let phase_secs = f64::from(self.phase_cycles) * PERIOD_SECS;
@@ -175,10 +178,17 @@ impl Descent {
                 let is_at_end = way_m >= self.touch_down.max_way_m || self.down_m - way_m >= MAX_LEAD_M;
                 if self.is_contact || is_at_end {
                     self.enter(Phase::Pressing);
-                }
-                if is_at_end {
-                    // The tcp stays where it is.
-                    self.down_m = way_m;
+                    self.control.change(self.touch_down.contact);
+                    // The softer spring presses as the stiff one did; at the way's end the tcp stays where it is.
+                    let [before, now] = [self.touch_down.free_air, self.touch_down.contact].map(|one| one.stiffness.z);
+                    self.down_m = if is_at_end { way_m } else { way_m + (self.down_m - way_m) * (before / now) };
+                } else {
+                    let mut wanted = self.start;
+                    wanted.translation.z -= self.down_m;
+                    let [beside_m, beside_rad] = &mut self.free_air_error;
+                    let apart = wanted.inverse() * base_from_tcp;
+                    *beside_m = beside_m.max(apart.translation.vector.norm());
+                    *beside_rad = beside_rad.max(apart.rotation.angle());
                 }
             }
             Phase::Pressing => {
@@ -196,17 +206,17 @@ impl Descent {
             }
         }
         self.down_m += self.speed_m_s * PERIOD_SECS;
-        let mut base_from_tcp = self.start;
-        base_from_tcp.translation.z -= self.down_m;
+        let mut base_from_wanted = self.start;
+        base_from_wanted.translation.z -= self.down_m;
         let twist = Vector6::new(0.0, 0.0, -self.speed_m_s, 0.0, 0.0, 0.0);
-        let reference = TcpReference { base_from_tcp, twist };
+        let reference = TcpReference { base_from_tcp: base_from_wanted, twist };
         (self.control.torque(panda, q, dq, &reference, &JointVector::zeros()), is_last)
     }
 
     /// How fast the reference goes on down while less is felt than is to be pressed with, or up while more is, m/s.
     fn yielding(&self, pressed_n: f64) -> f64 {
         let too_little_n = self.touch_down.press_n - pressed_n;
-        (YIELDING_M_PER_NS * too_little_n).clamp(-self.touch_down.speed_m_s, self.touch_down.speed_m_s)
+        (YIELDING_M_PER_NS * too_little_n).clamp(-MAX_YIELDING_M_S, MAX_YIELDING_M_S)
     }
 
     fn enter(&mut self, phase: Phase) {
@@ -214,18 +224,19 @@ impl Descent {
     }
 
     /// The torques of the last cycle, N·m.
-    pub(crate) fn last_torque(&self) -> &JointVector {
+    pub fn last_torque(&self) -> &JointVector {
         self.control.last_torque()
     }
 
     /// What was found, once the last torques are told.
-    pub(crate) fn touched(&self) -> Touched {
+    pub fn touched(&self) -> Touched {
         let num = f64::from(self.num_summed.max(1));
         Touched {
             is_contact: self.is_contact,
             tcp_height_m: self.height_sum_m / num,
             force_n: self.force_sum_n / num,
             peak_n: self.peak_n,
+            free_air_error: self.free_air_error,
         }
     }
 }

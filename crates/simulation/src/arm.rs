@@ -63,6 +63,11 @@ impl Workcell {
     /// One cycle of a motion or of standing still; the arm may stop itself in it.
     fn cycle(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         self.tick()?;
+        self.observe_moving(watch)
+    }
+
+    /// Shows the state of a cycle to `watch`; the arm may stop itself.
+    pub(crate) fn observe_moving(&mut self, watch: &mut Watch) -> Result<Option<StopReason>> {
         if self.fault() == Some(ArmFaultKind::Reflex) && !self.is_in_reflex {
             self.is_in_reflex = true;
             self.set_reference(ArmReference::at_rest(self.panda_ids.position(&self.data)));
@@ -173,8 +178,9 @@ impl Arm for Workcell {
         Ok(())
     }
 
-    /// The controller does without: at its stiffness a part costs a fraction of a millimetre.
-    fn set_load(&mut self, _load: Load) -> Result<()> {
+    /// Control of joint positions does without: at its stiffness a part costs a fraction of a millimetre. Torques do not.
+    fn set_load(&mut self, load: Load) -> Result<()> {
+        self.load = load;
         Ok(())
     }
 

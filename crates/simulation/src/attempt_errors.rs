@@ -64,6 +64,8 @@ pub struct AttemptErrors {
     pub shake: Option<Shake>,
     /// What goes wrong with the arm.
     pub arm_fault: Option<ArmFault>,
+    /// What dry friction takes in every joint while the arm is driven by torques, N·m. Its control of joint positions makes up for it.
+    pub joint_friction_nm: f64,
 }
 
 impl AttemptErrors {

@@ -7,6 +7,7 @@ use sdg_fci::server::{Jacobian, JointVector, Observation, Plant};
 use sdg_kinematics::{Panda, ready_pose};
 use sdg_robot::PERIOD_SECS;
 
+use crate::compliant::friction_torque_nm;
 use crate::data::Data;
 use crate::error::Result;
 use crate::gripper::Gripper;
@@ -45,9 +46,6 @@ pub struct PandaPlant {
     /// What each joint takes of its motor's torque while it moves, N·m.
     friction_nm: f64,
 }
-
-/// From this velocity on most of the friction acts, rad/s: slower, the simulation's step would be too long for it.
-const FULL_FRICTION_RAD_S: f64 = 0.02;
 
 impl PandaPlant {
     /// A scene at its start: the arm at rest in its ready pose, the hand open.
@@ -156,7 +154,7 @@ impl Plant for PandaPlant {
         for joint in 0..NUM_ARM_JOINTS {
             // A robot's torque sensors sit behind the gears, whose friction its own control makes up for.
             let compensated = self.data.qfrc_passive()[joints[joint]];
-            let friction = self.friction_nm * (dq[joint] / FULL_FRICTION_RAD_S).tanh();
+            let friction = friction_torque_nm(self.friction_nm, dq[joint]);
             self.data.ctrl_mut()[self.ids.motors[joint].index()] = torque[joint] - compensated - friction;
         }
         self.gripper.apply(&mut self.data, &self.ids, PERIOD_SECS);

@@ -32,6 +32,7 @@ mod attempt;
 mod attempt_errors;
 mod camera;
 mod collision_world;
+mod compliant;
 mod controller;
 mod data;
 mod egl;

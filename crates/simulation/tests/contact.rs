@@ -22,6 +22,9 @@ const ABOVE_M: [f64; 3] = [0.45, 0.0, 0.024];
 /// What a part and a table stand.
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
+/// In free air the tcp is no farther beside its reference.
+const MAX_FREE_AIR_M: f64 = 1.5e-3;
+const MAX_FREE_AIR_DEG: f64 = 0.5;
 
 fn serve(friction_nm: f64) -> Server {
     let config = WorkcellConfig::new(SceneVariation::nominal(None));
@@ -59,6 +62,10 @@ fn a_soft_tcp_finds_a_table_that_is_higher_than_told_and_presses_little() {
         let told = TouchDown::default();
         let touched = robot.touch_down(&told).unwrap();
         assert!(touched.is_contact, "friction {friction_nm}: {touched:?}");
+        println!("friction {friction_nm}: {touched:?}");
+        let [beside_reference_m, turned_rad] = touched.free_air_error;
+        assert!(beside_reference_m < MAX_FREE_AIR_M, "friction {friction_nm}: {touched:?}");
+        assert!(turned_rad.to_degrees() < MAX_FREE_AIR_DEG, "friction {friction_nm}: {touched:?}");
         let beside_m = touched.tcp_height_m - FINGERTIP_BEYOND_TCP_M;
         assert!(beside_m.abs() < 1e-3, "friction {friction_nm}: {touched:?}");
         assert!((touched.force_n - told.press_n).abs() < 2.0, "friction {friction_nm}: {touched:?}");

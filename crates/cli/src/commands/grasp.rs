@@ -1,4 +1,4 @@
-//! `sdg grasp`: one grasp, from the picture to the lifted part, with a real arm or a simulated one.
+//! `sdg grasp`: one grasp, from the picture to the lifted part, or to the part in its place; with a real arm or a simulated one.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -9,8 +9,8 @@ use sdg_camera::{Address, LatestFrame};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, PartFinder, Robot,
-    SafetyLimits,
+    Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget,
+    PartFinder, PlaceGoal, PlacingConfig, Robot, SafetyLimits, TouchDown,
 };
 use serde_json::{Value, json};
 
@@ -21,8 +21,8 @@ use crate::files;
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{
-    self, Consent, DryRun, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
-    write_states,
+    self, Consent, DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
+    run_sequence, write_states,
 };
 use crate::shared_args::ComputeArgs;
 
@@ -45,6 +45,13 @@ pub struct GraspArgs {
     /// The workcell's file: robot, tool, camera, table, where the arm may be, where it looks out from
     #[arg(long, value_name = "FILE")]
     pub workcell: PathBuf,
+    /// Put the part down in this place of the workcell's file, and look where it lies: NAME, or NAME:CELL for a cell of a tray,
+    /// counted from 1 along its x
+    #[arg(long, value_name = "NAME")]
+    pub place: Option<String>,
+    /// Come down softly on the last 2 cm: for a table whose height is not known to a millimetre
+    #[arg(long)]
+    pub soft: bool,
     /// Plan the grasp from where the arm stands, draw it, and ask before anything moves
     #[arg(long)]
     pub dry_run: bool,
@@ -83,6 +90,7 @@ struct Prepared {
     model: GraspModel,
     camera: PlacedCamera,
     config: GraspConfig,
+    place: Option<(PlaceGoal, PlacingConfig)>,
 }
 
 /// Reads and checks everything, then connects to the arm and grasps.
@@ -106,7 +114,10 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
 
 fn prepare(args: &GraspArgs) -> Result<Prepared> {
     let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
-    robots::refuse_obstacles(&workcell, &args.workcell)?;
+    let goal = match &args.place {
+        None => None,
+        Some(text) => Some(workcell.place(text).map_err(|error| Usage(format!("--{error}")))?),
+    };
     let pace = robots::pace(args.speed)?;
     if !(args.max_detection_age_secs > 0.0 && args.max_detection_age_secs.is_finite()) {
         let found = args.max_detection_age_secs;
@@ -123,8 +134,15 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
     files::check_writable(&args.states)?;
-    let config = GraspConfig { pace, max_detection_age_secs: args.max_detection_age_secs, ..workcell.grasp_config() };
-    Ok(Prepared { workcell, model, camera, config })
+    let config = GraspConfig {
+        pace,
+        max_detection_age_secs: args.max_detection_age_secs,
+        soft_approach: args.soft.then(TouchDown::default),
+        ..workcell.grasp_config()
+    };
+    let symmetry = model.facts().symmetry;
+    let place = goal.map(|goal| (goal, PlacingConfig { symmetry, ..PlacingConfig::default() }));
+    Ok(Prepared { workcell, model, camera, config, place })
 }
 
 /// Grasps with an arm in MuJoCo.
@@ -143,6 +161,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(intrinsics),
         camera_place: Some(place),
+        obstacles: prepared.workcell.obstacles.clone(),
         ..WorkcellConfig::new(scene)
     })?;
     let limits = SafetyLimits {
@@ -162,7 +181,7 @@ fn simulated(_args: &GraspArgs, _prepared: &Prepared, _interrupt: &Interrupt) ->
 }
 
 /// One grasp with any arm; a real one, which has an address, moves after a person has agreed.
-fn attempt<A: Arm, P: Pictures<A>>(
+fn attempt<A: CompliantArm, P: Pictures<A>>(
     args: &GraspArgs,
     prepared: &Prepared,
     arm: &mut A,
@@ -172,6 +191,9 @@ fn attempt<A: Arm, P: Pictures<A>>(
     address: Option<&str>,
 ) -> Result<Outcome> {
     let mut finder = ModelFinder::new(prepared.model.clone(), prepared.camera, pictures);
+    if prepared.place.is_some() {
+        finder.places.clone_from(&prepared.workcell.places);
+    }
     if args.dry_run {
         let target = finder.find(arm)?.filter(|target| target.score >= sdg_robot::SURE);
         dry_run(args, prepared, arm, limits.clone(), target, finder.seen.as_ref())?;
@@ -189,17 +211,17 @@ fn attempt<A: Arm, P: Pictures<A>>(
     let started = Instant::now();
     let mount = prepared.camera.mount();
     let mut robot = Robot::new(arm, limits, robots::watch(interrupt));
-    let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut (), mount, &prepared.config);
-    // A part that is not there is no error, and a part that is held is none.
+    let ended = run_sequence(&mut robot, &mut finder, mount, &prepared.config, prepared.place.as_ref());
+    // A part that is not there is no error, and one that is held or in its place is none.
     let has_failed = match &ended {
-        Ok(report) => !report.outcome.is_held() && !is_nothing_found(report),
+        Ok(ended) => ended.failed.is_some() && !is_nothing_found(&ended.grasp),
         Err(_) => true,
     };
     if has_failed || robot.latched().is_some() {
         write_states(&args.states, robot.watch())?;
     }
-    let report = ended?;
-    print_report(args, prepared, &report, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
+    let ended = ended?;
+    print_report(args, prepared, &ended, started.elapsed().as_secs_f64(), address.unwrap_or("sim"))
 }
 
 /// Plans from where the arm stands, draws and prints the plan.
@@ -213,39 +235,48 @@ fn dry_run<A: Arm>(
 ) -> Result<()> {
     let (state, hand) = (arm.state()?, arm.hand()?);
     let mount = prepared.camera.mount();
-    let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config)?;
+    let place = prepared.place.as_ref();
+    let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config, place)?;
     eprintln!("what would be done:");
     plan.print(target.is_some())?;
-    for file in plan.draw(&args.out, seen.filter(|_| target.is_some()))? {
+    for file in plan.draw(&args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
         eprintln!("  {}", file.display());
     }
     Ok(())
 }
 
 /// The closing lines, or the one object.
-fn print_report(
-    args: &GraspArgs,
-    prepared: &Prepared,
-    report: &GraspReport,
-    secs: f64,
-    robot: &str,
-) -> Result<Outcome> {
+fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
-        println!("{}", to_json(prepared, report, secs, robot));
+        println!("{}", to_json(prepared, ended, secs, robot));
     }
-    match &report.outcome {
-        GraspOutcome::Held => {
-            let width_mm = report.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
+    let Ended { grasp, failed, beside, .. } = ended;
+    match (failed, &prepared.place) {
+        (None, None) => {
+            let width_mm = grasp.closed.map_or(f64::NAN, |hand| hand.opening_m * 1e3);
             eprintln!(
                 "the part is held, {width_mm:.0} mm between the fingers ({secs:.1} s); sdg robot open lets it go"
             );
             Ok(Outcome::Done)
         }
-        GraspOutcome::Failed { why, .. } if is_nothing_found(report) => {
+        (None, Some((goal, _))) => {
+            let where_it_lies = match (beside, goal.bin_m) {
+                (Some(_), Some(_)) => "is in".to_owned(),
+                (None, _) => "is let go over".to_owned(),
+                (Some(error), None) => format!(
+                    "lies {:.1} mm and {:.1}° beside its place in",
+                    error.distance_m() * 1e3,
+                    error.angle_rad.abs().to_degrees()
+                ),
+            };
+            eprintln!("the part {where_it_lies} \"{}\" ({secs:.1} s)", goal.name);
+            Ok(Outcome::Done)
+        }
+        (Some((_, why)), _) if is_nothing_found(grasp) => {
             eprintln!("{why}");
             Ok(Outcome::NothingToGrasp)
         }
-        GraspOutcome::Failed { step, why } => Err(anyhow!("{step}: {why}")),
+        (Some((step, why)), _) => Err(anyhow!("{step}: {why}")),
     }
 }
 
@@ -255,7 +286,8 @@ fn is_nothing_found(report: &GraspReport) -> bool {
     is_look && report.targets.last() == Some(&None)
 }
 
-fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) -> Value {
+fn to_json(prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Value {
+    let Ended { grasp: report, failed, beside, touched } = ended;
     let target = report.targets.iter().rev().flatten().next().map(|target| {
         let p = target.base_from_tcp.translation.vector;
         let along = target.base_from_tcp.rotation * nalgebra::Vector3::x();
@@ -267,11 +299,12 @@ fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) ->
             "score": target.score,
         })
     });
-    let (step, why) = match &report.outcome {
-        GraspOutcome::Held => (GraspStep::Hold, None),
-        GraspOutcome::Failed { step, why } => (*step, Some(why)),
+    let last_step = if prepared.place.is_some() { GraspStep::Check } else { GraspStep::Hold };
+    let (step, why) = match failed {
+        None => (last_step, None),
+        Some((step, why)) => (*step, Some(why)),
     };
-    json!({
+    let mut object = json!({
         "robot": robot,
         "model": prepared.model.kind().letter(),
         "object": prepared.model.object(),
@@ -282,5 +315,15 @@ fn to_json(prepared: &Prepared, report: &GraspReport, secs: f64, robot: &str) ->
         "target": target,
         "closed_width_m": report.closed.map(|hand| hand.opening_m),
         "seconds": secs,
-    })
+    });
+    if let Some((goal, _)) = &prepared.place {
+        object["place"] = json!({
+            "name": goal.name,
+            "placed": failed.is_none(),
+            "beside_mm": beside.map(|error| error.distance_m() * 1e3),
+            "turned_deg": beside.map(|error| error.angle_rad.abs().to_degrees()),
+            "pressed_n": touched.iter().map(|touched| touched.force_n).collect::<Vec<_>>(),
+        });
+    }
+    object
 }

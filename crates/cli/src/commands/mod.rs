@@ -21,3 +21,4 @@ pub mod simulate;
 pub mod teach;
 pub mod teach_folder;
 pub mod weights;
+pub mod workcell;

@@ -129,6 +129,7 @@ impl Evaluation<'_> {
             verification,
             errors: RehearsalErrors::default(),
             camera: None,
+            place: None,
         };
         let attempts = go_on(&rehearsal, self.store, &cell.file(&attempts_of(verification)), settings, is_interrupted)?;
         Ok(attempts.map(|attempts| held_of(&attempts)))

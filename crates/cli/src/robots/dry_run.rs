@@ -3,12 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow};
+use nalgebra::Isometry3;
+use sdg_kinematics::collision::Obstacle;
 use sdg_robot::{
-    ArmState, CameraMount, GraspConfig, GraspOutcome, GraspTarget, PartFinder, PlannedAction, PlannedArm, Robot,
-    SafetyLimits, Watch, grasp,
+    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedAction,
+    PlannedArm, Robot, SafetyLimits, Watch,
 };
 
 use super::finder::SeenOutline;
+use super::sequence_run::{Ended, run_sequence};
 
 /// A grasp that is planned and not carried out.
 #[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs the start"))]
@@ -16,7 +19,7 @@ pub(crate) struct DryRun {
     start: ArmState,
     opening_m: f64,
     arm: PlannedArm,
-    outcome: GraspOutcome,
+    failed: Option<(GraspStep, String)>,
 }
 
 /// Finds the same target, or none, wherever the arm is.
@@ -25,6 +28,15 @@ struct FixedTarget(Option<GraspTarget>);
 impl PartFinder<PlannedArm> for FixedTarget {
     fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
         Ok(self.0)
+    }
+
+    /// What was put down lies where it was to lie.
+    fn find_nearest(
+        &mut self,
+        _arm: &mut PlannedArm,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> sdg_robot::Result<Option<GraspTarget>> {
+        Ok(self.0.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
     }
 }
 
@@ -40,11 +52,13 @@ impl DryRun {
         limits: SafetyLimits,
         mount: CameraMount,
         config: &GraspConfig,
+        place: Option<&(PlaceGoal, PlacingConfig)>,
     ) -> Result<Self> {
         let mut arm = PlannedArm::new(start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
-        let report = grasp(&mut robot, &mut FixedTarget(target), &mut (), mount, config)?;
-        Ok(Self { start, opening_m, arm, outcome: report.outcome })
+        let Ended { failed, .. } =
+            run_sequence(&mut robot, &mut FixedTarget(target), mount, config, place).map_err(anyhow::Error::from)?;
+        Ok(Self { start, opening_m, arm, failed })
     }
 
     /// A line for each motion, and how the plan ends.
@@ -61,6 +75,10 @@ impl DryRun {
                     eprintln!("  tcp to ({:.0}, {:.0}, {:.0}) mm in {secs:.1} s", tcp.x, tcp.y, tcp.z);
                 }
                 PlannedAction::Wait(_) => {}
+                PlannedAction::Down { end, duration_secs } => {
+                    let z_mm = panda.forward(end).translation.z * 1e3;
+                    eprintln!("  down softly until something is felt, about {z_mm:.0} mm, in {duration_secs:.1} s");
+                }
                 PlannedAction::Hand(sdg_robot::HandCommand::Move { opening_m, .. }) => {
                     eprintln!("  hand open to {:.0} mm", opening_m * 1e3);
                 }
@@ -69,14 +87,14 @@ impl DryRun {
                 }
             }
         }
-        match &self.outcome {
-            GraspOutcome::Held => eprintln!("  {:.0} s in all", self.arm.duration_secs()),
-            GraspOutcome::Failed { .. } if !is_seen => {
+        match &self.failed {
+            None => eprintln!("  {:.0} s in all", self.arm.duration_secs()),
+            Some(_) if !is_seen => {
                 eprintln!(
                     "  the part is not seen from where the arm stands: this is the way to the look-out poses only"
                 );
             }
-            GraspOutcome::Failed { step, why } => return Err(anyhow!("{step}: {why}")),
+            Some((step, why)) => return Err(anyhow!("{step}: {why}")),
         }
         Ok(())
     }
@@ -87,14 +105,20 @@ impl DryRun {
     /// # Errors
     /// Files that cannot be written, and errors of the renderer.
     #[cfg(feature = "simulation")]
-    pub(crate) fn draw(&self, folder: &Path, seen: Option<&SeenOutline>) -> Result<Vec<PathBuf>> {
+    pub(crate) fn draw(
+        &self,
+        folder: &Path,
+        seen: Option<&SeenOutline>,
+        obstacles: &[Obstacle],
+    ) -> Result<Vec<PathBuf>> {
         use super::motion_drawing::MotionDrawing;
         use sdg_simulation::WorkcellConfig;
         use sdg_simulation::scene::{SceneVariation, SeenPart};
 
         const DRAWING: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
         let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
-        let config = WorkcellConfig { seen_part, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
+        let obstacles = obstacles.to_vec();
+        let config = WorkcellConfig { seen_part, obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
         let period_secs = DRAWING.period_secs(self.arm.duration_secs());
         let positions = PlannedArm::frames(&self.start.q_commanded, self.opening_m, self.arm.actions(), period_secs);
         DRAWING.draw(folder, &config, &positions)
@@ -102,7 +126,12 @@ impl DryRun {
 
     /// Without the simulator there is nothing to draw with.
     #[cfg(not(feature = "simulation"))]
-    pub(crate) fn draw(&self, _folder: &Path, _seen: Option<&SeenOutline>) -> Result<Vec<PathBuf>> {
+    pub(crate) fn draw(
+        &self,
+        _folder: &Path,
+        _seen: Option<&SeenOutline>,
+        _obstacles: &[Obstacle],
+    ) -> Result<Vec<PathBuf>> {
         eprintln!("this sdg was built without the simulator and draws no motion");
         Ok(Vec::new())
     }

@@ -16,7 +16,7 @@ use sdg_geometry::PosedCamera;
 use sdg_grasp::{CameraOverTable, GraspModel, PlanDetector, Verification};
 use sdg_kinematics::Panda;
 use sdg_robot::workcell::Mounting;
-use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, RobotError};
+use sdg_robot::{Arm, CameraMount, GraspTarget, PartFinder, Place, RobotError};
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const MAX_WAIT: Duration = Duration::from_secs(5);
@@ -25,12 +25,12 @@ const MAX_WAIT: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlacedCamera {
     intrinsics: sdg_geometry::PinholeCamera,
-    place: Place,
+    place: CameraPose,
     table_height_m: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
+enum CameraPose {
     OnFlange(Isometry3<f64>),
     InBase(Isometry3<f64>),
 }
@@ -42,12 +42,14 @@ impl PlacedCamera {
     /// A file without what the mounting needs: `hand_eye:`, or `table:` in the robot's base.
     pub(crate) fn new(camera: &CalibratedCamera, mounting: Mounting, table_height_m: f64) -> Result<Self> {
         let place = match (mounting, camera.flange_from_camera, &camera.table) {
-            (Mounting::Hand, Some(flange_from_camera), _) => Place::OnFlange(flange_from_camera),
+            (Mounting::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
             (Mounting::Hand, None, _) => bail!(
                 "expected hand_eye: flange_from_camera, since the workcell mounts the camera on the hand; \
                  sdg camera hand-eye --mount hand measures it"
             ),
-            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => Place::InBase(table.frame_from_camera),
+            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => {
+                CameraPose::InBase(table.frame_from_camera)
+            }
             (Mounting::Base, ..) => bail!(
                 "expected table: with frame: base, since the workcell mounts the camera beside the robot; \
                  sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it"
@@ -64,10 +66,10 @@ impl PlacedCamera {
     /// The camera's mount, as the grasp sequence takes it.
     pub(crate) fn mount(&self) -> CameraMount {
         match self.place {
-            Place::OnFlange(flange_from_camera) => {
+            CameraPose::OnFlange(flange_from_camera) => {
                 CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
             }
-            Place::InBase(_) => CameraMount::Base,
+            CameraPose::InBase(_) => CameraMount::Base,
         }
     }
 
@@ -75,16 +77,16 @@ impl PlacedCamera {
     #[cfg(feature = "simulation")]
     pub(crate) fn simulated(&self) -> (sdg_geometry::PinholeCamera, sdg_simulation::CameraPlace) {
         let place = match self.place {
-            Place::OnFlange(flange_from_camera) => sdg_simulation::CameraPlace::OnFlange(flange_from_camera),
-            Place::InBase(base_from_camera) => sdg_simulation::CameraPlace::InBase(base_from_camera),
+            CameraPose::OnFlange(flange_from_camera) => sdg_simulation::CameraPlace::OnFlange(flange_from_camera),
+            CameraPose::InBase(base_from_camera) => sdg_simulation::CameraPlace::InBase(base_from_camera),
         };
         (self.intrinsics, place)
     }
 
     fn over_table(&self, base_from_flange: &Isometry3<f64>) -> CameraOverTable {
         let world_from_camera = match self.place {
-            Place::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
-            Place::InBase(base_from_camera) => base_from_camera,
+            CameraPose::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
+            CameraPose::InBase(base_from_camera) => base_from_camera,
         };
         let camera = PosedCamera { intrinsics: self.intrinsics, world_from_camera };
         CameraOverTable { camera, table_height_m: self.table_height_m, workspace: None }
@@ -164,16 +166,45 @@ pub(crate) struct ModelFinder<P> {
     pub(crate) last: Option<RgbImage>,
     /// The best part of the last picture.
     pub(crate) seen: Option<SeenOutline>,
+    /// Parts that lie there are not to be taken: where parts are put down.
+    pub(crate) places: Vec<Place>,
 }
 
 impl<P> ModelFinder<P> {
     pub(crate) fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
-        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None }
+        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None, places: Vec::new() }
     }
 }
 
 impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
     fn find(&mut self, arm: &mut A) -> sdg_robot::Result<Option<GraspTarget>> {
+        let found = self.find_all(arm)?;
+        let is_placed = |target: &GraspTarget| {
+            let p = target.base_from_tcp.translation;
+            self.places.iter().any(|place| place.covers([p.x, p.y]))
+        };
+        Ok(found.into_iter().find(|target| !is_placed(target)))
+    }
+
+    fn find_nearest(&mut self, arm: &mut A, base_from_tcp: &Isometry3<f64>) -> sdg_robot::Result<Option<GraspTarget>> {
+        let apart_m = |target: &GraspTarget| {
+            (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
+        };
+        let sure = self.find_all(arm)?.into_iter().filter(|target| target.score >= sdg_robot::SURE);
+        Ok(sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b))))
+    }
+
+    fn picture_time(&self) -> Option<Instant> {
+        self.taken
+    }
+}
+
+impl<P> ModelFinder<P> {
+    /// All that is found in a picture, the best first.
+    fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
+    where
+        P: Pictures<A>,
+    {
         let state = arm.state()?;
         let TakenPicture { picture, taken } = self.pictures.take(arm)?;
         self.taken = taken;
@@ -201,14 +232,11 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
             let outline_in_base = outline.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
             Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
         });
-        Ok(found.first().map(|best| GraspTarget {
-            base_from_tcp: best.pose.frame_from_tcp(),
-            jaw_width_m: best.pose.opening_m,
-            score: best.detection.score,
-        }))
-    }
-
-    fn picture_time(&self) -> Option<Instant> {
-        self.taken
+        let targets = found.iter().map(|found| GraspTarget {
+            base_from_tcp: found.pose.frame_from_tcp(),
+            jaw_width_m: found.pose.opening_m,
+            score: found.detection.score,
+        });
+        Ok(targets.collect())
     }
 }

@@ -5,6 +5,7 @@ mod dry_run;
 mod finder;
 #[cfg(feature = "simulation")]
 mod motion_drawing;
+mod sequence_run;
 #[cfg(feature = "simulation")]
 mod simulated_scene;
 mod states_file;
@@ -27,10 +28,11 @@ pub(crate) use finder::TakenPicture;
 pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
 #[cfg(feature = "simulation")]
 pub(crate) use motion_drawing::MotionDrawing;
+pub(crate) use sequence_run::{Ended, run_sequence};
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;
-pub(crate) use workcell_file::{read_workcell, refuse_obstacles};
+pub(crate) use workcell_file::read_workcell;
 
 /// `--robot`: an address, or the simulated arm of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]

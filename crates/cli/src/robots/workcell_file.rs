@@ -23,19 +23,3 @@ pub(crate) fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> 
     let camera_file = workcell.camera_file.as_ref().map(|file| folder.join(file));
     Ok((workcell, camera_file))
 }
-
-/// Refuses a cell with obstacles, for commands whose motions are not planned around them.
-///
-/// # Errors
-/// The first obstacle.
-pub(crate) fn refuse_obstacles(workcell: &Workcell, path: &Path) -> Result<()> {
-    match workcell.obstacles.first() {
-        None => Ok(()),
-        Some(obstacle) => bail!(
-            "{}: expected no obstacle, found \"{}\": the motions of this command are not planned around it, so the arm might run into it; \
-             take it out of the cell and of this file (sdg plan plans around obstacles)",
-            path.display(),
-            obstacle.name
-        ),
-    }
-}

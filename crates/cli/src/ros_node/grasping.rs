@@ -41,7 +41,6 @@ impl GraspSettings {
         let workcell_path: &PathBuf =
             args.arm.workcell.as_ref().ok_or_else(|| Usage("--allow-motion: expected --workcell FILE".to_owned()))?;
         let (workcell, camera_of_workcell) = robots::read_workcell(workcell_path)?;
-        robots::refuse_obstacles(&workcell, workcell_path)?;
         robots::pace(args.arm.speed)?;
         let camera_path = args
             .camera

@@ -58,6 +58,22 @@ pub(super) fn free_configurations(
             }
         }
     }
+    free_of(panda, checker, start, reaching)
+}
+
+/// Of configurations those that are free, the quickest to reach from `start` first.
+///
+/// # Errors
+/// None at all, or all blocked.
+pub(super) fn free_of(
+    panda: &Panda,
+    checker: &mut Checker<'_>,
+    start: &JointVector,
+    reaching: Vec<GoalConfiguration>,
+) -> Result<Vec<GoalConfiguration>, PlanError> {
+    if reaching.is_empty() {
+        return Err(PlanError::NoGoal);
+    }
     let configurations: Vec<JointVector> = reaching.iter().map(|goal| goal.q).collect();
     let distances = checker.distances_m(&configurations);
     let mut free: Vec<GoalConfiguration> = reaching

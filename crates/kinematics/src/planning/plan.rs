@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::error::PlanError;
-use super::goals::{GoalConfiguration, free_configurations};
+use super::goals::{GoalConfiguration, free_configurations, free_of};
 use super::line::checked_line;
 use super::rrt::{Found, Growth, Samples, Stops, rrt_connect};
 use super::shortcut::{cost_secs, motion_secs, shorten};
@@ -114,6 +114,41 @@ impl Panda {
             Some(approach) => self.approaches(&mut checker, start, goals, approach)?,
         };
 
+        self.search(checker, start, goals, approaches, options)
+    }
+
+    /// As [`Panda::plan`], to one of several configurations (rad).
+    ///
+    /// # Errors
+    /// As [`Panda::plan`].
+    pub fn plan_to(
+        &self,
+        model: &CollisionModel,
+        start: &JointVector,
+        configurations: &[JointVector],
+        options: &PlanOptions,
+    ) -> Result<Plan, PlanError> {
+        check_options(options, None)?;
+        let mut checker = Checker::new(model, options.margin_m);
+        self.check_start(&mut checker, start)?;
+        let reaching = configurations.iter().enumerate().map(|(pose_idx, &q)| GoalConfiguration { q, pose_idx });
+        for goal in configurations {
+            let kinematics = |cause| PlanError::Kinematics { what: "the goal".to_owned(), cause };
+            self.check_configuration(goal).map_err(kinematics)?;
+        }
+        let goals = free_of(self, &mut checker, start, reaching.collect())?;
+        self.search(checker, start, goals, Vec::new(), options)
+    }
+
+    /// The cheapest way to one of the goals, which come the quickest first.
+    fn search(
+        &self,
+        mut checker: Checker<'_>,
+        start: &JointVector,
+        goals: Vec<GoalConfiguration>,
+        approaches: Vec<JointPath>,
+        options: &PlanOptions,
+    ) -> Result<Plan, PlanError> {
         let mut stops = Stops::default();
         let mut rng = Pcg64Mcg::seed_from_u64(options.seed);
         let mut growth = Growth { step_rad: options.step_rad, max_checks: options.max_checks };
@@ -161,10 +196,7 @@ impl Panda {
 
     fn check_start(&self, checker: &mut Checker<'_>, start: &JointVector) -> Result<(), PlanError> {
         let kinematics = |cause| PlanError::Kinematics { what: "the start".to_owned(), cause };
-        check_joints("joint positions", start).map_err(kinematics)?;
-        if let Some(violation) = self.limits.worst_violation(start, LIMIT_ROUNDING_RAD) {
-            return Err(kinematics(KinematicsError::JointOutOfRange { what: "joint positions", violation }));
-        }
+        self.check_configuration(start).map_err(kinematics)?;
         if let Some((obstacle, depth_m)) = checker.model().overlap_with_column() {
             return Err(PlanError::EnclosesRobot { obstacle, depth_m });
         }
@@ -173,6 +205,14 @@ impl Panda {
             return Err(PlanError::StartBlocked { nearest, margin_m: checker.margin_m() });
         }
         Ok(())
+    }
+
+    fn check_configuration(&self, q: &JointVector) -> Result<(), KinematicsError> {
+        check_joints("joint positions", q)?;
+        match self.limits.worst_violation(q, LIMIT_ROUNDING_RAD) {
+            None => Ok(()),
+            Some(violation) => Err(KinematicsError::JointOutOfRange { what: "joint positions", violation }),
+        }
     }
 
     /// Configurations before the approach from which it is free, and the approaches.

@@ -1,11 +1,13 @@
 //! Where the sequence looks from and how it grasps.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::collision::Obstacle;
 use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
 
 use crate::arm_state::Load;
 use crate::error::{Result, RobotError};
 use crate::pace::Pace;
+use crate::touch::TouchDown;
 
 /// Middle of the first look on the table unless another is set, base frame, m.
 pub const LOOK_AT_M: [f64; 2] = [0.48, 0.0];
@@ -62,6 +64,13 @@ pub struct GraspConfig {
     pub max_detection_age_secs: f64,
     /// What the hand carries once it holds the part.
     pub load: Option<Load>,
+    /// How the hand comes down on the last centimetres before it closes, on an arm that yields: where the table's height is not known
+    /// to a millimetre. In joint positions where `None`.
+    pub soft_approach: Option<TouchDown>,
+    /// What stands in the cell besides the table: free motions are planned around it.
+    pub obstacles: Vec<Obstacle>,
+    /// The part reaches so far to all sides of its grasp, m: it is kept off the obstacles, too.
+    pub part_radius_m: f64,
     /// Speed of the motions.
     pub pace: Pace,
 }
@@ -84,6 +93,9 @@ impl Default for GraspConfig {
             hold_secs: 1.0,
             max_detection_age_secs: 1.0,
             load: None,
+            soft_approach: None,
+            obstacles: Vec::new(),
+            part_radius_m: 0.06,
             pace: Pace::REHEARSED,
         }
     }

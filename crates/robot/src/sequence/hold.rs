@@ -1,11 +1,14 @@
 //! Closing, lifting and holding; whether the part is held is read from the hand's width and force.
 
-use sdg_kinematics::LineOptions;
+use nalgebra::Isometry3;
+use sdg_kinematics::collision::{Capsule, Checker};
+use sdg_kinematics::planning::{CheckedLine, checked_line};
+use sdg_kinematics::{JointPath, JointVector, LineOptions};
 
 use super::reach::above;
-use super::{Sequence, Steps, Stop, fails_at};
+use super::{GraspConfig, Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
-use crate::arm_state::{HandCommand, HandState, MIN_HELD_WIDTH_M};
+use crate::arm_state::{HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
 use crate::perception::{GraspStep, GraspTarget};
 
@@ -13,6 +16,8 @@ use crate::perception::{GraspStep, GraspTarget};
 const CLOSING_SPEED_M_S: f64 = 0.1;
 /// Steps in which a lift is made shorter where the arm cannot reach so far, m.
 const LIFT_STEP_M: f64 = 0.05;
+/// Distance kept from what stands in the cell on straight motions, m.
+const LINE_MARGIN_M: f64 = 0.003;
 /// Fingers that moved by more since they closed no longer hold what they held, m.
 const MAX_WIDTH_CHANGE_M: f64 = 0.005;
 
@@ -30,6 +35,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
         if let Some(load) = self.config.load {
             self.robot.set_load(load)?;
         }
+        let q = self.robot.state()?.q;
+        let base_from_tcp = self.robot.panda().forward(&q);
+        self.held = Some(HeldPart::new(target, &base_from_tcp, self.robot.limits().table_height_m, self.config));
         Ok(())
     }
 
@@ -40,10 +48,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut lift_m = self.config.lift_m;
         let path = loop {
             let lifted = above(&base_from_tcp, lift_m);
-            match self.robot.panda().straight_path(&start, &lifted, &LineOptions::default()) {
+            match self.free_line(&start, &lifted)? {
                 Ok(path) => break path,
                 Err(_) if lift_m - LIFT_STEP_M >= self.config.min_lift_m - 1e-9 => lift_m -= LIFT_STEP_M,
-                Err(error) => return fails_at(GraspStep::Lift, Err(RobotError::Planning(error))),
+                Err(why) => return Err(Stop::Failed(GraspStep::Lift, why)),
             }
         };
         let planned = self.robot.plan_along(&path, &self.config.pace.lift_limits());
@@ -51,6 +59,27 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.follow(motion, GraspStep::Lift)?;
         let hand = self.robot.hand()?;
         self.judge(GraspStep::Lift, &hand)
+    }
+
+    /// A straight motion that nothing is in the way of; else why there is none.
+    pub(super) fn free_line(
+        &self,
+        start: &JointVector,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> Steps<Result<JointPath, String>> {
+        let panda = self.robot.panda();
+        if !self.is_surrounded() {
+            let line = panda.straight_path(start, base_from_tcp, &LineOptions::default());
+            return Ok(line.map_err(|error| error.to_string()));
+        }
+        let model = self.surroundings().contact_model(self.robot.limits().table_height_m)?;
+        let mut checker = Checker::new(&model, LINE_MARGIN_M);
+        let line = checked_line(panda, &mut checker, start, base_from_tcp).map_err(RobotError::Planning)?;
+        let CheckedLine { share, path, blocked_by } = line;
+        Ok(path.ok_or_else(|| {
+            let why = blocked_by.unwrap_or_default();
+            format!("{:.0} % of the straight way can be followed: {why}", share * 100.0)
+        }))
     }
 
     /// Holds the part still for a while.
@@ -62,11 +91,52 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Whether the part is held: the observer's word, which may rest on more, then the hand's.
-    fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
+    pub(super) fn judge(&mut self, step: GraspStep, hand: &HandState) -> Steps<()> {
         let by_hand = held(&self.closed.unwrap_or(*hand), hand);
+        if by_hand.is_err() && self.held.take().is_some() && self.config.load.is_some() {
+            // The controller must not carry what is lost.
+            self.robot.set_load(Load::NONE)?;
+        }
         self.hand_verdicts.push((step, by_hand.clone().err()));
         self.passed(step)?;
         by_hand.map_err(|why| Stop::Failed(step, why))
+    }
+}
+
+/// What the hand holds, from when it closed.
+#[derive(Debug, Clone)]
+pub(super) struct HeldPart {
+    /// The tcp in the frame of the part's grasp as it was detected: x along the marked line, z down.
+    pub(super) part_from_tcp: Isometry3<f64>,
+    /// The grasp's height over what the part lay on, m.
+    pub(super) height_m: f64,
+    /// How far the part reaches below the tcp, m.
+    pub(super) hang_m: f64,
+    /// Capsules that hold it, in the tcp's frame.
+    pub(super) in_tcp: Vec<Capsule>,
+}
+
+/// A part reaches so far below the tcp at least, m.
+const MIN_HANG_M: f64 = 0.010;
+
+impl HeldPart {
+    fn new(target: &GraspTarget, base_from_tcp: &Isometry3<f64>, table_height_m: f64, config: &GraspConfig) -> Self {
+        let hang_m = (base_from_tcp.translation.z - table_height_m).max(MIN_HANG_M);
+        let reach_m = (config.part_radius_m - hang_m).max(0.0);
+        // A disc around the tcp: how the part lies in it is not known to the arm.
+        let in_tcp = (0..4)
+            .map(|index| {
+                let (sin, cos) = (f64::from(index) * std::f64::consts::FRAC_PI_4).sin_cos();
+                let [x, y] = [reach_m * cos, reach_m * sin];
+                Capsule::new([-x, -y, 0.0], [x, y, 0.0], hang_m)
+            })
+            .collect();
+        Self {
+            part_from_tcp: target.base_from_tcp.inverse() * base_from_tcp,
+            height_m: target.base_from_tcp.translation.z - table_height_m,
+            hang_m,
+            in_tcp,
+        }
     }
 }
 

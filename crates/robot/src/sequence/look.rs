@@ -1,15 +1,15 @@
 //! Looking: from afar, and from above what was found.
 
 use nalgebra::Vector3;
-use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, JointVector, with_fingers_exchanged};
+use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
-use super::{FREE_CLEARANCE_M, SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down, fails_at};
+use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
 use crate::arm::Arm;
-use crate::arm_state::ContactSensitivity;
 use crate::perception::{GraspStep, GraspTarget};
+use crate::surroundings::Destination;
 
 /// Where the camera looks from above the part: small shifts, so that it stays in the middle of the picture, m.
-const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
+pub(super) const HOVER_SHIFTS_M: [[f64; 2]; 3] = [[0.0, 0.0], [-0.03, 0.03], [0.03, -0.03]];
 /// Score on which perception decides.
 pub const SURE: f64 = 0.5;
 /// What lies where the first look found the part is it at a lower score already, where it lies within so many metres and
@@ -47,7 +47,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
-            match self.hover(first, shift_m) {
+            match self.hover(first, shift_m, GraspStep::Hover) {
                 Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
                 Err(_) => continue,
                 Ok(()) => looks += 1,
@@ -97,18 +97,30 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Puts the camera over the grasp or shifted from there, the hand turned as for the grasp or by half a turn more.
-    fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2]) -> Steps<()> {
+    pub(super) fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         let seed = self.robot.commanded()?;
         let grasp = target.base_from_tcp.translation;
         let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
         let height_m = self.robot.limits().table_height_m + self.config.hover_height_m;
-        let mut best: Option<IkSolution> = None;
-        let mut first_error = None;
-        for base_from_grasp in [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)] {
+        let poses = [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)].map(|base_from_grasp| {
             // The picture's up is the hand's x.
             let up = base_from_grasp.rotation * Vector3::x();
             let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
-            let base_from_tcp = self.mount.base_from_tcp(&base_from_camera);
+            self.mount.base_from_tcp(&base_from_camera)
+        });
+        let unreachable =
+            |why: String| Stop::Failed(step, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"));
+        if self.is_surrounded() {
+            let way = self.way_to(&Destination::Poses(&poses));
+            let way =
+                way.map_err(|error| if error.latches() { error.into() } else { unreachable(error.to_string()) })?;
+            self.check_age()?;
+            self.travel(way, step)?;
+            return Ok(self.robot.wait(SETTLE_SECS)?);
+        }
+        let mut best: Option<IkSolution> = None;
+        let mut first_error = None;
+        for base_from_tcp in poses {
             match self.robot.panda().inverse(&base_from_tcp, &seed, &IkOptions::default()) {
                 Ok(solution) if best.as_ref().is_none_or(|best| solution.cost < best.cost) => best = Some(solution),
                 Ok(_) => {}
@@ -118,31 +130,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
             }
         }
         let solution = best.ok_or_else(|| {
-            let why = first_error.map_or_else(String::new, |error| error.to_string());
-            Stop::Failed(GraspStep::Hover, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"))
+            unreachable(first_error.map_or_else(String::new, |error: KinematicsError| error.to_string()))
         })?;
         self.check_age()?;
-        self.move_freely(&solution.q, GraspStep::Hover)?;
+        self.move_freely(&solution.q, step)?;
         Ok(self.robot.wait(SETTLE_SECS)?)
-    }
-
-    /// Goes to a configuration in joint space, keeping off the table.
-    pub(super) fn move_freely(&mut self, q: &JointVector, step: GraspStep) -> Steps<()> {
-        let limits = self.config.pace.free_limits();
-        let planned = self.robot.plan_free(q, &limits);
-        let motion = fails_at(step, planned)?;
-        let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
-        let clearance = motion.clearance(panda, table_height_m);
-        // The end is wanted, whatever its height; on the way the arm must not come lower.
-        let allowed = FREE_CLEARANCE_M.min(panda.clearance(q, table_height_m).lowest_m - 1e-3);
-        if clearance.lowest_m < allowed {
-            return Err(Stop::Failed(
-                step,
-                format!("the way there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
-            ));
-        }
-        self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
-        self.follow(motion, step)
     }
 }
 

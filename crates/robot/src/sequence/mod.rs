@@ -6,24 +6,32 @@
 //! ```
 //! After an empty detection the arm looks from the next place: another place shows a tall part from another side, and shadows of the arm
 //! elsewhere. A camera beside the robot looks once, with the arm out of its view.
+//!
+//! Placing goes on from there: carry ─> come down until the place is felt ─> open, up ─> look where the part lies.
 
 mod config;
 mod hold;
 mod look;
+mod place;
 mod reach;
+mod travel;
 
 use std::time::Instant;
 
 use sdg_kinematics::Trajectory;
 
-use crate::arm::Arm;
+use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;
+use crate::touch::{TouchDown, Touched};
 
 pub use config::{CameraMount, GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, camera_looking_down};
 pub use look::SURE;
+pub use place::{PlaceOutcome, PlaceReport, PlacingConfig, grasp_and_place};
+
+use hold::HeldPart;
 
 /// Least height of the arm over the table on its free motions, m.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
@@ -57,6 +65,8 @@ pub struct GraspReport {
     pub closed: Option<HandState>,
     /// The verdict of the hand's width and force after closing, lifting and holding: `None` where the part is held, otherwise why not.
     pub hand_verdicts: Vec<(GraspStep, Option<String>)>,
+    /// What was touched on soft ways down, in their order.
+    pub touched: Vec<Touched>,
 }
 
 /// Grasps the part once.
@@ -71,26 +81,30 @@ pub fn grasp<A: Arm>(
     mount: CameraMount,
     config: &GraspConfig,
 ) -> Result<GraspReport> {
-    let mut sequence = Sequence {
-        robot,
-        finder,
-        observer,
-        mount,
-        config,
-        targets: Vec::new(),
-        looks: [0; 2],
-        picture_time: None,
-        closed: None,
-        hand_verdicts: Vec::new(),
-    };
-    let outcome = match sequence.run() {
-        Ok(()) => GraspOutcome::Held,
-        Err(Stop::Failed(step, why)) => GraspOutcome::Failed { step, why },
-        Err(Stop::Error(error)) => return Err(error),
-    };
-    let Sequence { targets, looks, closed, hand_verdicts, .. } = sequence;
-    Ok(GraspReport { outcome, targets, looks, closed, hand_verdicts })
+    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
+    let outcome = sequence.grasp()?;
+    Ok(sequence.grasp_report(outcome))
 }
+
+/// As [`grasp`], with an arm that yields: it comes down as [`GraspConfig::soft_approach`] says.
+///
+/// # Errors
+/// As [`grasp`].
+pub fn grasp_softly<A: CompliantArm>(
+    robot: &mut Robot<'_, A>,
+    finder: &mut dyn PartFinder<A>,
+    observer: &mut dyn StepObserver<A>,
+    mount: CameraMount,
+    config: &GraspConfig,
+) -> Result<GraspReport> {
+    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
+    sequence.touch = Some(|robot, touch_down| robot.touch_down(touch_down));
+    let outcome = sequence.grasp()?;
+    Ok(sequence.grasp_report(outcome))
+}
+
+/// Comes down until something is felt.
+type Touch<A> = fn(&mut Robot<'_, A>, &TouchDown) -> Result<Touched>;
 
 /// Why the sequence ended early.
 enum Stop {
@@ -110,7 +124,9 @@ type Steps<T> = std::result::Result<T, Stop>;
 fn fails_at<T>(step: GraspStep, result: Result<T>) -> Steps<T> {
     result.map_err(|error| match error {
         RobotError::Planning(error) => Stop::Failed(step, error.to_string()),
-        error @ (RobotError::Unsafe(_) | RobotError::Blocked(_)) => Stop::Failed(step, error.to_string()),
+        error @ (RobotError::Unsafe(_) | RobotError::Blocked(_) | RobotError::NoWay(_)) => {
+            Stop::Failed(step, error.to_string())
+        }
         error => Stop::Error(error),
     })
 }
@@ -127,6 +143,11 @@ struct Sequence<'s, 'r, A: Arm> {
     picture_time: Option<Instant>,
     closed: Option<HandState>,
     hand_verdicts: Vec<(GraspStep, Option<String>)>,
+    /// Of an arm that yields.
+    touch: Option<Touch<A>>,
+    /// What was touched on soft ways down.
+    touched: Vec<Touched>,
+    held: Option<HeldPart>,
 }
 
 impl GraspOutcome {
@@ -136,16 +157,65 @@ impl GraspOutcome {
     }
 }
 
-impl<A: Arm> Sequence<'_, '_, A> {
+impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
+    fn new(
+        robot: &'s mut Robot<'r, A>,
+        finder: &'s mut dyn PartFinder<A>,
+        observer: &'s mut dyn StepObserver<A>,
+        mount: CameraMount,
+        config: &'s GraspConfig,
+    ) -> Self {
+        Self {
+            robot,
+            finder,
+            observer,
+            mount,
+            config,
+            targets: Vec::new(),
+            looks: [0; 2],
+            picture_time: None,
+            closed: None,
+            hand_verdicts: Vec::new(),
+            touch: None,
+            touched: Vec::new(),
+            held: None,
+        }
+    }
+
+    /// Grasps; how that ended.
+    fn grasp(&mut self) -> Result<GraspOutcome> {
+        match self.run() {
+            Ok(()) => Ok(GraspOutcome::Held),
+            Err(Stop::Failed(step, why)) => Ok(GraspOutcome::Failed { step, why }),
+            Err(Stop::Error(error)) => Err(error),
+        }
+    }
+
+    fn grasp_report(&mut self, outcome: GraspOutcome) -> GraspReport {
+        GraspReport {
+            outcome,
+            targets: std::mem::take(&mut self.targets),
+            looks: self.looks,
+            closed: self.closed,
+            hand_verdicts: std::mem::take(&mut self.hand_verdicts),
+            touched: std::mem::take(&mut self.touched),
+        }
+    }
+
     fn run(&mut self) -> Steps<()> {
         let first = self.look_around()?;
         let target = match self.mount {
             CameraMount::Hand { .. } => self.look_from_above(&first)?,
             CameraMount::Base => first,
         };
-        let approach = self.go_above(&target)?;
+        self.take(&target)
+    }
+
+    /// From above a part that was found to the part in the air.
+    fn take(&mut self, target: &GraspTarget) -> Steps<()> {
+        let approach = self.go_above(target)?;
         self.descend(approach)?;
-        self.close(&target)?;
+        self.close(target)?;
         self.lift()?;
         self.hold()
     }

@@ -1,12 +1,17 @@
 //! From above the part straight down to it.
 
 use nalgebra::{Isometry3, Translation3};
-use sdg_kinematics::{Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, LineOptions};
+use sdg_kinematics::{
+    GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged,
+};
 
 use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::{ContactSensitivity, HandCommand};
+use crate::error::RobotError;
 use crate::perception::{GraspStep, GraspTarget};
+use crate::surroundings::Destination;
+use crate::touch::TouchDown;
 
 /// Least distance of the finger tips to the table when closing, m.
 const FINGERTIP_CLEARANCE_M: f64 = 0.002;
@@ -14,10 +19,16 @@ const FINGERTIP_CLEARANCE_M: f64 = 0.002;
 const OPENING_SPEED_M_S: f64 = 0.2;
 /// How long the arm stands still before the hand closes, s.
 const SETTLE_SECS: f64 = 0.1;
+/// Heights from which a straight way down is looked for, m.
+const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
+/// A soft way down begins so far above its end, m.
+const SOFT_WAY_M: f64 = 0.020;
+/// What is felt higher above the grasp is not the table, m.
+const MAX_EARLY_M: f64 = 0.010;
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Puts the open hand above the grasp, as high as a straight way down exists from.
-    pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<Approach> {
+    pub(super) fn go_above(&mut self, target: &GraspTarget) -> Steps<JointPath> {
         self.check_age()?;
         let limits = self.robot.limits();
         let lowest = limits.table_height_m + limits.fingertip_beyond_tcp_m + FINGERTIP_CLEARANCE_M;
@@ -29,10 +40,22 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let seed = self.robot.commanded()?;
         let here = self.robot.panda().forward(&seed).translation.z;
         let mut first_error = None;
-        for height in [here - base_from_grasp.translation.z, 0.25, 0.15, 0.10] {
-            let base_from_pregrasp = above(&base_from_grasp, height.max(0.05));
+        for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
+            let height = height.max(0.05);
+            if self.is_surrounded() {
+                // Whichever finger is on which side, whichever way of the arm: the cheapest.
+                let grasps = [base_from_grasp, with_fingers_exchanged(&base_from_grasp)];
+                match self.way_to(&Destination::Approached(&grasps, height)) {
+                    Ok(way) => return self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),
+                    Err(error) if error.latches() => return Err(error.into()),
+                    Err(error) => {
+                        first_error.get_or_insert(error.to_string());
+                    }
+                }
+                continue;
+            }
             let planned = self.robot.panda().approach(
-                &base_from_pregrasp,
+                &above(&base_from_grasp, height),
                 &base_from_grasp,
                 GraspSymmetry::HalfTurn,
                 &seed,
@@ -42,15 +65,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
             match planned {
                 Ok(approach) => {
                     self.move_freely(&approach.pregrasp.q, GraspStep::Approach)?;
-                    return Ok(approach);
+                    return Ok(approach.path);
                 }
                 Err(error) => {
-                    first_error.get_or_insert(error);
+                    first_error.get_or_insert(error.to_string());
                 }
             }
         }
         let p = base_from_grasp.translation.vector;
-        let why = first_error.map_or_else(String::new, |error| error.to_string());
+        let why = first_error.unwrap_or_default();
         Err(Stop::Failed(
             GraspStep::Approach,
             format!("no straight way down to ({:.2}, {:.2}, {:.3}) m: {why}", p.x, p.y, p.z),
@@ -58,14 +81,52 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Moves straight down to the grasp with the hand open.
-    pub(super) fn descend(&mut self, approach: Approach) -> Steps<()> {
+    pub(super) fn descend(&mut self, path: JointPath) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        let planned = self.robot.plan_along(&approach.path, &self.config.pace.approach_limits());
-        let motion = fails_at(GraspStep::Approach, planned)?;
-        self.follow(motion, GraspStep::Approach)?;
+        match (self.touch, self.config.soft_approach) {
+            (Some(touch), Some(touch_down)) => {
+                let end = *path.end();
+                self.go_down_to(
+                    path.start(),
+                    &above(&self.robot.panda().forward(&end), SOFT_WAY_M),
+                    GraspStep::Approach,
+                )?;
+                let touched = touch(self.robot, &TouchDown { max_way_m: SOFT_WAY_M, ..touch_down });
+                let touched = fails_at(GraspStep::Approach, touched)?;
+                self.touched.push(touched);
+                let early_m = touched.tcp_height_m - self.robot.panda().forward(&end).translation.z;
+                if touched.is_contact && early_m > MAX_EARLY_M {
+                    let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
+                    return Err(Stop::Failed(GraspStep::Approach, why));
+                }
+            }
+            _ => {
+                let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+                let motion = fails_at(GraspStep::Approach, planned)?;
+                self.follow(motion, GraspStep::Approach)?;
+            }
+        }
         Ok(self.robot.wait(SETTLE_SECS)?)
     }
+
+    /// Straight to a pose below, as an approach goes.
+    pub(super) fn go_down_to(
+        &mut self,
+        start: &JointVector,
+        base_from_tcp: &Isometry3<f64>,
+        step: GraspStep,
+    ) -> Steps<()> {
+        let line = self.robot.panda().straight_path(start, base_from_tcp, &LineOptions::default());
+        let path = fails_at(step, line.map_err(RobotError::Planning))?;
+        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let motion = fails_at(step, planned)?;
+        self.follow(motion, step)
+    }
+}
+
+fn no_approach() -> Stop {
+    Stop::Failed(GraspStep::Approach, "the way around the obstacles has no approach".to_owned())
 }
 
 /// A pose higher up.

@@ -7,6 +7,7 @@ use toml::Spanned;
 
 use super::error::WorkcellError;
 use super::obstacle::{ObstacleSection, obstacles};
+use super::place::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
 use super::{Mounting, RobotModel, Workcell};
 use crate::franka::RobotAddress;
@@ -21,6 +22,9 @@ const MAX_TABLE_MM: f64 = 1000.0;
 const MAX_FINGERTIP_MM: f64 = 100.0;
 /// What the hand holds for long, N.
 const MAX_FORCE_N: f64 = 70.0;
+/// How far a part reaches from its grasp unless told, and at most, mm.
+const PART_RADIUS_MM: f64 = 60.0;
+const MAX_PART_MM: f64 = 500.0;
 /// What a Panda may carry, kg.
 const MAX_LOAD_KG: f64 = 3.0;
 /// Heights of a camera above the table, mm.
@@ -42,7 +46,11 @@ struct File {
     #[serde(default)]
     obstacle: Vec<Spanned<ObstacleSection>>,
     #[serde(default)]
-    tray: Vec<Spanned<toml::Value>>,
+    place: Vec<Spanned<PlaceSection>>,
+    #[serde(default)]
+    tray: Vec<Spanned<TraySection>>,
+    #[serde(default)]
+    bin: Vec<Spanned<BinSection>>,
 }
 
 #[derive(Deserialize)]
@@ -58,6 +66,7 @@ struct Tool {
     fingertip_beyond_tcp_mm: Option<Spanned<f64>>,
     grasp_force_n: Option<Spanned<f64>>,
     part_mass_kg: Option<Spanned<f64>>,
+    part_radius_mm: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -71,6 +80,8 @@ struct Camera {
 #[serde(deny_unknown_fields)]
 struct Table {
     height_mm: Spanned<f64>,
+    x_mm: Option<Spanned<Numbers<2>>>,
+    y_mm: Option<Spanned<Numbers<2>>>,
 }
 
 #[derive(Deserialize)]
@@ -133,11 +144,6 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
             ));
         }
     };
-    if let Some(section) = file.tray.first() {
-        let why =
-            "tray: nothing is placed yet, and the arm might run into it; take it out of the cell and of this file";
-        return Err(source.error(section.span().start, why));
-    }
     let option = |value: &Option<Spanned<f64>>, name: &str, range: [f64; 2]| {
         value.as_ref().map(|value| source.number(value, name, range)).transpose()
     };
@@ -152,16 +158,31 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     if look_outs.is_empty() {
         return Err(source.expected(&file.look_out, "look_out", "at least one", "none"));
     }
+    let table_height_m = source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3;
+    let table_m = match (&file.table.x_mm, &file.table.y_mm) {
+        (None, None) => None,
+        (Some(x), Some(y)) => Some([source.range_m(x, "x_mm")?, source.range_m(y, "y_mm")?]),
+        (Some(one), None) | (None, Some(one)) => {
+            return Err(source.error(one.span().start, "table: expected x_mm and y_mm, or neither"));
+        }
+    };
+    let workspace = WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) };
+    let room = Room { table_height_m, table_m, workspace: &workspace };
+    let places = places(&source, &file.place, &file.tray, &file.bin, &room)?;
     Ok(Workcell {
         robot,
         address: file.robot.address.map(Spanned::into_inner),
         fingertip_beyond_tcp_m: fingertip_mm.unwrap_or(FINGERTIP_MM) * 1e-3,
         grasp_force_n: option(&tool.grasp_force_n, "grasp_force_n", [1.0, MAX_FORCE_N])?.unwrap_or(40.0),
         part_mass_kg: option(&tool.part_mass_kg, "part_mass_kg", [0.0, MAX_LOAD_KG])?,
+        part_radius_m: option(&tool.part_radius_mm, "part_radius_mm", [1.0, MAX_PART_MM])?.unwrap_or(PART_RADIUS_MM)
+            * 1e-3,
         camera_file: file.camera.file.map(Spanned::into_inner),
         mounting,
-        table_height_m: source.number(&file.table.height_mm, "height_mm", [-MAX_TABLE_MM, MAX_TABLE_MM])? * 1e-3,
-        workspace: WorkspaceBox { min_m: Vector3::new(x[0], y[0], z[0]), max_m: Vector3::new(x[1], y[1], z[1]) },
+        table_height_m,
+        table_m,
+        workspace,
+        places,
         obstacles: obstacles(&source, &file.obstacle)?,
         look_outs: look_outs.iter().map(|section| look_out(&source, section, mounting)).collect::<Result<_, _>>()?,
     })

@@ -10,7 +10,8 @@
 //! [tool]                            # may be left out
 //! fingertip_beyond_tcp_mm = 9.0     # how far the finger tips reach beyond the tcp
 //! grasp_force_n = 40.0
-//! part_mass_kg = 0.2                # told to the controller once the part is held
+//! part_mass_kg = 0.2                # told to the controller while the part is held
+//! part_radius_mm = 60               # the part reaches so far from its grasp: it is kept off the obstacles, too
 //!
 //! [camera]
 //! file = "camera.yaml"              # beside this file; --camera says it too
@@ -18,6 +19,8 @@
 //!
 //! [table]
 //! height_mm = 0.0                   # its z in the robot's base frame
+//! x_mm = [100, 900]                 # where it is; with y_mm, or both left out: no place may reach over its edge
+//! y_mm = [-600, 600]
 //!
 //! [workspace]                       # where tcp and flange may be, mm in the base frame
 //! x_mm = [200, 800]
@@ -29,27 +32,46 @@
 //! joints_deg = [0, -45, 0, -135, 0, 90, 45]
 //! yaw_deg = 0                       # with camera_at_mm; may be left out
 //!
-//! [[obstacle]]                      # any number; sdg plan plans around them, other motions are refused
+//! [[obstacle]]                      # any number; motions are planned around them
 //! name = "fixture"
 //! box_mm = [200, 100, 300]          # or cylinder_mm = [diameter, length], along z; capsule_mm = [diameter, length over all];
 //! at_mm = [500, 300, 150]           # or plane_normal = [x, y, z], out of what is solid; its middle, in the base frame
 //! rpy_deg = [0, 0, 30]              # roll, pitch, yaw; may be left out
 //!
-//! [[tray]]                          # refused as long as nothing is placed
+//! [[place]]                         # one pose for a part: sdg grasp --place shelf
+//! name = "shelf"
+//! at_mm = [450, 300]                # x, y of the part's grasp, base frame
+//! yaw_deg = 90                      # direction of its marked line; may be left out
+//! height_mm = 0                     # of what it stands on, above the table; may be left out
+//!
+//! [[tray]]                          # a grid of cells: sdg grasp --place tray:7; yaw_deg and height_mm as above
+//! name = "tray"
+//! first_mm = [350, 250]             # middle of the first cell
+//! columns = 5                       # cells along its x, which yaw_deg turns
+//! rows = 4
+//! pitch_mm = [60, 60]               # from one cell to the next along its x and its y
+//!
+//! [[bin]]                           # parts lie in it anyhow; yaw_deg and height_mm as above
+//! name = "bin"
+//! at_mm = [450, -300]               # its middle
+//! size_mm = [200, 150]              # of its inside, along its x and its y
 //! ```
 //! Every error names the line. This crate holds no file: text in, a [`Workcell`] out.
 
 mod error;
 mod file;
 mod obstacle;
+mod place;
 mod source;
 
-use nalgebra::Isometry3;
 use sdg_kinematics::JointVector;
-use sdg_kinematics::collision::{Body, CollisionError, CollisionModel, Obstacle, Shape};
+use sdg_kinematics::collision::{CollisionError, CollisionModel, Obstacle};
 
+use crate::error::{Result as RobotResult, RobotError};
+use crate::place::{Place, PlaceGoal};
 use crate::safety::{SafetyLimits, WorkspaceBox};
 use crate::sequence::{GraspConfig, LookOut};
+use crate::surroundings;
 
 pub use error::WorkcellError;
 
@@ -104,22 +126,25 @@ pub struct Workcell {
     pub grasp_force_n: f64,
     /// Mass of the part, kg.
     pub part_mass_kg: Option<f64>,
+    /// How far the part reaches to all sides of its grasp, m.
+    pub part_radius_m: f64,
     /// The camera's file, as it is written.
     pub camera_file: Option<String>,
     /// How the camera is mounted.
     pub mounting: Mounting,
     /// The table's z in the base frame, m.
     pub table_height_m: f64,
+    /// Where the table is along x and y of the base frame, m, where that is told.
+    pub table_m: Option<[[f64; 2]; 2]>,
     /// Box that tcp and flange stay in, in the base frame.
     pub workspace: WorkspaceBox,
     /// Where the arm looks out from.
     pub look_outs: Vec<LookOut>,
     /// What stands in the cell besides the table.
     pub obstacles: Vec<Obstacle>,
+    /// Where parts are put down.
+    pub places: Vec<Place>,
 }
-
-/// The table's name among the obstacles.
-const TABLE: &str = "table";
 
 impl Workcell {
     /// What every motion in this workcell keeps to.
@@ -146,6 +171,8 @@ impl Workcell {
             look_outs: self.look_outs.clone(),
             grasp_force_n: self.grasp_force_n,
             load,
+            obstacles: self.obstacles.clone(),
+            part_radius_m: self.part_radius_m,
             ..GraspConfig::default()
         }
     }
@@ -155,15 +182,37 @@ impl Workcell {
     /// # Errors
     /// An opening that the hand does not have; obstacles were checked when the file was read.
     pub fn collision_model(&self, opening_m: f64) -> Result<CollisionModel, CollisionError> {
-        let table = Obstacle {
-            name: TABLE.to_owned(),
-            shape: Shape::Plane,
-            base_from_obstacle: Isometry3::translation(0.0, 0.0, self.table_height_m),
+        surroundings::collision_model(self.table_height_m, &self.obstacles, opening_m)
+    }
+
+    /// The place of this name, or the cell of a tray: `NAME` or `NAME:CELL`.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`] with the places that there are, or the cells.
+    pub fn place(&self, text: &str) -> RobotResult<PlaceGoal> {
+        let wrong = |expected: String| RobotError::Configuration {
+            what: "place".to_owned(),
+            expected,
+            found: format!("\"{text}\""),
         };
-        let mut model = CollisionModel::new([&[table], &self.obstacles[..]].concat(), opening_m)?;
-        // Link 1 turns about the vertical only: a table that is higher than the base's foot is around it, not in its way.
-        model.allow(Body::link(1), TABLE)?;
-        Ok(model)
+        let (name, cell) = match text.split_once(':') {
+            None => (text, None),
+            Some((name, cell)) => {
+                let expected = || "NAME, or NAME:CELL with a cell's number from 1 on".to_owned();
+                (name, Some(cell.parse::<u32>().map_err(|_| wrong(expected()))?))
+            }
+        };
+        let Some(place) = self.places.iter().find(|place| place.name == name) else {
+            let names: Vec<&str> = self.places.iter().map(|place| place.name.as_str()).collect();
+            return Err(wrong(match names.is_empty() {
+                true => "a [[place]], [[tray]] or [[bin]] in the workcell's file".to_owned(),
+                false => format!("one of {}", names.join(", ")),
+            }));
+        };
+        match (cell, place.num_cells()) {
+            (None, num) if num > 1 => Err(wrong(format!("{name}:1 to {name}:{num}, a cell of the tray"))),
+            (cell, _) => place.goal(cell.unwrap_or(1)),
+        }
     }
 
     /// Joint angles of the first look-out pose that is given as such.

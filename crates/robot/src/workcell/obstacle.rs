@@ -5,9 +5,9 @@ use sdg_kinematics::collision::{Obstacle, Shape};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::TABLE;
 use super::error::WorkcellError;
 use super::source::{MAX_REACH_MM, Numbers, Source};
+use crate::surroundings::TABLE;
 
 /// Lengths of obstacles, mm.
 const SIZES_MM: [f64; 2] = [1.0, 5000.0];

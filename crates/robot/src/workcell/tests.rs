@@ -76,10 +76,82 @@ fn errors_name_the_line() {
     }
 }
 
+const PLACES: &str = r#"
+[[place]]
+name = "shelf"
+at_mm = [450, 300]
+yaw_deg = 90
+height_mm = 20
+
+[[tray]]
+name = "tray"
+first_mm = [350, -400]
+columns = 5
+rows = 4
+pitch_mm = [60, 50]
+
+[[bin]]
+name = "bin"
+at_mm = [700, 200]
+size_mm = [200, 150]
+"#;
+
+fn placing() -> String {
+    let table = "height_mm = -12.5";
+    WHOLE.replace(table, &format!("{table}\nx_mm = [100, 900]\ny_mm = [-500, 500]")) + PLACES
+}
+
 #[test]
-fn trays_are_refused() {
-    let error = Workcell::from_toml(&format!("{WHOLE}\n[[tray]]\nname = \"a\"\n")).unwrap_err();
-    assert!(error.to_string().starts_with("line 30: tray: nothing is placed yet"), "{error}");
+fn places_are_where_the_file_says() {
+    let cell = Workcell::from_toml(&placing()).unwrap();
+    let shelf = cell.place("shelf").unwrap();
+    assert_eq!(shelf.at_m, [0.45, 0.3]);
+    assert!(
+        (shelf.surface_m - 0.0075).abs() < 1e-12 && (shelf.yaw_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12,
+        "{shelf:?}"
+    );
+    // The seventh cell is the second of the second row.
+    let cell_7 = cell.place("tray:7").unwrap();
+    assert!((cell_7.at_m[0] - 0.41).abs() < 1e-12 && (cell_7.at_m[1] + 0.35).abs() < 1e-12, "{cell_7:?}");
+    assert_eq!(cell.place("bin").unwrap().bin_m, Some([0.2, 0.15]));
+    for (text, expected) in [
+        ("tray", "expected tray:1 to tray:20, a cell of the tray, found \"tray\""),
+        ("tray:21", "expected 1 to 20, found 21"),
+        ("tray:x", "expected NAME, or NAME:CELL"),
+        ("box", "expected one of shelf, tray, bin, found \"box\""),
+    ] {
+        let error = cell.place(text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    let without = Workcell::from_toml(WHOLE).unwrap().place("a").unwrap_err().to_string();
+    assert!(without.contains("a [[place]], [[tray]] or [[bin]] in the workcell's file"), "{without}");
+}
+
+#[test]
+fn places_that_cannot_be_name_the_line() {
+    for (line, from, to, expected) in [
+        (34, "[450, 300]", "[450, nan]", "at_mm: expected x and y within 1500 mm"),
+        (34, "[450, 300]", "[150, 300]", "\"shelf\" is at x = 150 mm, outside the workspace of 200 to 800 mm"),
+        (34, "[450, 300]", "[450, 300, 0]", "expected 2 numbers, found 3"),
+        (35, "yaw_deg = 90", "yaw_deg = inf", "yaw_deg: expected a number from -360 to 360, found inf"),
+        (36, "height_mm = 20", "height_mm = -5", "height_mm: expected a number from 0 to 500, found -5"),
+        (39, "\"tray\"", "\"shelf\"", "name: expected a name of its own, found a second \"shelf\""),
+        (39, "\"tray\"", "\"a:b\"", "expected a name without \":\""),
+        (40, "[350, -400]", "[350, -480]", "\"tray\" reaches over the table's edge: its corner is at (320, -505) mm"),
+        (40, "columns = 5", "columns = 20", "\"tray\" reaches over the table's edge: its corner is at (1520, -425)"),
+        (41, "columns = 5", "columns = 0", "columns: expected a whole number from 1 to 100, found 0"),
+        (42, "rows = 4", "rows = -4", "rows: expected a whole number from 1 to 100, found -4"),
+        (43, "[60, 50]", "[60, 0]", "pitch_mm: expected lengths from 5 to 1000 mm"),
+        (43, "[60, 50]", "[60, nan]", "pitch_mm: expected lengths"),
+        (47, "[700, 200]", "[790, 480]", "\"bin\" reaches over the table's edge"),
+        (48, "size_mm", "size", "unknown field `size`"),
+        (18, "y_mm = [-500, 500]", "", "table: expected x_mm and y_mm, or neither"),
+    ] {
+        let whole = placing();
+        assert!(whole.contains(from), "{from}");
+        let error = Workcell::from_toml(&whole.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.starts_with(&format!("line {line}: ")), "{to}: {error}");
+    }
 }
 
 const OBSTACLES: &str = r#"

@@ -56,6 +56,7 @@ impl StepObserver<Workcell> for Judge {
     fn after(&mut self, cell: &mut Workcell, step: GraspStep) -> Result<Option<String>> {
         Ok(match step {
             GraspStep::Detect | GraspStep::Hover | GraspStep::Approach => None,
+            GraspStep::Carry | GraspStep::PutDown | GraspStep::Release | GraspStep::Check => None,
             GraspStep::Close => cell.why_not_grasped(),
             GraspStep::Lift | GraspStep::Hold => cell.why_not_lifted(self.success_height_m),
         })

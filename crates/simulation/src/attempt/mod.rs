@@ -9,12 +9,13 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{CartesianLimits, JointVector, Trajectory, ready_pose};
 use sdg_robot::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspReport, GraspTarget, LookOut, PartFinder, Robot, RobotError,
-    SafetyLimits, Watch,
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, LookOut, PartFinder,
+    PlaceGoal, PlaceOutcome, PlaceReport, PlacingConfig, Robot, RobotError, SafetyLimits, Watch,
 };
 
 use crate::camera::CameraView;
 use crate::error::{Result, SimulationError};
+use crate::objects::GraspError;
 use crate::panda::FINGERTIP_BEYOND_TCP_M;
 use crate::perception::Perception;
 use crate::record::RecordConfig;
@@ -32,11 +33,13 @@ pub struct AttemptConfig {
     pub success_height_m: f64,
     /// Pictures from outside while it happens.
     pub record: Option<RecordConfig>,
+    /// Where the part is put down, and how.
+    pub placing: Option<(PlaceGoal, PlacingConfig)>,
 }
 
 impl Default for AttemptConfig {
     fn default() -> Self {
-        Self { grasp: GraspConfig::default(), success_height_m: 0.10, record: None }
+        Self { grasp: GraspConfig::default(), success_height_m: 0.10, record: None, placing: None }
     }
 }
 
@@ -93,10 +96,31 @@ impl Workcell {
         let mut judge = Judge::new(config.success_height_m);
         let mount = self.wrist_mount();
         let mut robot = Robot::new(self, Self::safety_limits(), Watch::default());
-        let ended = sdg_robot::grasp(&mut robot, &mut finder, &mut judge, mount, &config.grasp);
+        let ended = match &config.placing {
+            None => sdg_robot::grasp(&mut robot, &mut finder, &mut judge, mount, &config.grasp),
+            Some((goal, placing)) => {
+                sdg_robot::grasp_and_place(&mut robot, &mut finder, &mut judge, mount, &config.grasp, goal, placing)
+                    .map(|PlaceReport { grasp, outcome, .. }| match outcome {
+                        PlaceOutcome::Placed => grasp,
+                        PlaceOutcome::Failed { step, why } => {
+                            GraspReport { outcome: GraspOutcome::Failed { step, why }, ..grasp }
+                        }
+                    })
+            }
+        };
         let ViewFinder { views, perception_secs, .. } = finder;
         let frames = self.stop_recording();
-        let GraspReport { outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
+        let GraspReport { mut outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
+        let placed = config.placing.as_ref().zip(self.true_place_error(config));
+        if let (true, Some(((goal, placing), error))) = (outcome.is_held(), placed)
+            && goal.bin_m.is_none()
+            && (error.distance_m > placing.tolerance_m || error.angle_rad > placing.tolerance_rad)
+        {
+            // The look is not the truth.
+            let (distance_mm, angle_deg) = (error.distance_m * 1e3, error.angle_rad.to_degrees());
+            let why = format!("the part really lies {distance_mm:.1} mm and {angle_deg:.1}° beside its place");
+            outcome = GraspOutcome::Failed { step: GraspStep::Check, why };
+        }
         Ok(AttemptReport {
             outcome,
             seed,
@@ -104,6 +128,7 @@ impl Workcell {
             views,
             targets,
             looks,
+            place_error: placed.map(|(_, error)| error),
             shake_amplitude_m: judge.shake_amplitude_m,
             hand_verdicts,
             object_height_m: self.object_height_m(),
@@ -112,6 +137,13 @@ impl Workcell {
             perception_secs,
             frames,
         })
+    }
+
+    /// How far the part really lies beside its place.
+    fn true_place_error(&self, config: &AttemptConfig) -> Option<GraspError> {
+        let (goal, _) = config.placing.as_ref()?;
+        let spec = &self.config().scene.object.as_ref()?.spec;
+        Some(spec.grasp_error(&self.base_from_object()?, &goal.base_from_part(0.0, 0.0)))
     }
 
     /// Puts everything back to the start of an attempt: the arm at rest in a configuration drawn from `seed`.

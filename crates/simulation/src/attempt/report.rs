@@ -5,6 +5,7 @@ use nalgebra::Isometry3;
 use sdg_robot::{GraspOutcome, GraspStep, GraspTarget};
 
 use crate::camera::CameraView;
+use crate::objects::GraspError;
 
 /// All that happened in an attempt.
 #[derive(Debug, Clone)]
@@ -22,6 +23,8 @@ pub struct AttemptReport {
     /// How many looks there were from afar, and how many from above what they found: one each where the part was found
     /// at the first look.
     pub looks: [usize; 2],
+    /// How far the part really lies beside the place where it was put down, where it was to be.
+    pub place_error: Option<GraspError>,
     /// How far the hand swung to either side after lifting, in metres; `None` where it was not shaken.
     pub shake_amplitude_m: Option<f64>,
     /// The same by the hand's width and force, after each of the last steps; see [`sdg_robot::GraspReport`].

@@ -6,7 +6,7 @@ mod pictures;
 
 use nalgebra::Isometry3;
 use sdg_kinematics::{Panda, ready_pose};
-use sdg_robot::{HandCommand, PERIOD_SECS};
+use sdg_robot::{HandCommand, Load, PERIOD_SECS};
 
 use crate::camera::posed_camera;
 use crate::controller::{ArmController, ArmReference};
@@ -42,7 +42,7 @@ pub struct Workcell {
     scene_camera: Id<Camera>,
     /// The camera that perception is shown.
     camera: Id<Camera>,
-    controller: ArmController,
+    pub(crate) controller: ArmController,
     pub(crate) gripper: Gripper,
     reference: ArmReference,
     recorder: Option<Recorder>,
@@ -51,6 +51,11 @@ pub struct Workcell {
     pub(crate) hand_command: Option<HandCommand>,
     /// Whether the arm has stopped itself.
     pub(crate) is_in_reflex: bool,
+    /// What the controller was told that the hand carries.
+    pub(crate) load: Load,
+    /// The vertical force on the hand, and the largest since it was asked for, N.
+    pub(crate) felt_n: f64,
+    pub(crate) peak_felt_n: f64,
 }
 
 impl Workcell {
@@ -99,6 +104,9 @@ impl Workcell {
             tcp_from_camera,
             hand_command: None,
             is_in_reflex: false,
+            load: Load::NONE,
+            felt_n: 0.0,
+            peak_felt_n: 0.0,
         };
         workcell.reset(&ready_pose())?;
         Ok(workcell)
@@ -122,6 +130,7 @@ impl Workcell {
         self.reference = ArmReference::at_rest(*q);
         self.hand_command = None;
         self.is_in_reflex = false;
+        (self.load, self.felt_n, self.peak_felt_n) = (Load::NONE, 0.0, 0.0);
         self.data.forward()
     }
 
@@ -214,6 +223,12 @@ impl Workcell {
         self.controller.apply(&mut self.data, &self.panda_ids, &self.reference);
         self.gripper.apply(&mut self.data, &self.panda_ids, PERIOD_SECS);
         self.data.step2()?;
+        self.look_on()
+    }
+
+    /// What is noted of every period: what the hand feels, and pictures.
+    pub(crate) fn look_on(&mut self) -> Result<()> {
+        self.feel();
         match &mut self.recorder {
             Some(recorder) => recorder.look(&mut self.data),
             None => Ok(()),

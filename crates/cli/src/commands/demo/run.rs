@@ -62,6 +62,7 @@ pub fn run(args: &DemoArgs) -> Result<Outcome> {
         verification: Verification::ByShape,
         errors: RehearsalErrors::default(),
         camera: None,
+        place: None,
     };
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let command = format!("sdg demo --object {} --attempts {} --seed {}", args.object, args.attempts, args.seed);

@@ -37,6 +37,13 @@ pub struct RehearseArgs {
     /// where it is the arm tells. For models taught with a camera, which then look in the plan view
     #[arg(long, value_name = "FILE")]
     pub camera: Option<PathBuf>,
+    /// Put the part down in this place of the workcell's file: NAME, or NAME:CELL for one cell of a tray, whose cells are else taken
+    /// in turn. An attempt succeeds where the part really lies within 3 mm and 3° of its place
+    #[arg(long, value_name = "NAME", requires = "workcell")]
+    pub place: Option<String>,
+    /// The workcell's file, for its places and obstacles
+    #[arg(long, value_name = "FILE", requires = "place")]
+    pub workcell: Option<PathBuf>,
     /// Leave out the check against the demonstration
     #[arg(long)]
     pub no_verify: bool,

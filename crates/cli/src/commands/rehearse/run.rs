@@ -1,8 +1,9 @@
 //! `sdg rehearse`: grasp attempts in MuJoCo with a taught model.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{GraspError, Verification};
 use sdg_report::AttemptSummary;
@@ -11,12 +12,13 @@ use serde_json::json;
 use super::RehearseArgs;
 use crate::camera_files::CameraFile;
 use crate::commands::devices;
-use crate::exit::Outcome;
+use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::own_part::OwnPart;
 use crate::parts::part_named;
-use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, step_name};
+use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
+use crate::robots;
 use crate::run_page::{self, RunPage};
 use crate::shared_args::OwnPartArgs;
 
@@ -39,6 +41,10 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     if camera.is_some() && model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).context(model_file);
     }
+    let place = match (&args.place, &args.workcell) {
+        (Some(place), Some(workcell)) => Some(rehearsed_place(place, workcell)?),
+        _ => None,
+    };
     files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal = Rehearsal {
@@ -49,6 +55,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         verification,
         errors: RehearsalErrors::default(),
         camera,
+        place,
     };
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
@@ -66,9 +73,33 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     if let Some(camera) = &args.camera {
         command += &format!(" --camera {}", camera.display());
     }
+    if let (Some(place), Some(workcell)) = (&args.place, &args.workcell) {
+        command += &format!(" --place {place} --workcell {}", workcell.display());
+    }
     let page = RunPage { model: &model, object: &object, rehearsed: &rehearsed, command: &command };
     let report = run_page::rehearsal(&page)?.write(&args.out)?;
     finish(&page, None, &report, args.json)
+}
+
+/// A place of a workcell's file; rehearsals have the table at the base's height.
+fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
+    let (workcell, _) = robots::read_workcell(path)?;
+    if workcell.table_height_m != 0.0 {
+        let found_mm = workcell.table_height_m * 1e3;
+        bail!("{}: height_mm: expected 0, the table's height in rehearsals, found {found_mm}", path.display());
+    }
+    let name = text.split_once(':').map_or(text, |(name, _)| name);
+    let place = workcell.places.iter().find(|place| place.name == name).cloned();
+    let cell = match text.split_once(':') {
+        None if place.as_ref().is_some_and(|place| place.num_cells() > 1) => None,
+        // Says what is wrong with a name or a cell.
+        _ => {
+            workcell.place(text).map_err(|error| Usage(format!("--{error}")))?;
+            text.split_once(':').and_then(|(_, cell)| cell.parse().ok())
+        }
+    };
+    let place = place.context("the place was found before")?;
+    Ok(RehearsedPlace { place, cell, obstacles: workcell.obstacles })
 }
 
 /// A line for each attempt; breaks when Ctrl-C was pressed.
@@ -78,7 +109,10 @@ pub fn show_attempt(attempt: &AttemptSummary, of: u32, interrupt: &Interrupt) ->
         .map(|e| format!(", detected {:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg))
         .unwrap_or_default();
     let outcome = if attempt.success {
-        "grasped and held".to_owned()
+        match step_name(attempt) {
+            "check" => "placed".to_owned(),
+            _ => "grasped and held".to_owned(),
+        }
     } else {
         format!("failed at {}: {}", step_name(attempt), attempt.why)
     };
@@ -109,7 +143,8 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         if let Some(seconds) = teach_seconds {
             println!("taught the {} from one photo in {seconds:.0} s", object.title.to_lowercase());
         }
-        println!("grasped it in {successes} of {of} attempts");
+        let done = if rehearsed.is_placing { "placed" } else { "grasped" };
+        println!("{done} it in {successes} of {of} attempts");
         println!("report: {}", report.display());
     }
     Ok(if rehearsed.found_nothing() { Outcome::NothingToGrasp } else { Outcome::Done })

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use sdg_kinematics::ready_pose;
-use sdg_robot::{DEFAULT_SPEED, FrankaArm, Robot};
+use sdg_kinematics::{Trajectory, ready_pose};
+use sdg_robot::{DEFAULT_SPEED, Destination, FREE_CLEARANCE_M, FrankaArm, Robot, Surroundings};
 
 use super::arm_args::ArmArgs;
 use crate::exit::{Outcome, Usage};
@@ -47,25 +47,33 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
     };
     let pace = robots::pace(args.speed)?;
     let (workcell, _) = robots::read_workcell(path)?;
-    robots::refuse_obstacles(&workcell, path)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
     arm.check_model(workcell.robot)?;
     let interrupt = Interrupt::watch();
     let mut robot = Robot::new(&mut arm, workcell.safety_limits(), robots::watch(&interrupt));
     let home = workcell.home().unwrap_or_else(ready_pose);
-    let motion = robot.plan_free(&home, &pace.free_limits())?;
-    // Refused before anybody is asked.
-    robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
-    let secs = motion.duration_secs();
+    let motions = if workcell.obstacles.is_empty() {
+        let motion = robot.plan_free(&home, &pace.free_limits())?;
+        // Refused before anybody is asked.
+        robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
+        vec![motion]
+    } else {
+        let surroundings =
+            Surroundings { obstacles: &workcell.obstacles, held: &[], table_clearance_m: FREE_CLEARANCE_M };
+        robot.plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits())?.motions
+    };
+    let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
     if confirm(&format!("Move the arm at {address} home, in {secs:.1} s?"), args.yes)? == Consent::Refused {
         return Ok(Outcome::Done);
     }
     eprintln!("moving home, {secs:.1} s; Ctrl-C stops the arm");
-    let moved = robot.follow(motion);
-    if moved.is_err() {
-        write_states(&args.states, robot.watch())?;
+    for motion in motions {
+        let moved = robot.follow(motion);
+        if moved.is_err() {
+            write_states(&args.states, robot.watch())?;
+        }
+        moved?;
     }
-    moved?;
     Ok(Outcome::Done)
 }

@@ -149,6 +149,7 @@ impl AxesEvaluation<'_> {
             verification: Verification::ByShape,
             errors: errors_of(condition),
             camera: None,
+            place: None,
         };
         let attempts = if self.is_in_protocol(condition) {
             let file = cell.file(&attempts_of(Verification::ByShape));

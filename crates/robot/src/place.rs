@@ -1,0 +1,198 @@
+//! Where parts are put down: a pose, the cells of a tray, a bin.
+
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+
+use crate::error::{Result, RobotError};
+
+/// A place of a workcell, for one part or several.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Place {
+    /// Its name.
+    pub name: String,
+    /// Middle of a pose or a bin, or of a tray's first cell: x and y in the base frame, m.
+    pub at_m: [f64; 2],
+    /// Direction of the part's marked line, and of a tray's columns: about the vertical from the base's x, rad.
+    pub yaw_rad: f64,
+    /// What the parts stand on: its z in the base frame, m.
+    pub surface_m: f64,
+    /// How many parts it takes, and how.
+    pub kind: PlaceKind,
+}
+
+/// How many parts a place takes, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PlaceKind {
+    /// One part in a pose.
+    Pose,
+    /// Cells in a grid, counted along x first.
+    Tray {
+        /// Cells along its x and its y.
+        cells: [u32; 2],
+        /// From one cell to the next, m.
+        pitch_m: [f64; 2],
+    },
+    /// Any number of parts, anyhow.
+    Bin {
+        /// Length of its inside along x and y, m.
+        size_m: [f64; 2],
+    },
+}
+
+/// Where one part is to lie.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaceGoal {
+    /// The place, and the cell of a tray, in words.
+    pub name: String,
+    /// x and y of the part's grasp in the base frame, m.
+    pub at_m: [f64; 2],
+    /// Direction of its marked line about the vertical from the base's x, rad.
+    pub yaw_rad: f64,
+    /// z of what it is put on in the base frame, m.
+    pub surface_m: f64,
+    /// Inside of a bin along the goal's x and y, m: there the part may lie anyhow. A pose is to be met where `None`.
+    pub bin_m: Option<[f64; 2]>,
+}
+
+/// How far a part lies beside where it was to lie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaceError {
+    /// Along the marked line and across it, m.
+    pub beside_m: [f64; 2],
+    /// Turn, without those that the part's symmetry hides, rad.
+    pub angle_rad: f64,
+}
+
+impl PlaceError {
+    /// Distance over the table, m.
+    pub fn distance_m(&self) -> f64 {
+        self.beside_m[0].hypot(self.beside_m[1])
+    }
+}
+
+impl Place {
+    /// How many cells it has.
+    pub fn num_cells(&self) -> u32 {
+        match self.kind {
+            PlaceKind::Tray { cells: [columns, rows], .. } => columns * rows,
+            PlaceKind::Pose | PlaceKind::Bin { .. } => 1,
+        }
+    }
+
+    /// Where a part is to lie; cells count from 1.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`] for a cell that there is not.
+    pub fn goal(&self, cell: u32) -> Result<PlaceGoal> {
+        let num_cells = self.num_cells();
+        if !(1..=num_cells).contains(&cell) {
+            return Err(RobotError::Configuration {
+                what: format!("cell of \"{}\"", self.name),
+                expected: format!("1 to {num_cells}"),
+                found: cell.to_string(),
+            });
+        }
+        let (name, offset_m, bin_m) = match self.kind {
+            PlaceKind::Pose => (self.name.clone(), [0.0; 2], None),
+            PlaceKind::Bin { size_m } => (self.name.clone(), [0.0; 2], Some(size_m)),
+            PlaceKind::Tray { cells: [columns, _], pitch_m: [along, across] } => {
+                let (column, row) = ((cell - 1) % columns, (cell - 1) / columns);
+                let offset_m = [f64::from(column) * along, f64::from(row) * across];
+                (format!("{}, cell {cell}", self.name), offset_m, None)
+            }
+        };
+        let at_m = self.at(offset_m);
+        Ok(PlaceGoal { name, at_m: at_m.into(), yaw_rad: self.yaw_rad, surface_m: self.surface_m, bin_m })
+    }
+
+    /// The corners of all that it covers of the table, counter-clockwise, base frame, m: of a pose its point alone.
+    pub fn corners(&self) -> Vec<Point2<f64>> {
+        let [low, high] = match self.kind {
+            PlaceKind::Pose => return vec![self.at([0.0; 2])],
+            PlaceKind::Tray { cells, pitch_m } => [
+                pitch_m.map(|pitch| -0.5 * pitch),
+                std::array::from_fn(|axis| (f64::from(cells[axis]) - 0.5) * pitch_m[axis]),
+            ],
+            PlaceKind::Bin { size_m } => [size_m.map(|size| -0.5 * size), size_m.map(|size| 0.5 * size)],
+        };
+        [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]].map(|p| self.at(p)).to_vec()
+    }
+
+    /// Whether a part there belongs to this place.
+    pub fn covers(&self, at_m: [f64; 2]) -> bool {
+        /// Around the point of a pose.
+        const POSE_RADIUS_M: f64 = 0.03;
+        let apart = Point2::from(at_m) - Point2::from(self.at_m);
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let [along, across] = [apart.x * cos + apart.y * sin, apart.y * cos - apart.x * sin];
+        let within = |value: f64, low: f64, high: f64| value >= low && value <= high;
+        match self.kind {
+            PlaceKind::Pose => apart.norm() <= POSE_RADIUS_M,
+            PlaceKind::Bin { size_m: [length, width] } => {
+                within(along, -0.5 * length, 0.5 * length) && within(across, -0.5 * width, 0.5 * width)
+            }
+            PlaceKind::Tray { cells: [columns, rows], pitch_m: [a, b] } => {
+                within(along, -0.5 * a, (f64::from(columns) - 0.5) * a)
+                    && within(across, -0.5 * b, (f64::from(rows) - 0.5) * b)
+            }
+        }
+    }
+
+    fn at(&self, [along, across]: [f64; 2]) -> Point2<f64> {
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        Point2::new(self.at_m[0] + along * cos - across * sin, self.at_m[1] + along * sin + across * cos)
+    }
+}
+
+impl PlaceGoal {
+    /// The pose of the part's grasp there, `base_from_tcp` of a hand that holds it as it was marked: x along the marked line, z down.
+    pub fn base_from_part(&self, height_m: f64, turn_rad: f64) -> Isometry3<f64> {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad + turn_rad);
+        Isometry3::from_parts(Translation3::new(self.at_m[0], self.at_m[1], height_m), turn * down)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn tray() -> Place {
+        let kind = PlaceKind::Tray { cells: [3, 2], pitch_m: [0.1, 0.05] };
+        Place { name: "tray".to_owned(), at_m: [0.4, 0.2], yaw_rad: FRAC_PI_2, surface_m: 0.003, kind }
+    }
+
+    #[test]
+    fn cells_count_along_the_trays_x_first() {
+        // The tray's x is the base's y, its y the base's -x.
+        for (cell, expected) in [(1, [0.4, 0.2]), (3, [0.4, 0.4]), (4, [0.35, 0.2]), (6, [0.35, 0.4])] {
+            let goal = tray().goal(cell).unwrap();
+            let apart = Point2::from(goal.at_m) - Point2::from(expected);
+            assert!(apart.norm() < 1e-12, "{cell}: {goal:?}");
+            assert_eq!(goal.name, format!("tray, cell {cell}"));
+        }
+        for cell in [0, 7] {
+            let error = tray().goal(cell).unwrap_err().to_string();
+            assert_eq!(error, format!("cell of \"tray\": expected 1 to 6, found {cell}"));
+        }
+    }
+
+    #[test]
+    fn a_tray_covers_half_a_pitch_around_its_cells() {
+        let corners = tray().corners();
+        let expected = [[0.425, 0.15], [0.425, 0.45], [0.325, 0.45], [0.325, 0.15]];
+        for (corner, expected) in corners.iter().zip(expected) {
+            assert!((corner - Point2::from(expected)).norm() < 1e-12, "{corners:?}");
+        }
+        assert!(tray().covers([0.42, 0.44]) && tray().covers([0.33, 0.16]));
+        assert!(!tray().covers([0.43, 0.3]) && !tray().covers([0.4, 0.14]));
+    }
+
+    #[test]
+    fn a_part_at_its_goal_has_its_line_along_the_yaw_and_z_down() {
+        let goal = tray().goal(1).unwrap();
+        let pose = goal.base_from_part(0.02, 0.0);
+        assert!((pose.rotation * Vector3::x() - Vector3::y()).norm() < 1e-12);
+        assert!((pose.rotation * Vector3::z() + Vector3::z()).norm() < 1e-12);
+    }
+}

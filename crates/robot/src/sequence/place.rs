@@ -1,0 +1,414 @@
+//! Putting the held part down: by contact, not by height, and checked by a look.
+//!
+//! ```text
+//! held ─> carry ─> straight down, softly at the end, until the place is felt ─> open, up ─> look ─> within the tolerance
+//!           ▲                                                                                └ beside it: take it again,
+//!           └────────────────── aim with where the part was in the hand ◄───────────────────────┘ so many times
+//! ```
+//! Fingers do not hold a part along the line that they close across: some parts slide there when they are closed on. The look shows by how
+//! much, and the next time the hand aims so that it makes no difference.
+
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use sdg_geometry::{Angle, RotationalSymmetry};
+use sdg_kinematics::{Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions};
+
+use super::look::HOVER_SHIFTS_M;
+use super::reach::above;
+use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
+use crate::arm::{Arm, CompliantArm};
+use crate::arm_state::{ContactSensitivity, HandCommand, Load};
+use crate::error::Result;
+use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
+use crate::place::{PlaceError, PlaceGoal};
+use crate::robot::Robot;
+use crate::surroundings::Destination;
+use crate::touch::{TouchDown, Touched};
+
+/// Heights above a place that a straight way down to it begins at, m.
+const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
+/// A soft way down begins so far above where the place is to be felt, m.
+const SOFT_WAY_M: f64 = 0.015;
+/// It ends so far below, m.
+const BELOW_M: f64 = 0.010;
+/// Speed at which the opening changes when the part is let go, m/s.
+const RELEASING_SPEED_M_S: f64 = 0.05;
+/// How long the arm stands still after the fingers have opened, s.
+const RELEASED_SECS: f64 = 0.2;
+/// Steps in which the way up is made shorter where the arm cannot reach so far, m.
+const RETREAT_STEP_M: f64 = 0.05;
+/// Turns that are tried of a part that looks the same in all.
+const NUM_TURNS: u32 = 12;
+
+/// How a held part is put down.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlacingConfig {
+    /// How the hand comes down at the end.
+    pub touch_down: TouchDown,
+    /// Turns of the part that count as the same.
+    pub symmetry: RotationalSymmetry,
+    /// How far the hand opens beyond the part to let it go, both sides together, m.
+    pub release_margin_m: f64,
+    /// How far it then goes up, m.
+    pub retreat_m: f64,
+    /// How far beside its place the part may lie, m.
+    pub tolerance_m: f64,
+    /// How far it may be turned, rad.
+    pub tolerance_rad: f64,
+    /// A part that lies farther beside its place, m, or is turned by more, rad, is taken again: less than what is allowed, for looks are
+    /// not exact.
+    pub aim: (f64, f64),
+    /// How often.
+    pub max_corrections: usize,
+}
+
+impl Default for PlacingConfig {
+    /// Within 3 mm and 3°, taken again beyond 2 mm or 2°, twice.
+    fn default() -> Self {
+        Self {
+            touch_down: TouchDown::default(),
+            symmetry: RotationalSymmetry::None,
+            release_margin_m: 0.020,
+            retreat_m: 0.15,
+            tolerance_m: 0.003,
+            tolerance_rad: 3_f64.to_radians(),
+            aim: (0.002, 2_f64.to_radians()),
+            max_corrections: 2,
+        }
+    }
+}
+
+/// How placing ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlaceOutcome {
+    /// The part lies where it was to lie.
+    Placed,
+    /// A step failed, of the grasp or of placing.
+    Failed {
+        /// The step that failed.
+        step: GraspStep,
+        /// Why, in one sentence.
+        why: String,
+    },
+}
+
+/// How placing ended, with what was measured on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlaceReport {
+    /// The first grasp.
+    pub grasp: GraspReport,
+    /// How it ended.
+    pub outcome: PlaceOutcome,
+    /// What was felt each time the part was put down, and on soft approaches after the first.
+    pub touched: Vec<Touched>,
+    /// How far the part lay beside its place by each look; for a bin from its middle. None where the part was not seen in a bin.
+    pub errors: Vec<PlaceError>,
+}
+
+/// Grasps the part once and puts it down.
+///
+/// # Errors
+/// As [`super::grasp`].
+pub fn grasp_and_place<A: CompliantArm>(
+    robot: &mut Robot<'_, A>,
+    finder: &mut dyn PartFinder<A>,
+    observer: &mut dyn StepObserver<A>,
+    mount: CameraMount,
+    config: &GraspConfig,
+    goal: &PlaceGoal,
+    placing: &PlacingConfig,
+) -> Result<PlaceReport> {
+    placing.touch_down.validate()?;
+    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
+    let touch = |robot: &mut Robot<'_, A>, touch_down: &TouchDown| robot.touch_down(touch_down);
+    sequence.touch = Some(touch);
+    let outcome = sequence.grasp()?;
+    let grasp = sequence.grasp_report(outcome);
+    let mut errors = Vec::new();
+    let outcome = match &grasp.outcome {
+        GraspOutcome::Failed { step, why } => PlaceOutcome::Failed { step: *step, why: why.clone() },
+        GraspOutcome::Held => match sequence.place(goal, placing, touch, &mut errors) {
+            Ok(()) => PlaceOutcome::Placed,
+            Err(Stop::Failed(step, why)) => PlaceOutcome::Failed { step, why },
+            Err(Stop::Error(error)) => return Err(error),
+        },
+    };
+    Ok(PlaceReport { grasp, outcome, touched: std::mem::take(&mut sequence.touched), errors })
+}
+
+impl PlaceOutcome {
+    /// Whether the part lies where it was to lie.
+    pub fn is_placed(&self) -> bool {
+        *self == Self::Placed
+    }
+}
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    fn place(
+        &mut self,
+        goal: &PlaceGoal,
+        placing: &PlacingConfig,
+        touch: super::Touch<A>,
+        errors: &mut Vec<PlaceError>,
+    ) -> Steps<()> {
+        let (mut num_corrections, mut slid) = (0, Isometry3::identity());
+        loop {
+            let aim = self.carry(goal, placing, &slid)?;
+            self.put_down(&aim, placing, touch)?;
+            let q = self.robot.state()?.q;
+            let base_from_tcp = self.robot.panda().forward(&q);
+            let part_from_tcp = self.release(placing)?;
+            let found = match (self.look_at(goal, &aim.base_from_part)?, goal.bin_m) {
+                (Some(found), _) => found,
+                // In a bin a part lies anyhow, under others, too.
+                (None, Some(_)) => return Ok(()),
+                (None, None) => return Err(fails("the part is not seen where it was put down".to_owned())),
+            };
+            let error = beside(&aim.base_from_part, &found.base_from_tcp, placing.symmetry);
+            errors.push(error);
+            if let Some(size_m) = goal.bin_m {
+                return match inside(goal, &found.base_from_tcp, size_m) {
+                    true => Ok(()),
+                    false => Err(fails(format!("the part lies beside the bin {}", told(&error)))),
+                };
+            }
+            let is_within = |(distance_m, angle_rad): (f64, f64)| {
+                error.distance_m() <= distance_m && error.angle_rad.abs() <= angle_rad
+            };
+            let is_allowed = is_within((placing.tolerance_m, placing.tolerance_rad));
+            let is_last = num_corrections == placing.max_corrections;
+            if is_allowed && (is_last || is_within(placing.aim)) {
+                return Ok(());
+            }
+            if is_last {
+                let (allowed_mm, allowed_deg) = (placing.tolerance_m * 1e3, placing.tolerance_rad.to_degrees());
+                return Err(fails(format!(
+                    "the part lies {} beside its place, at most {allowed_mm:.1} mm and {allowed_deg:.1}° are allowed",
+                    told(&error)
+                )));
+            }
+            num_corrections += 1;
+            slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
+            // Perception takes the part to lie on the table.
+            let mut target = found;
+            target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
+            self.take(&target)?;
+        }
+    }
+
+    /// Takes the part over its place: as far as a soft way down from there.
+    fn carry(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, slip: &Isometry3<f64>) -> Steps<Aim> {
+        let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
+        let turns = match placing.symmetry {
+            RotationalSymmetry::Fold(count) => count.clamp(1, 36),
+            RotationalSymmetry::Full => NUM_TURNS,
+            _ => 1,
+        };
+        let aims: Vec<Aim> = (0..turns)
+            .map(|turn| {
+                let turn_rad = std::f64::consts::TAU * f64::from(turn) / f64::from(turns);
+                let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
+                let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
+                Aim { base_from_part, base_from_tcp }
+            })
+            .collect();
+        let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
+        let mut why = String::new();
+        for height_m in HEIGHTS_M {
+            let planned = match self.is_surrounded() {
+                true => match self.way_to(&Destination::Approached(&poses, height_m)) {
+                    Ok(way) => {
+                        let aim_idx = way.goal_idx;
+                        let path = self.travel(way, GraspStep::Carry)?;
+                        path.map(|path| (aim_idx, path)).ok_or_else(|| "the way has no approach".to_owned())
+                    }
+                    Err(error) if error.latches() => return Err(error.into()),
+                    Err(error) => Err(error.to_string()),
+                },
+                false => self.straight_down(&poses, height_m)?,
+            };
+            match planned {
+                Ok((aim_idx, path)) => {
+                    let hand = self.robot.hand()?;
+                    self.judge(GraspStep::Carry, &hand)?;
+                    self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
+                    let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+                    let motion = fails_at(GraspStep::PutDown, planned)?;
+                    self.follow(motion, GraspStep::PutDown)?;
+                    return Ok(aims[aim_idx]);
+                }
+                Err(because) if why.is_empty() => why = because,
+                Err(_) => {}
+            }
+        }
+        let [x, y] = goal.at_m;
+        Err(Stop::Failed(GraspStep::Carry, format!("no way to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
+    }
+
+    /// Goes above the pose that the arm reaches best, from which a straight way leads down to it.
+    fn straight_down(
+        &mut self,
+        poses: &[Isometry3<f64>],
+        height_m: f64,
+    ) -> Steps<std::result::Result<(usize, JointPath), String>> {
+        let seed = self.robot.commanded()?;
+        let mut best: Option<(f64, usize, Approach)> = None;
+        let mut why = String::new();
+        for (index, pose) in poses.iter().enumerate() {
+            let (ik, line) = (IkOptions::default(), LineOptions::default());
+            let planned =
+                self.robot.panda().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
+            match planned {
+                Ok(approach) if best.as_ref().is_none_or(|best| approach.pregrasp.cost < best.0) => {
+                    best = Some((approach.pregrasp.cost, index, approach));
+                }
+                Ok(_) => {}
+                Err(error) => why = error.to_string(),
+            }
+        }
+        let Some((_, index, approach)) = best else { return Ok(Err(why)) };
+        self.move_freely(&approach.pregrasp.q, GraspStep::Carry)?;
+        Ok(Ok((index, approach.path)))
+    }
+
+    /// Comes down softly until the place is felt.
+    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig, touch: super::Touch<A>) -> Steps<()> {
+        let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
+        let touched = touch(self.robot, &touch_down);
+        let touched = fails_at(GraspStep::PutDown, touched)?;
+        self.touched.push(touched);
+        let hand = self.robot.hand()?;
+        self.judge(GraspStep::PutDown, &hand)?;
+        if touched.is_contact {
+            return Ok(());
+        }
+        let below_mm = (aim.base_from_tcp.translation.z - SOFT_WAY_M - touched.tcp_height_m) * 1e3;
+        let why = format!("nothing was felt down to {below_mm:.0} mm below the place; the part is still held");
+        Err(Stop::Failed(GraspStep::PutDown, why))
+    }
+
+    /// Opens the hand and goes up; where the tcp was in the part's frame by the detection.
+    fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
+        let closed_m = self.closed.map_or(0.0, |hand| hand.opening_m);
+        let opening_m = (closed_m + placing.release_margin_m).min(HAND_OPENING_MAX_M);
+        self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
+        self.robot.finish_hand()?;
+        let part_from_tcp = self.held.take().map_or_else(Isometry3::identity, |held| held.part_from_tcp);
+        if self.config.load.is_some() {
+            self.robot.set_load(Load::NONE)?;
+        }
+        self.robot.wait(RELEASED_SECS)?;
+        self.passed(GraspStep::Release)?;
+        let start = self.robot.commanded()?;
+        let path = self.way_up(&start, placing.retreat_m)?;
+        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let motion = fails_at(GraspStep::Release, planned)?;
+        self.follow(motion, GraspStep::Release)?;
+        Ok(part_from_tcp)
+    }
+
+    fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
+        let base_from_tcp = self.robot.panda().forward(start);
+        let mut up_m = retreat_m;
+        loop {
+            match self.free_line(start, &above(&base_from_tcp, up_m))? {
+                Ok(path) => return Ok(path),
+                Err(_) if up_m > RETREAT_STEP_M + 1e-9 => up_m -= RETREAT_STEP_M,
+                Err(why) => return Err(Stop::Failed(GraspStep::Release, why)),
+            }
+        }
+    }
+
+    /// Looks where the part lies.
+    fn look_at(&mut self, goal: &PlaceGoal, base_from_part: &Isometry3<f64>) -> Steps<Option<GraspTarget>> {
+        let expected = GraspTarget { base_from_tcp: *base_from_part, jaw_width_m: 0.0, score: 1.0 };
+        self.picture_time = None;
+        let table_height_m = self.robot.limits().table_height_m;
+        for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
+            let arrived = match (&self.mount, self.config.look_outs.first()) {
+                (CameraMount::Hand { .. }, _) => self.hover(&expected, shift_m, GraspStep::Check),
+                (CameraMount::Base, Some(look_out)) if look == 0 => {
+                    let q = look_out.configuration(self.robot.panda(), &self.mount, table_height_m)?;
+                    self.move_freely(&q, GraspStep::Check)?;
+                    Ok(self.robot.wait(SETTLE_SECS)?)
+                }
+                (CameraMount::Base, _) => break,
+            };
+            match arrived {
+                Err(stop) if look == 0 || self.robot.latched().is_some() => return Err(stop),
+                Err(_) => continue,
+                Ok(()) => {}
+            }
+            let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
+            let is_here = |found: &GraspTarget| match goal.bin_m {
+                Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
+                None => {
+                    let apart = found.base_from_tcp.translation.vector - base_from_part.translation.vector;
+                    apart.xy().norm() <= MAX_SEEN_BESIDE_M
+                }
+            };
+            if let Some(found) = found.filter(|found| found.score >= SURE && is_here(found)) {
+                self.picture_time = self.finder.picture_time();
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// What is farther from its place is another part, m.
+const MAX_SEEN_BESIDE_M: f64 = 0.03;
+
+/// Where the part is to lie, and the tcp before the soft way down.
+#[derive(Debug, Clone, Copy)]
+struct Aim {
+    base_from_part: Isometry3<f64>,
+    base_from_tcp: Isometry3<f64>,
+}
+
+fn fails(why: String) -> Stop {
+    Stop::Failed(GraspStep::Check, why)
+}
+
+fn told(error: &PlaceError) -> String {
+    format!("{:.1} mm and {:.1}°", error.distance_m() * 1e3, error.angle_rad.abs().to_degrees())
+}
+
+fn yaw(base_from_tcp: &Isometry3<f64>) -> Angle {
+    let along = base_from_tcp.rotation * Vector3::x();
+    Angle::from_direction(along.x, along.y)
+}
+
+/// How far a part lies beside its place.
+fn beside(place: &Isometry3<f64>, found: &Isometry3<f64>, symmetry: RotationalSymmetry) -> PlaceError {
+    let apart = place.inverse() * Point3::from(found.translation.vector);
+    PlaceError { beside_m: [apart.x, apart.y], angle_rad: symmetry.visible(yaw(found) - yaw(place)).radians() }
+}
+
+/// Whether a part is inside of a bin, seen from above.
+fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2]) -> bool {
+    let place = goal.base_from_part(0.0, 0.0);
+    let apart = place.inverse() * Point3::from(found.translation.vector);
+    apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
+}
+
+/// How the part slid in its own frame when the hand closed: where the tcp was in it when it was let go, against where it was by the detection.
+fn slip(
+    place: &Isometry3<f64>,
+    found: &Isometry3<f64>,
+    base_from_tcp: &Isometry3<f64>,
+    part_from_tcp: &Isometry3<f64>,
+    error: &PlaceError,
+) -> Isometry3<f64> {
+    // Turns that cannot be seen are taken out of what was found.
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
+    let base_from_part = Isometry3::from_parts(found.translation, turn * place.rotation);
+    let moved = base_from_part.inverse() * base_from_tcp * part_from_tcp.inverse();
+    let along = moved.rotation * Vector3::x();
+    Isometry3::from_parts(
+        Translation3::new(moved.translation.x, moved.translation.y, 0.0),
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), along.y.atan2(along.x)),
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,233 @@
+use super::*;
+use crate::arm_state::{ArmState, HandState, MotionEnd};
+use crate::pace::Pace;
+use crate::place::{Place, PlaceKind};
+use crate::planned_arm::{PlannedAction, PlannedArm};
+use crate::safety::{CheckedMotion, SafetyLimits};
+use crate::sequence::LookOut;
+use crate::watch::Watch;
+use sdg_kinematics::collision::{Obstacle, Shape};
+use sdg_kinematics::{Panda, ready_pose};
+
+/// A planned arm whose part slides by so much in its own frame when the hand closes on it, and stays where it is let go.
+struct Cell {
+    arm: PlannedArm,
+    base_from_part: Isometry3<f64>,
+    slide: Isometry3<f64>,
+    tcp_from_part: Option<Isometry3<f64>>,
+    loads_kg: Vec<f64>,
+    touches: bool,
+}
+
+impl Cell {
+    fn tcp(&mut self) -> Isometry3<f64> {
+        Panda::new().forward(&self.arm.state().unwrap().q)
+    }
+}
+
+impl Arm for Cell {
+    fn state(&mut self) -> Result<ArmState> {
+        self.arm.state()
+    }
+    fn follow(&mut self, motion: &CheckedMotion, watch: &mut Watch) -> Result<MotionEnd> {
+        self.arm.follow(motion, watch)
+    }
+    fn wait(&mut self, duration_secs: f64, watch: &mut Watch) -> Result<()> {
+        self.arm.wait(duration_secs, watch)
+    }
+    fn hand(&mut self) -> Result<HandState> {
+        self.arm.hand()
+    }
+    fn start_hand(&mut self, command: HandCommand) -> Result<()> {
+        let tcp = self.tcp();
+        match (command, self.tcp_from_part) {
+            (HandCommand::Grasp { .. }, _) => {
+                self.tcp_from_part = Some(tcp.inverse() * self.base_from_part * self.slide);
+            }
+            (HandCommand::Move { .. }, Some(tcp_from_part)) => {
+                self.base_from_part = tcp * tcp_from_part;
+                self.tcp_from_part = None;
+            }
+            (HandCommand::Move { .. }, None) => {}
+        }
+        self.arm.start_hand(command)
+    }
+    fn finish_hand(&mut self, watch: &mut Watch) -> Result<HandState> {
+        self.arm.finish_hand(watch)
+    }
+    fn set_contact_sensitivity(&mut self, sensitivity: ContactSensitivity) -> Result<()> {
+        self.arm.set_contact_sensitivity(sensitivity)
+    }
+    fn set_load(&mut self, load: Load) -> Result<()> {
+        self.loads_kg.push(load.mass_kg);
+        Ok(())
+    }
+    fn stop(&mut self) -> Result<()> {
+        Ok(())
+    }
+    fn recover(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl CompliantArm for Cell {
+    fn touch_down(&mut self, touch_down: &TouchDown, watch: &mut Watch) -> Result<Touched> {
+        let touched = self.arm.touch_down(touch_down, watch)?;
+        Ok(Touched { is_contact: self.touches, ..touched })
+    }
+}
+
+struct Truth;
+
+impl PartFinder<Cell> for Truth {
+    fn find(&mut self, cell: &mut Cell) -> Result<Option<GraspTarget>> {
+        Ok(Some(GraspTarget { base_from_tcp: cell.base_from_part, jaw_width_m: 0.02, score: 0.9 }))
+    }
+}
+
+fn lying(x: f64, y: f64, yaw_rad: f64) -> Isometry3<f64> {
+    let place = Place { name: "p".to_owned(), at_m: [x, y], yaw_rad, surface_m: 0.0, kind: PlaceKind::Pose };
+    place.goal(1).unwrap().base_from_part(0.02, 0.0)
+}
+
+fn cell(slide: Isometry3<f64>) -> Cell {
+    Cell {
+        arm: PlannedArm::new(ready_pose(), 0.08),
+        base_from_part: lying(0.5, 0.1, 0.4),
+        slide,
+        tcp_from_part: None,
+        loads_kg: Vec::new(),
+        touches: true,
+    }
+}
+
+fn tray() -> Place {
+    let kind = PlaceKind::Tray { cells: [2, 2], pitch_m: [0.08, 0.08] };
+    Place { name: "tray".to_owned(), at_m: [0.4, -0.3], yaw_rad: 1.0, surface_m: 0.0, kind }
+}
+
+fn config() -> GraspConfig {
+    let load = Load { mass_kg: 0.3, center_in_flange_m: [0.0, 0.0, 0.1] };
+    GraspConfig {
+        look_outs: vec![LookOut::Joints(ready_pose())],
+        pace: Pace::at_speed(0.3).unwrap(),
+        load: Some(load),
+        ..GraspConfig::default()
+    }
+}
+
+fn run(cell: &mut Cell, config: &GraspConfig, goal: &PlaceGoal, placing: &PlacingConfig) -> PlaceReport {
+    let mut robot = Robot::new(cell, SafetyLimits::default(), Watch::default());
+    grasp_and_place(&mut robot, &mut Truth, &mut (), CameraMount::Base, config, goal, placing).unwrap()
+}
+
+fn planar(x: f64, y: f64, angle_rad: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::new(x, y, 0.0), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle_rad))
+}
+
+#[test]
+fn a_part_lies_where_it_was_to_lie() {
+    for number in 1..=4 {
+        let mut cell = cell(Isometry3::identity());
+        let goal = tray().goal(number).unwrap();
+        let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
+        assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+        assert_eq!(report.touched.len(), 1);
+        let error = beside(&goal.base_from_part(0.02, 0.0), &cell.base_from_part, RotationalSymmetry::None);
+        assert!(error.distance_m() < 1e-4 && error.angle_rad.abs() < 1e-4, "{error:?}");
+        assert!((cell.base_from_part.translation.z - 0.02).abs() < 1e-4, "{}", cell.base_from_part);
+        // Told while it is held, and taken back.
+        assert_eq!(cell.loads_kg, [0.3, 0.0]);
+    }
+}
+
+#[test]
+fn a_part_that_slides_in_the_hand_is_taken_again_and_lies_right() {
+    let slide = planar(0.005, 0.001, 0.08);
+    let mut cell = cell(slide);
+    let goal = tray().goal(2).unwrap();
+    let report = run(&mut cell, &config(), &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 2);
+    assert!(report.errors[0].distance_m() > 0.004 && report.errors[1].distance_m() < 2e-4, "{report:?}");
+    // Where it is not taken again it lies beside its place, and that is said.
+    let mut once = super::tests::cell(slide);
+    let never = PlacingConfig { max_corrections: 0, ..PlacingConfig::default() };
+    let PlaceOutcome::Failed { step: GraspStep::Check, why } = run(&mut once, &config(), &goal, &never).outcome else {
+        panic!("{:?}", once.base_from_part)
+    };
+    assert!(why.contains("5.1 mm and 4.6° beside its place, at most 3.0 mm and 3.0°"), "{why}");
+}
+
+#[test]
+fn turns_that_cannot_be_seen_do_not_count() {
+    let mut cell = cell(Isometry3::identity());
+    let place = Place { yaw_rad: 0.4 + std::f64::consts::PI - 0.2, ..tray() };
+    let placing = PlacingConfig { symmetry: RotationalSymmetry::Fold(2), ..PlacingConfig::default() };
+    let goal = place.goal(1).unwrap();
+    let report = run(&mut cell, &config(), &goal, &placing);
+    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    let error = beside(&goal.base_from_part(0.0, 0.0), &cell.base_from_part, placing.symmetry);
+    assert!(error.angle_rad.abs() < 1e-4, "{error:?}");
+}
+
+#[test]
+fn where_nothing_is_felt_the_part_stays_in_the_hand() {
+    let mut cell = cell(Isometry3::identity());
+    cell.touches = false;
+    let report = run(&mut cell, &config(), &tray().goal(1).unwrap(), &PlacingConfig::default());
+    let PlaceOutcome::Failed { step: GraspStep::PutDown, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("nothing was felt") && why.contains("still held"), "{why}");
+    assert_eq!(cell.loads_kg, [0.3]);
+    assert!(matches!(cell.arm.actions().last(), Some(PlannedAction::Down { .. })), "{:?}", cell.arm.actions().last());
+}
+
+#[test]
+fn a_place_out_of_reach_is_said_before_the_part_is_carried() {
+    let mut cell = cell(Isometry3::identity());
+    let far = Place { at_m: [0.9, -0.6], ..tray() };
+    let report = run(&mut cell, &config(), &far.goal(1).unwrap(), &PlacingConfig::default());
+    let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("no way to \"tray, cell 1\"") && why.contains("out of reach"), "{why}");
+}
+
+#[test]
+fn in_a_bin_a_part_lies_anyhow() {
+    let bin = Place { kind: PlaceKind::Bin { size_m: [0.1, 0.1] }, ..tray() };
+    let slid = planar(0.02, 0.0, 0.5);
+    let report = run(&mut cell(slid), &config(), &bin.goal(1).unwrap(), &PlacingConfig::default());
+    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    assert_eq!(report.errors.len(), 1);
+}
+
+#[test]
+fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
+    let wall = Obstacle {
+        name: "wall".to_owned(),
+        shape: Shape::Box { half_m: [0.15, 0.015, 0.2] },
+        base_from_obstacle: Isometry3::translation(0.5, -0.1, 0.2),
+    };
+    let surrounded = GraspConfig { obstacles: vec![wall.clone()], ..config() };
+    let mut cell = cell(Isometry3::identity());
+    let goal = tray().goal(1).unwrap();
+    let report = run(&mut cell, &surrounded, &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    let model = crate::surroundings::collision_model(-1.0, std::slice::from_ref(&wall), 0.08).unwrap();
+    let mut checker = sdg_kinematics::collision::Checker::new(&model, 1e-3);
+    let motions = cell.arm.actions().iter().filter_map(|action| match action {
+        PlannedAction::Motion(motion) => Some(motion),
+        _ => None,
+    });
+    for motion in motions {
+        for step in 0..=200 {
+            let q = motion.sample(motion.duration_secs() * f64::from(step) / 200.0).0;
+            assert!(checker.is_free(&q), "{}", model.nearest(&q));
+        }
+    }
+    // A place inside of it is refused with its name.
+    let inside = Place { at_m: [0.5, -0.1], ..tray() };
+    let report =
+        run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
+    let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("wall"), "{why}");
+}

@@ -1,0 +1,74 @@
+//! Free motions: straight in joint space over an empty table, or around what stands in the cell.
+
+use sdg_kinematics::{JointLimits, JointPath, JointVector};
+
+use super::{FREE_CLEARANCE_M, Sequence, Steps, Stop, fails_at};
+use crate::arm::Arm;
+use crate::arm_state::ContactSensitivity;
+use crate::error::Result;
+use crate::perception::GraspStep;
+use crate::surroundings::{Destination, Surroundings, Way};
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    /// Whether anything stands in the cell that motions have to be planned around.
+    pub(super) fn is_surrounded(&self) -> bool {
+        !self.config.obstacles.is_empty()
+    }
+
+    /// What stands around the arm, and what it holds.
+    pub(super) fn surroundings(&self) -> Surroundings<'_> {
+        let held = self.held.as_ref().map_or(&[][..], |held| &held.in_tcp);
+        Surroundings { obstacles: &self.config.obstacles, held, table_clearance_m: FREE_CLEARANCE_M }
+    }
+
+    /// A way around what stands in the cell.
+    pub(super) fn way_to(&mut self, to: &Destination<'_>) -> Result<Way> {
+        let held = self.held.as_ref().map_or(&[][..], |held| &held.in_tcp);
+        let surroundings =
+            Surroundings { obstacles: &self.config.obstacles, held, table_clearance_m: FREE_CLEARANCE_M };
+        self.robot.plan_around(&surroundings, to, &self.free_limits())
+    }
+
+    /// Joint limits of free motions, with a part in the hand and without.
+    fn free_limits(&self) -> JointLimits {
+        match self.held {
+            Some(_) => self.config.pace.carry_limits(),
+            None => self.config.pace.free_limits(),
+        }
+    }
+
+    /// Goes along a way; its approach, where it has one, is left to go.
+    pub(super) fn travel(&mut self, way: Way, step: GraspStep) -> Steps<Option<JointPath>> {
+        self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
+        for motion in way.motions {
+            self.follow(motion, step)?;
+        }
+        Ok(way.approach)
+    }
+
+    /// Goes to a configuration, keeping off the table and what stands in the cell.
+    pub(super) fn move_freely(&mut self, q: &JointVector, step: GraspStep) -> Steps<()> {
+        if self.is_surrounded() {
+            let planned = self.way_to(&Destination::Configuration(q));
+            let way = fails_at(step, planned)?;
+            return self.travel(way, step).map(|_| ());
+        }
+        let limits = self.free_limits();
+        let planned = self.robot.plan_free(q, &limits);
+        let motion = fails_at(step, planned)?;
+        let (panda, table_height_m) = (self.robot.panda(), self.robot.limits().table_height_m);
+        let clearance = motion.clearance(panda, table_height_m);
+        // What is held hangs lower than the fingers.
+        let held_m = self.held.as_ref().map_or(0.0, |held| held.hang_m);
+        // The end is wanted, whatever its height; on the way the arm must not come lower.
+        let allowed = (FREE_CLEARANCE_M + held_m).min(panda.clearance(q, table_height_m).lowest_m - 1e-3);
+        if clearance.lowest_m < allowed {
+            return Err(Stop::Failed(
+                step,
+                format!("the way there passes {:.0} mm over the table", clearance.lowest_m * 1e3),
+            ));
+        }
+        self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
+        self.follow(motion, step)
+    }
+}

@@ -1,0 +1,72 @@
+use super::*;
+use crate::planned_arm::PlannedArm;
+use crate::safety::SafetyLimits;
+use crate::watch::Watch;
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::collision::Checker;
+use sdg_kinematics::ready_pose;
+
+fn wall(name: &str, half_m: [f64; 3], at: [f64; 3]) -> Obstacle {
+    let base_from_obstacle = Isometry3::translation(at[0], at[1], at[2]);
+    Obstacle { name: name.to_owned(), shape: Shape::Box { half_m }, base_from_obstacle }
+}
+
+fn down(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    Isometry3::from_parts(Translation3::new(x, y, z), turn)
+}
+
+fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Result<Way> {
+    let mut arm = PlannedArm::new(*start, 0.08);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let surroundings = Surroundings { obstacles, held: &[], table_clearance_m: 0.05 };
+    robot.plan_around(&surroundings, to, &joints)
+}
+
+#[test]
+fn a_wall_is_gone_around_and_nothing_is_touched() {
+    // Between the two sides, 0.45 m high.
+    let obstacles = [wall("wall", [0.2, 0.02, 0.225], [0.5, 0.0, 0.225])];
+    let panda = Panda::new();
+    let start = panda.inverse(&down(0.45, 0.3, 0.25), &ready_pose(), &Default::default()).unwrap().q;
+    let goals = [down(0.45, -0.3, 0.02)];
+    let way = plan(&obstacles, &start, &Destination::Approached(&goals, 0.2)).unwrap();
+    assert!(way.motions.len() > 1, "{}", way.motions.len());
+    let model = collision_model(0.0, &obstacles, HAND_OPENING_MAX_M).unwrap();
+    let mut checker = Checker::new(&model, 1e-3);
+    for motion in &way.motions {
+        for step in 0..=200 {
+            let q = motion.sample(motion.duration_secs() * f64::from(step) / 200.0).0;
+            assert!(checker.is_free(&q), "{}", model.nearest(&q));
+            assert!(lowest_m(&model, &panda, &q) > 0.04, "{}", lowest_m(&model, &panda, &q));
+        }
+    }
+    let tcp = panda.forward(way.approach.unwrap().end());
+    assert!((tcp.translation.vector - goals[0].translation.vector).norm() < 1e-5, "{tcp}");
+}
+
+#[test]
+fn what_blocks_is_named() {
+    let start = ready_pose();
+    let at_goal = [wall("press", [0.1, 0.1, 0.2], [0.45, -0.3, 0.2])];
+    let error = plan(&at_goal, &start, &Destination::Poses(&[down(0.45, -0.3, 0.15)])).unwrap_err();
+    assert!(error.to_string().contains("press") && !error.latches(), "{error}");
+    let around = [wall("cage", [0.3, 0.3, 0.1], [0.0, 0.0, 0.3])];
+    let error = plan(&around, &start, &Destination::Configuration(&start)).unwrap_err().to_string();
+    assert!(error.contains("the obstacle \"cage\" encloses the robot"), "{error}");
+    let at_start = [wall("box", [0.05, 0.05, 0.05], [0.307, 0.0, 0.48])];
+    let error = plan(&at_start, &start, &Destination::Poses(&[down(0.45, -0.3, 0.15)])).unwrap_err().to_string();
+    assert!(error.contains("the start is not free") && error.contains("box"), "{error}");
+    let error = plan(&[], &start, &Destination::Poses(&[down(1.5, 0.0, 0.15)])).unwrap_err().to_string();
+    assert!(error.contains("the pose is out of reach"), "{error}");
+    let error = plan(&[], &start, &Destination::Poses(&[down(f64::NAN, 0.0, 0.15)])).unwrap_err().to_string();
+    assert!(error.contains("must be finite"), "{error}");
+}
+
+#[test]
+fn a_hand_that_begins_near_the_table_may_leave_it() {
+    let start = Panda::new().inverse(&down(0.45, 0.2, 0.012), &ready_pose(), &Default::default()).unwrap().q;
+    let way = plan(&[], &start, &Destination::Configuration(&ready_pose())).unwrap();
+    assert!((way.motions.last().unwrap().end() - ready_pose()).amax() < 1e-9);
+}
