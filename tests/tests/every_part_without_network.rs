@@ -53,6 +53,7 @@ fn model_s_finds_and_grasps_every_part() {
             verification: Verification::ByShape,
             errors: RehearsalErrors::default(),
             camera: None,
+            place: None,
         };
         let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
         println!(

@@ -51,6 +51,7 @@ fn the_pendulum_is_taught_found_and_grasped() {
         verification: Verification::ByShape,
         errors: RehearsalErrors::default(),
         camera: None,
+        place: None,
     };
     let rehearsed = rehearsal.run(&mut |_| ControlFlow::Continue(())).unwrap();
     println!("grasped in {} of 10, failures {:?}", rehearsed.successes(), rehearsed.failures());
