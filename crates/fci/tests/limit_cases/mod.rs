@@ -299,6 +299,8 @@ fn found<T>(ended: Result<T, FciError>) -> Result<Found, FciError> {
         Ok(_) => Ok(Found::Done),
         Err(FciError::Motion { status: Status::ReflexAborted, errors, .. }) => Ok(Found::Stopped(errors)),
         Err(FciError::Refused { status, .. }) => Ok(Found::Refused(status)),
+        // Where the start is looked at in the cycle after the Move was accepted, the refusal is its second answer.
+        Err(FciError::Motion { status: status @ Status::StartAtSingularPose, .. }) => Ok(Found::Refused(status)),
         Err(error @ FciError::Motion { .. }) => Ok(Found::Other(error.to_string())),
         Err(error) => Err(error),
     }
