@@ -1,12 +1,13 @@
 //! Closing, lifting and holding; whether the part is held is read from the hand's width and force.
 
 use nalgebra::Isometry3;
-use sdg_kinematics::collision::{Capsule, Checker};
+use sdg_kinematics::collision::Checker;
 use sdg_kinematics::planning::{CheckedLine, checked_line};
 use sdg_kinematics::{JointPath, JointVector, LineOptions};
 
+use super::held_part::HeldPart;
 use super::reach::above;
-use super::{GraspConfig, Sequence, Steps, Stop, fails_at};
+use super::{Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::{HandCommand, HandState, Load, MIN_HELD_WIDTH_M};
 use crate::error::RobotError;
@@ -100,43 +101,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
         self.hand_verdicts.push((step, by_hand.clone().err()));
         self.passed(step)?;
         by_hand.map_err(|why| Stop::Failed(step, why))
-    }
-}
-
-/// What the hand holds, from when it closed.
-#[derive(Debug, Clone)]
-pub(super) struct HeldPart {
-    /// The tcp in the frame of the part's grasp as it was detected: x along the marked line, z down.
-    pub(super) part_from_tcp: Isometry3<f64>,
-    /// The grasp's height over what the part lay on, m.
-    pub(super) height_m: f64,
-    /// How far the part reaches below the tcp, m.
-    pub(super) hang_m: f64,
-    /// Capsules that hold it, in the tcp's frame.
-    pub(super) in_tcp: Vec<Capsule>,
-}
-
-/// A part reaches so far below the tcp at least, m.
-const MIN_HANG_M: f64 = 0.010;
-
-impl HeldPart {
-    fn new(target: &GraspTarget, base_from_tcp: &Isometry3<f64>, table_height_m: f64, config: &GraspConfig) -> Self {
-        let hang_m = (base_from_tcp.translation.z - table_height_m).max(MIN_HANG_M);
-        let reach_m = (config.part_radius_m - hang_m).max(0.0);
-        // A disc around the tcp: how the part lies in it is not known to the arm.
-        let in_tcp = (0..4)
-            .map(|index| {
-                let (sin, cos) = (f64::from(index) * std::f64::consts::FRAC_PI_4).sin_cos();
-                let [x, y] = [reach_m * cos, reach_m * sin];
-                Capsule::new([-x, -y, 0.0], [x, y, 0.0], hang_m)
-            })
-            .collect();
-        Self {
-            part_from_tcp: target.base_from_tcp.inverse() * base_from_tcp,
-            height_m: target.base_from_tcp.translation.z - table_height_m,
-            hang_m,
-            in_tcp,
-        }
     }
 }
 

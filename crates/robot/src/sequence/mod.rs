@@ -10,6 +10,7 @@
 //! Placing goes on from there: carry ─> come down until the place is felt ─> open, up ─> look where the part lies.
 
 mod config;
+mod held_part;
 mod hold;
 mod look;
 mod place;
@@ -31,7 +32,7 @@ pub use config::{CameraMount, GraspConfig, LOOK_AT_M, LOOK_HEIGHT_M, LookOut, ca
 pub use look::SURE;
 pub use place::{PlaceOutcome, PlaceReport, PlacingConfig, grasp_and_place};
 
-use hold::HeldPart;
+use held_part::HeldPart;
 
 /// Least height of the arm over the table on its free motions, m.
 pub const FREE_CLEARANCE_M: f64 = 0.05;
