@@ -149,6 +149,8 @@ struct Sequence<'s, 'r, A: Arm> {
     /// What was touched on soft ways down.
     touched: Vec<Touched>,
     held: Option<HeldPart>,
+    /// How far the hand opens beyond the part, both sides together, m.
+    opening_margin_m: f64,
 }
 
 impl GraspOutcome {
@@ -180,6 +182,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             touch: None,
             touched: Vec::new(),
             held: None,
+            opening_margin_m: config.opening_margin_m,
         }
     }
 

@@ -191,6 +191,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
             // Perception takes the part to lie on the table.
             let mut target = found;
             target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
+            // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
+            self.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
     }

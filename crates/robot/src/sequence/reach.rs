@@ -35,7 +35,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut base_from_grasp = target.base_from_tcp;
         base_from_grasp.translation.z = base_from_grasp.translation.z.max(lowest);
 
-        let opening_m = (target.jaw_width_m + self.config.opening_margin_m).min(HAND_OPENING_MAX_M);
+        let opening_m = (target.jaw_width_m + self.opening_margin_m).min(HAND_OPENING_MAX_M);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
         let seed = self.robot.commanded()?;
         let here = self.robot.panda().forward(&seed).translation.z;
