@@ -27,8 +27,8 @@ const CAMERA_FRAME: &str = "camera_optical_frame";
 const BASE_FRAME: &str = "panda_link0";
 const PICTURE_EVERY: Duration = Duration::from_millis(200);
 const STATES_EVERY: Duration = Duration::from_millis(20);
-/// The simulation may be so far behind the clock, s.
-const MAX_BEHIND_SECS: f64 = 0.05;
+/// The simulation may be so far behind the clock, s: longer than a picture takes to draw, or every picture would hold up the arm.
+const MAX_BEHIND_SECS: f64 = 0.5;
 /// Fingers that move by less within a tenth of a second stand still, m.
 const STILL_M: f64 = 2e-4;
 /// A hand this near to its opening is there, m.

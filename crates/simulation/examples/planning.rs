@@ -1,9 +1,11 @@
-//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning length [COUNT] [FIRST_SEED] [SECONDS]`,
-//! `planning serve`.
+//! Planning on random problems, measured: `planning rate`, `planning proof [COUNT] [FIRST_SEED]`, `planning checks [COUNT] [FIRST_SEED]`,
+//! `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
 //!
 //! - `rate`: configurations that the collision model checks in a second on one core.
 //! - `proof`: plans COUNT problems, and follows each path in MuJoCo at steps of 1 ms.
 //!
+//! - `checks`: configurations that the search checks on its way to one given configuration of the goal, before shortening, as planners of
+//!   others are asked it (benches/peers/ompl_planning.py).
 //! - `length`: how long a plan takes to follow against the best that SECONDS (60) of optimising find: the same planner again and again with other
 //!   seeds, more searches, and a hundred times the attempts to shorten. COUNT (50) problems whose goal no straight motion reaches.
 //!
@@ -29,9 +31,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     match args.first().map(String::as_str) {
         Some("rate") => rate(),
         Some("proof") => proof(number(1, 1000)?, number(2, 0)?),
+        Some("checks") => checks(number(1, 300)?, number(2, 0)?),
         Some("length") => length(number(1, 50)?, number(2, 0)?, number(3, 60)?),
         Some("serve") => serve(),
-        _ => Err("expected rate, proof [COUNT] [FIRST_SEED], length [COUNT] [FIRST_SEED] [SECONDS] or serve".into()),
+        _ => Err("expected rate, proof [COUNT] [FIRST_SEED], checks [COUNT] [FIRST_SEED], length [COUNT] [FIRST_SEED] [SECONDS] or serve".into()),
     }
 }
 
@@ -131,6 +134,33 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         println!("{name}: median {median:.1}, mean {mean:.1}, 99 % {p99:.1}, most {max:.1}");
     }
+    Ok(())
+}
+
+fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
+    let panda = Panda::new();
+    // One search: further ones look for shorter ways, after the count has ended.
+    let mut options = PlanOptions::default();
+    options.num_searches = 1;
+    let mut checks = Vec::new();
+    for seed in first_seed..first_seed + count {
+        let problem = PlanningProblem::obstructed(seed);
+        match panda.plan_to(&problem.model, &problem.start, &[problem.goal], &options) {
+            Ok(plan) => checks.push(plan.num_search_checks),
+            Err(error) => println!("problem {seed}: {error}"),
+        }
+    }
+    checks.sort_unstable();
+    let at = |share: f64| checks.get(((checks.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(0);
+    println!(
+        "{} of {count} found; checks before shortening, one configuration of the goal: median {}, mean {:.0}, 90 % {}, 99 % {}, most {}",
+        checks.len(),
+        at(0.5),
+        checks.iter().sum::<usize>() as f64 / checks.len() as f64,
+        at(0.9),
+        at(0.99),
+        at(1.0)
+    );
     Ok(())
 }
 

@@ -40,7 +40,7 @@ pub struct PlanOptions {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { seed: 0, margin_m: 0.003, step_rad: 0.7, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 5 }
+        Self { seed: 0, margin_m: 0.003, step_rad: 3.0, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 5 }
     }
 }
 
