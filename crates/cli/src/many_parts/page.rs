@@ -1,7 +1,7 @@
 //! Many parts on one page.
 
 use image::RgbImage;
-use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, Table, Tone};
+use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, Table, Tone, contact_sheet};
 
 use super::findings::Findings;
 use super::part_store::PartOutcome;
@@ -10,6 +10,8 @@ use crate::teaching_page::FOOTER;
 
 /// Pairs of photos that are shown; the table has all.
 const MAX_SHOWN: usize = 24;
+/// Of two photos beside each other, each so wide, px.
+const PHOTO_WIDTH: u32 = 360;
 
 /// Which parts look alike, which need another photo, and how well each is found. `photos` are those of the taught parts.
 pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
@@ -61,17 +63,22 @@ fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
     for pair in &findings.look_alikes {
         let [first, second] = findings.names(pair);
         let [there, back] = pair.scores;
-        table = table.row(vec![Cell::text(first), Cell::text(second), Cell::number(there, 2), Cell::number(back, 2)]);
-        if figures.len() < 2 * MAX_SHOWN {
-            let both = pair.parts.iter().zip([first, second]);
-            figures.extend(both.map(|(&part, name)| Figure::photo(photos[part].clone()).caption(name)));
+        if figures.len() < MAX_SHOWN {
+            let both = pair.parts.map(|part| photos[part].clone());
+            let caption = format!("{first} and {second}: {there:.2}, {back:.2}");
+            figures.push(Figure::photo(contact_sheet(&both, 2, PHOTO_WIDTH)).caption(caption));
         }
+        table = table.row(vec![Cell::text(first), Cell::text(second), Cell::number(there, 2), Cell::number(back, 2)]);
     }
+    let caption = match findings.look_alikes.len() {
+        count if count > MAX_SHOWN => format!("The {MAX_SHOWN} most alike of {count} pairs; the table has all."),
+        _ => "The most alike first.".to_owned(),
+    };
     section
         .lead("Scores from 0.5 on are accepted. Two names for one part, or parts that only a mark tells apart: put the mark into the photo, \
                or give each its own place.")
+        .captioned_gallery(GallerySize::Large, figures, caption)
         .table(table)
-        .gallery(GallerySize::Large, figures)
 }
 
 fn all_parts(findings: &Findings) -> Section {

@@ -35,7 +35,7 @@ def over_ros(sdg, cell, model, part, seed, domain):
     reader.start()
     try:
         time.sleep(2.0)
-        with Sdg(sdg, domain, f"--grasp-model={model}", f"--camera={CAMERA}", f"--workcell={WORKCELL}", "--base-frame=panda_link0", "--allow-motion"):
+        with Sdg(sdg, domain, f"--grasp-model={model}", f"--camera={CAMERA}", f"--workcell={WORKCELL}", "--base-frame=panda_link0", "--allow-motion") as node:
             answer, secs = grasp(Peer(domain))
             time.sleep(0.5)
     finally:
@@ -44,7 +44,9 @@ def over_ros(sdg, cell, model, part, seed, domain):
         reader.join(5)
     lifted = sum("lifted" in line for line in said) > sum("down" in line for line in said)
     held = bool(answer and answer.success)
-    return held, lifted, f"{answer.step}: {answer.message}" if answer else f"no answer in {secs:.0f} s"
+    # Without an answer the node's own lines are what tells why.
+    words = f"{answer.step}: {answer.message}" if answer else f"no answer in {secs:.0f} s; the node said {node.lines[-4:]}"
+    return held, lifted, words
 
 
 def in_process(sdg, model, part, seed):
