@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! base_from_tcp ──► inverse ──► q ──► point-to-point trajectory ─┐
-//!                                └──► straight path ──► timed ───┴──► Trajectory::sample(t) = q, q̇, q̈
+//!                                ├──► straight path ──► timed ───┼──► Trajectory::sample(t) = q, q̇, q̈
+//! Plan ──► waypoints ──► rounded path ─────────────────► timed ───┘
 //! ```
 //!
-//! [`collision`] says what the arm would touch, [`planning`] finds motions around it.
+//! [`collision`] says what the arm would touch, [`planning`] finds motions around it, [`dynamics`] the torques of a motion.
 //!
-//! Left out: dynamics (masses, torques), communication with a real robot.
+//! Left out: communication with a real robot.
 //!
 //! ```
 //! use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -29,6 +30,7 @@ mod approach;
 mod check;
 mod clearance;
 pub mod collision;
+pub mod dynamics;
 mod error;
 mod ik;
 mod inverse;
@@ -38,8 +40,10 @@ mod nearest;
 mod panda;
 mod path;
 pub mod planning;
+mod rounded_path;
 #[cfg(test)]
 mod test_poses;
+mod timing;
 mod trajectory;
 
 pub use approach::{Approach, GraspSymmetry, with_fingers_exchanged};
@@ -57,6 +61,7 @@ pub use panda::{
     TCP_OFFSET_M,
 };
 pub use path::{JointPath, LineOptions, PathPoint};
+pub use rounded_path::RoundedPath;
 pub use trajectory::Trajectory;
 
 /// The README's example, which runs with the other examples.

@@ -1,4 +1,4 @@
-//! What the robot may do: positions, velocities, accelerations and jerks, in joint and Cartesian space.
+//! What the robot may do: positions, velocities, accelerations, jerks and torques, in joint and Cartesian space.
 //!
 //! # Source
 //! Franka Control Interface documentation, "Robot and interface specifications", Franka Emika Robot ("Panda").
@@ -33,6 +33,8 @@ pub struct JointLimits {
     pub acceleration_max: JointVector,
     /// Largest jerks, rad/s³.
     pub jerk_max: JointVector,
+    /// Largest torques, N·m; [`JointLimits::scaled`] leaves them.
+    pub torque_max: JointVector,
 }
 
 impl JointLimits {
@@ -44,6 +46,7 @@ impl JointLimits {
             velocity_max: VELOCITY_MAX_RAD_S.into(),
             acceleration_max: ACCELERATION_MAX_RAD_S2.into(),
             jerk_max: JERK_MAX_RAD_S3.into(),
+            torque_max: TORQUE_MAX_NM.into(),
         }
     }
 

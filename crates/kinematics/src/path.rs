@@ -35,7 +35,8 @@ impl Default for LineOptions {
     }
 }
 
-/// A point of a [`JointPath`]: the configuration and its derivatives by `s`.
+/// A point of a path: the configuration and its derivatives by the path's parameter `s`, which is in m on a [`JointPath`] (the units below) and
+/// in s on a [`crate::RoundedPath`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathPoint {
     /// Joint positions, rad.

@@ -5,14 +5,18 @@
 //! - Point to point from a state in motion: each joint on its own profile, all ending at the same time (rsruckig).
 //! - Along a straight Cartesian path: `s(t)` is a jerk-limited profile (rsruckig, one degree of freedom) stretched in time
 //!   by the smallest factor that keeps every joint's and the tcp's velocity, acceleration and jerk inside their limits.
+//! - Along a rounded path in joint space: nearly the quickest within all limits, torques too (timing/).
 
 use rsruckig::prelude::{InputParameter, Ruckig, Synchronization, ThrowErrorHandler};
 
 use crate::check::check_joints;
+use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::limits::{CartesianLimits, JointLimits};
 use crate::path::JointPath;
+use crate::rounded_path::RoundedPath;
+use crate::timing::{self, MotionLimits, Timing};
 
 /// A motion in time that ends at rest.
 #[derive(Debug, Clone)]
@@ -36,6 +40,7 @@ enum Motion {
     },
     EachJoint(Box<rsruckig::trajectory::Trajectory<NUM_JOINTS>>),
     AlongPath(Box<TimedPath>),
+    AlongRoundedPath(Box<(RoundedPath, Timing)>),
 }
 
 #[derive(Debug, Clone)]
@@ -181,6 +186,39 @@ impl Trajectory {
         })
     }
 
+    /// Nearly the quickest motion from rest to rest along a rounded path, within the limits of joints and tcp, the torques of an arm with
+    /// its load among them.
+    ///
+    /// # Errors
+    /// [`KinematicsError::JointOutOfRange`] for an end outside the limits; [`KinematicsError::Trajectory`] where the joints cannot hold the weight of
+    /// arm and load somewhere on the path.
+    pub fn along_rounded_path(
+        path: RoundedPath,
+        limits: &JointLimits,
+        cartesian_limits: &CartesianLimits,
+        dynamics: &ArmDynamics,
+    ) -> Result<Self, KinematicsError> {
+        check_in_range("start", path.start(), limits)?;
+        check_in_range("end", path.end(), limits)?;
+        let limits = MotionLimits { joints: limits, cartesian: cartesian_limits, dynamics };
+        let timing = timing::time(&path, &limits)?;
+        Ok(Self {
+            duration_secs: timing.profile.duration_secs() * timing.stretch,
+            start: at_rest(path.start()),
+            end: *path.end(),
+            motion: Motion::AlongRoundedPath(Box::new((path, timing))),
+        })
+    }
+
+    /// For a motion along a rounded path: how long it would take, s, with no limit of the jerk. What is computed keeps to the other limits at the places
+    /// of its grid.
+    pub fn without_jerk_limit_secs(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::AlongRoundedPath(timed) => Some(timed.1.jerkless_secs),
+            _ => None,
+        }
+    }
+
     /// How long the motion takes, s.
     pub fn duration_secs(&self) -> f64 {
         self.duration_secs
@@ -222,6 +260,14 @@ impl Trajectory {
                 let point = timed.path.at(progress.s);
                 let velocity = progress.velocity / timed.stretch;
                 let acceleration = progress.acceleration / timed.stretch.powi(2);
+                (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
+            }
+            Motion::AlongRoundedPath(timed) => {
+                let (path, timing) = timed.as_ref();
+                let progress = timing.profile.at(time_secs / timing.stretch);
+                let point = path.at(progress.s);
+                let velocity = progress.velocity / timing.stretch;
+                let acceleration = progress.acceleration / timing.stretch.powi(2);
                 (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
             }
         }

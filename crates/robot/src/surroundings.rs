@@ -62,7 +62,7 @@ pub struct Surroundings<'a> {
 /// A way around what stands in the cell.
 #[derive(Debug, Clone)]
 pub struct Way {
-    /// Motions one after the other, each from rest to rest; none where the arm is there already.
+    /// Motions one after the other, each from rest to rest: one, unless the arm has to stop at a waypoint; none where it is there already.
     pub motions: Vec<Trajectory>,
     /// The straight approach, where one was asked for.
     pub approach: Option<JointPath>,
@@ -149,7 +149,7 @@ impl<A: Arm> Robot<'_, A> {
         for seed in 0..NUM_SEEDS {
             let mut options = PlanOptions::default();
             (options.seed, options.max_checks) = (seed, MAX_CHECKS);
-            let Plan { waypoints, approach, goal_idx, .. } = match to {
+            let Plan { ways, approach, goal_idx, .. } = match to {
                 Destination::Configuration(q) => self.panda().plan_to(&model, &start, &[**q], &options),
                 Destination::Poses(poses) => self.panda().plan(&model, &start, poses, None, &options),
                 Destination::Approached(poses, length_m) => {
@@ -157,11 +157,7 @@ impl<A: Arm> Robot<'_, A> {
                     self.panda().plan(&model, &start, poses, Some(&straight), &options)
                 }
             }?;
-            let motions = waypoints
-                .windows(2)
-                .filter(|pair| pair[0] != pair[1])
-                .map(|pair| self.plan_between(&pair[0], &pair[1], joints))
-                .collect::<Result<Vec<_>>>()?;
+            let motions = ways.iter().map(|way| self.plan_through(way, joints)).collect::<Result<Vec<_>>>()?;
             let refuse = |motion: &Trajectory| self.limits_from(motion.start()).check(motion.clone()).err();
             match motions.iter().find_map(refuse) {
                 None => return Ok(Way { motions, approach, goal_idx }),

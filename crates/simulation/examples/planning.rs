@@ -2,7 +2,9 @@
 //! `planning length [COUNT] [FIRST_SEED] [SECONDS]`, `planning serve`.
 //!
 //! - `rate`: configurations that the collision model checks in a second on one core.
-//! - `proof`: plans COUNT problems, and follows each path in MuJoCo at steps of 1 ms.
+//! - `proof`: plans COUNT problems, times each plan at Franka's full limits, and follows the motion in MuJoCo at steps of 1 ms: collisions; velocity,
+//!   acceleration, jerk by differences, and torque by MuJoCo's inverse dynamics, as shares of the limits; the tcp's speed and acceleration; how much longer
+//!   it takes with a stop at every waypoint, and how much less without a limit of the jerk.
 //!
 //! - `checks`: configurations that the search checks on its way to one given configuration of the goal, before shortening, as planners of
 //!   others are asked it (benches/peers/ompl_planning.py).
@@ -21,9 +23,10 @@ use std::time::Instant;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::collision::Checker;
-use sdg_kinematics::planning::PlanOptions;
-use sdg_kinematics::{CartesianLimits, JointLimits, JointVector, Panda};
-use sdg_simulation::{CollisionWorld, PlanningProblem};
+use sdg_kinematics::dynamics::ArmDynamics;
+use sdg_kinematics::planning::{Plan, PlanOptions};
+use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, JointVector, Panda, RoundedPath, Trajectory};
+use sdg_simulation::{CollisionWorld, InverseDynamics, PlanningProblem};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -84,17 +87,137 @@ fn rate() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// The largest shares of limits at every millisecond.
+#[derive(Debug, Default)]
+struct Shares {
+    largest: [f64; 7],
+}
+
+impl Shares {
+    const NAMES: [&str; 7] =
+        ["velocity", "acceleration", "jerk", "torque", "tcp velocity", "tcp acceleration", "tcp jerk"];
+
+    /// Looks at every millisecond of a motion.
+    fn look_at(&mut self, motion: &Trajectory, mujoco: &mut InverseDynamics) -> Result<(), Box<dyn Error>> {
+        let (panda, joints, tcp) = (Panda::new(), JointLimits::franka(), CartesianLimits::franka());
+        let share = |values: &JointVector, limits: &JointVector| values.abs().component_div(limits).max();
+        let (mut ddq_before, mut twists) = (JointVector::zeros(), Vec::new());
+        for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
+            let (q, dq, ddq) = motion.sample(step as f64 * 1e-3);
+            let jerk = (ddq - ddq_before) * 1e3;
+            ddq_before = ddq;
+            twists.push(panda.jacobian(&q) * dq);
+            let difference = |order: usize| -> (f64, f64) {
+                let Some(last) = twists.len().checked_sub(order + 1) else { return (0.0, 0.0) };
+                let value = match order {
+                    0 => twists[last],
+                    1 => (twists[last + 1] - twists[last]) * 1e3,
+                    _ => (twists[last + 2] - twists[last + 1] * 2.0 + twists[last]) * 1e6,
+                };
+                (value.fixed_rows::<3>(0).norm(), value.fixed_rows::<3>(3).norm())
+            };
+            let [speed, acceleration, tcp_jerk] = [difference(0), difference(1), difference(2)];
+            let found = [
+                share(&dq, &joints.velocity_max),
+                share(&ddq, &joints.acceleration_max),
+                share(&jerk, &joints.jerk_max),
+                share(&mujoco.torques_nm(&q, &dq, &ddq)?, &joints.torque_max),
+                (speed.0 / tcp.velocity_m_s).max(speed.1 / tcp.angular_velocity_rad_s),
+                (acceleration.0 / tcp.acceleration_m_s2).max(acceleration.1 / tcp.angular_acceleration_rad_s2),
+                (tcp_jerk.0 / tcp.jerk_m_s3).max(tcp_jerk.1 / tcp.angular_jerk_rad_s3),
+            ];
+            for (largest, found) in self.largest.iter_mut().zip(found) {
+                *largest = largest.max(found);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Times of the plans that are not straight.
+#[derive(Debug, Default)]
+struct Bent {
+    num_corners: usize,
+    num_stops: usize,
+    secs: Vec<f64>,
+    /// The motion's time over that with a stop at every waypoint, and over that without a limit of the jerk.
+    over_stopping: Vec<f64>,
+    over_jerkless: Vec<f64>,
+    /// Over the largest corners that there is room for on the straight parts, whatever they touch.
+    over_largest_corners: Vec<f64>,
+    /// Over a stop at every waypoint within the joints' velocities, accelerations and jerks alone.
+    over_point_to_point: Vec<f64>,
+}
+
+impl Bent {
+    fn look_at(&mut self, plan: &Plan, motions: &[Trajectory], dynamics: &ArmDynamics) -> Result<(), Box<dyn Error>> {
+        let (joints, tcp) = (JointLimits::franka(), CartesianLimits::franka());
+        let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();
+        let jerkless: f64 = motions.iter().filter_map(Trajectory::without_jerk_limit_secs).sum();
+        let lengths: Vec<f64> =
+            plan.waypoints.windows(2).map(|pair| RoundedPath::new(pair, &[]).length_secs()).collect();
+        let last = lengths.len() - 1;
+        let room = |index: usize| lengths[index] * if index == 0 || index == last { 1.0 } else { 0.5 };
+        let rooms: Vec<f64> = (0..last).map(|index| room(index).min(room(index + 1))).collect();
+        let largest = RoundedPath::new(&plan.waypoints, &rooms);
+        let largest = Trajectory::along_rounded_path(largest, &joints, &tcp, dynamics)?;
+        self.over_largest_corners.push(secs / largest.duration_secs());
+        let mut point_to_point = 0.0;
+        for pair in plan.waypoints.windows(2) {
+            point_to_point += Trajectory::point_to_point(&pair[0], &pair[1], &joints)?.duration_secs();
+        }
+        self.num_corners += plan.waypoints.len() - 2;
+        self.num_stops += motions.len() - 1;
+        self.secs.push(secs);
+        self.over_stopping.push(secs / plan.stopping_secs(&joints, &tcp, dynamics)?);
+        self.over_jerkless.push(secs / jerkless);
+        self.over_point_to_point.push(secs / point_to_point);
+        Ok(())
+    }
+
+    fn print(&mut self) {
+        println!(
+            "{} plans are not straight: {} inner waypoints, {} of them stops",
+            self.secs.len(),
+            self.num_corners,
+            self.num_stops
+        );
+        print_spread("their time, s", &mut self.secs, 3);
+        print_spread("their time over that with stops, same limits", &mut self.over_stopping, 4);
+        print_spread(
+            "their time over that with stops, joints' limits without torques alone",
+            &mut self.over_point_to_point,
+            4,
+        );
+        print_spread("their time over that without a limit of the jerk", &mut self.over_jerkless, 4);
+    }
+}
+
+fn print_spread(name: &str, values: &mut [f64], digits: usize) {
+    values.sort_by(f64::total_cmp);
+    let at =
+        |share: f64| values.get(((values.len() as f64 - 1.0) * share).round() as usize).copied().unwrap_or(f64::NAN);
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let [least, median, p99, most] = [0.0, 0.5, 0.99, 1.0].map(at);
+    println!(
+        "{name}: least {least:.digits$}, median {median:.digits$}, mean {mean:.digits$}, 99 % {p99:.digits$}, most {most:.digits$}"
+    );
+}
+
 fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     let (panda, limits) = (Panda::new(), JointLimits::franka());
-    let (mut millis, mut clock_millis) = (Vec::new(), Vec::new());
+    let dynamics = ArmDynamics::panda(HAND_OPENING_MAX_M);
+    let mut mujoco = InverseDynamics::new(HAND_OPENING_MAX_M)?;
+    let (mut millis, mut timing_millis) = (Vec::new(), Vec::new());
     let (mut search_checks, mut all_checks) = (Vec::new(), Vec::new());
-    let (mut num_colliding, mut num_steps) = (0, 0);
+    let (mut num_colliding, mut num_steps, mut num_at_torque) = (0, 0, 0);
+    let (mut shares, mut bent) = (Shares::default(), Bent::default());
     for seed in first_seed..first_seed + count {
         let problem = PlanningProblem::obstructed(seed);
         let options = PlanOptions::default();
         let watch = Stopwatch::start();
         let planned = panda.plan(&problem.model, &problem.start, &[problem.base_from_goal], None, &options);
-        let [clock_ms, processor_ms] = watch.elapsed_ms();
+        let [_, processor_ms] = watch.elapsed_ms();
         let plan = match planned {
             Ok(plan) => plan,
             Err(error) => {
@@ -103,12 +226,27 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
             }
         };
         millis.push(processor_ms);
-        clock_millis.push(clock_ms);
         search_checks.push(plan.num_search_checks as f64);
         all_checks.push(plan.num_checks as f64);
-        let mut world = CollisionWorld::new(&problem.obstacles, sdg_kinematics::HAND_OPENING_MAX_M)?;
+        let watch = Stopwatch::start();
+        let motions = plan.trajectories(&limits, &CartesianLimits::franka(), &dynamics)?;
+        // Linux counts the processor's time in steps that are longer than this takes.
+        timing_millis.push(watch.elapsed_ms()[0]);
+        if plan.waypoints.len() > 2 {
+            bent.look_at(&plan, &motions, &dynamics)?;
+        }
+        let mut world = CollisionWorld::new(&problem.obstacles, HAND_OPENING_MAX_M)?;
         let mut deepest = None;
-        for motion in plan.trajectories(&limits, &CartesianLimits::franka())? {
+        for motion in &motions {
+            let mut here = Shares::default();
+            here.look_at(motion, &mut mujoco)?;
+            num_at_torque += usize::from(here.largest[3] > 0.99);
+            for (index, share) in here.largest.into_iter().enumerate() {
+                shares.largest[index] = shares.largest[index].max(share);
+                if share > 1.0 + MAX_EXCESS {
+                    println!("problem {seed}: {share:.4} of the limit of {}", Shares::NAMES[index]);
+                }
+            }
             for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
                 num_steps += 1;
                 if let Some(overlap) = world.deepest(&motion.sample(step as f64 * 1e-3).0)? {
@@ -121,19 +259,19 @@ fn proof(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
             println!("problem {seed}: MuJoCo finds {overlap:?}");
         }
     }
-    let share =
-        |sorted: &[f64], share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied();
-    for values in [&mut millis, &mut clock_millis, &mut search_checks, &mut all_checks] {
-        values.sort_by(f64::total_cmp);
+    println!(
+        "{} of {count} found; {num_colliding} motions collide in MuJoCo at {num_steps} steps of 1 ms",
+        millis.len()
+    );
+    print_spread("processor's ms of planning", &mut millis, 1);
+    print_spread("ms of timing by the clock", &mut timing_millis, 2);
+    print_spread("checks before shortening", &mut search_checks, 0);
+    print_spread("checks in all", &mut all_checks, 0);
+    for (name, share) in Shares::NAMES.iter().zip(shares.largest) {
+        println!("most of the limit of {name}: {share:.4}");
     }
-    println!("{} of {count} found; {num_colliding} paths collide in MuJoCo at {num_steps} steps of 1 ms", millis.len());
-    for (name, values) in
-        [("ms", &millis), ("checks before shortening", &search_checks), ("checks in all", &all_checks)]
-    {
-        let [median, p99, max] = [0.5, 0.99, 1.0].map(|at| share(values, at).unwrap_or(f64::NAN));
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        println!("{name}: median {median:.1}, mean {mean:.1}, 99 % {p99:.1}, most {max:.1}");
-    }
+    println!("motions with more than 0.99 of a torque limit: {num_at_torque}");
+    bent.print();
     Ok(())
 }
 
@@ -163,6 +301,9 @@ fn checks(count: u64, first_seed: u64) -> Result<(), Box<dyn Error>> {
     );
     Ok(())
 }
+
+/// Limits that are broken by a larger share are told.
+const MAX_EXCESS: f64 = 1e-3;
 
 fn length(count: u64, first_seed: u64, seconds: u64) -> Result<(), Box<dyn Error>> {
     const MAX_RATIO: f64 = 1.3;

@@ -1,6 +1,7 @@
 //! Plans on random problems, followed in MuJoCo at every millisecond; `make bench-planning` does the same with a thousand.
 #![allow(clippy::unwrap_used)]
 
+use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, Panda};
 use sdg_simulation::{CollisionWorld, PlanningProblem};
@@ -20,7 +21,8 @@ fn no_path_of_fifty_collides_in_mujoco() {
         num_found += 1;
         num_bent += usize::from(plan.waypoints.len() > 2);
         let mut world = CollisionWorld::new(&problem.obstacles, HAND_OPENING_MAX_M).unwrap();
-        for motion in plan.trajectories(&JointLimits::franka(), &CartesianLimits::franka()).unwrap() {
+        let dynamics = ArmDynamics::panda(HAND_OPENING_MAX_M);
+        for motion in plan.trajectories(&JointLimits::franka(), &CartesianLimits::franka(), &dynamics).unwrap() {
             for step in 0..=(motion.duration_secs() * 1e3).ceil() as usize {
                 let overlap = world.deepest(&motion.sample(step as f64 * 1e-3).0).unwrap();
                 assert_eq!(overlap, None, "problem {seed}, {step} ms");

@@ -4,6 +4,7 @@
 //! configuration each pair of bodies has a distance d, and a bound v of how fast the two approach each other along the edge, from the joints' turns
 //! and the bodies' reach. Up to d / v further along, that pair cannot touch. So steps are long in free space and short beside obstacles, and what lies
 //! between two checked configurations is proven free, too. Lanes start at evenly spread places of the edge and each advances to the next one's start.
+//! Curves are proven in the same way, with the greatest rate of each joint along them.
 #![allow(clippy::needless_range_loop, reason = "one index for the lanes of several arrays")]
 
 use super::arm_shape::SELF_PAIRS;
@@ -96,14 +97,24 @@ impl<'a> Checker<'a> {
     /// The first place found on the straight motion that does not keep the margin, as a share of the way; not always the one nearest to the start.
     pub fn blocked_share(&mut self, from: &JointVector, to: &JointVector) -> Option<f64> {
         let delta = to - from;
-        let weights = self.edge_weights(&delta);
+        self.blocked_share_of_curve(|share| from + delta * share, &delta.abs())
+    }
+
+    /// As [`Checker::blocked_share`] on any curve, told by its configuration at a share of the way; `max_turns` is how far each joint would turn on all
+    /// of it at its greatest rate, rad.
+    pub(crate) fn blocked_share_of_curve(
+        &mut self,
+        at: impl Fn(f64) -> JointVector,
+        max_turns: &JointVector,
+    ) -> Option<f64> {
+        let weights = self.edge_weights(max_turns);
         // Lane i starts at i of L - 1 parts of the way and goes to where the next one started; the last one is at the end.
         let start = |lane: usize| lane as f64 / (NUM_LANES - 1) as f64;
         let mut share: Lane = std::array::from_fn(start);
         let mut active: Lanes = Lanes::all();
         while active.len > 0 {
             let places: Lane = std::array::from_fn(|place| share[active.lanes[place.min(active.len - 1)]]);
-            let q = places.map(|share| from + delta * share);
+            let q = places.map(&at);
             let found = self.evaluate(&q, &weights, true);
             self.num_checked += active.len;
             if let Some(place) = (0..active.len).find(|&place| found.is_blocked[place]) {
@@ -118,10 +129,10 @@ impl<'a> Checker<'a> {
     }
 
     /// How far along an edge, as a share of it, each pair may go for a metre of distance.
-    fn edge_weights(&self, delta: &JointVector) -> Weights {
+    fn edge_weights(&self, max_turns: &JointVector) -> Weights {
         let reach_m = &self.model.arm.reach_m;
         let speed_m = |body: usize, since_joint: usize| -> f64 {
-            (since_joint..NUM_JOINTS).map(|joint_idx| reach_m[body][joint_idx] * delta[joint_idx].abs()).sum()
+            (since_joint..NUM_JOINTS).map(|joint_idx| reach_m[body][joint_idx] * max_turns[joint_idx]).sum()
         };
         // A pair that does not move against each other gets infinity: any distance lasts for the whole edge.
         let per_metre = |speed_m: f64| if speed_m > 0.0 { 1.0 / speed_m } else { f64::INFINITY };

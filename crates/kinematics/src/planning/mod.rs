@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! start ────────────────────────┐
-//! goal poses ─> configurations ─┼─> RRT-Connect ─> shorter way ─> Plan ─> trajectories
-//! CollisionModel ─> Checker ────┘                     approach ──┘
+//! goal poses ─> configurations ─┼─> RRT-Connect ─> shorter way ─> round corners ─> Plan ─> trajectories
+//! CollisionModel ─> Checker ────┘                                      approach ──┘
 //! ```
 //!
 //! There is no clock here: a search ends after so many collision checks, and gives the same plan on every machine.
 
+mod corners;
 mod error;
 mod goals;
 mod line;

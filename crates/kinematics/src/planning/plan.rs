@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Translation3};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
+use super::corners;
 use super::error::PlanError;
 use super::goals::{GoalConfiguration, free_configurations, free_of};
 use super::line::checked_line;
@@ -13,11 +14,13 @@ use super::rrt::{Found, Growth, Samples, Stops, rrt_connect};
 use super::shortcut::{cost_secs, motion_secs, shorten};
 use crate::check::check_joints;
 use crate::collision::{Checker, CollisionModel};
+use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
 use crate::joints::JointVector;
 use crate::limits::{CartesianLimits, JointLimits};
 use crate::panda::Panda;
 use crate::path::JointPath;
+use crate::rounded_path::RoundedPath;
 use crate::trajectory::Trajectory;
 
 /// Options of the planner.
@@ -40,7 +43,7 @@ pub struct PlanOptions {
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        Self { seed: 0, margin_m: 0.003, step_rad: 3.0, max_checks: 3_000_000, num_shortcuts: 60, num_searches: 5 }
+        Self { seed: 0, margin_m: 0.003, step_rad: 3.0, max_checks: 3_000_000, num_shortcuts: 120, num_searches: 12 }
     }
 }
 
@@ -56,8 +59,11 @@ pub struct StraightApproach<'a> {
 /// A way around obstacles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Configurations, start and end included, between which the arm moves straight in joint space, rad.
+    /// Configurations, start and end included, between which the way is straight in joint space but for its corners, rad.
     pub waypoints: Vec<JointVector>,
+    /// The way through them with rounded corners. Most often one; several, each beginning where the one before ends, where nothing rounder than a stop is
+    /// free; none where start and end are the same.
+    pub ways: Vec<RoundedPath>,
     /// The straight end, where one was asked for.
     pub approach: Option<JointPath>,
     /// Which of the goal poses is reached.
@@ -71,18 +77,42 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The motions in time: one a straight part, each from rest to rest.
+    /// The motions in time, each from rest to rest: one along each of [`Plan::ways`], and the straight approach.
+    ///
+    /// `dynamics` are the arm's with its load; the approach's torques are not looked at.
     ///
     /// # Errors
-    /// As [`Trajectory::point_to_point`] and [`Trajectory::along_path`].
+    /// As [`Trajectory::along_rounded_path`] and [`Trajectory::along_path`].
     pub fn trajectories(
         &self,
         limits: &JointLimits,
         cartesian_limits: &CartesianLimits,
+        dynamics: &ArmDynamics,
     ) -> Result<Vec<Trajectory>, KinematicsError> {
-        let straight = self.waypoints.windows(2).map(|pair| Trajectory::point_to_point(&pair[0], &pair[1], limits));
+        let ways =
+            self.ways.iter().map(|way| Trajectory::along_rounded_path(way.clone(), limits, cartesian_limits, dynamics));
         let approach = self.approach.iter().map(|path| Trajectory::along_path(path.clone(), limits, cartesian_limits));
-        straight.chain(approach).collect()
+        ways.chain(approach).collect()
+    }
+
+    /// How long the free part would take, s, if the arm stopped at each waypoint, within the same limits.
+    ///
+    /// # Errors
+    /// As [`Trajectory::along_rounded_path`].
+    pub fn stopping_secs(
+        &self,
+        limits: &JointLimits,
+        cartesian_limits: &CartesianLimits,
+        dynamics: &ArmDynamics,
+    ) -> Result<f64, KinematicsError> {
+        let parts = self.waypoints.windows(2).filter(|pair| pair[0] != pair[1]);
+        parts
+            .map(|pair| {
+                let straight = RoundedPath::new(pair, &[]);
+                let motion = Trajectory::along_rounded_path(straight, limits, cartesian_limits, dynamics)?;
+                Ok(motion.duration_secs())
+            })
+            .sum()
     }
 }
 
@@ -166,6 +196,7 @@ impl Panda {
         let mut best = first;
         shorten(&mut checker, &self.limits, &mut best.waypoints, options.num_shortcuts, &mut rng);
         // A further search may take some times as long as the first: it is for a better way, not for any.
+        growth.step_rad = growth.step_rad.min(FURTHER_STEP_RAD);
         growth.max_checks = growth.max_checks.min(MIN_FURTHER_CHECKS + FURTHER_CHECKS_RATIO * num_search_checks);
         for _ in 1..if is_straight { 1 } else { options.num_searches } {
             let best_secs = cost_secs(&best.waypoints, &self.limits);
@@ -184,9 +215,11 @@ impl Panda {
             }
         }
         let Found { waypoints, goal_idx } = best;
+        let ways = corners::round(&mut checker, &waypoints);
         Ok(Plan {
             cost_secs: [first_secs, cost_secs(&waypoints, &self.limits)],
             waypoints,
+            ways,
             approach: approaches.into_iter().nth(goal_idx),
             goal_idx: goals[goal_idx].pose_idx,
             num_checks: checker.num_checked(),
@@ -250,6 +283,8 @@ impl Panda {
 /// Checks that every further search may take, and how many times those of the first.
 const MIN_FURTHER_CHECKS: usize = 1000;
 const FURTHER_CHECKS_RATIO: usize = 2;
+/// The longest motion that a further search adds at once, rad: shorter ones than the first search's find narrower and quicker ways.
+const FURTHER_STEP_RAD: f64 = 2.0;
 
 /// Straight to the quickest goal that can be reached so; goals come the quickest first.
 fn straight(checker: &mut Checker<'_>, start: &JointVector, goals: &[GoalConfiguration]) -> Option<Found> {

@@ -12,6 +12,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Capsule;
+use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
 use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, Panda, Trajectory, ready_pose};
 use sdg_robot::DEFAULT_SPEED;
@@ -82,8 +83,11 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let started = Instant::now();
     let plan = Panda::new().plan(&model, &start, &goals, None, &options).context("no plan")?;
     let planning_ms = started.elapsed().as_secs_f64() * 1e3;
-    let motions = plan.trajectories(&pace.free_limits(), &CartesianLimits::franka())?;
-    let explained = Explained::new(&model, &plan, &motions, args.turns, planning_ms);
+    let (joints, tcp, dynamics) =
+        (pace.free_limits(), CartesianLimits::franka(), ArmDynamics::panda(args.opening_mm * 1e-3));
+    let motions = plan.trajectories(&joints, &tcp, &dynamics)?;
+    let stopping_secs = plan.stopping_secs(&joints, &tcp, &dynamics)?;
+    let explained = Explained::new(&model, &plan, &motions, stopping_secs, args.turns, planning_ms);
     eprint!("{}", explained.text());
     if let Some(refused) = refused_by_limits(&workcell, &motions) {
         eprintln!("  sdg grasp would refuse it: {refused}");
@@ -91,7 +95,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
     if args.json {
         println!("{}", explained.json());
     }
-    if !args.no_drawing {
+    if !args.no_drawing && !motions.is_empty() {
         draw(args, &workcell, &motions)?;
     }
     Ok(Outcome::Done)

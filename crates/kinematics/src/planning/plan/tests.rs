@@ -34,6 +34,54 @@ fn plan(model: &CollisionModel, goals: &[Isometry3<f64>], seed: u64) -> Result<P
     Panda::new().plan(model, &start(), goals, None, &options)
 }
 
+fn motions(plan: &Plan) -> Vec<Trajectory> {
+    plan.trajectories(&JointLimits::franka(), &CartesianLimits::franka(), &ArmDynamics::panda(0.08)).unwrap()
+}
+
+#[test]
+fn corners_are_round_free_and_quicker_than_stops() {
+    // Every stop is braking and accelerating: two tenths of a second and more at full speed.
+    const MIN_SAVED_SECS: f64 = 0.1;
+    let model = cell(vec![table(), wall()]);
+    let goal = top_grasp(0.5, -0.3, 0.15, 0.0);
+    let (joints, cartesian, dynamics) = (JointLimits::franka(), CartesianLimits::franka(), ArmDynamics::panda(0.08));
+    let (mut num_corners, mut num_stops) = (0, 0);
+    for seed in 0..5 {
+        let found = plan(&model, &[goal], seed).unwrap();
+        num_corners += found.waypoints.len() - 2;
+        num_stops += found.ways.len() - 1;
+        assert_eq!(
+            (*found.ways[0].start(), *found.ways.last().unwrap().end()),
+            (found.waypoints[0], *found.waypoints.last().unwrap())
+        );
+        assert!(found.ways.windows(2).all(|pair| pair[0].end() == pair[1].start()));
+        let mut checker = Checker::new(&model, 0.001);
+        for way in &found.ways {
+            let q: Vec<JointVector> =
+                (0..=2000).map(|step| way.at(way.length_secs() * f64::from(step) / 2000.0).q).collect();
+            let least_m = checker.distances_m(&q).into_iter().fold(f64::INFINITY, f64::min);
+            assert!(least_m > 0.0, "seed {seed}: {least_m} m");
+        }
+        let secs: f64 = motions(&found).iter().map(Trajectory::duration_secs).sum();
+        let stopping_secs = found.stopping_secs(&joints, &cartesian, &dynamics).unwrap();
+        println!(
+            "seed {seed}: {secs:.2} s, {stopping_secs:.2} s with stops at {} waypoints",
+            found.waypoints.len() - 2
+        );
+        if found.ways.len() < found.waypoints.len() - 1 {
+            assert!(secs < stopping_secs - MIN_SAVED_SECS, "seed {seed}: {secs} s, {stopping_secs} s with stops");
+        }
+    }
+    assert!(num_corners >= 5 && num_stops * 4 < num_corners, "{num_stops} stops at {num_corners} waypoints");
+}
+
+#[test]
+fn a_plan_that_stays_where_it_is_has_no_motion() {
+    let model = cell(vec![table()]);
+    let found = Panda::new().plan_to(&model, &start(), &[start()], &PlanOptions::default()).unwrap();
+    assert!(found.ways.is_empty() && motions(&found).is_empty());
+}
+
 #[test]
 fn a_way_leads_over_the_wall_and_touches_nothing() {
     let panda = Panda::new();
@@ -48,7 +96,7 @@ fn a_way_leads_over_the_wall_and_touches_nothing() {
         assert!(pose_error(&panda.forward(&end), &goal).norm() < 1e-8);
         assert!(found.waypoints.len() > 2 && found.cost_secs[1] <= found.cost_secs[0]);
         let mut checker = Checker::new(&model, 0.001);
-        for motion in found.trajectories(&JointLimits::franka(), &CartesianLimits::franka()).unwrap() {
+        for motion in motions(&found) {
             let num_cycles = (motion.duration_secs() / 0.001) as usize;
             let q: Vec<JointVector> = (0..=num_cycles).map(|i| motion.sample(i as f64 * 0.001).0).collect();
             let min_m = checker.distances_m(&q).into_iter().fold(f64::INFINITY, f64::min);

@@ -1,0 +1,95 @@
+//! The quickest way in time along a rounded path: `s(t)` from rest to rest within all limits.
+//!
+//! ```text
+//! path ──► grid of linear constraints on (s̈, ṡ²) ──► backward and forward pass ──► mean over a window ──► stretched until all holds
+//!               ▲                                                                        │
+//!               └──────────────── limits lowered where the mean breaks one ◄─────────────┘
+//! ```
+//!
+//! Without a limit of the jerk the time optimum along a path is known up to its grid (phase_plane.rs). s̈ jumps there. Its mean over a window of time
+//! that moves along (profile.rs) has jerks of at most the jump over the window's length, stays on the path, and takes longer by that length alone:
+//! 2 or 4 ms with Franka's limits. What the mean breaks, in corners above all, is repaired by lowering the limits there and passing again; what
+//! is left by stretching the time of the whole motion.
+
+mod check;
+mod grid;
+mod phase_plane;
+mod profile;
+
+use check::Worst;
+use grid::{Grid, Tightening};
+pub(crate) use profile::Profile;
+
+use crate::dynamics::ArmDynamics;
+use crate::error::KinematicsError;
+use crate::limits::{CartesianLimits, JointLimits};
+use crate::rounded_path::RoundedPath;
+
+/// What a motion along a rounded path keeps to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MotionLimits<'a> {
+    pub(crate) joints: &'a JointLimits,
+    pub(crate) cartesian: &'a CartesianLimits,
+    pub(crate) dynamics: &'a ArmDynamics,
+}
+
+/// `s(t)` on a path.
+#[derive(Debug, Clone)]
+pub(crate) struct Timing {
+    pub(crate) profile: Profile,
+    /// Time of the motion over that of the profile.
+    pub(crate) stretch: f64,
+    /// The time optimum without a limit of the jerk, s.
+    pub(crate) jerkless_secs: f64,
+}
+
+/// Passes with lowered limits; most motions need three or four.
+const MAX_PASSES: usize = 6;
+/// Limits that are broken by less than this share are left to the stretching.
+const TOLERANCE: f64 = 1e-3;
+/// Longest time between places that are checked, s.
+const COARSE_SECS: f64 = 4e-3;
+const FINE_SECS: f64 = 1e-3;
+/// Room between the checked maximum and the limit, for what lies between places that are checked.
+const HEADROOM: f64 = 1.0005;
+
+/// Times a path.
+///
+/// # Errors
+/// [`KinematicsError::Trajectory`] where the arm cannot hold its own weight and load on the path.
+pub(crate) fn time(path: &RoundedPath, limits: &MotionLimits<'_>) -> Result<Timing, KinematicsError> {
+    let grid = Grid::new(path, limits)?;
+    let mut tightening = Tightening::none(&grid);
+    let ramp_secs = limits.joints.acceleration_max.component_div(&limits.joints.jerk_max).max();
+    // From nothing to the full acceleration; twice as long where it jumps from one side to the other.
+    let mut window_secs = ramp_secs;
+    let mut jerkless_secs = None;
+    let mut best: Option<(f64, Profile)> = None;
+    for _ in 0..MAX_PASSES {
+        let phases = match phase_plane::fastest(&grid, &tightening) {
+            // A motion within lowered limits is for a better one, not for any.
+            Err(_) if best.is_some() => break,
+            phases => phases?,
+        };
+        let profile = Profile::new(&phases, window_secs);
+        let optimum_secs = *jerkless_secs.get_or_insert(profile.duration_secs() - window_secs);
+        let worst = Worst::of(path, &profile, limits, COARSE_SECS, &mut tightening, &grid);
+        let secs = profile.duration_secs() * worst.stretch();
+        if best.as_ref().is_none_or(|(best_secs, _)| secs < *best_secs) {
+            best = Some((secs, profile));
+        }
+        if worst.stretch() < 1.0 + TOLERANCE || secs < optimum_secs * (1.0 + TOLERANCE) {
+            break;
+        }
+        if window_secs == ramp_secs && worst.is_jump() {
+            window_secs = 2.0 * ramp_secs;
+            tightening = Tightening::none(&grid);
+        }
+    }
+    let (_, profile) = best.expect("there is at least one pass");
+    let stretch = Worst::of(path, &profile, limits, FINE_SECS, &mut tightening, &grid).stretch() * HEADROOM;
+    Ok(Timing { profile, stretch, jerkless_secs: jerkless_secs.unwrap_or(0.0) })
+}
+
+#[cfg(test)]
+mod tests;

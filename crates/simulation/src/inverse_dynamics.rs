@@ -1,0 +1,109 @@
+//! MuJoCo's own inverse dynamics of the arm: what the torques of `sdg-kinematics` are compared with.
+
+use std::sync::Arc;
+
+use crate::data::Data;
+use crate::error::Result;
+use crate::model::{Asset, Body, Model};
+use crate::panda::{ArmVector, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset};
+
+/// The simulated Panda alone, without time, the fingers at rest in the hand.
+pub struct InverseDynamics {
+    data: Data,
+    ids: PandaIds,
+}
+
+impl InverseDynamics {
+    /// The arm with its fingers at an opening (m).
+    ///
+    /// # Errors
+    /// As [`Model::from_xml`].
+    pub fn new(opening_m: f64) -> Result<Self> {
+        Self::with_load(opening_m, 0.0, [0.0; 3])
+    }
+
+    /// The same with a load as a point: its mass (kg) and its place in the flange's frame (m).
+    ///
+    /// # Errors
+    /// As [`Model::from_xml`].
+    pub fn with_load(opening_m: f64, mass_kg: f64, center_in_flange_m: [f64; 3]) -> Result<Self> {
+        let mut text = String::from_utf8_lossy(&panda_asset().bytes).into_owned();
+        if mass_kg > 0.0 {
+            let [x, y, z] = center_in_flange_m;
+            // The smallest inertia that MuJoCo takes does not show beside the mass.
+            let load = format!(
+                "<body name=\"load\" pos=\"0 0 {}\"><inertial mass=\"{mass_kg}\" pos=\"{x} {y} {z}\" diaginertia=\"1e-12 1e-12 1e-12\"/></body>",
+                sdg_kinematics::FLANGE_OFFSET_M
+            );
+            let hand = "<!-- Flange 0.107 m on";
+            text = text.replacen(hand, &format!("{load}{hand}"), 1);
+        }
+        let xml = format!(
+            "<mujoco><compiler angle=\"radian\"/><option><flag contact=\"disable\" limit=\"disable\"/></option>\
+             <include file=\"{PANDA_FILE}\"/></mujoco>"
+        );
+        let model =
+            Arc::new(Model::from_xml(&xml, &[Asset { name: PANDA_FILE.to_owned(), bytes: text.into_bytes() }])?);
+        let ids = PandaIds::find(&model)?;
+        assert_eq!(model.id::<Body>("load").is_ok(), mass_kg > 0.0, "the load is in the hand");
+        let mut data = Data::new(model)?;
+        ids.set_finger_position_m(&mut data, 0.5 * opening_m);
+        Ok(Self { data, ids })
+    }
+
+    /// The torques (N·m) that give the arm its motion: positions in rad, velocities in rad/s, accelerations in rad/s².
+    ///
+    /// # Errors
+    /// [`crate::SimulationError::Unstable`] for numbers that are not finite.
+    pub fn torques_nm(&mut self, q: &ArmVector, velocity: &ArmVector, acceleration: &ArmVector) -> Result<ArmVector> {
+        self.ids.set_position(&mut self.data, q);
+        let joints = *self.ids.qvel_indices();
+        for joint in 0..NUM_ARM_JOINTS {
+            self.data.qvel_mut()[joints[joint]] = velocity[joint];
+        }
+        self.data.forward()?;
+        let mass = self.data.mass_matrix();
+        let (bias, passive) = (self.data.qfrc_bias(), self.data.qfrc_passive());
+        Ok(ArmVector::from_fn(|row, _| {
+            let inertial: f64 =
+                (0..NUM_ARM_JOINTS).map(|column| mass[(joints[row], joints[column])] * acceleration[column]).sum();
+            inertial + bias[joints[row]] - passive[joints[row]]
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_pcg::Pcg64;
+    use sdg_kinematics::dynamics::ArmDynamics;
+    use sdg_kinematics::{POSITION_MAX_RAD, POSITION_MIN_RAD, TORQUE_MAX_NM};
+
+    use super::*;
+
+    #[test]
+    fn torques_are_mujocos() {
+        // Rounding of seven links: MuJoCo keeps quaternions, and turns of its XML have 16 digits.
+        const TOLERANCE: f64 = 1e-9;
+        let mut rng = Pcg64::seed_from_u64(71);
+        for load in [None, Some((0.7, [0.02, -0.01, 0.15])), Some((3.0, [0.0, 0.0, 0.1034]))] {
+            let opening_m = rng.random_range(0.0..0.08);
+            let mut dynamics = ArmDynamics::panda(opening_m);
+            let (mass_kg, center_m) = load.unwrap_or((0.0, [0.0; 3]));
+            if load.is_some() {
+                dynamics = dynamics.with_load(mass_kg, center_m);
+            }
+            let mut mujoco = InverseDynamics::with_load(opening_m, mass_kg, center_m).unwrap();
+            for _ in 0..200 {
+                let q =
+                    ArmVector::from_fn(|joint, _| rng.random_range(POSITION_MIN_RAD[joint]..POSITION_MAX_RAD[joint]));
+                let qd = ArmVector::from_fn(|_, _| rng.random_range(-2.5..2.5));
+                let qdd = ArmVector::from_fn(|_, _| rng.random_range(-15.0..15.0));
+                let expected = mujoco.torques_nm(&q, &qd, &qdd).unwrap();
+                let error = dynamics.torques_nm(&q, &qd, &qdd) - expected;
+                let relative = error.component_div(&ArmVector::from(TORQUE_MAX_NM)).amax();
+                assert!(relative < TOLERANCE, "{relative}: {error}, {expected}");
+            }
+        }
+    }
+}
