@@ -98,8 +98,7 @@ pub fn grasp_softly<A: CompliantArm>(
     mount: CameraMount,
     config: &GraspConfig,
 ) -> Result<GraspReport> {
-    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    sequence.touch = Some(|robot, touch_down| robot.touch_down(touch_down));
+    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
     let outcome = sequence.grasp()?;
     Ok(sequence.grasp_report(outcome))
 }
@@ -186,6 +185,14 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         }
     }
 
+    /// Comes down softly until something is felt, where the arm yields; `None` where it does not.
+    fn touch_down(&mut self, touch_down: &TouchDown, step: GraspStep) -> Steps<Option<Touched>> {
+        let Some(touch) = self.touch else { return Ok(None) };
+        let touched = fails_at(step, touch(self.robot, touch_down))?;
+        self.touched.push(touched);
+        Ok(Some(touched))
+    }
+
     /// Grasps; how that ended.
     fn grasp(&mut self) -> Result<GraspOutcome> {
         match self.run() {
@@ -234,5 +241,19 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     fn follow(&mut self, motion: Trajectory, step: GraspStep) -> Steps<()> {
         fails_at(step, self.robot.follow(motion))
+    }
+}
+
+impl<'s, 'r, A: CompliantArm> Sequence<'s, 'r, A> {
+    /// As [`Sequence::new`], with an arm that yields.
+    fn yielding(
+        robot: &'s mut Robot<'r, A>,
+        finder: &'s mut dyn PartFinder<A>,
+        observer: &'s mut dyn StepObserver<A>,
+        mount: CameraMount,
+        config: &'s GraspConfig,
+    ) -> Self {
+        let touch: Touch<A> = |robot, touch_down| robot.touch_down(touch_down);
+        Self { touch: Some(touch), ..Self::new(robot, finder, observer, mount, config) }
     }
 }

@@ -118,15 +118,13 @@ pub fn grasp_and_place<A: CompliantArm>(
     placing: &PlacingConfig,
 ) -> Result<PlaceReport> {
     placing.touch_down.validate()?;
-    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    let touch = |robot: &mut Robot<'_, A>, touch_down: &TouchDown| robot.touch_down(touch_down);
-    sequence.touch = Some(touch);
+    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
     let outcome = sequence.grasp()?;
     let grasp = sequence.grasp_report(outcome);
     let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
         GraspOutcome::Failed { step, why } => PlaceOutcome::Failed { step: *step, why: why.clone() },
-        GraspOutcome::Held => match sequence.place(goal, placing, touch, &mut errors) {
+        GraspOutcome::Held => match sequence.place(goal, placing, &mut errors) {
             Ok(()) => PlaceOutcome::Placed,
             Err(Stop::Failed(step, why)) => PlaceOutcome::Failed { step, why },
             Err(Stop::Error(error)) => return Err(error),
@@ -143,17 +141,11 @@ impl PlaceOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    fn place(
-        &mut self,
-        goal: &PlaceGoal,
-        placing: &PlacingConfig,
-        touch: super::Touch<A>,
-        errors: &mut Vec<PlaceError>,
-    ) -> Steps<()> {
+    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing, &slid)?;
-            self.put_down(&aim, placing, touch)?;
+            self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
             let part_from_tcp = self.release(placing)?;
@@ -273,11 +265,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Comes down softly until the place is felt.
-    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig, touch: super::Touch<A>) -> Steps<()> {
+    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
-        let touched = touch(self.robot, &touch_down);
-        let touched = fails_at(GraspStep::PutDown, touched)?;
-        self.touched.push(touched);
+        let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
+            let why = "the arm does not yield, and a place is felt; the part is still held".to_owned();
+            return Err(Stop::Failed(GraspStep::PutDown, why));
+        };
         let hand = self.robot.hand()?;
         self.judge(GraspStep::PutDown, &hand)?;
         if touched.is_contact {

@@ -84,30 +84,31 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn descend(&mut self, path: JointPath) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        match (self.touch, self.config.soft_approach) {
-            (Some(touch), Some(touch_down)) => {
-                let end = *path.end();
-                self.go_down_to(
-                    path.start(),
-                    &above(&self.robot.panda().forward(&end), SOFT_WAY_M),
-                    GraspStep::Approach,
-                )?;
-                let touched = touch(self.robot, &TouchDown { max_way_m: SOFT_WAY_M, ..touch_down });
-                let touched = fails_at(GraspStep::Approach, touched)?;
-                self.touched.push(touched);
-                let early_m = touched.tcp_height_m - self.robot.panda().forward(&end).translation.z;
-                if touched.is_contact && early_m > MAX_EARLY_M {
-                    let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
-                    return Err(Stop::Failed(GraspStep::Approach, why));
-                }
-            }
-            _ => {
+        match self.config.soft_approach.filter(|_| self.touch.is_some()) {
+            Some(touch_down) => self.descend_softly(&path, &touch_down)?,
+            None => {
                 let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
                 let motion = fails_at(GraspStep::Approach, planned)?;
                 self.follow(motion, GraspStep::Approach)?;
             }
         }
         Ok(self.robot.wait(SETTLE_SECS)?)
+    }
+
+    /// As an approach goes, and softly on the last of it.
+    fn descend_softly(&mut self, path: &JointPath, touch_down: &TouchDown) -> Steps<()> {
+        let base_from_grasp = self.robot.panda().forward(path.end());
+        self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
+        let touch_down = TouchDown { max_way_m: SOFT_WAY_M, ..*touch_down };
+        let touched = self.touch_down(&touch_down, GraspStep::Approach)?;
+        let early_m = touched
+            .filter(|touched| touched.is_contact)
+            .map_or(0.0, |touched| touched.tcp_height_m - base_from_grasp.translation.z);
+        if early_m > MAX_EARLY_M {
+            let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
+            return Err(Stop::Failed(GraspStep::Approach, why));
+        }
+        Ok(())
     }
 
     /// Straight to a pose below, as an approach goes.
