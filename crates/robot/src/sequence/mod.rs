@@ -83,7 +83,7 @@ pub fn grasp<A: Arm>(
     config: &GraspConfig,
 ) -> Result<GraspReport> {
     let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    let outcome = sequence.grasp()?;
+    let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
 
@@ -99,7 +99,7 @@ pub fn grasp_softly<A: CompliantArm>(
     config: &GraspConfig,
 ) -> Result<GraspReport> {
     let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
-    let outcome = sequence.grasp()?;
+    let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
 
@@ -193,9 +193,9 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         Ok(Some(touched))
     }
 
-    /// Grasps; how that ended.
-    fn grasp(&mut self) -> Result<GraspOutcome> {
-        match self.run() {
+    /// Grasps what `is_wanted` does not refuse once it was found; how that ended.
+    fn grasp(&mut self, is_wanted: impl FnOnce(&Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
+        match self.run(is_wanted) {
             Ok(()) => Ok(GraspOutcome::Held),
             Err(Stop::Failed(step, why)) => Ok(GraspOutcome::Failed { step, why }),
             Err(Stop::Error(error)) => Err(error),
@@ -213,12 +213,13 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         }
     }
 
-    fn run(&mut self) -> Steps<()> {
+    fn run(&mut self, is_wanted: impl FnOnce(&Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         let first = self.look_around()?;
         let target = match self.mount {
             CameraMount::Hand { .. } => self.look_from_above(&first)?,
             CameraMount::Base => first,
         };
+        is_wanted(self, &target)?;
         self.take(&target)
     }
 

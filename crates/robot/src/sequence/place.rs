@@ -10,8 +10,9 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
-use sdg_kinematics::{Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions};
+use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
 
+use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
 use super::reach::above;
 use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
@@ -21,6 +22,7 @@ use crate::error::Result;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::place::{PlaceError, PlaceGoal};
 use crate::robot::Robot;
+use crate::room::{release_opening_m, same_turns_rad};
 use crate::surroundings::Destination;
 use crate::touch::{TouchDown, Touched};
 
@@ -36,8 +38,6 @@ const RELEASING_SPEED_M_S: f64 = 0.05;
 const RELEASED_SECS: f64 = 0.2;
 /// Steps in which the way up is made shorter where the arm cannot reach so far, m.
 const RETREAT_STEP_M: f64 = 0.05;
-/// Turns that are tried of a part that looks the same in all.
-const NUM_TURNS: u32 = 12;
 
 /// How a held part is put down.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,10 +104,11 @@ pub struct PlaceReport {
     pub errors: Vec<PlaceError>,
 }
 
-/// Grasps the part once and puts it down.
+/// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that let it go among the parts in the
+/// cells around it, whether there are any or not: by [`GraspConfig::part`] before anything moves, else once the part was found.
 ///
 /// # Errors
-/// As [`super::grasp`].
+/// As [`super::grasp`]; [`crate::RobotError::Configuration`] where there is no room by [`GraspConfig::part`].
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -118,8 +119,11 @@ pub fn grasp_and_place<A: CompliantArm>(
     placing: &PlacingConfig,
 ) -> Result<PlaceReport> {
     placing.touch_down.validate()?;
+    if let Some(part) = &config.part {
+        goal.check_room(part, placing.symmetry, placing.release_margin_m)?;
+    }
     let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
-    let outcome = sequence.grasp()?;
+    let outcome = sequence.grasp(|sequence, target| sequence.check_room(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
     let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
@@ -141,6 +145,13 @@ impl PlaceOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
+    /// Refuses a part that has no room in its place by what is known now.
+    fn check_room(&self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
+        let Some(part) = shape_of(target, self.robot.limits().table_height_m, self.config) else { return Ok(()) };
+        goal.check_room(&part, placing.symmetry, placing.release_margin_m)
+            .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))
+    }
+
     fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
@@ -181,7 +192,9 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // Perception takes the part to lie on the table.
-            let mut target = found;
+            // The hand is turned as it let the part go, where its fingers had room.
+            let mut target =
+                GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
             // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
             self.opening_margin_m = placing.release_margin_m;
@@ -192,19 +205,23 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes the part over its place: as far as a soft way down from there.
     fn carry(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, slip: &Isometry3<f64>) -> Steps<Aim> {
         let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        let turns = match placing.symmetry {
-            RotationalSymmetry::Fold(count) => count.clamp(1, 36),
-            RotationalSymmetry::Full => NUM_TURNS,
-            _ => 1,
-        };
-        let aims: Vec<Aim> = (0..turns)
-            .map(|turn| {
-                let turn_rad = std::f64::consts::TAU * f64::from(turn) / f64::from(turns);
+        let opening_m = self.release_opening_m(placing);
+        let mut aims: Vec<Aim> = same_turns_rad(placing.symmetry)
+            .into_iter()
+            .map(|turn_rad| {
                 let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
                 let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
                 Aim { base_from_part, base_from_tcp }
             })
             .collect();
+        if let Some(part) = &held.shape {
+            aims = goal.with_room_for_fingers(part, opening_m, aims, |aim| aim.base_from_tcp);
+        }
+        if aims.is_empty() {
+            let opening_mm = opening_m * 1e3;
+            let why = format!("\"{}\" has no room for fingers that open to {opening_mm:.0} mm", goal.name);
+            return Err(Stop::Failed(GraspStep::Carry, why));
+        }
         let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
         let mut why = String::new();
         for height_m in HEIGHTS_M {
@@ -283,8 +300,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Opens the hand and goes up; where the tcp was in the part's frame by the detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
-        let closed_m = self.closed.map_or(0.0, |hand| hand.opening_m);
-        let opening_m = (closed_m + placing.release_margin_m).min(HAND_OPENING_MAX_M);
+        let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
         self.robot.finish_hand()?;
         let part_from_tcp = self.held.take().map_or_else(Isometry3::identity, |held| held.part_from_tcp);
@@ -299,6 +315,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let motion = fails_at(GraspStep::Release, planned)?;
         self.follow(motion, GraspStep::Release)?;
         Ok(part_from_tcp)
+    }
+
+    /// How far the hand opens to let go what it closed on, m.
+    fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
+        release_opening_m(self.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
     }
 
     fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
@@ -386,6 +407,12 @@ fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2
     apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
 }
 
+/// The pose that was found, without the turns that cannot be seen: as near as it can be to the one that was aimed at.
+fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceError) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
+    Isometry3::from_parts(found.translation, turn * place.rotation)
+}
+
 /// How the part slid in its own frame when the hand closed: where the tcp was in it when it was let go, against where it was by the detection.
 fn slip(
     place: &Isometry3<f64>,
@@ -394,10 +421,7 @@ fn slip(
     part_from_tcp: &Isometry3<f64>,
     error: &PlaceError,
 ) -> Isometry3<f64> {
-    // Turns that cannot be seen are taken out of what was found.
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
-    let base_from_part = Isometry3::from_parts(found.translation, turn * place.rotation);
-    let moved = base_from_part.inverse() * base_from_tcp * part_from_tcp.inverse();
+    let moved = as_aimed(place, found, error).inverse() * base_from_tcp * part_from_tcp.inverse();
     let along = moved.rotation * Vector3::x();
     Isometry3::from_parts(
         Translation3::new(moved.translation.x, moved.translation.y, 0.0),

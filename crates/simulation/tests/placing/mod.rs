@@ -13,7 +13,7 @@ use sdg_robot::{
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{PlacedObject, SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp,
+    AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp, part_shape,
 };
 
 #[path = "../network/mod.rs"]
@@ -33,12 +33,17 @@ pub enum Where {
 
 /// A tray for parts as long as the spring clip, beside where parts lie.
 pub fn tray() -> Place {
+    tray_of([0.10, 0.055])
+}
+
+/// The same with another pitch, m.
+pub fn tray_of(pitch_m: [f64; 2]) -> Place {
     Place {
         name: "tray".to_owned(),
         at_m: [0.32, -0.40],
         yaw_rad: 0.0,
         surface_m: 0.0,
-        kind: PlaceKind::Tray { cells: [4, 5], pitch_m: [0.10, 0.055] },
+        kind: PlaceKind::Tray { cells: [4, 5], pitch_m },
     }
 }
 
@@ -90,7 +95,8 @@ pub fn config(spec: &ObjectSpec) -> GraspConfig {
     let radius = |p: &nalgebra::Point2<f64>| {
         (p.coords - nalgebra::center(&spec.grasp_start, &spec.grasp_end).xy().coords).norm()
     };
-    GraspConfig { load, part_radius_m: spec.footprint.iter().map(radius).fold(0.0, f64::max), ..GraspConfig::default() }
+    let part_radius_m = spec.footprint.iter().map(radius).fold(0.0, f64::max);
+    GraspConfig { load, part_radius_m, part: Some(part_shape(spec).unwrap()), ..GraspConfig::default() }
 }
 
 /// How a part was placed, and where everything is afterwards.
