@@ -1,6 +1,6 @@
 //! Looking: from afar, and from above what was found.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
@@ -47,7 +47,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
-            match self.hover(first, shift_m, GraspStep::Hover) {
+            match self.hover(&[first.base_from_tcp], shift_m, GraspStep::Hover) {
                 Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
                 Err(_) => continue,
                 Ok(()) => looks += 1,
@@ -96,18 +96,21 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// Puts the camera over the grasp or shifted from there, the hand turned as for the grasp or by half a turn more.
-    pub(super) fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
+    /// Puts the camera over a grasp or shifted from there, the hand turned as for one of the grasps, which are at one place, or by half a turn more.
+    pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         let seed = self.robot.commanded()?;
-        let grasp = target.base_from_tcp.translation;
+        let grasp = grasps.first().map_or_else(Vector3::zeros, |grasp| grasp.translation.vector);
         let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
         let height_m = self.robot.limits().table_height_m + self.config.hover_height_m;
-        let poses = [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)].map(|base_from_grasp| {
-            // The picture's up is the hand's x.
-            let up = base_from_grasp.rotation * Vector3::x();
-            let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
-            self.mount.base_from_tcp(&base_from_camera)
-        });
+        let both_ways = grasps.iter().flat_map(|grasp| [*grasp, with_fingers_exchanged(grasp)]);
+        let poses: Vec<Isometry3<f64>> = both_ways
+            .map(|base_from_grasp| {
+                // The picture's up is the hand's x.
+                let up = base_from_grasp.rotation * Vector3::x();
+                let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
+                self.mount.base_from_tcp(&base_from_camera)
+            })
+            .collect();
         let unreachable =
             |why: String| Stop::Failed(step, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"));
         if self.is_surrounded() {

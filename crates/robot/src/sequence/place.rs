@@ -160,7 +160,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
             let part_from_tcp = self.release(placing)?;
-            let found = match (self.look_at(goal, &aim.base_from_part)?, goal.bin_m) {
+            let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part lies anyhow, under others, too.
                 (None, Some(_)) => return Ok(()),
@@ -335,13 +335,24 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Looks where the part lies.
-    fn look_at(&mut self, goal: &PlaceGoal, base_from_part: &Isometry3<f64>) -> Steps<Option<GraspTarget>> {
-        let expected = GraspTarget { base_from_tcp: *base_from_part, jaw_width_m: 0.0, score: 1.0 };
+    fn look_at(
+        &mut self,
+        goal: &PlaceGoal,
+        base_from_part: &Isometry3<f64>,
+        placing: &PlacingConfig,
+    ) -> Steps<Option<GraspTarget>> {
+        let turns_rad = same_turns_rad(placing.symmetry);
+        let num_skipped = turns_rad.len().div_ceil(MAX_LOOK_TURNS);
+        let grasps: Vec<Isometry3<f64>> = turns_rad
+            .into_iter()
+            .step_by(num_skipped)
+            .map(|turn_rad| base_from_part * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad))
+            .collect();
         self.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
             let arrived = match (&self.mount, self.config.look_outs.first()) {
-                (CameraMount::Hand { .. }, _) => self.hover(&expected, shift_m, GraspStep::Check),
+                (CameraMount::Hand { .. }, _) => self.hover(&grasps, shift_m, GraspStep::Check),
                 (CameraMount::Base, Some(look_out)) if look == 0 => {
                     let q = look_out.configuration(self.robot.panda(), &self.mount, table_height_m)?;
                     self.move_freely(&q, GraspStep::Check)?;
@@ -371,6 +382,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
+/// In so many turns of a part that looks the same in all it is looked at, at most: a hand that was turned for its fingers may reach too far to look so.
+const MAX_LOOK_TURNS: usize = 4;
 /// What is farther from its place is another part, m.
 const MAX_SEEN_BESIDE_M: f64 = 0.03;
 
