@@ -32,6 +32,7 @@ mod arm_state;
 mod error;
 mod franka;
 mod impedance;
+mod lying_part;
 mod pace;
 mod part_shape;
 mod perception;
@@ -55,6 +56,7 @@ pub use arm_state::{
 pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};
+pub use lying_part::LyingPart;
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use part_shape::PartShape;
 pub use perception::{GraspStep, GraspTarget, PartFinder, StepObserver};

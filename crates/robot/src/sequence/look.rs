@@ -3,8 +3,10 @@
 use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
+use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
 use crate::arm::Arm;
+use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, GraspTarget};
 use crate::surroundings::Destination;
 
@@ -63,6 +65,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes a picture and asks perception; a target that no hand can take is a failure.
     fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
         let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
+        self.note_others();
         self.picture_time = self.finder.picture_time();
         self.targets.push(target);
         let Some(found) = target else { return Ok(None) };
@@ -79,6 +82,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
             )));
         }
         Ok(Some(found))
+    }
+
+    /// Keeps where other parts lie by the last picture.
+    pub(super) fn note_others(&mut self) {
+        let table_height_m = self.robot.limits().table_height_m;
+        for other in self.finder.others() {
+            if let Some(shape) = shape_of(&other, table_height_m, self.config) {
+                self.lying.put(LyingPart { base_from_part: other.base_from_tcp, shape });
+            }
+        }
     }
 
     /// Refuses to begin a motion that rests on an old picture.

@@ -19,11 +19,12 @@ mod travel;
 
 use std::time::Instant;
 
-use sdg_kinematics::Trajectory;
+use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
+use crate::lying_part::LyingParts;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
@@ -148,6 +149,10 @@ struct Sequence<'s, 'r, A: Arm> {
     /// What was touched on soft ways down.
     touched: Vec<Touched>,
     held: Option<HeldPart>,
+    /// Parts that lie and are not to be touched.
+    lying: LyingParts,
+    /// How far the hand is open, or is to be on the next straight way, m.
+    opening_m: f64,
     /// How far the hand opens beyond the part, both sides together, m.
     opening_margin_m: f64,
 }
@@ -181,6 +186,8 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             touch: None,
             touched: Vec::new(),
             held: None,
+            lying: LyingParts::new(&config.lying),
+            opening_m: HAND_OPENING_MAX_M,
             opening_margin_m: config.opening_margin_m,
         }
     }
@@ -194,7 +201,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
     }
 
     /// Grasps what `is_wanted` does not refuse once it was found; how that ended.
-    fn grasp(&mut self, is_wanted: impl FnOnce(&Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
+    fn grasp(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
         match self.run(is_wanted) {
             Ok(()) => Ok(GraspOutcome::Held),
             Err(Stop::Failed(step, why)) => Ok(GraspOutcome::Failed { step, why }),
@@ -213,7 +220,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         }
     }
 
-    fn run(&mut self, is_wanted: impl FnOnce(&Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
+    fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         let first = self.look_around()?;
         let target = match self.mount {
             CameraMount::Hand { .. } => self.look_from_above(&first)?,
@@ -225,6 +232,7 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     /// From above a part that was found to the part in the air.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
+        self.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;
         self.descend(approach)?;
         self.close(target)?;

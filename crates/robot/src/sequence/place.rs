@@ -19,6 +19,7 @@ use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SU
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ContactSensitivity, HandCommand, Load};
 use crate::error::Result;
+use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::place::{PlaceError, PlaceGoal};
 use crate::robot::Robot;
@@ -123,7 +124,7 @@ pub fn grasp_and_place<A: CompliantArm>(
         goal.check_room(part, placing.symmetry, placing.release_margin_m)?;
     }
     let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
-    let outcome = sequence.grasp(|sequence, target| sequence.check_room(target, goal, placing))?;
+    let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
     let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
@@ -145,11 +146,16 @@ impl PlaceOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Refuses a part that has no room in its place by what is known now.
-    fn check_room(&self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
-        let Some(part) = shape_of(target, self.robot.limits().table_height_m, self.config) else { return Ok(()) };
+    /// Refuses a part that has no room in its place by what is known now, and keeps off what may lie around.
+    fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
+        let table_height_m = self.robot.limits().table_height_m;
+        let Some(part) = shape_of(target, table_height_m, self.config) else { return Ok(()) };
         goal.check_room(&part, placing.symmetry, placing.release_margin_m)
-            .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))
+            .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
+        for base_from_part in goal.neighbours_in_base(goal.surface_m + part.grasp_height_m()) {
+            self.lying.suppose(LyingPart { base_from_part, shape: part.clone() });
+        }
+        Ok(())
     }
 
     fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
@@ -159,7 +165,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
+            let shape = self.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
+            let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
+            lies.into_iter().for_each(|part| self.lying.put(part));
             let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part lies anyhow, under others, too.
@@ -190,6 +199,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
+            self.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // Perception takes the part to lie on the table.
             // The hand is turned as it let the part go, where its fingers had room.
@@ -206,6 +216,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn carry(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, slip: &Isometry3<f64>) -> Steps<Aim> {
         let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
         let opening_m = self.release_opening_m(placing);
+        // Where the hand cannot open it need not come down.
+        self.opening_m = opening_m;
         let mut aims: Vec<Aim> = same_turns_rad(placing.symmetry)
             .into_iter()
             .map(|turn_rad| {
@@ -366,6 +378,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Ok(()) => {}
             }
             let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
+            self.note_others();
             let is_here = |found: &GraspTarget| match goal.bin_m {
                 Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
                 None => {

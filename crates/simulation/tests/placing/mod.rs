@@ -7,8 +7,9 @@ use nalgebra::Isometry3;
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::TCP_OFFSET_M;
 use sdg_robot::{
-    Arm, CameraMount, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, PartFinder, Place,
-    PlaceGoal, PlaceKind, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch, grasp, grasp_and_place, grasp_softly,
+    Arm, CameraMount, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, LyingPart, PartFinder,
+    Place, PlaceGoal, PlaceKind, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch, grasp, grasp_and_place,
+    grasp_softly,
 };
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{PlacedObject, SceneVariation, VariationConfig};
@@ -113,7 +114,13 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     let limits = Workcell::safety_limits();
     let lying: Vec<Isometry3<f64>> =
         cell.config().scene.instances.iter().map(|instance| instance.base_from_object).collect();
-    let (report, cell) = run(cell, at, 0.0, &mut |arm| arm.place(limits.clone(), config, goal, placing));
+    // What lies in the scene is known, too.
+    let known = |instance: &PlacedObject| LyingPart {
+        base_from_part: marked_grasp(&instance.spec, &instance.base_from_object).base_from_tcp,
+        shape: part_shape(&instance.spec).unwrap(),
+    };
+    let config = GraspConfig { lying: cell.config().scene.instances.iter().map(known).collect(), ..config.clone() };
+    let (report, cell) = run(cell, at, 0.0, &mut |arm| arm.place(limits.clone(), &config, goal, placing));
     let moved = |(index, before): (usize, &Isometry3<f64>)| {
         let body = cell.data().model().id(&format!("instance_{index}")).unwrap();
         (cell.data().world_from_body(body).translation.vector - before.translation.vector).norm()
