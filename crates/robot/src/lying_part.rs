@@ -4,10 +4,13 @@ use nalgebra::{Isometry3, Point2, Translation3};
 use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::part_shape::PartShape;
+use crate::room::MIN_FINGER_ROOM_M;
 
-/// Capsules of the finger tips stand out of them by so much along the fingers' motion, m: on straight ways, which lead fingers between parts, these
-/// are thinner by that.
+/// Capsules of the finger tips stand out of them by so much along the fingers' motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
+/// On straight ways, which lead fingers between parts, these are thinner by that, and by what the planner keeps off everything beyond the room that
+/// fingers must have in a tray (3 mm, and 1 mm), m.
+const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
 /// A part that is thinner is taken to be so thick, m.
 const MIN_HALF_M: f64 = 0.0005;
 /// An outline that fills at least this share of the circle around it is a disc: a square fills 0.64 of its own.
@@ -37,7 +40,7 @@ impl LyingPart {
 
     /// The same for fingers that go straight down or up beside it.
     pub(crate) fn obstacle_beside_fingers(&self, number: usize) -> Obstacle {
-        self.solid(number, CAPSULES_STAND_OUT_M)
+        self.solid(number, THINNER_M)
     }
 
     fn solid(&self, number: usize, thinner_m: f64) -> Obstacle {
@@ -122,7 +125,7 @@ impl LyingParts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{UnitQuaternion, Vector3};
+    use nalgebra::{Point3, UnitQuaternion, Vector3};
 
     fn at(x: f64, y: f64) -> Isometry3<f64> {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -159,7 +162,7 @@ mod tests {
         let part = LyingPart { base_from_part: at(0.5, 0.1), shape };
         let Shape::Cylinder { radius_m, .. } = part.obstacle(0).shape else { panic!("{:?}", part.obstacle(0)) };
         let Shape::Cylinder { radius_m: thinner_m, .. } = part.obstacle_beside_fingers(0).shape else { panic!() };
-        assert!((radius_m - 0.026).abs() < 1e-4 && (radius_m - thinner_m - CAPSULES_STAND_OUT_M).abs() < 1e-12);
+        assert!((radius_m - 0.026).abs() < 1e-4 && (radius_m - thinner_m - THINNER_M).abs() < 1e-12);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //!        ┌──────┐  part in the next cell along y
 //!        └──────┘
-//!   ROOM_M  ┌─┐    finger, open to let go, with the part's own place between it and the other
+//!    room   ┌─┐    finger, open to let go, with the part's own place between it and the other
 //!        ┌──┴─┴─┐
 //!        │ part │  turned as the symmetry of the part allows, the fingers find room elsewhere
 //!        └──┬─┬─┘
@@ -22,8 +22,12 @@ use crate::error::{Result, RobotError};
 use crate::part_shape::PartShape;
 use crate::place::PlaceGoal;
 
-/// What is to be left between a part in a cell and what comes beside it, m: each of two parts may lie 2 mm beside its cell before it is taken again.
-const ROOM_M: f64 = 0.004;
+/// What is to be left between fingers and a part in a neighbouring cell, m: it may lie 2 mm beside its cell before it is taken again.
+const FINGER_ROOM_M: f64 = 0.002;
+/// What is to be left between two parts, m: both may lie so.
+const PART_ROOM_M: f64 = 2.0 * FINGER_ROOM_M;
+/// Least room for fingers that aim with how a part slides in them, m: they are then not in the middle of their cell.
+pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
 /// Turns that are tried of a part that looks the same in all: every 15°, so that both axes of a tray and its diagonals are among them.
 const NUM_TURNS: u32 = 24;
 /// Rounding of lengths, m.
@@ -76,17 +80,17 @@ impl PlaceGoal {
         let base_from_part = self.base_from_part(0.0, 0.0);
         let own = part.outline_in_base(&base_from_part);
         let near = self.neighbours(part).map(|neighbour| gap_m(&own, &neighbour)).fold(f64::INFINITY, f64::min);
-        if near < ROOM_M - ROUNDING_M {
+        if near < PART_ROOM_M - ROUNDING_M {
             let what = match near < 0.0 {
                 true => format!("parts in neighbouring cells would overlap by {:.1} mm", -near * 1e3),
                 false => format!("parts in neighbouring cells are {:.1} mm apart", near * 1e3),
             };
-            return Some(format!("{what}, at least {:.0} mm are asked for", ROOM_M * 1e3));
+            return Some(format!("{what}, at least {:.0} mm are asked for", PART_ROOM_M * 1e3));
         }
         let near =
             turns_rad.iter().map(|&turn_rad| self.finger_gap_m(part, &self.base_from_part(0.0, turn_rad), opening_m));
         let near = near.fold(f64::NEG_INFINITY, f64::max);
-        if near >= ROOM_M - ROUNDING_M {
+        if near >= FINGER_ROOM_M - ROUNDING_M {
             return None;
         }
         let turned = if turns_rad.len() > 1 { ", however the hand is turned," } else { "" };
@@ -100,12 +104,11 @@ impl PlaceGoal {
             part.jaw_width_m() * 1e3,
             thickness_m(part) * 1e3,
             opening_m * 1e3,
-            ROOM_M * 1e3
+            FINGER_ROOM_M * 1e3
         ))
     }
 
-    /// Of poses of the hand those at which its fingers, open so far (m), have room among the parts around. Fingers that aim with how a part slides are
-    /// not in the middle of their cell: half of the room will do where none has all of it.
+    /// Of poses of the hand those at which its fingers, open so far (m), have the most room among the parts around; none where that is too little.
     pub(crate) fn with_room_for_fingers<T>(
         &self,
         part: &PartShape,
@@ -116,7 +119,8 @@ impl PlaceGoal {
         let gaps_m: Vec<f64> =
             poses.iter().map(|pose| self.finger_gap_m(part, &base_from_tcp(pose), opening_m)).collect();
         let largest_m = gaps_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let least_m = if largest_m >= ROOM_M - ROUNDING_M { ROOM_M } else { 0.5 * ROOM_M };
+        let rooms_m = [PART_ROOM_M, FINGER_ROOM_M, MIN_FINGER_ROOM_M];
+        let least_m = rooms_m.into_iter().find(|room_m| largest_m >= room_m - ROUNDING_M).unwrap_or(f64::INFINITY);
         let has_room = |gap_m: f64| gap_m >= least_m - ROUNDING_M;
         poses.into_iter().zip(gaps_m).filter_map(|(pose, gap_m)| has_room(gap_m).then_some(pose)).collect()
     }

@@ -63,7 +63,7 @@ fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
                 let peak_n = report.touched.iter().map(|touched| touched.peak_n).fold(0.0, f64::max);
                 (format!("{:?}", report.outcome), peak_n, report.errors.len())
             }
-            Err(error) => (error.to_string(), f64::NAN, 0),
+            Err(error) => return Err(format!("cell {number}: {error}").into()),
         };
         let is_placed = placed.report.as_ref().is_ok_and(|report| report.outcome.is_placed());
         let is_right =
