@@ -15,7 +15,7 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{
     AttemptConfig, AttemptErrors, AttemptReport, CameraView, Perception, RecordConfig, SimulationError, Workcell,
-    WorkcellConfig,
+    WorkcellConfig, part_shape,
 };
 use serde::{Deserialize, Serialize};
 
@@ -146,6 +146,20 @@ impl Rehearsal<'_> {
         Ok(rehearsed)
     }
 
+    /// Refuses a place whose cells leave no room for the part or for the fingers that let it go.
+    ///
+    /// # Errors
+    /// The first of such cells, with a pitch that would do.
+    pub fn check_room(&self) -> Result<()> {
+        let part = part_shape(self.object)?;
+        for number in 1..=self.attempts as usize {
+            if let Some((goal, placing)) = self.placing(number)? {
+                goal.check_room(&part, placing.symmetry, placing.release_margin_m)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Runs one attempt: the same number of the same rehearsal is always the same scene and start.
     ///
     /// A grasp that leads nowhere (wider than the hand, off the table) is a failed attempt.
@@ -162,7 +176,8 @@ impl Rehearsal<'_> {
         let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
         let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
         let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
-        let grasp = GraspConfig { obstacles: obstacles.clone(), ..GraspConfig::default() };
+        let part = Some(part_shape(self.object)?);
+        let grasp = GraspConfig { obstacles: obstacles.clone(), part, ..GraspConfig::default() };
         let mut workcell = Workcell::new(&WorkcellConfig {
             errors,
             wrist_camera: self.camera,

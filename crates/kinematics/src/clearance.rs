@@ -37,15 +37,22 @@ const HAND_HALF_DEPTH_M: f64 = 0.033;
 /// Length of the hand's body from the flange, m.
 const HAND_LENGTH_M: f64 = 0.066;
 /// Half the width of a finger across its motion, m.
-const FINGER_HALF_WIDTH_M: f64 = 0.011;
-/// Thickness of a finger along its motion, m.
+pub const FINGER_HALF_WIDTH_M: f64 = 0.011;
+/// Thickness of a finger along its motion, m: of its tip, and of its root, which begins so far above the tcp.
 const FINGER_THICKNESS_M: f64 = 0.015;
+const FINGER_ROOT_THICKNESS_M: f64 = 0.026;
+const FINGER_ROOT_ABOVE_TCP_M: f64 = 0.015;
 /// Radius of a ball around link 6's and link 7's origins that holds the wrist, m.
 const WRIST_RADIUS_M: f64 = 0.075;
 /// Radius of a ball around link 4's origin that holds the elbow, m.
 const ELBOW_RADIUS_M: f64 = 0.09;
 /// Time between two looks, s: at most 5 mm of travel at 2 m/s.
 const LOOK_SECS: f64 = 0.0025;
+
+/// How thick a finger is along its motion, m, up to a height above the tcp, m.
+pub fn finger_thickness_m(above_tcp_m: f64) -> f64 {
+    if above_tcp_m <= FINGER_ROOT_ABOVE_TCP_M { FINGER_THICKNESS_M } else { FINGER_ROOT_THICKNESS_M }
+}
 
 impl Panda {
     /// The lowest point of hand, wrist and elbow above a level table at `table_height_m` in the base frame.

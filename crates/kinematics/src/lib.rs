@@ -47,7 +47,7 @@ mod timing;
 mod trajectory;
 
 pub use approach::{Approach, GraspSymmetry, with_fingers_exchanged};
-pub use clearance::{ArmPart, Clearance};
+pub use clearance::{ArmPart, Clearance, FINGER_HALF_WIDTH_M, finger_thickness_m};
 pub use error::KinematicsError;
 pub use ik::{IkOptions, IkSolution};
 pub use joints::{JointVector, LimitViolation, NUM_JOINTS, READY_RAD, ready_pose};

@@ -36,6 +36,11 @@ pub trait PartFinder<A: Arm> {
         self.find(arm)
     }
 
+    /// What else the picture of the last call shows for sure: parts of the same kind that lie beside the one that was found.
+    fn others(&self) -> Vec<GraspTarget> {
+        Vec::new()
+    }
+
     /// When the picture of the last call was taken; `None` where time does not pass by a clock.
     fn picture_time(&self) -> Option<Instant> {
         None

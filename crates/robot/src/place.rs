@@ -51,6 +51,17 @@ pub struct PlaceGoal {
     pub surface_m: f64,
     /// Inside of a bin along the goal's x and y, m: there the part may lie anyhow. A pose is to be met where `None`.
     pub bin_m: Option<[f64; 2]>,
+    /// The cells around it, of a tray.
+    pub tray: Option<TrayCell>,
+}
+
+/// A cell among others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrayCell {
+    /// From one cell to the next along the tray's x and y, m.
+    pub pitch_m: [f64; 2],
+    /// The cells around it, up to eight: steps along the tray's x and y.
+    pub neighbours: Vec<[i32; 2]>,
 }
 
 /// How far a part lies beside where it was to lie.
@@ -91,17 +102,20 @@ impl Place {
                 found: cell.to_string(),
             });
         }
-        let (name, offset_m, bin_m) = match self.kind {
-            PlaceKind::Pose => (self.name.clone(), [0.0; 2], None),
-            PlaceKind::Bin { size_m } => (self.name.clone(), [0.0; 2], Some(size_m)),
-            PlaceKind::Tray { cells: [columns, _], pitch_m: [along, across] } => {
-                let (column, row) = ((cell - 1) % columns, (cell - 1) / columns);
-                let offset_m = [f64::from(column) * along, f64::from(row) * across];
-                (format!("{}, cell {cell}", self.name), offset_m, None)
+        let Self { name, yaw_rad, surface_m, .. } = self.clone();
+        let at_m = self.at([0.0; 2]).into();
+        let goal = PlaceGoal { name, at_m, yaw_rad, surface_m, bin_m: None, tray: None };
+        Ok(match self.kind {
+            PlaceKind::Pose => goal,
+            PlaceKind::Bin { size_m } => PlaceGoal { bin_m: Some(size_m), ..goal },
+            PlaceKind::Tray { cells, pitch_m } => {
+                let at = [(cell - 1) % cells[0], (cell - 1) / cells[0]];
+                let at_m = self.at([0, 1].map(|axis| f64::from(at[axis]) * pitch_m[axis])).into();
+                let name = format!("{}, cell {cell}", self.name);
+                let tray = Some(TrayCell { pitch_m, neighbours: neighbours(at, cells) });
+                PlaceGoal { name, at_m, tray, ..goal }
             }
-        };
-        let at_m = self.at(offset_m);
-        Ok(PlaceGoal { name, at_m: at_m.into(), yaw_rad: self.yaw_rad, surface_m: self.surface_m, bin_m })
+        })
     }
 
     /// The corners of all that it covers of the table, counter-clockwise, base frame, m: of a pose its point alone.
@@ -150,6 +164,27 @@ impl PlaceGoal {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad + turn_rad);
         Isometry3::from_parts(Translation3::new(self.at_m[0], self.at_m[1], height_m), turn * down)
     }
+
+    /// As [`PlaceGoal::base_from_part`], in the cells around it.
+    pub(crate) fn neighbours_in_base(&self, height_m: f64) -> impl Iterator<Item = Isometry3<f64>> {
+        let base_from_part = self.base_from_part(height_m, 0.0);
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.yaw_rad);
+        self.tray.iter().flat_map(move |TrayCell { pitch_m, neighbours }| {
+            neighbours.iter().map(move |steps| {
+                let [x, y] = [0, 1].map(|axis| f64::from(steps[axis]) * pitch_m[axis]);
+                Translation3::from(turn * Vector3::new(x, y, 0.0)) * base_from_part
+            })
+        })
+    }
+}
+
+/// Steps from a cell to those around it that there are.
+fn neighbours(at: [u32; 2], cells: [u32; 2]) -> Vec<[i32; 2]> {
+    let is_there = |axis: usize, step: i32| at[axis].checked_add_signed(step).is_some_and(|to| to < cells[axis]);
+    (-1..=1)
+        .flat_map(|y| (-1..=1).map(move |x| [x, y]))
+        .filter(|steps| *steps != [0, 0] && is_there(0, steps[0]) && is_there(1, steps[1]))
+        .collect()
 }
 
 #[cfg(test)]
@@ -174,6 +209,19 @@ mod tests {
         for cell in [0, 7] {
             let error = tray().goal(cell).unwrap_err().to_string();
             assert_eq!(error, format!("cell of \"tray\": expected 1 to 6, found {cell}"));
+        }
+    }
+
+    #[test]
+    fn a_cell_knows_those_around_it() {
+        let steps = |cell| tray().goal(cell).unwrap().tray.unwrap().neighbours;
+        assert_eq!(steps(1), [[1, 0], [0, 1], [1, 1]]);
+        assert_eq!(steps(5), [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0]]);
+        let beside: Vec<_> =
+            tray().goal(5).unwrap().neighbours_in_base(0.0).map(|pose| pose.translation.vector.xy()).collect();
+        for (cell, found) in [1, 2, 3, 4, 6].into_iter().zip(beside) {
+            let expected = Point2::from(tray().goal(cell).unwrap().at_m);
+            assert!((found - expected.coords).norm() < 1e-12, "{cell}: {found}");
         }
     }
 

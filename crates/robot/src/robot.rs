@@ -1,7 +1,5 @@
 //! An arm with its limits: every motion is planned and checked here.
 
-use std::borrow::Cow;
-
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::{
     CartesianLimits, HAND_OPENING_MAX_M, JointLimits, JointPath, JointVector, LineOptions, NUM_JOINTS, Panda,
@@ -11,7 +9,7 @@ use sdg_kinematics::{
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
-use crate::safety::{SafetyLimits, Violation};
+use crate::safety::{FeltBelow, LimitsFrom, SafetyLimits, Violation};
 use crate::touch::{TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 
@@ -20,8 +18,6 @@ const MAX_START_DISTANCE_RAD: f64 = 1e-3;
 /// How often a motion is slowed down so that joints and tcp keep to their limits, and to which share of its speed each time.
 const MAX_SLOWDOWNS: usize = 8;
 const SLOWDOWN: f64 = 0.8;
-/// A hand that goes up from what it touched may be so much lower for the first instants, m: a straight way in joint space is bent.
-const LEAVING_M: f64 = 0.5e-3;
 
 /// An arm, the limits of its motions, and whether it may move at all.
 ///
@@ -36,14 +32,14 @@ pub struct Robot<'a, A: Arm> {
     latched: Option<String>,
     /// What the hand was told to carry.
     load: Load,
-    /// How far below the table's told height something may have been touched, m.
-    below_table_m: f64,
+    /// Where the hand last came down by contact, until it has gone up from there.
+    felt_below: Option<FeltBelow>,
 }
 
 impl<'a, A: Arm> Robot<'a, A> {
     /// Puts an arm behind limits; `watch` sees every state and may stop it.
     pub fn new(arm: &'a mut A, limits: SafetyLimits, watch: Watch) -> Self {
-        Self { arm, panda: Panda::new(), limits, watch, latched: None, load: Load::NONE, below_table_m: 0.0 }
+        Self { arm, panda: Panda::new(), limits, watch, latched: None, load: Load::NONE, felt_below: None }
     }
 
     /// The arm, to take pictures with it and to read what only it has. It is not for moving it.
@@ -139,26 +135,9 @@ impl<'a, A: Arm> Robot<'a, A> {
         plan(share)
     }
 
-    /// The limits of a motion from a configuration. Where the hand came down on something lower than the table is told to be, it may go
-    /// up from there, and not lower.
-    pub(crate) fn limits_from(&self, start: &JointVector) -> Cow<'_, SafetyLimits> {
-        let SafetyLimits { table_height_m, min_table_clearance_m, fingertip_beyond_tcp_m, .. } = self.limits;
-        let here_m = self.panda.clearance(start, table_height_m).lowest_m - fingertip_beyond_tcp_m;
-        let lower_m = min_table_clearance_m - here_m;
-        if lower_m <= 0.0 || lower_m > self.below_table_m {
-            return Cow::Borrowed(&self.limits);
-        }
-        Cow::Owned(self.lowered(lower_m + LEAVING_M))
-    }
-
-    /// The limits with table and workspace so much lower.
-    fn lowered(&self, lower_m: f64) -> SafetyLimits {
-        let mut limits = self.limits.clone();
-        limits.table_height_m -= lower_m;
-        if let Some(workspace) = &mut limits.workspace {
-            workspace.min_m.z -= lower_m;
-        }
-        limits
+    /// The limits of a motion from a configuration: a hand that came down by contact, lower than the limits allow, may go straight up.
+    pub(crate) fn limits_from(&self, start: &JointVector) -> LimitsFrom<'_> {
+        self.limits.from_start(&self.panda, start, self.felt_below.as_ref())
     }
 
     /// Checks a motion and follows it to its end.
@@ -180,6 +159,10 @@ impl<'a, A: Arm> Robot<'a, A> {
             Ok(MotionEnd::Blocked(by)) => Err(RobotError::Blocked(by)),
             Err(error) => Err(error),
         };
+        if ended.is_ok() {
+            // It has left what it felt: the limits count again.
+            self.felt_below = None;
+        }
         self.note(ended)
     }
 
@@ -294,16 +277,20 @@ impl<A: CompliantArm> Robot<'_, A> {
     pub fn touch_down(&mut self, touch_down: &TouchDown) -> Result<Touched> {
         touch_down.validate()?;
         let start = self.ready()?.q_commanded;
-        let mut lowest = self.panda.forward(&start);
+        let base_from_tcp = self.panda.forward(&start);
+        let mut lowest = base_from_tcp;
         lowest.translation.z -= touch_down.max_way_m;
         let path = self.panda.straight_path(&start, &lowest, &LineOptions::default())?;
         let [velocity, acceleration, jerk] = TOUCH_SHARES;
         let slow = CartesianLimits::franka().scaled(velocity, acceleration, jerk)?;
         let way = Trajectory::along_path(path, &self.limits.joints, &slow)?;
-        self.lowered(touch_down.below_table_m).check(way)?;
+        let below_m = touch_down.below_table_m;
+        self.limits.lowered(below_m, below_m).check(way)?;
         self.watch.begin();
-        self.below_table_m = touch_down.below_table_m;
         let touched = self.arm.touch_down(touch_down, &mut self.watch);
+        // After an error it stands anywhere on the way that was checked.
+        let lowest_m = touched.as_ref().map_or(lowest.translation.z, |touched| touched.tcp_height_m);
+        self.felt_below = Some(FeltBelow::new(&base_from_tcp.translation.vector, lowest_m, below_m));
         self.note(touched)
     }
 }

@@ -7,6 +7,7 @@ use sdg_kinematics::{HAND_OPENING_MAX_M, JointLimits, JointPath, JointVector, NU
 
 use crate::arm::Arm;
 use crate::error::{Result, RobotError};
+use crate::lying_part::LyingPart;
 use crate::robot::Robot;
 
 /// The table's name among the obstacles.
@@ -48,13 +49,17 @@ pub enum Destination<'a> {
     Approached(&'a [Isometry3<f64>], f64),
 }
 
-/// What stands around the arm, and what it holds.
-#[derive(Debug, Clone, Copy)]
+/// What stands around the arm, and what it holds; by default nothing.
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Surroundings<'a> {
     /// What stands in the cell besides the table.
     pub obstacles: &'a [Obstacle],
+    /// Parts that lie: fingers and what they hold keep off them, and on straight ways fingers may come between them.
+    pub lying: &'a [LyingPart],
     /// The part in the hand, in the tcp's frame; empty without one.
     pub held: &'a [Capsule],
+    /// How far the hand is open on straight ways, m; elsewhere it may be open as far as it goes.
+    pub opening_m: f64,
     /// Height over the table that is kept on the way, where start and destination are as high, m.
     pub table_clearance_m: f64,
 }
@@ -72,17 +77,26 @@ pub struct Way {
 
 impl Surroundings<'_> {
     fn model(&self, table_height_m: f64) -> Result<CollisionModel> {
+        let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle(number));
+        self.model_with(table_height_m, lying.collect(), HAND_OPENING_MAX_M)
+    }
+
+    fn model_with(&self, table_height_m: f64, lying: Vec<Obstacle>, opening_m: f64) -> Result<CollisionModel> {
         let device = |error: CollisionError| RobotError::Device(Box::new(error));
-        let mut model = collision_model(table_height_m, self.obstacles, HAND_OPENING_MAX_M).map_err(device)?;
+        let obstacles = [self.obstacles, &lying].concat();
+        let mut model = collision_model(table_height_m, &obstacles, opening_m).map_err(device)?;
         if !self.held.is_empty() {
             model.hold(self.held).map_err(device)?;
         }
         Ok(model)
     }
 
-    /// The same where the hand may touch the table, and the held part whatever it is lifted from or put on.
+    /// The same where the hand may touch the table, and the held part whatever it is lifted from, put on or comes beside: it is not known as well as
+    /// the fingers are, and whether it has room in a tray is judged before.
     pub(crate) fn contact_model(&self, table_height_m: f64) -> Result<CollisionModel> {
-        let mut model = self.model(table_height_m)?;
+        let lying = self.lying.iter().enumerate().map(|(number, part)| part.obstacle_beside_fingers(number));
+        let opening_m = self.opening_m.clamp(0.0, HAND_OPENING_MAX_M);
+        let mut model = self.model_with(table_height_m, lying.collect(), opening_m)?;
         let names: Vec<String> = model.obstacles().iter().map(|obstacle| obstacle.name.clone()).collect();
         let device = |error: CollisionError| RobotError::Device(Box::new(error));
         model.allow(Body::HAND, TABLE).map_err(device)?;

@@ -1,7 +1,8 @@
 //! Parts placed in a tray, and grasps from a table that is higher than told; true poses in place of pictures, 1 Nm of friction a joint.
 //!
 //! ```text
-//! placing tray process|lockstep [PART [CELLS]]            spring_clip 20: a part into each cell; those that lie stay in the scene
+//! placing tray process|lockstep [PART [CELLS [X Y]]]      spring_clip 20 100 55: a part into each cell, X by Y mm from one to the next;
+//!                                                         those that lie stay in the scene
 //! placing heights process|lockstep [ATTEMPTS [SEED [PART]…]]   10 101: each part softly and in joint positions, the table 5 mm higher
 //! ```
 //! Ends with an error where a part is dropped, lies more than 3 mm or 3° beside its cell, or moves another; where fewer than 8 of 10 soft
@@ -16,7 +17,7 @@ use sdg_simulation::objects::ObjectSpec;
 #[path = "../tests/placing/mod.rs"]
 mod placing;
 
-use placing::{Where, beside, cell, config, grasp_on_other_table, place, tray};
+use placing::{Where, beside, cell, config, grasp_on_other_table, place, tray, tray_of};
 
 /// How much higher the table is than told.
 const HIGHER_M: f64 = 0.005;
@@ -44,12 +45,16 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
     let spec = ObjectSpec::by_name(rest.first().unwrap_or(&"spring_clip"))?;
-    let num_cells: u32 = rest.get(1).map_or(Ok(tray().num_cells()), |text| text.parse())?;
+    let tray = match rest.get(2..4) {
+        Some(&[x_mm, y_mm]) => tray_of([1e-3 * x_mm.parse::<f64>()?, 1e-3 * y_mm.parse::<f64>()?]),
+        _ => tray(),
+    };
+    let num_cells: u32 = rest.get(1).map_or(Ok(tray.num_cells()), |text| text.parse())?;
     let placing = PlacingConfig { symmetry: spec.symmetry, ..PlacingConfig::default() };
     let mut lying: Vec<Isometry3<f64>> = Vec::new();
     let (mut num_right, mut worst, mut num_again) = (0, (0.0_f64, 0.0_f64), 0);
     for number in 1..=num_cells {
-        let goal = tray().goal(number)?;
+        let goal = tray.goal(number)?;
         let placed = place(cell(&spec, 100 + u64::from(number), &lying), at, &goal, &config(&spec), &placing);
         let (distance_m, angle_rad) = beside(&spec, &placed.base_from_object, &goal);
         let (distance_mm, angle_deg, moved_mm) = (distance_m * 1e3, angle_rad.to_degrees(), placed.moved_m * 1e3);
@@ -58,7 +63,7 @@ fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
                 let peak_n = report.touched.iter().map(|touched| touched.peak_n).fold(0.0, f64::max);
                 (format!("{:?}", report.outcome), peak_n, report.errors.len())
             }
-            Err(error) => (error.to_string(), f64::NAN, 0),
+            Err(error) => return Err(format!("cell {number}: {error}").into()),
         };
         let is_placed = placed.report.as_ref().is_ok_and(|report| report.outcome.is_placed());
         let is_right =

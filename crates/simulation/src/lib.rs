@@ -72,7 +72,7 @@ pub use gripper::{Gripper, MAX_FINGER_FORCE_N};
 pub use inverse_dynamics::InverseDynamics;
 pub use model::{Actuator, Asset, Body, Camera, Geom, Id, Joint, Kind, Model, Site};
 pub use obstacles::{obstacles_mjcf, random_obstacles};
-pub use oracle::marked_grasp;
+pub use oracle::{marked_grasp, part_shape};
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };

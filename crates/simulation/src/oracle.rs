@@ -1,7 +1,7 @@
 //! Perception that gives the part's true pose, to measure the robot without a model.
 
-use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use sdg_robot::GraspTarget;
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use sdg_robot::{GraspTarget, PartShape};
 
 use crate::attempt::{AttemptConfig, AttemptReport};
 use crate::error::Result;
@@ -19,6 +19,18 @@ pub fn marked_grasp(spec: &ObjectSpec, base_from_object: &Isometry3<f64>) -> Gra
         jaw_width_m: spec.jaw_width_m,
         score: 1.0,
     }
+}
+
+/// The part's shape, as the sequence takes it.
+///
+/// # Errors
+/// Numbers that make no shape.
+pub fn part_shape(spec: &ObjectSpec) -> Result<PartShape> {
+    let part_from_object = marked_grasp(spec, &Isometry3::identity()).base_from_tcp.inverse();
+    let outline = spec.footprint.iter().map(|p| (part_from_object * Point3::new(p.x, p.y, 0.0)).xy());
+    // Marks are in the middle of a round bar and on top of others.
+    let top_m = spec.mark_height_m.max(2.0 * spec.grasp_height_m);
+    Ok(PartShape::new(outline, spec.jaw_width_m, top_m, spec.grasp_height_m)?)
 }
 
 impl Workcell {

@@ -138,10 +138,15 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
         soft_approach: args.soft.then(TouchDown::default),
+        part: robots::part_shape(&model),
         ..workcell.grasp_config()
     };
     let symmetry = model.facts().symmetry;
     let place = goal.map(|goal| (goal, PlacingConfig { symmetry, ..PlacingConfig::default() }));
+    if let (Some((goal, placing)), Some(part)) = (&place, &config.part) {
+        let room = goal.check_room(part, symmetry, placing.release_margin_m);
+        room.map_err(|error| Usage(format!("--place: {error}")))?;
+    }
     Ok(Prepared { workcell, model, camera, config, place })
 }
 

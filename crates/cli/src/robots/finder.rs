@@ -166,13 +166,25 @@ pub(crate) struct ModelFinder<P> {
     pub(crate) last: Option<RgbImage>,
     /// The best part of the last picture.
     pub(crate) seen: Option<SeenOutline>,
+    /// What else it shows for sure.
+    others: Vec<GraspTarget>,
     /// Parts that lie there are not to be taken: where parts are put down.
     pub(crate) places: Vec<Place>,
 }
 
 impl<P> ModelFinder<P> {
     pub(crate) fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
-        Self { pictures, camera, model, detector: None, taken: None, last: None, seen: None, places: Vec::new() }
+        Self {
+            pictures,
+            camera,
+            model,
+            detector: None,
+            taken: None,
+            last: None,
+            seen: None,
+            others: Vec::new(),
+            places: Vec::new(),
+        }
     }
 }
 
@@ -183,15 +195,24 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
             let p = target.base_from_tcp.translation;
             self.places.iter().any(|place| place.covers([p.x, p.y]))
         };
-        Ok(found.into_iter().find(|target| !is_placed(target)))
+        let best = found.iter().copied().find(|target| !is_placed(target));
+        self.keep_others(found, best.as_ref());
+        Ok(best)
     }
 
     fn find_nearest(&mut self, arm: &mut A, base_from_tcp: &Isometry3<f64>) -> sdg_robot::Result<Option<GraspTarget>> {
         let apart_m = |target: &GraspTarget| {
             (target.base_from_tcp.translation.vector - base_from_tcp.translation.vector).xy().norm()
         };
-        let sure = self.find_all(arm)?.into_iter().filter(|target| target.score >= sdg_robot::SURE);
-        Ok(sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b))))
+        let found = self.find_all(arm)?;
+        let sure = found.iter().copied().filter(|target| target.score >= sdg_robot::SURE);
+        let nearest = sure.min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)));
+        self.keep_others(found, nearest.as_ref());
+        Ok(nearest)
+    }
+
+    fn others(&self) -> Vec<GraspTarget> {
+        self.others.clone()
     }
 
     fn picture_time(&self) -> Option<Instant> {
@@ -200,6 +221,11 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
 }
 
 impl<P> ModelFinder<P> {
+    fn keep_others(&mut self, found: Vec<GraspTarget>, chosen: Option<&GraspTarget>) {
+        self.others = found;
+        self.others.retain(|other| other.score >= sdg_robot::SURE && chosen.is_none_or(|chosen| other != chosen));
+    }
+
     /// All that is found in a picture, the best first.
     fn find_all<A: Arm>(&mut self, arm: &mut A) -> sdg_robot::Result<Vec<GraspTarget>>
     where

@@ -3,6 +3,7 @@
 mod confirm;
 mod dry_run;
 mod finder;
+mod model_shape;
 #[cfg(feature = "simulation")]
 mod motion_drawing;
 mod sequence_run;
@@ -26,6 +27,7 @@ pub(crate) use finder::SimulatedPictures;
 #[cfg(feature = "ros2")]
 pub(crate) use finder::TakenPicture;
 pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
+pub(crate) use model_shape::part_shape;
 #[cfg(feature = "simulation")]
 pub(crate) use motion_drawing::MotionDrawing;
 pub(crate) use sequence_run::{Ended, run_sequence};

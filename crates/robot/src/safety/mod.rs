@@ -9,9 +9,11 @@
 //! stands in the cell, or of a fault below them. An emergency stop remains required.
 
 mod capsules;
+mod leaving;
 mod limits;
 mod violation;
 
 pub use capsules::{LinkCapsules, SelfCollision};
+pub(crate) use leaving::{FeltBelow, LimitsFrom};
 pub use limits::{CheckedMotion, SafetyLimits, WorkspaceBox};
 pub use violation::Violation;

@@ -73,6 +73,12 @@ pub enum Violation {
         found_mm: f64,
         min_mm: f64,
     },
+    /// A hand that came down by contact, lower than the limits allow, does not go straight up.
+    #[error(
+        "at {time_secs:.3} s the hand, lower than the limits allow after it came down by contact, is {beside_mm:.1} mm beside the way \
+         straight up and {down_mm:.1} mm lower than before"
+    )]
+    Leaving { time_secs: f64, beside_mm: f64, down_mm: f64 },
     /// The arm comes too near to itself.
     #[error("at {time_secs:.3} s {collision}")]
     SelfCollision { time_secs: f64, collision: SelfCollision },

@@ -6,7 +6,9 @@ use sdg_kinematics::{IkOptions, JointVector, Panda, ready_pose};
 
 use crate::arm_state::Load;
 use crate::error::{Result, RobotError};
+use crate::lying_part::LyingPart;
 use crate::pace::Pace;
+use crate::part_shape::PartShape;
 use crate::touch::TouchDown;
 
 /// Middle of the first look on the table unless another is set, base frame, m.
@@ -71,6 +73,10 @@ pub struct GraspConfig {
     pub obstacles: Vec<Obstacle>,
     /// The part reaches so far to all sides of its grasp, m: it is kept off the obstacles, too.
     pub part_radius_m: f64,
+    /// What is known of its shape: whether it has room among others is judged by that, or else by its width between the fingers alone.
+    pub part: Option<PartShape>,
+    /// Parts that lie in the cell and are not to be touched, as far as they are known before a picture is taken.
+    pub lying: Vec<LyingPart>,
     /// Speed of the motions.
     pub pace: Pace,
 }
@@ -96,6 +102,8 @@ impl Default for GraspConfig {
             soft_approach: None,
             obstacles: Vec::new(),
             part_radius_m: 0.06,
+            part: None,
+            lying: Vec::new(),
             pace: Pace::REHEARSED,
         }
     }

@@ -4,6 +4,7 @@ use nalgebra::Isometry3;
 use sdg_kinematics::collision::Capsule;
 
 use super::config::GraspConfig;
+use crate::part_shape::PartShape;
 use crate::perception::GraspTarget;
 
 /// What the hand holds, from when it closed.
@@ -15,12 +16,20 @@ pub(super) struct HeldPart {
     pub(super) height_m: f64,
     /// How far the part reaches below the tcp, m.
     pub(super) hang_m: f64,
+    /// What is known of its shape; nothing where what was detected makes no sense.
+    pub(super) shape: Option<PartShape>,
     /// Capsules that hold it, in the tcp's frame.
     pub(super) in_tcp: Vec<Capsule>,
 }
 
 /// A part reaches so far below the tcp at least, m.
 const MIN_HANG_M: f64 = 0.010;
+
+/// What is known of the shape of a part that was detected.
+pub(super) fn shape_of(target: &GraspTarget, table_height_m: f64, config: &GraspConfig) -> Option<PartShape> {
+    let height_m = target.base_from_tcp.translation.z - table_height_m;
+    config.part.clone().or_else(|| PartShape::between_fingers(target.jaw_width_m, height_m.max(MIN_HANG_M)).ok())
+}
 
 impl HeldPart {
     pub(super) fn new(
@@ -43,6 +52,7 @@ impl HeldPart {
             part_from_tcp: target.base_from_tcp.inverse() * base_from_tcp,
             height_m: target.base_from_tcp.translation.z - table_height_m,
             hang_m,
+            shape: shape_of(target, table_height_m, config),
             in_tcp,
         }
     }

@@ -32,6 +32,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         })?;
         let hand = self.robot.finish_hand()?;
         self.closed = Some(hand);
+        self.opening_m = hand.opening_m;
         self.judge(GraspStep::Close, &hand)?;
         if let Some(load) = self.config.load {
             self.robot.set_load(load)?;

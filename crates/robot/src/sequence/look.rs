@@ -1,10 +1,12 @@
 //! Looking: from afar, and from above what was found.
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, IkSolution, KinematicsError, with_fingers_exchanged};
 
+use super::held_part::shape_of;
 use super::{SETTLE_SECS, Sequence, Steps, Stop, camera_looking_down};
 use crate::arm::Arm;
+use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, GraspTarget};
 use crate::surroundings::Destination;
 
@@ -47,7 +49,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn look_from_above(&mut self, first: &GraspTarget) -> Steps<GraspTarget> {
         let mut looks = 0;
         for shift_m in HOVER_SHIFTS_M {
-            match self.hover(first, shift_m, GraspStep::Hover) {
+            match self.hover(&[first.base_from_tcp], shift_m, GraspStep::Hover) {
                 Err(stop) if looks == 0 || self.robot.latched().is_some() => return Err(stop),
                 Err(_) => continue,
                 Ok(()) => looks += 1,
@@ -63,6 +65,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes a picture and asks perception; a target that no hand can take is a failure.
     fn find(&mut self, is_accepted: impl Fn(&GraspTarget) -> bool) -> Steps<Option<GraspTarget>> {
         let target = self.finder.find(self.robot.arm())?.filter(is_accepted);
+        self.note_others();
         self.picture_time = self.finder.picture_time();
         self.targets.push(target);
         let Some(found) = target else { return Ok(None) };
@@ -81,6 +84,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(Some(found))
     }
 
+    /// Keeps where other parts lie by the last picture.
+    pub(super) fn note_others(&mut self) {
+        let table_height_m = self.robot.limits().table_height_m;
+        for other in self.finder.others() {
+            if let Some(shape) = shape_of(&other, table_height_m, self.config) {
+                self.lying.put(LyingPart { base_from_part: other.base_from_tcp, shape });
+            }
+        }
+    }
+
     /// Refuses to begin a motion that rests on an old picture.
     pub(super) fn check_age(&mut self) -> Steps<()> {
         let Some(taken) = self.picture_time.take() else { return Ok(()) };
@@ -96,18 +109,21 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
-    /// Puts the camera over the grasp or shifted from there, the hand turned as for the grasp or by half a turn more.
-    pub(super) fn hover(&mut self, target: &GraspTarget, shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
+    /// Puts the camera over a grasp or shifted from there, the hand turned as for one of the grasps, which are at one place, or by half a turn more.
+    pub(super) fn hover(&mut self, grasps: &[Isometry3<f64>], shift_m: [f64; 2], step: GraspStep) -> Steps<()> {
         let seed = self.robot.commanded()?;
-        let grasp = target.base_from_tcp.translation;
+        let grasp = grasps.first().map_or_else(Vector3::zeros, |grasp| grasp.translation.vector);
         let [x, y] = [grasp.x + shift_m[0], grasp.y + shift_m[1]];
         let height_m = self.robot.limits().table_height_m + self.config.hover_height_m;
-        let poses = [target.base_from_tcp, with_fingers_exchanged(&target.base_from_tcp)].map(|base_from_grasp| {
-            // The picture's up is the hand's x.
-            let up = base_from_grasp.rotation * Vector3::x();
-            let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
-            self.mount.base_from_tcp(&base_from_camera)
-        });
+        let both_ways = grasps.iter().flat_map(|grasp| [*grasp, with_fingers_exchanged(grasp)]);
+        let poses: Vec<Isometry3<f64>> = both_ways
+            .map(|base_from_grasp| {
+                // The picture's up is the hand's x.
+                let up = base_from_grasp.rotation * Vector3::x();
+                let base_from_camera = camera_looking_down(x, y, height_m, up.y.atan2(up.x));
+                self.mount.base_from_tcp(&base_from_camera)
+            })
+            .collect();
         let unreachable =
             |why: String| Stop::Failed(step, format!("the part at ({x:.2}, {y:.2}) m is out of reach: {why}"));
         if self.is_surrounded() {

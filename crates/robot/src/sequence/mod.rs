@@ -19,11 +19,12 @@ mod travel;
 
 use std::time::Instant;
 
-use sdg_kinematics::Trajectory;
+use sdg_kinematics::{HAND_OPENING_MAX_M, Trajectory};
 
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::HandState;
 use crate::error::{Result, RobotError};
+use crate::lying_part::LyingParts;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::robot::Robot;
 use crate::touch::{TouchDown, Touched};
@@ -83,7 +84,7 @@ pub fn grasp<A: Arm>(
     config: &GraspConfig,
 ) -> Result<GraspReport> {
     let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    let outcome = sequence.grasp()?;
+    let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
 
@@ -98,9 +99,8 @@ pub fn grasp_softly<A: CompliantArm>(
     mount: CameraMount,
     config: &GraspConfig,
 ) -> Result<GraspReport> {
-    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    sequence.touch = Some(|robot, touch_down| robot.touch_down(touch_down));
-    let outcome = sequence.grasp()?;
+    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
+    let outcome = sequence.grasp(|_, _| Ok(()))?;
     Ok(sequence.grasp_report(outcome))
 }
 
@@ -149,6 +149,10 @@ struct Sequence<'s, 'r, A: Arm> {
     /// What was touched on soft ways down.
     touched: Vec<Touched>,
     held: Option<HeldPart>,
+    /// Parts that lie and are not to be touched.
+    lying: LyingParts,
+    /// How far the hand is open, or is to be on the next straight way, m.
+    opening_m: f64,
     /// How far the hand opens beyond the part, both sides together, m.
     opening_margin_m: f64,
 }
@@ -182,13 +186,23 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
             touch: None,
             touched: Vec::new(),
             held: None,
+            lying: LyingParts::new(&config.lying),
+            opening_m: HAND_OPENING_MAX_M,
             opening_margin_m: config.opening_margin_m,
         }
     }
 
-    /// Grasps; how that ended.
-    fn grasp(&mut self) -> Result<GraspOutcome> {
-        match self.run() {
+    /// Comes down softly until something is felt, where the arm yields; `None` where it does not.
+    fn touch_down(&mut self, touch_down: &TouchDown, step: GraspStep) -> Steps<Option<Touched>> {
+        let Some(touch) = self.touch else { return Ok(None) };
+        let touched = fails_at(step, touch(self.robot, touch_down))?;
+        self.touched.push(touched);
+        Ok(Some(touched))
+    }
+
+    /// Grasps what `is_wanted` does not refuse once it was found; how that ended.
+    fn grasp(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Result<GraspOutcome> {
+        match self.run(is_wanted) {
             Ok(()) => Ok(GraspOutcome::Held),
             Err(Stop::Failed(step, why)) => Ok(GraspOutcome::Failed { step, why }),
             Err(Stop::Error(error)) => Err(error),
@@ -206,17 +220,19 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
         }
     }
 
-    fn run(&mut self) -> Steps<()> {
+    fn run(&mut self, is_wanted: impl FnOnce(&mut Self, &GraspTarget) -> Steps<()>) -> Steps<()> {
         let first = self.look_around()?;
         let target = match self.mount {
             CameraMount::Hand { .. } => self.look_from_above(&first)?,
             CameraMount::Base => first,
         };
+        is_wanted(self, &target)?;
         self.take(&target)
     }
 
     /// From above a part that was found to the part in the air.
     fn take(&mut self, target: &GraspTarget) -> Steps<()> {
+        self.lying.take(&target.base_from_tcp);
         let approach = self.go_above(target)?;
         self.descend(approach)?;
         self.close(target)?;
@@ -234,5 +250,19 @@ impl<'s, 'r, A: Arm> Sequence<'s, 'r, A> {
 
     fn follow(&mut self, motion: Trajectory, step: GraspStep) -> Steps<()> {
         fails_at(step, self.robot.follow(motion))
+    }
+}
+
+impl<'s, 'r, A: CompliantArm> Sequence<'s, 'r, A> {
+    /// As [`Sequence::new`], with an arm that yields.
+    fn yielding(
+        robot: &'s mut Robot<'r, A>,
+        finder: &'s mut dyn PartFinder<A>,
+        observer: &'s mut dyn StepObserver<A>,
+        mount: CameraMount,
+        config: &'s GraspConfig,
+    ) -> Self {
+        let touch: Touch<A> = |robot, touch_down| robot.touch_down(touch_down);
+        Self { touch: Some(touch), ..Self::new(robot, finder, observer, mount, config) }
     }
 }

@@ -10,17 +10,20 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
-use sdg_kinematics::{Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions};
+use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
 
+use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
 use super::reach::above;
 use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
 use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ContactSensitivity, HandCommand, Load};
 use crate::error::Result;
+use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::place::{PlaceError, PlaceGoal};
 use crate::robot::Robot;
+use crate::room::{release_opening_m, same_turns_rad};
 use crate::surroundings::Destination;
 use crate::touch::{TouchDown, Touched};
 
@@ -36,8 +39,6 @@ const RELEASING_SPEED_M_S: f64 = 0.05;
 const RELEASED_SECS: f64 = 0.2;
 /// Steps in which the way up is made shorter where the arm cannot reach so far, m.
 const RETREAT_STEP_M: f64 = 0.05;
-/// Turns that are tried of a part that looks the same in all.
-const NUM_TURNS: u32 = 12;
 
 /// How a held part is put down.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,10 +105,11 @@ pub struct PlaceReport {
     pub errors: Vec<PlaceError>,
 }
 
-/// Grasps the part once and puts it down.
+/// Grasps the part once and puts it down. A cell of a tray must have room for the part and for the fingers that let it go among the parts in the
+/// cells around it, whether there are any or not: by [`GraspConfig::part`] before anything moves, else once the part was found.
 ///
 /// # Errors
-/// As [`super::grasp`].
+/// As [`super::grasp`]; [`crate::RobotError::Configuration`] where there is no room by [`GraspConfig::part`].
 pub fn grasp_and_place<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
@@ -118,15 +120,16 @@ pub fn grasp_and_place<A: CompliantArm>(
     placing: &PlacingConfig,
 ) -> Result<PlaceReport> {
     placing.touch_down.validate()?;
-    let mut sequence = Sequence::new(robot, finder, observer, mount, config);
-    let touch = |robot: &mut Robot<'_, A>, touch_down: &TouchDown| robot.touch_down(touch_down);
-    sequence.touch = Some(touch);
-    let outcome = sequence.grasp()?;
+    if let Some(part) = &config.part {
+        goal.check_room(part, placing.symmetry, placing.release_margin_m)?;
+    }
+    let mut sequence = Sequence::yielding(robot, finder, observer, mount, config);
+    let outcome = sequence.grasp(|sequence, target| sequence.prepare(target, goal, placing))?;
     let grasp = sequence.grasp_report(outcome);
     let mut errors = Vec::new();
     let outcome = match &grasp.outcome {
         GraspOutcome::Failed { step, why } => PlaceOutcome::Failed { step: *step, why: why.clone() },
-        GraspOutcome::Held => match sequence.place(goal, placing, touch, &mut errors) {
+        GraspOutcome::Held => match sequence.place(goal, placing, &mut errors) {
             Ok(()) => PlaceOutcome::Placed,
             Err(Stop::Failed(step, why)) => PlaceOutcome::Failed { step, why },
             Err(Stop::Error(error)) => return Err(error),
@@ -143,21 +146,30 @@ impl PlaceOutcome {
 }
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    fn place(
-        &mut self,
-        goal: &PlaceGoal,
-        placing: &PlacingConfig,
-        touch: super::Touch<A>,
-        errors: &mut Vec<PlaceError>,
-    ) -> Steps<()> {
+    /// Refuses a part that has no room in its place by what is known now, and keeps off what may lie around.
+    fn prepare(&mut self, target: &GraspTarget, goal: &PlaceGoal, placing: &PlacingConfig) -> Steps<()> {
+        let table_height_m = self.robot.limits().table_height_m;
+        let Some(part) = shape_of(target, table_height_m, self.config) else { return Ok(()) };
+        goal.check_room(&part, placing.symmetry, placing.release_margin_m)
+            .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
+        for base_from_part in goal.neighbours_in_base(goal.surface_m + part.grasp_height_m()) {
+            self.lying.suppose(LyingPart { base_from_part, shape: part.clone() });
+        }
+        Ok(())
+    }
+
+    fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
             let aim = self.carry(goal, placing, &slid)?;
-            self.put_down(&aim, placing, touch)?;
+            self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
+            let shape = self.held.as_ref().and_then(|held| held.shape.clone());
             let part_from_tcp = self.release(placing)?;
-            let found = match (self.look_at(goal, &aim.base_from_part)?, goal.bin_m) {
+            let lies = shape.map(|shape| LyingPart { base_from_part: aim.base_from_part, shape });
+            lies.into_iter().for_each(|part| self.lying.put(part));
+            let found = match (self.look_at(goal, &aim.base_from_part, placing)?, goal.bin_m) {
                 (Some(found), _) => found,
                 // In a bin a part lies anyhow, under others, too.
                 (None, Some(_)) => return Ok(()),
@@ -187,9 +199,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 )));
             }
             num_corrections += 1;
+            self.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
             // Perception takes the part to lie on the table.
-            let mut target = found;
+            // The hand is turned as it let the part go, where its fingers had room.
+            let mut target =
+                GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
             target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
             // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
             self.opening_margin_m = placing.release_margin_m;
@@ -200,19 +215,25 @@ impl<A: Arm> Sequence<'_, '_, A> {
     /// Takes the part over its place: as far as a soft way down from there.
     fn carry(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, slip: &Isometry3<f64>) -> Steps<Aim> {
         let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        let turns = match placing.symmetry {
-            RotationalSymmetry::Fold(count) => count.clamp(1, 36),
-            RotationalSymmetry::Full => NUM_TURNS,
-            _ => 1,
-        };
-        let aims: Vec<Aim> = (0..turns)
-            .map(|turn| {
-                let turn_rad = std::f64::consts::TAU * f64::from(turn) / f64::from(turns);
+        let opening_m = self.release_opening_m(placing);
+        // Where the hand cannot open it need not come down.
+        self.opening_m = opening_m;
+        let mut aims: Vec<Aim> = same_turns_rad(placing.symmetry)
+            .into_iter()
+            .map(|turn_rad| {
                 let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
                 let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
                 Aim { base_from_part, base_from_tcp }
             })
             .collect();
+        if let Some(part) = &held.shape {
+            aims = goal.with_room_for_fingers(part, opening_m, aims, |aim| aim.base_from_tcp);
+        }
+        if aims.is_empty() {
+            let opening_mm = opening_m * 1e3;
+            let why = format!("\"{}\" has no room for fingers that open to {opening_mm:.0} mm", goal.name);
+            return Err(Stop::Failed(GraspStep::Carry, why));
+        }
         let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
         let mut why = String::new();
         for height_m in HEIGHTS_M {
@@ -273,11 +294,12 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Comes down softly until the place is felt.
-    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig, touch: super::Touch<A>) -> Steps<()> {
+    fn put_down(&mut self, aim: &Aim, placing: &PlacingConfig) -> Steps<()> {
         let touch_down = TouchDown { max_way_m: SOFT_WAY_M + BELOW_M, ..placing.touch_down };
-        let touched = touch(self.robot, &touch_down);
-        let touched = fails_at(GraspStep::PutDown, touched)?;
-        self.touched.push(touched);
+        let Some(touched) = self.touch_down(&touch_down, GraspStep::PutDown)? else {
+            let why = "the arm does not yield, and a place is felt; the part is still held".to_owned();
+            return Err(Stop::Failed(GraspStep::PutDown, why));
+        };
         let hand = self.robot.hand()?;
         self.judge(GraspStep::PutDown, &hand)?;
         if touched.is_contact {
@@ -290,8 +312,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
 
     /// Opens the hand and goes up; where the tcp was in the part's frame by the detection.
     fn release(&mut self, placing: &PlacingConfig) -> Steps<Isometry3<f64>> {
-        let closed_m = self.closed.map_or(0.0, |hand| hand.opening_m);
-        let opening_m = (closed_m + placing.release_margin_m).min(HAND_OPENING_MAX_M);
+        let opening_m = self.release_opening_m(placing);
         self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: RELEASING_SPEED_M_S })?;
         self.robot.finish_hand()?;
         let part_from_tcp = self.held.take().map_or_else(Isometry3::identity, |held| held.part_from_tcp);
@@ -308,6 +329,11 @@ impl<A: Arm> Sequence<'_, '_, A> {
         Ok(part_from_tcp)
     }
 
+    /// How far the hand opens to let go what it closed on, m.
+    fn release_opening_m(&self, placing: &PlacingConfig) -> f64 {
+        release_opening_m(self.closed.map_or(0.0, |hand| hand.opening_m), placing.release_margin_m)
+    }
+
     fn way_up(&self, start: &JointVector, retreat_m: f64) -> Steps<JointPath> {
         let base_from_tcp = self.robot.panda().forward(start);
         let mut up_m = retreat_m;
@@ -321,13 +347,24 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 
     /// Looks where the part lies.
-    fn look_at(&mut self, goal: &PlaceGoal, base_from_part: &Isometry3<f64>) -> Steps<Option<GraspTarget>> {
-        let expected = GraspTarget { base_from_tcp: *base_from_part, jaw_width_m: 0.0, score: 1.0 };
+    fn look_at(
+        &mut self,
+        goal: &PlaceGoal,
+        base_from_part: &Isometry3<f64>,
+        placing: &PlacingConfig,
+    ) -> Steps<Option<GraspTarget>> {
+        let turns_rad = same_turns_rad(placing.symmetry);
+        let num_skipped = turns_rad.len().div_ceil(MAX_LOOK_TURNS);
+        let grasps: Vec<Isometry3<f64>> = turns_rad
+            .into_iter()
+            .step_by(num_skipped)
+            .map(|turn_rad| base_from_part * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad))
+            .collect();
         self.picture_time = None;
         let table_height_m = self.robot.limits().table_height_m;
         for (look, shift_m) in HOVER_SHIFTS_M.into_iter().enumerate() {
             let arrived = match (&self.mount, self.config.look_outs.first()) {
-                (CameraMount::Hand { .. }, _) => self.hover(&expected, shift_m, GraspStep::Check),
+                (CameraMount::Hand { .. }, _) => self.hover(&grasps, shift_m, GraspStep::Check),
                 (CameraMount::Base, Some(look_out)) if look == 0 => {
                     let q = look_out.configuration(self.robot.panda(), &self.mount, table_height_m)?;
                     self.move_freely(&q, GraspStep::Check)?;
@@ -341,6 +378,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 Ok(()) => {}
             }
             let found = self.finder.find_nearest(self.robot.arm(), base_from_part)?;
+            self.note_others();
             let is_here = |found: &GraspTarget| match goal.bin_m {
                 Some(size_m) => inside(goal, &found.base_from_tcp, size_m),
                 None => {
@@ -357,6 +395,8 @@ impl<A: Arm> Sequence<'_, '_, A> {
     }
 }
 
+/// In so many turns of a part that looks the same in all it is looked at, at most: a hand that was turned for its fingers may reach too far to look so.
+const MAX_LOOK_TURNS: usize = 4;
 /// What is farther from its place is another part, m.
 const MAX_SEEN_BESIDE_M: f64 = 0.03;
 
@@ -393,6 +433,12 @@ fn inside(goal: &PlaceGoal, found: &Isometry3<f64>, [along_m, across_m]: [f64; 2
     apart.x.abs() <= 0.5 * along_m && apart.y.abs() <= 0.5 * across_m
 }
 
+/// The pose that was found, without the turns that cannot be seen: as near as it can be to the one that was aimed at.
+fn as_aimed(place: &Isometry3<f64>, found: &Isometry3<f64>, error: &PlaceError) -> Isometry3<f64> {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
+    Isometry3::from_parts(found.translation, turn * place.rotation)
+}
+
 /// How the part slid in its own frame when the hand closed: where the tcp was in it when it was let go, against where it was by the detection.
 fn slip(
     place: &Isometry3<f64>,
@@ -401,10 +447,7 @@ fn slip(
     part_from_tcp: &Isometry3<f64>,
     error: &PlaceError,
 ) -> Isometry3<f64> {
-    // Turns that cannot be seen are taken out of what was found.
-    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), error.angle_rad);
-    let base_from_part = Isometry3::from_parts(found.translation, turn * place.rotation);
-    let moved = base_from_part.inverse() * base_from_tcp * part_from_tcp.inverse();
+    let moved = as_aimed(place, found, error).inverse() * base_from_tcp * part_from_tcp.inverse();
     let along = moved.rotation * Vector3::x();
     Isometry3::from_parts(
         Translation3::new(moved.translation.x, moved.translation.y, 0.0),

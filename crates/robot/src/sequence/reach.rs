@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3};
 use sdg_kinematics::{
-    GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged,
+    Approach, GraspSymmetry, HAND_OPENING_MAX_M, IkOptions, JointPath, JointVector, LineOptions, with_fingers_exchanged,
 };
 
 use super::{Sequence, Steps, Stop, fails_at};
@@ -10,7 +10,7 @@ use crate::arm::Arm;
 use crate::arm_state::{ContactSensitivity, HandCommand};
 use crate::error::RobotError;
 use crate::perception::{GraspStep, GraspTarget};
-use crate::surroundings::Destination;
+use crate::surroundings::{Destination, Way};
 use crate::touch::TouchDown;
 
 /// Least distance of the finger tips to the table when closing, m.
@@ -21,10 +21,18 @@ const OPENING_SPEED_M_S: f64 = 0.2;
 const SETTLE_SECS: f64 = 0.1;
 /// Heights from which a straight way down is looked for, m.
 const HEIGHTS_M: [f64; 3] = [0.25, 0.15, 0.10];
+/// The hand opens so far beyond a part, both sides together, where others are in the way of more, m.
+const NARROW_MARGIN_M: f64 = 0.020;
 /// A soft way down begins so far above its end, m.
 const SOFT_WAY_M: f64 = 0.020;
 /// What is felt higher above the grasp is not the table, m.
 const MAX_EARLY_M: f64 = 0.010;
+
+/// How the hand comes above a grasp, with the straight way down from there.
+enum Reach {
+    Around(Way),
+    Straight(Approach),
+}
 
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Puts the open hand above the grasp, as high as a straight way down exists from.
@@ -35,42 +43,28 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let mut base_from_grasp = target.base_from_tcp;
         base_from_grasp.translation.z = base_from_grasp.translation.z.max(lowest);
 
-        let opening_m = (target.jaw_width_m + self.opening_margin_m).min(HAND_OPENING_MAX_M);
-        self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
-        let seed = self.robot.commanded()?;
-        let here = self.robot.panda().forward(&seed).translation.z;
+        let mut openings_m = vec![(target.jaw_width_m + self.opening_margin_m).min(HAND_OPENING_MAX_M)];
+        if !self.lying.all().is_empty() && NARROW_MARGIN_M < self.opening_margin_m {
+            openings_m.push((target.jaw_width_m + NARROW_MARGIN_M).min(HAND_OPENING_MAX_M));
+        }
         let mut first_error = None;
-        for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
-            let height = height.max(0.05);
-            if self.is_surrounded() {
-                // Whichever finger is on which side, whichever way of the arm: the cheapest.
-                let grasps = [base_from_grasp, with_fingers_exchanged(&base_from_grasp)];
-                match self.way_to(&Destination::Approached(&grasps, height)) {
-                    Ok(way) => return self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),
-                    Err(error) if error.latches() => return Err(error.into()),
-                    Err(error) => {
-                        first_error.get_or_insert(error.to_string());
-                    }
+        for opening_m in openings_m {
+            self.opening_m = opening_m;
+            let reach = match self.reach(&base_from_grasp)? {
+                Ok(reach) => reach,
+                Err(why) => {
+                    first_error.get_or_insert(why);
+                    continue;
                 }
-                continue;
-            }
-            let planned = self.robot.panda().approach(
-                &above(&base_from_grasp, height),
-                &base_from_grasp,
-                GraspSymmetry::HalfTurn,
-                &seed,
-                &IkOptions::default(),
-                &LineOptions::default(),
-            );
-            match planned {
-                Ok(approach) => {
+            };
+            self.robot.start_hand(HandCommand::Move { opening_m, speed_m_s: OPENING_SPEED_M_S })?;
+            return match reach {
+                Reach::Around(way) => self.travel(way, GraspStep::Approach)?.ok_or_else(no_approach),
+                Reach::Straight(approach) => {
                     self.move_freely(&approach.pregrasp.q, GraspStep::Approach)?;
-                    return Ok(approach.path);
+                    Ok(approach.path)
                 }
-                Err(error) => {
-                    first_error.get_or_insert(error.to_string());
-                }
-            }
+            };
         }
         let p = base_from_grasp.translation.vector;
         let why = first_error.unwrap_or_default();
@@ -80,34 +74,72 @@ impl<A: Arm> Sequence<'_, '_, A> {
         ))
     }
 
+    /// How to come above a grasp; else why there is no way.
+    fn reach(&mut self, base_from_grasp: &Isometry3<f64>) -> Steps<Result<Reach, String>> {
+        let seed = self.robot.commanded()?;
+        let here = self.robot.panda().forward(&seed).translation.z;
+        let mut first_error = None;
+        for height in [&[here - base_from_grasp.translation.z], &HEIGHTS_M[..]].concat() {
+            let height = height.max(0.05);
+            if self.is_surrounded() {
+                // Whichever finger is on which side, whichever way of the arm: the cheapest.
+                let grasps = [*base_from_grasp, with_fingers_exchanged(base_from_grasp)];
+                match self.way_to(&Destination::Approached(&grasps, height)) {
+                    Ok(way) => return Ok(Ok(Reach::Around(way))),
+                    Err(error) if error.latches() => return Err(error.into()),
+                    Err(error) => {
+                        first_error.get_or_insert(error.to_string());
+                    }
+                }
+                continue;
+            }
+            let planned = self.robot.panda().approach(
+                &above(base_from_grasp, height),
+                base_from_grasp,
+                GraspSymmetry::HalfTurn,
+                &seed,
+                &IkOptions::default(),
+                &LineOptions::default(),
+            );
+            match planned {
+                Ok(approach) => return Ok(Ok(Reach::Straight(approach))),
+                Err(error) => {
+                    first_error.get_or_insert(error.to_string());
+                }
+            }
+        }
+        Ok(Err(first_error.unwrap_or_default()))
+    }
+
     /// Moves straight down to the grasp with the hand open.
     pub(super) fn descend(&mut self, path: JointPath) -> Steps<()> {
         self.robot.finish_hand()?;
         self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-        match (self.touch, self.config.soft_approach) {
-            (Some(touch), Some(touch_down)) => {
-                let end = *path.end();
-                self.go_down_to(
-                    path.start(),
-                    &above(&self.robot.panda().forward(&end), SOFT_WAY_M),
-                    GraspStep::Approach,
-                )?;
-                let touched = touch(self.robot, &TouchDown { max_way_m: SOFT_WAY_M, ..touch_down });
-                let touched = fails_at(GraspStep::Approach, touched)?;
-                self.touched.push(touched);
-                let early_m = touched.tcp_height_m - self.robot.panda().forward(&end).translation.z;
-                if touched.is_contact && early_m > MAX_EARLY_M {
-                    let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
-                    return Err(Stop::Failed(GraspStep::Approach, why));
-                }
-            }
-            _ => {
+        match self.config.soft_approach.filter(|_| self.touch.is_some()) {
+            Some(touch_down) => self.descend_softly(&path, &touch_down)?,
+            None => {
                 let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
                 let motion = fails_at(GraspStep::Approach, planned)?;
                 self.follow(motion, GraspStep::Approach)?;
             }
         }
         Ok(self.robot.wait(SETTLE_SECS)?)
+    }
+
+    /// As an approach goes, and softly on the last of it.
+    fn descend_softly(&mut self, path: &JointPath, touch_down: &TouchDown) -> Steps<()> {
+        let base_from_grasp = self.robot.panda().forward(path.end());
+        self.go_down_to(path.start(), &above(&base_from_grasp, SOFT_WAY_M), GraspStep::Approach)?;
+        let touch_down = TouchDown { max_way_m: SOFT_WAY_M, ..*touch_down };
+        let touched = self.touch_down(&touch_down, GraspStep::Approach)?;
+        let early_m = touched
+            .filter(|touched| touched.is_contact)
+            .map_or(0.0, |touched| touched.tcp_height_m - base_from_grasp.translation.z);
+        if early_m > MAX_EARLY_M {
+            let why = format!("the fingers met something {:.0} mm above the grasp", early_m * 1e3);
+            return Err(Stop::Failed(GraspStep::Approach, why));
+        }
+        Ok(())
     }
 
     /// Straight to a pose below, as an approach goes.

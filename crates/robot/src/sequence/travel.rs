@@ -2,31 +2,32 @@
 
 use sdg_kinematics::{JointLimits, JointPath, JointVector};
 
+use super::config::GraspConfig;
+use super::held_part::HeldPart;
 use super::{FREE_CLEARANCE_M, Sequence, Steps, Stop, fails_at};
 use crate::arm::Arm;
 use crate::arm_state::ContactSensitivity;
 use crate::error::Result;
+use crate::lying_part::LyingParts;
 use crate::perception::GraspStep;
 use crate::surroundings::{Destination, Surroundings, Way};
 
 impl<A: Arm> Sequence<'_, '_, A> {
-    /// Whether anything stands in the cell that motions have to be planned around.
+    /// Whether anything stands or lies in the cell that motions have to be planned around.
     pub(super) fn is_surrounded(&self) -> bool {
-        !self.config.obstacles.is_empty()
+        !(self.config.obstacles.is_empty() && self.lying.all().is_empty())
     }
 
-    /// What stands around the arm, and what it holds.
+    /// What stands and lies around the arm, and what it holds.
     pub(super) fn surroundings(&self) -> Surroundings<'_> {
-        let held = self.held.as_ref().map_or(&[][..], |held| &held.in_tcp);
-        Surroundings { obstacles: &self.config.obstacles, held, table_clearance_m: FREE_CLEARANCE_M }
+        around(self.config, &self.lying, self.held.as_ref(), self.opening_m)
     }
 
-    /// A way around what stands in the cell.
+    /// A way around what stands and lies in the cell.
     pub(super) fn way_to(&mut self, to: &Destination<'_>) -> Result<Way> {
-        let held = self.held.as_ref().map_or(&[][..], |held| &held.in_tcp);
-        let surroundings =
-            Surroundings { obstacles: &self.config.obstacles, held, table_clearance_m: FREE_CLEARANCE_M };
-        self.robot.plan_around(&surroundings, to, &self.free_limits())
+        let limits = self.free_limits();
+        let surroundings = around(self.config, &self.lying, self.held.as_ref(), self.opening_m);
+        self.robot.plan_around(&surroundings, to, &limits)
     }
 
     /// Joint limits of free motions, with a part in the hand and without.
@@ -70,5 +71,21 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         self.robot.set_contact_sensitivity(ContactSensitivity::Free)?;
         self.follow(motion, step)
+    }
+}
+
+/// What stands and lies around an arm, and what it holds.
+fn around<'s>(
+    config: &'s GraspConfig,
+    lying: &'s LyingParts,
+    held: Option<&'s HeldPart>,
+    opening_m: f64,
+) -> Surroundings<'s> {
+    Surroundings {
+        obstacles: &config.obstacles,
+        lying: lying.all(),
+        held: held.map_or(&[], |held| &held.in_tcp),
+        opening_m,
+        table_clearance_m: FREE_CLEARANCE_M,
     }
 }

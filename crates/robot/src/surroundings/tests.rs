@@ -1,4 +1,5 @@
 use super::*;
+use crate::part_shape::PartShape;
 use crate::planned_arm::PlannedArm;
 use crate::safety::SafetyLimits;
 use crate::watch::Watch;
@@ -20,7 +21,7 @@ fn plan(obstacles: &[Obstacle], start: &JointVector, to: &Destination<'_>) -> Re
     let mut arm = PlannedArm::new(*start, 0.08);
     let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
     let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
-    let surroundings = Surroundings { obstacles, held: &[], table_clearance_m: 0.05 };
+    let surroundings = Surroundings { obstacles, lying: &[], held: &[], opening_m: 0.08, table_clearance_m: 0.05 };
     robot.plan_around(&surroundings, to, &joints)
 }
 
@@ -76,4 +77,54 @@ fn a_hand_that_begins_near_the_table_may_leave_it() {
     let start = Panda::new().inverse(&down(0.45, 0.2, 0.012), &ready_pose(), &Default::default()).unwrap().q;
     let way = plan(&[], &start, &Destination::Configuration(&ready_pose())).unwrap();
     assert!((way.motions.last().unwrap().end() - ready_pose()).amax() < 1e-9);
+}
+
+fn bar_at(x: f64, y: f64) -> LyingPart {
+    // Along the hand's x, 20 mm wide and 14 mm high.
+    let corners = [[-0.045, -0.01], [0.045, -0.01], [0.045, 0.01], [-0.045, 0.01]].map(nalgebra::Point2::from);
+    let shape = PartShape::new(corners, 0.020, 0.014, 0.007).unwrap();
+    LyingPart { base_from_part: down(x, y, 0.007), shape }
+}
+
+#[test]
+fn fingers_come_down_between_parts_that_lie_as_far_as_they_are_open() {
+    let lying = [bar_at(0.45, 0.153), bar_at(0.45, 0.247)];
+    let start = Panda::new().inverse(&down(0.45, 0.2, 0.30), &ready_pose(), &Default::default()).unwrap().q;
+    let goals = [down(0.45, 0.2, 0.007)];
+    let approach = |opening_m: f64| {
+        let mut arm = PlannedArm::new(start, 0.08);
+        let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+        let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+        let surroundings = Surroundings { lying: &lying, opening_m, table_clearance_m: 0.05, ..Default::default() };
+        robot.plan_around(&surroundings, &Destination::Approached(&goals, 0.2), &joints)
+    };
+    // As the room in a tray is judged: 20 mm of part, 20 mm opened, 15 mm of each finger, and 2 mm.
+    assert!(approach(0.040).unwrap().approach.is_some());
+    let error = approach(0.060).unwrap_err().to_string();
+    assert!(error.contains("the hand is") && error.contains("that lies at (0.45, "), "{error}");
+}
+
+#[test]
+fn what_is_held_is_carried_around_parts_that_lie() {
+    // So high that the held part would run into it.
+    let tall = PartShape::new(bar_at(0.0, 0.0).shape.outline().to_vec(), 0.02, 0.30, 0.15).unwrap();
+    let lying = [LyingPart { base_from_part: down(0.45, 0.0, 0.15), shape: tall }];
+    let panda = Panda::new();
+    let start = panda.inverse(&down(0.45, 0.25, 0.20), &ready_pose(), &Default::default()).unwrap().q;
+    let held = [Capsule::new([-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], 0.01)];
+    let mut arm = PlannedArm::new(start, 0.02);
+    let mut robot = Robot::new(&mut arm, SafetyLimits::default(), Watch::default());
+    let joints = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    let surroundings = Surroundings { lying: &lying, held: &held, table_clearance_m: 0.05, ..Default::default() };
+    let goals = [down(0.45, -0.25, 0.20)];
+    let way = robot.plan_around(&surroundings, &Destination::Poses(&goals), &joints).unwrap();
+    let mut model = collision_model(0.0, &[lying[0].obstacle(0)], HAND_OPENING_MAX_M).unwrap();
+    model.hold(&held).unwrap();
+    let mut checker = Checker::new(&model, 1e-3);
+    for motion in &way.motions {
+        for step in 0..=200 {
+            let q = motion.sample(motion.duration_secs() * f64::from(step) / 200.0).0;
+            assert!(checker.is_free(&q), "{}", model.nearest(&q));
+        }
+    }
 }

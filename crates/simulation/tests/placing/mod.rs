@@ -7,13 +7,14 @@ use nalgebra::Isometry3;
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::TCP_OFFSET_M;
 use sdg_robot::{
-    Arm, CameraMount, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, PartFinder, Place,
-    PlaceGoal, PlaceKind, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch, grasp, grasp_and_place, grasp_softly,
+    Arm, CameraMount, CompliantArm, FrankaArm, GraspConfig, GraspReport, GraspTarget, Load, LyingPart, PartFinder,
+    Place, PlaceGoal, PlaceKind, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch, grasp, grasp_and_place,
+    grasp_softly,
 };
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{PlacedObject, SceneVariation, VariationConfig};
 use sdg_simulation::{
-    AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp,
+    AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp, part_shape,
 };
 
 #[path = "../network/mod.rs"]
@@ -33,12 +34,17 @@ pub enum Where {
 
 /// A tray for parts as long as the spring clip, beside where parts lie.
 pub fn tray() -> Place {
+    tray_of([0.10, 0.055])
+}
+
+/// The same with another pitch, m.
+pub fn tray_of(pitch_m: [f64; 2]) -> Place {
     Place {
         name: "tray".to_owned(),
         at_m: [0.32, -0.40],
         yaw_rad: 0.0,
         surface_m: 0.0,
-        kind: PlaceKind::Tray { cells: [4, 5], pitch_m: [0.10, 0.055] },
+        kind: PlaceKind::Tray { cells: [4, 5], pitch_m },
     }
 }
 
@@ -90,7 +96,8 @@ pub fn config(spec: &ObjectSpec) -> GraspConfig {
     let radius = |p: &nalgebra::Point2<f64>| {
         (p.coords - nalgebra::center(&spec.grasp_start, &spec.grasp_end).xy().coords).norm()
     };
-    GraspConfig { load, part_radius_m: spec.footprint.iter().map(radius).fold(0.0, f64::max), ..GraspConfig::default() }
+    let part_radius_m = spec.footprint.iter().map(radius).fold(0.0, f64::max);
+    GraspConfig { load, part_radius_m, part: Some(part_shape(spec).unwrap()), ..GraspConfig::default() }
 }
 
 /// How a part was placed, and where everything is afterwards.
@@ -107,7 +114,13 @@ pub fn place(cell: Workcell, at: Where, goal: &PlaceGoal, config: &GraspConfig, 
     let limits = Workcell::safety_limits();
     let lying: Vec<Isometry3<f64>> =
         cell.config().scene.instances.iter().map(|instance| instance.base_from_object).collect();
-    let (report, cell) = run(cell, at, 0.0, &mut |arm| arm.place(limits.clone(), config, goal, placing));
+    // What lies in the scene is known, too.
+    let known = |instance: &PlacedObject| LyingPart {
+        base_from_part: marked_grasp(&instance.spec, &instance.base_from_object).base_from_tcp,
+        shape: part_shape(&instance.spec).unwrap(),
+    };
+    let config = GraspConfig { lying: cell.config().scene.instances.iter().map(known).collect(), ..config.clone() };
+    let (report, cell) = run(cell, at, 0.0, &mut |arm| arm.place(limits.clone(), &config, goal, placing));
     let moved = |(index, before): (usize, &Isometry3<f64>)| {
         let body = cell.data().model().id(&format!("instance_{index}")).unwrap();
         (cell.data().world_from_body(body).translation.vector - before.translation.vector).norm()

@@ -57,6 +57,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         camera,
         place,
     };
+    rehearsal.check_room().map_err(|error| Usage(format!("--place: {error}")))?;
     let interrupt = Interrupt::watch();
     let rehearsed = rehearsal.run(&mut |attempt| show_attempt(attempt, args.attempts, &interrupt))?;
     let mut command = format!("sdg rehearse --grasp-model {model_file}");

@@ -59,8 +59,11 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         robot.limits().check(motion.clone()).map_err(sdg_robot::RobotError::from)?;
         vec![motion]
     } else {
-        let surroundings =
-            Surroundings { obstacles: &workcell.obstacles, held: &[], table_clearance_m: FREE_CLEARANCE_M };
+        let surroundings = Surroundings {
+            obstacles: &workcell.obstacles,
+            table_clearance_m: FREE_CLEARANCE_M,
+            ..Surroundings::default()
+        };
         robot.plan_around(&surroundings, &Destination::Configuration(&home), &pace.free_limits())?.motions
     };
     let secs: f64 = motions.iter().map(Trajectory::duration_secs).sum();

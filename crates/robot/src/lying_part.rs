@@ -1,0 +1,179 @@
+//! Parts that lie in the cell, as obstacles.
+
+use nalgebra::{Isometry3, Point2, Translation3};
+use sdg_kinematics::collision::{Obstacle, Shape};
+
+use crate::part_shape::PartShape;
+use crate::room::MIN_FINGER_ROOM_M;
+
+/// Capsules of the finger tips stand out of them by so much along the fingers' motion, m.
+const CAPSULES_STAND_OUT_M: f64 = 0.0055;
+/// On straight ways, which lead fingers between parts, these are thinner by that, and by what the planner keeps off everything beyond the room that
+/// fingers must have in a tray (3 mm, and 1 mm), m.
+const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
+/// A part that is thinner is taken to be so thick, m.
+const MIN_HALF_M: f64 = 0.0005;
+/// An outline that fills at least this share of the circle around it is a disc: a square fills 0.64 of its own.
+const DISC_SHARE: f64 = 0.9;
+/// Grasps of two parts are not nearer to each other than this, m: it is the same one.
+const SAME_WITHIN_M: f64 = 0.015;
+
+/// A part that lies in the cell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LyingPart {
+    /// Its grasp as it was marked, base frame: x along the marked line, z down.
+    pub base_from_part: Isometry3<f64>,
+    /// What is known of its shape.
+    pub shape: PartShape,
+}
+
+impl LyingPart {
+    /// Whether it is the part of this grasp.
+    pub(crate) fn is_at(&self, base_from_part: &Isometry3<f64>) -> bool {
+        (self.base_from_part.translation.vector - base_from_part.translation.vector).xy().norm() < SAME_WITHIN_M
+    }
+
+    /// A solid that holds it, from what it lies on up to its top.
+    pub(crate) fn obstacle(&self, number: usize) -> Obstacle {
+        self.solid(number, 0.0)
+    }
+
+    /// The same for fingers that go straight down or up beside it.
+    pub(crate) fn obstacle_beside_fingers(&self, number: usize) -> Obstacle {
+        self.solid(number, THINNER_M)
+    }
+
+    fn solid(&self, number: usize, thinner_m: f64) -> Obstacle {
+        let half_height_m = 0.5 * self.shape.top_m();
+        // z of the grasp's frame points down: the middle of the height is below the grasp by so much.
+        let middle_z_m = self.shape.grasp_height_m() - half_height_m;
+        let (center, shape) = match disc(self.shape.outline()) {
+            Some((center, radius_m)) => {
+                let radius_m = (radius_m - thinner_m).max(MIN_HALF_M);
+                (center, Shape::Cylinder { radius_m, half_length_m: half_height_m })
+            }
+            None => {
+                let (center, half_m) = bounds(self.shape.outline());
+                let [x, y] = half_m.map(|half| (half - thinner_m).max(MIN_HALF_M));
+                (center, Shape::Box { half_m: [x, y, half_height_m] })
+            }
+        };
+        let p = self.base_from_part.translation;
+        Obstacle {
+            name: format!("part {} that lies at ({:.2}, {:.2}) m", number + 1, p.x, p.y),
+            shape,
+            base_from_obstacle: self.base_from_part * Translation3::new(center.x, center.y, middle_z_m),
+        }
+    }
+}
+
+/// Middle and halves of the sides of the rectangle around points, along the grasp's axes.
+fn bounds(outline: &[Point2<f64>]) -> (Point2<f64>, [f64; 2]) {
+    let along = |axis: usize| {
+        let values = outline.iter().map(|p| p[axis]);
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    };
+    let [(left, right), (front, back)] = [along(0), along(1)];
+    (Point2::new(0.5 * (left + right), 0.5 * (front + back)), [0.5 * (right - left), 0.5 * (back - front)])
+}
+
+/// Middle and radius of an outline that is round.
+fn disc(outline: &[Point2<f64>]) -> Option<(Point2<f64>, f64)> {
+    let (center, _) = bounds(outline);
+    let radius_m = outline.iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
+    let next = outline.iter().cycle().skip(1);
+    let area: f64 = outline.iter().zip(next).map(|(a, b)| 0.5 * (a - center).perp(&(b - center))).sum();
+    (area.abs() >= DISC_SHARE * std::f64::consts::PI * radius_m * radius_m).then_some((center, radius_m))
+}
+
+/// Parts that lie, each once: of those at one place the one that was told last.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct LyingParts(Vec<LyingPart>);
+
+impl LyingParts {
+    /// These, each once.
+    pub(crate) fn new(told: &[LyingPart]) -> Self {
+        let mut parts = Self::default();
+        told.iter().for_each(|part| parts.put(part.clone()));
+        parts
+    }
+
+    /// A part may lie there, if none is known to.
+    pub(crate) fn suppose(&mut self, part: LyingPart) {
+        if !self.0.iter().any(|other| other.is_at(&part.base_from_part)) {
+            self.0.push(part);
+        }
+    }
+
+    /// A part lies there.
+    pub(crate) fn put(&mut self, part: LyingPart) {
+        self.take(&part.base_from_part);
+        self.0.push(part);
+    }
+
+    /// Nothing lies there any more, or it is to be touched.
+    pub(crate) fn take(&mut self, base_from_part: &Isometry3<f64>) {
+        self.0.retain(|part| !part.is_at(base_from_part));
+    }
+
+    /// All of them.
+    pub(crate) fn all(&self) -> &[LyingPart] {
+        &self.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point3, UnitQuaternion, Vector3};
+
+    fn at(x: f64, y: f64) -> Isometry3<f64> {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Isometry3::from_parts(Translation3::new(x, y, 0.010), down)
+    }
+
+    fn bar() -> PartShape {
+        let corners = [[-0.02, -0.01], [0.06, -0.01], [0.06, 0.01], [-0.02, 0.01]].map(Point2::from);
+        PartShape::new(corners, 0.02, 0.030, 0.010).unwrap()
+    }
+
+    #[test]
+    fn a_solid_holds_the_part_from_what_it_lies_on_to_its_top() {
+        let obstacle = LyingPart { base_from_part: at(0.5, 0.1), shape: bar() }.obstacle(0);
+        assert_eq!(obstacle.name, "part 1 that lies at (0.50, 0.10) m");
+        let distance_m = |x: f64, y: f64, z: f64| {
+            let p = obstacle.base_from_obstacle.inverse() * Point3::new(x, y, z);
+            obstacle.shape.signed_distance_m(&p)
+        };
+        for corner in [[0.48, 0.09, 0.0], [0.56, 0.11, 0.030], [0.48, 0.11, 0.030]] {
+            let [x, y, z] = corner;
+            assert!(distance_m(x, y, z).abs() < 1e-9, "{corner:?}: {}", distance_m(x, y, z));
+        }
+        assert!((distance_m(0.5, 0.1, 0.040) - 0.010).abs() < 1e-9);
+    }
+
+    #[test]
+    fn round_parts_are_cylinders() {
+        let corner = |index: u32| {
+            let (sin, cos) = (f64::from(index) * 0.1).sin_cos();
+            Point2::new(0.026 * cos, 0.026 * sin)
+        };
+        let shape = PartShape::new((0..63).map(corner), 0.052, 0.015, 0.008).unwrap();
+        let part = LyingPart { base_from_part: at(0.5, 0.1), shape };
+        let Shape::Cylinder { radius_m, .. } = part.obstacle(0).shape else { panic!("{:?}", part.obstacle(0)) };
+        let Shape::Cylinder { radius_m: thinner_m, .. } = part.obstacle_beside_fingers(0).shape else { panic!() };
+        assert!((radius_m - 0.026).abs() < 1e-4 && (radius_m - thinner_m - THINNER_M).abs() < 1e-12);
+    }
+
+    #[test]
+    fn at_one_place_lies_one_part() {
+        let mut parts = LyingParts::default();
+        parts.put(LyingPart { base_from_part: at(0.5, 0.1), shape: bar() });
+        parts.put(LyingPart { base_from_part: at(0.505, 0.1), shape: bar() });
+        parts.put(LyingPart { base_from_part: at(0.6, 0.1), shape: bar() });
+        assert_eq!(parts.all().len(), 2);
+        assert_eq!(parts.all()[0].base_from_part, at(0.505, 0.1));
+        parts.take(&at(0.5, 0.1));
+        assert_eq!(parts.all().len(), 1);
+    }
+}

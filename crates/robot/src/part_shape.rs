@@ -1,0 +1,130 @@
+//! What is known of a part's shape.
+
+use nalgebra::{Isometry3, Point2, Point3};
+use sdg_geometry::convex_hull;
+use sdg_kinematics::FINGER_HALF_WIDTH_M;
+
+use crate::error::{Result, RobotError};
+
+/// Outlines reach so far from their grasp at most, m.
+const MAX_RADIUS_M: f64 = 1.0;
+
+/// A part from above, in the frame of its grasp, and how high it is.
+///
+/// The grasp's frame is that of `base_from_tcp` when the part is held as it was marked: x along the marked line, y across it, z down.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartShape {
+    /// Convex, m.
+    outline: Vec<Point2<f64>>,
+    jaw_width_m: f64,
+    top_m: f64,
+    grasp_height_m: f64,
+}
+
+impl PartShape {
+    /// A part with these points of its outline (m, the grasp's frame; their convex hull counts), this wide between the fingers (m). Its top and
+    /// its grasp are so high over what it lies on, m.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`] for numbers that are not finite, an outline without an area, and one that does not hold its grasp within a metre.
+    pub fn new(
+        outline: impl IntoIterator<Item = Point2<f64>>,
+        jaw_width_m: f64,
+        top_m: f64,
+        grasp_height_m: f64,
+    ) -> Result<Self> {
+        let wrong = |what: &str, expected: &str, found: String| {
+            let (what, expected) = (what.to_owned(), expected.to_owned());
+            Err(RobotError::Configuration { what, expected, found })
+        };
+        let points: Vec<Point2<f64>> = outline.into_iter().collect();
+        let is_point = |p: &Point2<f64>| p.coords.norm() <= MAX_RADIUS_M;
+        if let Some(p) = points.iter().find(|p| !is_point(p)) {
+            return wrong("outline of the part", "points within 1 m of the grasp", p.to_string());
+        }
+        for (what, found_m) in [
+            ("width of the part between the fingers in m", jaw_width_m),
+            ("height of the part in m", top_m),
+            ("height of the part's grasp in m", grasp_height_m),
+        ] {
+            if !(found_m > 0.0 && found_m <= MAX_RADIUS_M) {
+                return wrong(what, "above 0 and at most 1", found_m.to_string());
+            }
+        }
+        let outline = convex_hull(points);
+        if outline.len() < 3 {
+            let found = format!("{} corners of its convex hull", outline.len());
+            return wrong("outline of the part", "points that are not on one line", found);
+        }
+        Ok(Self { outline, jaw_width_m, top_m, grasp_height_m })
+    }
+
+    /// What a grasp alone tells of a part: that it is this wide (m) where the fingers hold it. It is taken to be as long as these are wide there, and
+    /// to reach as far over the tcp as below.
+    ///
+    /// # Errors
+    /// As [`PartShape::new`].
+    pub fn between_fingers(jaw_width_m: f64, grasp_height_m: f64) -> Result<Self> {
+        let [x, y] = [FINGER_HALF_WIDTH_M, 0.5 * jaw_width_m];
+        let corners = [[-x, -y], [x, -y], [x, y], [-x, y]].map(Point2::from);
+        Self::new(corners, jaw_width_m, 2.0 * grasp_height_m, grasp_height_m)
+    }
+
+    /// The outline's corners, m, the grasp's frame.
+    pub fn outline(&self) -> &[Point2<f64>] {
+        &self.outline
+    }
+
+    /// Width between the fingers, m.
+    pub fn jaw_width_m(&self) -> f64 {
+        self.jaw_width_m
+    }
+
+    /// Height of its top over what it lies on, m.
+    pub fn top_m(&self) -> f64 {
+        self.top_m
+    }
+
+    /// Height of its grasp over what it lies on, m.
+    pub fn grasp_height_m(&self) -> f64 {
+        self.grasp_height_m
+    }
+
+    /// The outline on the table of a part whose grasp is at a pose, m, base frame.
+    pub(crate) fn outline_in_base(&self, base_from_part: &Isometry3<f64>) -> Vec<Point2<f64>> {
+        self.outline.iter().map(|p| (base_from_part * Point3::new(p.x, p.y, 0.0)).xy()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_convex_hull_of_the_outline_counts() {
+        let corners = [[-0.02, -0.01], [0.02, -0.01], [0.0, 0.0], [0.02, 0.01], [-0.02, 0.01]].map(Point2::from);
+        let shape = PartShape::new(corners, 0.02, 0.01, 0.005).unwrap();
+        assert_eq!(shape.outline().len(), 4);
+        // The grasp's y is the base's -y, for its z points down.
+        let down = Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::PI);
+        let in_base = shape.outline_in_base(&(Isometry3::translation(0.5, 0.1, 0.0) * down));
+        assert!(in_base.iter().all(|p| ((p.x - 0.5).abs() - 0.02).abs() < 1e-12));
+        assert!(in_base.iter().all(|p| ((p.y - 0.1).abs() - 0.01).abs() < 1e-12));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let square = [[-0.01, -0.01], [0.01, -0.01], [0.01, 0.01]].map(Point2::from);
+        for [jaw_width_m, top_m, grasp_m] in
+            [[f64::NAN, 0.01, 0.005], [0.0, 0.01, 0.005], [0.02, -0.01, 0.005], [0.02, 0.01, f64::INFINITY]]
+        {
+            assert!(PartShape::new(square, jaw_width_m, top_m, grasp_m).is_err());
+        }
+        let found = PartShape::new([Point2::new(f64::NAN, 0.0)], 0.02, 0.01, 0.005).unwrap_err().to_string();
+        assert!(found.starts_with("outline of the part: expected points within 1 m"), "{found}");
+        let line = [[0.0, 0.0], [0.01, 0.0], [0.02, 0.0]].map(Point2::from);
+        let found = PartShape::new(line, 0.02, 0.01, 0.005).unwrap_err().to_string();
+        assert!(found.contains("not on one line, found 2 corners"), "{found}");
+        assert!(PartShape::between_fingers(0.02, 0.01).unwrap().top_m() == 0.02);
+    }
+}

@@ -1,0 +1,225 @@
+//! Whether a part and the fingers that let it go have room in a cell of a tray, with parts in the cells around it.
+//!
+//! ```text
+//!        ┌──────┐  part in the next cell along y
+//!        └──────┘
+//!    room   ┌─┐    finger, open to let go, with the part's own place between it and the other
+//!        ┌──┴─┴─┐
+//!        │ part │  turned as the symmetry of the part allows, the fingers find room elsewhere
+//!        └──┬─┬─┘
+//!           └─┘
+//! ```
+//! All cells around count as filled. The order of filling would change nothing for a hand that cannot be turned: its fingers open to both sides
+//! alike, and of two neighbours the second one always has the first beside it.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Point2, Point3};
+use sdg_geometry::RotationalSymmetry;
+use sdg_kinematics::{FINGER_HALF_WIDTH_M, HAND_OPENING_MAX_M, finger_thickness_m};
+
+use crate::error::{Result, RobotError};
+use crate::part_shape::PartShape;
+use crate::place::PlaceGoal;
+
+/// What is to be left between fingers and a part in a neighbouring cell, m: it may lie 2 mm beside its cell before it is taken again.
+const FINGER_ROOM_M: f64 = 0.002;
+/// What is to be left between two parts, m: both may lie so.
+const PART_ROOM_M: f64 = 2.0 * FINGER_ROOM_M;
+/// Least room for fingers that aim with how a part slides in them, m: they are then not in the middle of their cell.
+pub(crate) const MIN_FINGER_ROOM_M: f64 = 0.5 * FINGER_ROOM_M;
+/// Turns that are tried of a part that looks the same in all: every 15°, so that both axes of a tray and its diagonals are among them.
+const NUM_TURNS: u32 = 24;
+/// Rounding of lengths, m.
+const ROUNDING_M: f64 = 1e-9;
+
+/// Turns in which the part looks the same, rad.
+pub(crate) fn same_turns_rad(symmetry: RotationalSymmetry) -> Vec<f64> {
+    let num = match symmetry {
+        RotationalSymmetry::Fold(count) => count.clamp(1, 36),
+        RotationalSymmetry::Full => NUM_TURNS,
+        _ => 1,
+    };
+    (0..num).map(|turn| TAU * f64::from(turn) / f64::from(num)).collect()
+}
+
+/// How far a hand opens to let a part go, m.
+pub(crate) fn release_opening_m(width_m: f64, release_margin_m: f64) -> f64 {
+    (width_m + release_margin_m).min(HAND_OPENING_MAX_M)
+}
+
+impl PlaceGoal {
+    /// Refuses a cell whose neighbours, if there are parts in them, leave no room for this one, or for fingers that open by `release_margin_m` more
+    /// than it is wide (m), in all turns that its symmetry allows.
+    ///
+    /// # Errors
+    /// [`RobotError::Configuration`] with what has no room, and a pitch that would do.
+    pub fn check_room(&self, part: &PartShape, symmetry: RotationalSymmetry, release_margin_m: f64) -> Result<()> {
+        let opening_m = release_opening_m(part.jaw_width_m(), release_margin_m);
+        let turns_rad = same_turns_rad(symmetry);
+        let Some(why) = self.lacks_room(part, &turns_rad, opening_m) else { return Ok(()) };
+        let pitch_m = self.tray.as_ref().map_or([0.0; 2], |tray| tray.pitch_m);
+        let does = |goal: &Self| goal.lacks_room(part, &turns_rad, opening_m).is_none();
+        let longer = |along: &[[bool; 2]]| -> Vec<String> {
+            along.iter().filter_map(|&along| self.pitch_that_does(along, does)).map(told).collect()
+        };
+        let mut would_do = longer(&[[true, false], [false, true]]);
+        if would_do.is_empty() {
+            would_do = longer(&[[true, true]]);
+        }
+        let expected = match would_do.join(" or ") {
+            none if none.is_empty() => "a wider pitch".to_owned(),
+            pitches => format!("a pitch of {pitches}"),
+        };
+        let found = format!("{}: {why}", told(pitch_m));
+        Err(RobotError::Configuration { what: format!("\"{}\"", self.name), expected, found })
+    }
+
+    /// What has no room, in words.
+    fn lacks_room(&self, part: &PartShape, turns_rad: &[f64], opening_m: f64) -> Option<String> {
+        let base_from_part = self.base_from_part(0.0, 0.0);
+        let own = part.outline_in_base(&base_from_part);
+        let near = self.neighbours(part).map(|neighbour| gap_m(&own, &neighbour)).fold(f64::INFINITY, f64::min);
+        if near < PART_ROOM_M - ROUNDING_M {
+            let what = match near < 0.0 {
+                true => format!("parts in neighbouring cells would overlap by {:.1} mm", -near * 1e3),
+                false => format!("parts in neighbouring cells are {:.1} mm apart", near * 1e3),
+            };
+            return Some(format!("{what}, at least {:.0} mm are asked for", PART_ROOM_M * 1e3));
+        }
+        let near =
+            turns_rad.iter().map(|&turn_rad| self.finger_gap_m(part, &self.base_from_part(0.0, turn_rad), opening_m));
+        let near = near.fold(f64::NEG_INFINITY, f64::max);
+        if near >= FINGER_ROOM_M - ROUNDING_M {
+            return None;
+        }
+        let turned = if turns_rad.len() > 1 { ", however the hand is turned," } else { "" };
+        let comes = match near < 0.0 {
+            true => format!("would reach {:.1} mm into", -near * 1e3),
+            false => format!("come within {:.1} mm of", near * 1e3),
+        };
+        Some(format!(
+            "the part is {:.0} mm wide between the fingers; {:.0} mm thick and open to {:.0} mm to let it go, they {comes} a part in a \
+             neighbouring cell{turned} and at least {:.0} mm are asked for",
+            part.jaw_width_m() * 1e3,
+            thickness_m(part) * 1e3,
+            opening_m * 1e3,
+            FINGER_ROOM_M * 1e3
+        ))
+    }
+
+    /// Of poses of the hand those at which its fingers, open so far (m), have the most room among the parts around; none where that is too little.
+    pub(crate) fn with_room_for_fingers<T>(
+        &self,
+        part: &PartShape,
+        opening_m: f64,
+        poses: Vec<T>,
+        base_from_tcp: impl Fn(&T) -> Isometry3<f64>,
+    ) -> Vec<T> {
+        let gaps_m: Vec<f64> =
+            poses.iter().map(|pose| self.finger_gap_m(part, &base_from_tcp(pose), opening_m)).collect();
+        let largest_m = gaps_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let rooms_m = [PART_ROOM_M, FINGER_ROOM_M, MIN_FINGER_ROOM_M];
+        let least_m = rooms_m.into_iter().find(|room_m| largest_m >= room_m - ROUNDING_M).unwrap_or(f64::INFINITY);
+        let has_room = |gap_m: f64| gap_m >= least_m - ROUNDING_M;
+        poses.into_iter().zip(gaps_m).filter_map(|(pose, gap_m)| has_room(gap_m).then_some(pose)).collect()
+    }
+
+    /// How near the fingers come to the parts around, m; infinite where there are none.
+    fn finger_gap_m(&self, part: &PartShape, base_from_tcp: &Isometry3<f64>, opening_m: f64) -> f64 {
+        let fingers = fingers_in_base(base_from_tcp, part.jaw_width_m().min(opening_m), opening_m, thickness_m(part));
+        self.neighbours(part)
+            .flat_map(|neighbour| fingers.each_ref().map(|finger| gap_m(finger, &neighbour)))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Outlines of the parts around, base frame, m.
+    fn neighbours(&self, part: &PartShape) -> impl Iterator<Item = Vec<Point2<f64>>> {
+        self.neighbours_in_base(0.0).map(|base_from_part| part.outline_in_base(&base_from_part))
+    }
+
+    /// The smallest pitch that does, in whole millimetres, longer along the tray's x, its y, or both.
+    fn pitch_that_does(&self, along: [bool; 2], does: impl Fn(&Self) -> bool) -> Option<[f64; 2]> {
+        const MAX_STEPS: u32 = 300;
+        let before_m = self.tray.as_ref()?.pitch_m;
+        let does = |steps: [u32; 2]| {
+            let mut goal = self.clone();
+            let pitch_m = [0, 1].map(|axis| longer_m(before_m[axis], steps[axis]));
+            goal.tray.as_mut()?.pitch_m = pitch_m;
+            does(&goal).then_some(pitch_m)
+        };
+        let both = |step: u32| along.map(|is_longer| if is_longer { step } else { 0 });
+        let (num, mut pitch_m) = (1..=MAX_STEPS).find_map(|step| Some((step, does(both(step))?)))?;
+        if along == [true, true] {
+            // One side alone may have asked for all of it.
+            let fewer = (0..num).find_map(|step| does([step, num]).or_else(|| does([num, step])));
+            pitch_m = fewer.unwrap_or(pitch_m);
+        }
+        Some(pitch_m)
+    }
+}
+
+/// A length so many millimetres longer: whole ones, so that what is told is what does.
+fn longer_m(before_m: f64, steps: u32) -> f64 {
+    const STEP_M: f64 = 1e-3;
+    if steps == 0 { before_m } else { ((before_m / STEP_M + ROUNDING_M).floor() + f64::from(steps)) * STEP_M }
+}
+
+fn told([along_m, across_m]: [f64; 2]) -> String {
+    format!("{:.0} x {:.0} mm", along_m * 1e3, across_m * 1e3)
+}
+
+/// Thickness of a finger along its motion, where it is as low as the part's top, m.
+fn thickness_m(part: &PartShape) -> f64 {
+    finger_thickness_m(part.top_m() - part.grasp_height_m())
+}
+
+/// What the fingers take on the table, from where they hold the part to where they are open: corners in the base frame, m.
+fn fingers_in_base(
+    base_from_tcp: &Isometry3<f64>,
+    closed_m: f64,
+    opening_m: f64,
+    thickness_m: f64,
+) -> [Vec<Point2<f64>>; 2] {
+    let (x, inner, outer) = (FINGER_HALF_WIDTH_M, 0.5 * closed_m, 0.5 * opening_m + thickness_m);
+    [1.0, -1.0].map(|side: f64| {
+        [[-x, inner], [x, inner], [x, outer], [-x, outer]]
+            .map(|[x, y]| (base_from_tcp * Point3::new(x, side * y, 0.0)).xy())
+            .to_vec()
+    })
+}
+
+/// Distance of two convex polygons, m; negative where they overlap, by how far one has to be moved.
+fn gap_m(one: &[Point2<f64>], other: &[Point2<f64>]) -> f64 {
+    let separation_m = [one, other].into_iter().flat_map(edges).filter_map(|[from, to]| {
+        let along = (to - from).try_normalize(0.0)?;
+        let across = |points: &[Point2<f64>]| {
+            let heights = points.iter().map(|p| along.perp(&(p - from)));
+            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| (low.min(height), high.max(height)))
+        };
+        let ((low, high), (other_low, other_high)) = (across(one), across(other));
+        Some((other_low - high).max(low - other_high))
+    });
+    let separation_m = separation_m.fold(f64::NEG_INFINITY, f64::max);
+    if separation_m <= 0.0 {
+        return separation_m;
+    }
+    let from_corners = |points: &[Point2<f64>], polygon: &[Point2<f64>]| {
+        let pairs = points.iter().flat_map(|p| edges(polygon).map(move |edge| to_edge_m(p, edge)));
+        pairs.fold(f64::INFINITY, f64::min)
+    };
+    from_corners(one, other).min(from_corners(other, one))
+}
+
+fn edges(polygon: &[Point2<f64>]) -> impl Iterator<Item = [Point2<f64>; 2]> + '_ {
+    polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(&from, &to)| [from, to])
+}
+
+fn to_edge_m(p: &Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
+    let along = to - from;
+    let share = (p - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+    (p - (from + along * share.clamp(0.0, 1.0))).norm()
+}
+
+#[cfg(test)]
+mod tests;

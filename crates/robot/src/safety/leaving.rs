@@ -1,0 +1,125 @@
+//! Up from what was felt lower than the limits allow, and nowhere else.
+
+use nalgebra::Vector3;
+use sdg_kinematics::{JointVector, Panda, Trajectory};
+
+use super::limits::{CheckedMotion, SafetyLimits};
+use super::violation::Violation;
+use crate::arm_state::PERIOD_SECS;
+
+/// A straight way in joint space is bent, and the reference may be lower than what was measured, m: so much is not counted as going lower.
+const LEAVING_M: f64 = 0.5e-3;
+/// The reference of an arm that stands on something may be so much lower than the tcp was measured, m.
+const BELOW_MEASURED_M: f64 = 1e-3;
+/// So far beside the way down a soft tcp may stand, m: joint friction and what it presses on push it.
+const STANDS_BESIDE_M: f64 = 5e-3;
+/// So far beside where it stood the hand may be until it is as high as the limits ask for, m.
+const BESIDE_M: f64 = 1e-3;
+
+/// Where a hand stands that came straight down by contact, and so may be lower than the limits allow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct FeltBelow {
+    /// x and y of the tcp on the way down, base frame, m.
+    at_m: [f64; 2],
+    /// The lowest z of the tcp there, m.
+    lowest_m: f64,
+    /// How much lower than the limits the way down was allowed to be, m.
+    below_limits_m: f64,
+}
+
+/// The limits of a motion from a configuration: as they are, or lower for a hand that leaves what it felt.
+#[derive(Debug)]
+pub(crate) struct LimitsFrom<'l> {
+    limits: &'l SafetyLimits,
+    /// The limits lowered to where the hand stands.
+    leaving: Option<SafetyLimits>,
+}
+
+impl FeltBelow {
+    /// After a way straight down from a tcp at `from` (base frame, m) that ended at z `lowest_m`; the way was checked against limits so much lower.
+    pub(crate) fn new(from: &Vector3<f64>, lowest_m: f64, below_limits_m: f64) -> Self {
+        Self { at_m: [from.x, from.y], lowest_m: lowest_m - BELOW_MEASURED_M, below_limits_m }
+    }
+
+    fn is_here(&self, tcp: &Vector3<f64>) -> bool {
+        let [x, y] = self.at_m;
+        (tcp.x - x).hypot(tcp.y - y) <= STANDS_BESIDE_M && tcp.z >= self.lowest_m
+    }
+}
+
+impl SafetyLimits {
+    /// The limits with table and workspace so much lower.
+    pub(crate) fn lowered(&self, table_m: f64, workspace_m: f64) -> Self {
+        let mut limits = self.clone();
+        limits.table_height_m -= table_m;
+        if let Some(workspace) = &mut limits.workspace {
+            workspace.min_m.z -= workspace_m;
+        }
+        limits
+    }
+
+    /// The limits of a motion from a configuration. A hand that stands where it came down by contact, lower than the limits allow, may go
+    /// straight up from there.
+    pub(crate) fn from_start(&self, panda: &Panda, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
+        let leaving = felt.and_then(|felt| {
+            let tcp = panda.forward(start).translation.vector;
+            let table_m = self.below_table_m(panda, start);
+            let floor_m = self.workspace.map_or(0.0, |workspace| workspace.min_m.z - tcp.z);
+            let deepest_m = table_m.max(floor_m);
+            let is_below = deepest_m > 0.0 && deepest_m <= felt.below_limits_m + LEAVING_M;
+            // Each is lowered by what it needs itself.
+            let lower_m = |needed_m: f64| if needed_m > 0.0 { needed_m + LEAVING_M } else { 0.0 };
+            (is_below && felt.is_here(&tcp)).then(|| self.lowered(lower_m(table_m), lower_m(floor_m)))
+        });
+        LimitsFrom { limits: self, leaving }
+    }
+
+    /// How much nearer to the table than allowed the arm is, m.
+    fn below_table_m(&self, panda: &Panda, q: &JointVector) -> f64 {
+        let lowest_m = panda.clearance(q, self.table_height_m).lowest_m - self.fingertip_beyond_tcp_m;
+        self.min_table_clearance_m - lowest_m
+    }
+
+    fn is_below(&self, panda: &Panda, q: &JointVector, tcp_z_m: f64) -> bool {
+        let is_under_floor = self.workspace.is_some_and(|workspace| tcp_z_m < workspace.min_m.z);
+        is_under_floor || self.below_table_m(panda, q) > 0.0
+    }
+}
+
+impl LimitsFrom<'_> {
+    /// As [`SafetyLimits::check`]; as long as the hand is lower than the limits allow, it must go straight up.
+    ///
+    /// # Errors
+    /// The first limit that the motion breaks.
+    pub(crate) fn check(&self, trajectory: Trajectory) -> Result<CheckedMotion, Violation> {
+        let Some(leaving) = &self.leaving else { return self.limits.check(trajectory) };
+        self.check_leaving(&trajectory)?;
+        leaving.check(trajectory)
+    }
+
+    fn check_leaving(&self, trajectory: &Trajectory) -> Result<(), Violation> {
+        let panda = Panda::new();
+        let from = panda.forward(trajectory.start()).translation.vector;
+        let num_cycles = (trajectory.duration_secs() / PERIOD_SECS).ceil() as usize;
+        let (mut highest_m, mut was_above) = (from.z, false);
+        for cycle in 0..=num_cycles {
+            let time_secs = cycle as f64 * PERIOD_SECS;
+            let (q, _, _) = trajectory.sample(time_secs);
+            let tcp = panda.forward(&q).translation.vector;
+            if !self.limits.is_below(&panda, &q, tcp.z) {
+                was_above = true;
+                continue;
+            }
+            let [beside_m, down_m] = [(tcp - from).xy().norm(), highest_m - tcp.z];
+            if was_above || beside_m > BESIDE_M || down_m > LEAVING_M {
+                let (beside_mm, down_mm) = (beside_m * 1e3, down_m.max(0.0) * 1e3);
+                return Err(Violation::Leaving { time_secs, beside_mm, down_mm });
+            }
+            highest_m = highest_m.max(tcp.z);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

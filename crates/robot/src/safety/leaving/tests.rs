@@ -1,0 +1,83 @@
+use super::*;
+use crate::safety::WorkspaceBox;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use sdg_kinematics::{CartesianLimits, IkOptions, JointLimits, LineOptions, ready_pose};
+
+const AT_M: [f64; 2] = [0.45, 0.10];
+/// The finger tips reach 4 mm below the tcp, and 1 mm is to be left: from here on the hand is lower than allowed.
+const LOWEST_ALLOWED_M: f64 = 0.005;
+
+fn limits() -> SafetyLimits {
+    let workspace = WorkspaceBox { min_m: Vector3::new(0.2, -0.5, 0.002), max_m: Vector3::new(0.8, 0.5, 0.9) };
+    SafetyLimits { workspace: Some(workspace), ..SafetyLimits::default() }
+}
+
+fn tcp(x: f64, y: f64, z: f64) -> Isometry3<f64> {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    Isometry3::from_parts(Translation3::new(x, y, z), down)
+}
+
+fn at(x: f64, y: f64, z: f64) -> JointVector {
+    Panda::new().inverse(&tcp(x, y, z), &ready_pose(), &IkOptions::default()).unwrap().q
+}
+
+fn felt(lowest_m: f64) -> FeltBelow {
+    FeltBelow::new(&Vector3::new(AT_M[0], AT_M[1], 0.03), lowest_m, 0.010)
+}
+
+fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
+    let path = Panda::new().straight_path(start, to, &LineOptions::default()).unwrap();
+    let slow = CartesianLimits::franka().scaled(0.1, 0.1, 0.05).unwrap();
+    Trajectory::along_path(path, &JointLimits::franka(), &slow).unwrap()
+}
+
+/// Whether a straight motion from one place of the tcp to another is allowed after a way down to `lowest_m`.
+fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
+    let start = at(from[0], from[1], from[2]);
+    let motion = line(&start, &tcp(to[0], to[1], to[2]));
+    limits().from_start(&Panda::new(), &start, felt).check(motion).map(|_| ())
+}
+
+#[test]
+fn the_hand_goes_straight_up_from_where_it_felt_something() {
+    let [x, y] = AT_M;
+    for lowest_m in [LOWEST_ALLOWED_M - 0.001, LOWEST_ALLOWED_M - 0.009] {
+        let felt = felt(lowest_m);
+        check(Some(&felt), [x, y, lowest_m], [x, y, 0.10]).unwrap();
+        // Once it is as high as allowed it may go anywhere.
+        check(Some(&felt), [x, y, LOWEST_ALLOWED_M + 0.001], [x + 0.1, y, 0.10]).unwrap();
+        let error = check(None, [x, y, lowest_m], [x, y, 0.10]).unwrap_err();
+        assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
+    }
+}
+
+#[test]
+fn neither_sideways_nor_down_nor_from_elsewhere_nor_deeper_than_was_felt() {
+    let ([x, y], lowest_m) = (AT_M, LOWEST_ALLOWED_M - 0.004);
+    let felt = felt(lowest_m);
+    for to in [[x + 0.10, y, lowest_m], [x + 0.10, y, 0.010], [x, y, lowest_m - 0.002]] {
+        let error = check(Some(&felt), [x, y, lowest_m], to).unwrap_err();
+        assert!(matches!(error, Violation::Leaving { .. }), "{to:?}: {error}");
+    }
+    // 7 mm beside the way down, and 3 mm deeper than was felt.
+    for from in [[x + 0.007, y, lowest_m], [x, y, lowest_m - 0.003]] {
+        let error = check(Some(&felt), from, [from[0], from[1], 0.10]).unwrap_err();
+        assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{from:?}: {error}");
+    }
+    // More than the way down was allowed.
+    let deep = FeltBelow::new(&Vector3::new(x, y, 0.03), LOWEST_ALLOWED_M - 0.020, 0.010);
+    assert!(check(Some(&deep), [x, y, LOWEST_ALLOWED_M - 0.015], [x, y, 0.10]).is_err());
+}
+
+#[test]
+fn a_motion_down_to_where_something_was_felt_is_refused() {
+    let ([x, y], lowest_m) = (AT_M, LOWEST_ALLOWED_M - 0.004);
+    let (start, end) = (at(x, y, lowest_m), at(x, y, lowest_m));
+    let panda = Panda::new();
+    let up = panda.inverse(&tcp(x, y, 0.05), &start, &IkOptions::default()).unwrap().q;
+    let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
+    // A motion down from above: its start is not below, so that nothing is lowered for it.
+    let down = Trajectory::point_to_point(&up, &end, &slow).unwrap();
+    let error = limits().from_start(&panda, &up, Some(&felt(lowest_m))).check(down).unwrap_err();
+    assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
+}
