@@ -344,8 +344,8 @@ def latency(sdg, folder):
                 time.sleep(0.0005)
             searches += [counts_of([message])["last search, ms"] for message in diagnostics()]
             time.sleep(0.02)
-        print(f"      picture to pose over ROS 2: median {np.median(times):.1f} ms, 99 % {np.percentile(times, 99):.1f} ms "
-              f"({len(times)} pictures); search alone: median {np.median(searches):.1f} ms", flush=True)
+        in_words = lambda values: f"median {np.median(values):.1f} ms, 99 % {np.percentile(values, 99):.1f} ms"
+        print(f"      picture to pose over ROS 2: {in_words(times)} ({len(times)} pictures); search alone: {in_words(searches)}", flush=True)
         check(len(times) == 200, "every picture got its pose")
 
 

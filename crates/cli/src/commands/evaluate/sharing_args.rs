@@ -63,7 +63,7 @@ pub struct SharingArgs {
     /// Memory that a unit asks for
     #[arg(
         long,
-        default_value_t = 3000,
+        default_value_t = 1500,
         value_name = "MB",
         value_parser = clap::value_parser!(u32).range(1..),
         requires = "submit",
@@ -73,7 +73,7 @@ pub struct SharingArgs {
     /// How long a unit may take
     #[arg(
         long,
-        default_value_t = 60,
+        default_value_t = 30,
         value_name = "MINS",
         value_parser = clap::value_parser!(u32).range(1..=100_000),
         requires = "submit",
