@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::MotionLimits;
 use super::grid::{Grid, Tightening};
+use super::limits::MotionLimits;
 use super::profile::Profile;
 use crate::dynamics::{GRAVITY_M_S2, Placed, TcpMotion};
 use crate::joints::{JointVector, NUM_JOINTS};

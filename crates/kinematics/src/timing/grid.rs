@@ -3,7 +3,7 @@
 //! With `q̈ = q' s̈ + q'' ṡ²` accelerations are linear in (s̈, ṡ²), and so are torques without friction:
 //! `τ = M q' s̈ + (M q'' + C(q, q') q') ṡ² + g`. Speeds bound ṡ² alone.
 
-use super::MotionLimits;
+use super::limits::MotionLimits;
 use crate::dynamics::{GRAVITY_M_S2, Placed};
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, NUM_JOINTS};

@@ -13,25 +13,17 @@
 
 mod check;
 mod grid;
+mod limits;
 mod phase_plane;
 mod profile;
 
 use check::Worst;
 use grid::{Grid, Tightening};
+pub(crate) use limits::MotionLimits;
 pub(crate) use profile::Profile;
 
-use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
-use crate::limits::{CartesianLimits, JointLimits};
 use crate::rounded_path::RoundedPath;
-
-/// What a motion along a rounded path keeps to.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct MotionLimits<'a> {
-    pub(crate) joints: &'a JointLimits,
-    pub(crate) cartesian: &'a CartesianLimits,
-    pub(crate) dynamics: &'a ArmDynamics,
-}
 
 /// `s(t)` on a path.
 #[derive(Debug, Clone)]

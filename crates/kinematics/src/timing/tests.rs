@@ -2,7 +2,9 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::dynamics::ArmDynamics;
 use crate::joints::{JointVector, ready_pose};
+use crate::limits::{CartesianLimits, JointLimits};
 use crate::rounded_path::length_secs;
 use crate::test_poses::random_configuration;
 use crate::trajectory::Trajectory;

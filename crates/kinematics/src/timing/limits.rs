@@ -1,0 +1,12 @@
+//! The limits of a motion, together.
+
+use crate::dynamics::ArmDynamics;
+use crate::limits::{CartesianLimits, JointLimits};
+
+/// What a motion along a rounded path keeps to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MotionLimits<'a> {
+    pub(crate) joints: &'a JointLimits,
+    pub(crate) cartesian: &'a CartesianLimits,
+    pub(crate) dynamics: &'a ArmDynamics,
+}
