@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point2, Translation3};
 use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::part_shape::PartShape;
-use crate::room::MIN_FINGER_ROOM_M;
+use crate::room::{MIN_FINGER_ROOM_M, gap_m};
 
 /// Capsules of the finger tips stand out of them by so much along the fingers' motion, m.
 const CAPSULES_STAND_OUT_M: f64 = 0.0055;
@@ -31,6 +31,16 @@ impl LyingPart {
     /// Whether it is the part of this grasp.
     pub(crate) fn is_at(&self, base_from_part: &Isometry3<f64>) -> bool {
         (self.base_from_part.translation.vector - base_from_part.translation.vector).xy().norm() < SAME_WITHIN_M
+    }
+
+    /// Its outline on the table, base frame, m.
+    pub(crate) fn outline_in_base(&self) -> Vec<Point2<f64>> {
+        self.shape.outline_in_base(&self.base_from_part)
+    }
+
+    /// Whether the two lie one over the other.
+    pub(crate) fn overlaps(&self, other: &Self) -> bool {
+        gap_m(&self.outline_in_base(), &other.outline_in_base()) < 0.0
     }
 
     /// A solid that holds it, from what it lies on up to its top.
@@ -150,6 +160,12 @@ mod tests {
             assert!(distance_m(x, y, z).abs() < 1e-9, "{corner:?}: {}", distance_m(x, y, z));
         }
         assert!((distance_m(0.5, 0.1, 0.040) - 0.010).abs() < 1e-9);
+    }
+
+    #[test]
+    fn parts_side_by_side_do_not_overlap() {
+        let part = |y: f64| LyingPart { base_from_part: at(0.5, y), shape: bar() };
+        assert!(part(0.1).overlaps(&part(0.119)) && !part(0.1).overlaps(&part(0.121)));
     }
 
     #[test]

@@ -137,7 +137,7 @@ impl<'a, A: Arm> Robot<'a, A> {
 
     /// The limits of a motion from a configuration: a hand that came down by contact, lower than the limits allow, may go straight up.
     pub(crate) fn limits_from(&self, start: &JointVector) -> LimitsFrom<'_> {
-        self.limits.from_start(&self.panda, start, self.felt_below.as_ref())
+        self.limits.starting_at(&self.panda, start, self.felt_below.as_ref())
     }
 
     /// Checks a motion and follows it to its end.

@@ -81,7 +81,7 @@ impl PlaceGoal {
         let own = part.outline_in_base(&base_from_part);
         let near = self.neighbours(part).map(|neighbour| gap_m(&own, &neighbour)).fold(f64::INFINITY, f64::min);
         if near < PART_ROOM_M - ROUNDING_M {
-            let what = match near < 0.0 {
+            let what = match near < -ROUNDING_M {
                 true => format!("parts in neighbouring cells would overlap by {:.1} mm", -near * 1e3),
                 false => format!("parts in neighbouring cells are {:.1} mm apart", near * 1e3),
             };
@@ -94,7 +94,7 @@ impl PlaceGoal {
             return None;
         }
         let turned = if turns_rad.len() > 1 { ", however the hand is turned," } else { "" };
-        let comes = match near < 0.0 {
+        let comes = match near < -ROUNDING_M {
             true => format!("would reach {:.1} mm into", -near * 1e3),
             false => format!("come within {:.1} mm of", near * 1e3),
         };
@@ -190,7 +190,7 @@ fn fingers_in_base(
 }
 
 /// Distance of two convex polygons, m; negative where they overlap, by how far one has to be moved.
-fn gap_m(one: &[Point2<f64>], other: &[Point2<f64>]) -> f64 {
+pub(crate) fn gap_m(one: &[Point2<f64>], other: &[Point2<f64>]) -> f64 {
     let separation_m = [one, other].into_iter().flat_map(edges).filter_map(|[from, to]| {
         let along = (to - from).try_normalize(0.0)?;
         let across = |points: &[Point2<f64>]| {

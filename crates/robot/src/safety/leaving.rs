@@ -60,7 +60,7 @@ impl SafetyLimits {
 
     /// The limits of a motion from a configuration. A hand that stands where it came down by contact, lower than the limits allow, may go
     /// straight up from there.
-    pub(crate) fn from_start(&self, panda: &Panda, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
+    pub(crate) fn starting_at(&self, panda: &Panda, start: &JointVector, felt: Option<&FeltBelow>) -> LimitsFrom<'_> {
         let leaving = felt.and_then(|felt| {
             let tcp = panda.forward(start).translation.vector;
             let table_m = self.below_table_m(panda, start);

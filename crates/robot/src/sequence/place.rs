@@ -152,8 +152,21 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let Some(part) = shape_of(target, table_height_m, self.config) else { return Ok(()) };
         goal.check_room(&part, placing.symmetry, placing.release_margin_m)
             .map_err(|error| Stop::Failed(GraspStep::Detect, error.to_string()))?;
-        for base_from_part in goal.neighbours_in_base(goal.surface_m + part.grasp_height_m()) {
-            self.lying.suppose(LyingPart { base_from_part, shape: part.clone() });
+        let taken = LyingPart { base_from_part: target.base_from_tcp, shape: part.clone() };
+        self.lying.take(&target.base_from_tcp);
+        let there = |base_from_part| LyingPart { base_from_part, shape: part.clone() };
+        let height_m = goal.surface_m + part.grasp_height_m();
+        let placed = there(goal.base_from_part(height_m, 0.0));
+        if goal.bin_m.is_none()
+            && let Some(other) = self.lying.all().iter().find(|other| other.overlaps(&placed))
+        {
+            let p = other.base_from_part.translation;
+            let why = format!("in \"{}\" lies a part already, at ({:.3}, {:.3}) m", goal.name, p.x, p.y);
+            return Err(Stop::Failed(GraspStep::Detect, why));
+        }
+        // What is taken from where a cell is shows that nothing else lies there.
+        for neighbour in goal.neighbours_in_base(height_m).map(there).filter(|part| !part.overlaps(&taken)) {
+            self.lying.suppose(neighbour);
         }
         Ok(())
     }

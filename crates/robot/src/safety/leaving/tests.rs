@@ -35,7 +35,7 @@ fn line(start: &JointVector, to: &Isometry3<f64>) -> Trajectory {
 fn check(felt: Option<&FeltBelow>, from: [f64; 3], to: [f64; 3]) -> Result<(), Violation> {
     let start = at(from[0], from[1], from[2]);
     let motion = line(&start, &tcp(to[0], to[1], to[2]));
-    limits().from_start(&Panda::new(), &start, felt).check(motion).map(|_| ())
+    limits().starting_at(&Panda::new(), &start, felt).check(motion).map(|_| ())
 }
 
 #[test]
@@ -78,6 +78,6 @@ fn a_motion_down_to_where_something_was_felt_is_refused() {
     let slow = JointLimits::franka().scaled(0.1, 0.1, 0.1).unwrap();
     // A motion down from above: its start is not below, so that nothing is lowered for it.
     let down = Trajectory::point_to_point(&up, &end, &slow).unwrap();
-    let error = limits().from_start(&panda, &up, Some(&felt(lowest_m))).check(down).unwrap_err();
+    let error = limits().starting_at(&panda, &up, Some(&felt(lowest_m))).check(down).unwrap_err();
     assert!(matches!(error, Violation::Table { .. } | Violation::Workspace { .. }), "{error}");
 }

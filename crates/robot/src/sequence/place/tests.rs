@@ -1,6 +1,7 @@
 use super::*;
 use crate::arm_state::{ArmState, HandState, MotionEnd};
 use crate::pace::Pace;
+use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};
 use crate::planned_arm::{PlannedAction, PlannedArm};
 use crate::safety::{CheckedMotion, SafetyLimits};
@@ -230,4 +231,43 @@ fn the_whole_sequence_goes_around_what_stands_in_the_cell() {
         run(&mut super::tests::cell(Isometry3::identity()), &surrounded, &inside.goal(1).unwrap(), &Default::default());
     let PlaceOutcome::Failed { step: GraspStep::Carry, why } = &report.outcome else { panic!("{report:?}") };
     assert!(why.contains("wall"), "{why}");
+}
+
+fn bar() -> PartShape {
+    let corners = [[-0.03, -0.01], [0.03, -0.01], [0.03, 0.01], [-0.03, 0.01]].map(nalgebra::Point2::from);
+    PartShape::new(corners, 0.020, 0.030, 0.020).unwrap()
+}
+
+#[test]
+fn a_tray_without_room_is_refused_before_anything_moves() {
+    let kind = PlaceKind::Tray { cells: [2, 2], pitch_m: [0.08, 0.045] };
+    let narrow = Place { kind, ..tray() }.goal(1).unwrap();
+    let mut cell = cell(Isometry3::identity());
+    let mut robot = Robot::new(&mut cell, SafetyLimits::default(), Watch::default());
+    let known = GraspConfig { part: Some(bar()), ..config() };
+    let placing = PlacingConfig::default();
+    let ended = grasp_and_place(&mut robot, &mut Truth, &mut (), CameraMount::Base, &known, &narrow, &placing);
+    let error = ended.unwrap_err();
+    assert!(!error.latches() && error.to_string().contains("expected a pitch of 80 x 47 mm"), "{error}");
+    assert!(cell.arm.actions().is_empty());
+    // Without its outline: once it was found, and before it is taken.
+    let report = run(&mut cell, &config(), &narrow, &placing);
+    let PlaceOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("the part is 20 mm wide between the fingers"), "{why}");
+    assert_eq!(cell.base_from_part, lying(0.5, 0.1, 0.4));
+}
+
+#[test]
+fn a_part_is_put_between_parts_that_lie_and_not_onto_one() {
+    let goal = tray().goal(1).unwrap();
+    let part = |goal: &PlaceGoal| LyingPart { base_from_part: goal.base_from_part(0.02, 0.0), shape: bar() };
+    let others: Vec<LyingPart> = (2..=4).map(|number| part(&tray().goal(number).unwrap())).collect();
+    let known = GraspConfig { part: Some(bar()), lying: others, ..config() };
+    let mut cell = cell(planar(0.003, 0.001, 0.02));
+    let report = run(&mut cell, &known, &goal, &PlacingConfig::default());
+    assert_eq!(report.outcome, PlaceOutcome::Placed, "{report:?}");
+    let onto = GraspConfig { lying: vec![part(&goal)], ..known };
+    let report = run(&mut super::tests::cell(Isometry3::identity()), &onto, &goal, &PlacingConfig::default());
+    let PlaceOutcome::Failed { step: GraspStep::Detect, why } = &report.outcome else { panic!("{report:?}") };
+    assert!(why.contains("in \"tray, cell 1\" lies a part already"), "{why}");
 }
