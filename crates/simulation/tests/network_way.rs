@@ -41,7 +41,13 @@ fn cell() -> Workcell {
 /// The one motion to a side of the wall.
 fn plan(robot: &mut Robot<FrankaArm>, y: f64) -> Trajectory {
     let obstacles = [wall()];
-    let surroundings = Surroundings { obstacles: &obstacles, held: &[], table_clearance_m: FREE_CLEARANCE_M };
+    let surroundings = Surroundings {
+        obstacles: &obstacles,
+        lying: &[],
+        held: &[],
+        opening_m: HAND_OPENING_MAX_M,
+        table_clearance_m: FREE_CLEARANCE_M,
+    };
     let goal = [beside_the_wall(y)];
     let way = robot.plan_around(&surroundings, &Destination::Poses(&goal), &Pace::REHEARSED.free_limits()).unwrap();
     assert_eq!(way.motions.len(), 1, "the way has no stop");
