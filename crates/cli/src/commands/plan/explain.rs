@@ -72,7 +72,7 @@ impl Explained {
         };
         let stops = match self.parts.len() {
             0 | 1 => String::new(),
-            parts => format!(" (with a stop at each of {} waypoints {:.1} s)", parts - 1, self.stopping_secs),
+            _ => format!(" ({:.1} s if it stopped at each waypoint)", self.stopping_secs),
         };
         line(format!(
             "found in {:.0} ms with {} collision checks: {motions} of {secs:.1} s{stops}",
