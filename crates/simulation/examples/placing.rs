@@ -24,6 +24,7 @@ const HIGHER_M: f64 = 0.005;
 const MAX_BESIDE_M: f64 = 0.003;
 const MAX_TURNED_DEG: f64 = 3.0;
 const MAX_MOVED_M: f64 = 0.5e-3;
+const MAX_OVER_REST_M: f64 = 0.005;
 const MAX_STATIC_N: f64 = 10.0;
 const MAX_PEAK_N: f64 = 25.0;
 /// Parts of the paper's that a hand 5 mm too high still holds.
@@ -74,7 +75,10 @@ fn fill_tray(at: Where, rest: &[&str]) -> Result<(), Box<dyn Error>> {
         num_right += u32::from(is_right);
         num_again += looks.saturating_sub(1);
         worst = (worst.0.max(distance_mm), worst.1.max(angle_deg));
-        lying.push(placed.base_from_object);
+        // A part that stayed in the hand does not lie.
+        if placed.base_from_object.translation.z < spec.rest_height_m + MAX_OVER_REST_M {
+            lying.push(placed.base_from_object);
+        }
     }
     println!(
         "{}: {num_right} of {num_cells} right, at most {:.2} mm and {:.2}° beside, {num_again} taken again",

@@ -9,6 +9,7 @@
 //!
 //! Placing goes on from there: carry ─> come down until the place is felt ─> open, up ─> look where the part lies.
 
+mod carry;
 mod config;
 mod held_part;
 mod hold;

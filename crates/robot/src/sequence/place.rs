@@ -10,29 +10,23 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_geometry::{Angle, RotationalSymmetry};
-use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
+use sdg_kinematics::{JointPath, JointVector};
 
+use super::carry::{Aim, BELOW_M, SOFT_WAY_M};
 use super::held_part::shape_of;
 use super::look::HOVER_SHIFTS_M;
 use super::reach::above;
 use super::{CameraMount, GraspConfig, GraspOutcome, GraspReport, SETTLE_SECS, SURE, Sequence, Steps, Stop, fails_at};
 use crate::arm::{Arm, CompliantArm};
-use crate::arm_state::{ContactSensitivity, HandCommand, Load};
+use crate::arm_state::{HandCommand, Load};
 use crate::error::Result;
 use crate::lying_part::LyingPart;
 use crate::perception::{GraspStep, GraspTarget, PartFinder, StepObserver};
 use crate::place::{PlaceError, PlaceGoal};
 use crate::robot::Robot;
 use crate::room::{release_opening_m, same_turns_rad};
-use crate::surroundings::Destination;
 use crate::touch::{TouchDown, Touched};
 
-/// Heights above a place that a straight way down to it begins at, m.
-const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
-/// A soft way down begins so far above where the place is to be felt, m.
-const SOFT_WAY_M: f64 = 0.015;
-/// It ends so far below, m.
-const BELOW_M: f64 = 0.010;
 /// Speed at which the opening changes when the part is let go, m/s.
 const RELEASING_SPEED_M_S: f64 = 0.05;
 /// How long the arm stands still after the fingers have opened, s.
@@ -174,7 +168,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     fn place(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, errors: &mut Vec<PlaceError>) -> Steps<()> {
         let (mut num_corrections, mut slid) = (0, Isometry3::identity());
         loop {
-            let aim = self.carry(goal, placing, &slid)?;
+            let aim = self.carry(goal, placing.symmetry, self.release_opening_m(placing), &slid)?;
             self.put_down(&aim, placing)?;
             let q = self.robot.state()?.q;
             let base_from_tcp = self.robot.panda().forward(&q);
@@ -223,87 +217,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
             self.opening_margin_m = placing.release_margin_m;
             self.take(&target)?;
         }
-    }
-
-    /// Takes the part over its place: as far as a soft way down from there.
-    fn carry(&mut self, goal: &PlaceGoal, placing: &PlacingConfig, slip: &Isometry3<f64>) -> Steps<Aim> {
-        let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
-        let opening_m = self.release_opening_m(placing);
-        // Where the hand cannot open it need not come down.
-        self.opening_m = opening_m;
-        let mut aims: Vec<Aim> = same_turns_rad(placing.symmetry)
-            .into_iter()
-            .map(|turn_rad| {
-                let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
-                let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
-                Aim { base_from_part, base_from_tcp }
-            })
-            .collect();
-        if let Some(part) = &held.shape {
-            aims = goal.with_room_for_fingers(part, opening_m, aims, |aim| aim.base_from_tcp);
-        }
-        if aims.is_empty() {
-            let opening_mm = opening_m * 1e3;
-            let why = format!("\"{}\" has no room for fingers that open to {opening_mm:.0} mm", goal.name);
-            return Err(Stop::Failed(GraspStep::Carry, why));
-        }
-        let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
-        let mut why = String::new();
-        for height_m in HEIGHTS_M {
-            let planned = match self.is_surrounded() {
-                true => match self.way_to(&Destination::Approached(&poses, height_m)) {
-                    Ok(way) => {
-                        let aim_idx = way.goal_idx;
-                        let path = self.travel(way, GraspStep::Carry)?;
-                        path.map(|path| (aim_idx, path)).ok_or_else(|| "the way has no approach".to_owned())
-                    }
-                    Err(error) if error.latches() => return Err(error.into()),
-                    Err(error) => Err(error.to_string()),
-                },
-                false => self.straight_down(&poses, height_m)?,
-            };
-            match planned {
-                Ok((aim_idx, path)) => {
-                    let hand = self.robot.hand()?;
-                    self.judge(GraspStep::Carry, &hand)?;
-                    self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
-                    let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
-                    let motion = fails_at(GraspStep::PutDown, planned)?;
-                    self.follow(motion, GraspStep::PutDown)?;
-                    return Ok(aims[aim_idx]);
-                }
-                Err(because) if why.is_empty() => why = because,
-                Err(_) => {}
-            }
-        }
-        let [x, y] = goal.at_m;
-        Err(Stop::Failed(GraspStep::Carry, format!("no way to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
-    }
-
-    /// Goes above the pose that the arm reaches best, from which a straight way leads down to it.
-    fn straight_down(
-        &mut self,
-        poses: &[Isometry3<f64>],
-        height_m: f64,
-    ) -> Steps<std::result::Result<(usize, JointPath), String>> {
-        let seed = self.robot.commanded()?;
-        let mut best: Option<(f64, usize, Approach)> = None;
-        let mut why = String::new();
-        for (index, pose) in poses.iter().enumerate() {
-            let (ik, line) = (IkOptions::default(), LineOptions::default());
-            let planned =
-                self.robot.panda().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
-            match planned {
-                Ok(approach) if best.as_ref().is_none_or(|best| approach.pregrasp.cost < best.0) => {
-                    best = Some((approach.pregrasp.cost, index, approach));
-                }
-                Ok(_) => {}
-                Err(error) => why = error.to_string(),
-            }
-        }
-        let Some((_, index, approach)) = best else { return Ok(Err(why)) };
-        self.move_freely(&approach.pregrasp.q, GraspStep::Carry)?;
-        Ok(Ok((index, approach.path)))
     }
 
     /// Comes down softly until the place is felt.
@@ -412,13 +325,6 @@ impl<A: Arm> Sequence<'_, '_, A> {
 const MAX_LOOK_TURNS: usize = 4;
 /// What is farther from its place is another part, m.
 const MAX_SEEN_BESIDE_M: f64 = 0.03;
-
-/// Where the part is to lie, and the tcp before the soft way down.
-#[derive(Debug, Clone, Copy)]
-struct Aim {
-    base_from_part: Isometry3<f64>,
-    base_from_tcp: Isometry3<f64>,
-}
 
 fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Check, why)

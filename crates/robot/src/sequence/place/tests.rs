@@ -1,5 +1,5 @@
 use super::*;
-use crate::arm_state::{ArmState, HandState, MotionEnd};
+use crate::arm_state::{ArmState, ContactSensitivity, HandState, MotionEnd};
 use crate::pace::Pace;
 use crate::part_shape::PartShape;
 use crate::place::{Place, PlaceKind};

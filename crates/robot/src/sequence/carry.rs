@@ -1,0 +1,153 @@
+//! Taking the held part over its place, turned so that its fingers have room and that the soft way down can be followed.
+
+use nalgebra::Isometry3;
+use sdg_geometry::RotationalSymmetry;
+use sdg_kinematics::{Approach, GraspSymmetry, IkOptions, JointPath, JointVector, LineOptions};
+
+use super::reach::above;
+use super::{Sequence, Steps, Stop, fails_at};
+use crate::arm::Arm;
+use crate::arm_state::ContactSensitivity;
+use crate::perception::GraspStep;
+use crate::place::PlaceGoal;
+use crate::room::same_turns_rad;
+use crate::surroundings::{Destination, Way};
+
+/// Heights above a place that a straight way down to it begins at, m.
+const HEIGHTS_M: [f64; 3] = [0.20, 0.15, 0.10];
+/// A soft way down begins so far above where the place is to be felt, m.
+pub(super) const SOFT_WAY_M: f64 = 0.015;
+/// It ends so far below, m.
+pub(super) const BELOW_M: f64 = 0.010;
+
+/// Where the part is to lie, and the tcp before the soft way down.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Aim {
+    pub(super) base_from_part: Isometry3<f64>,
+    pub(super) base_from_tcp: Isometry3<f64>,
+}
+
+/// How the held part comes above its place.
+enum Carried {
+    Around(Way),
+    Straight(Approach),
+}
+
+impl<A: Arm> Sequence<'_, '_, A> {
+    /// Takes the part over its place, as far as a soft way down from there, turned so that the fingers have room when they open so far, m.
+    pub(super) fn carry(
+        &mut self,
+        goal: &PlaceGoal,
+        symmetry: RotationalSymmetry,
+        opening_m: f64,
+        slip: &Isometry3<f64>,
+    ) -> Steps<Aim> {
+        let held = self.held.clone().ok_or_else(|| Stop::Failed(GraspStep::Carry, "nothing is held".to_owned()))?;
+        // Where the hand cannot open it need not come down.
+        self.opening_m = opening_m;
+        let mut aims: Vec<Aim> = same_turns_rad(symmetry)
+            .into_iter()
+            .map(|turn_rad| {
+                let base_from_part = goal.base_from_part(goal.surface_m + held.height_m, turn_rad);
+                let base_from_tcp = above(&(base_from_part * slip * held.part_from_tcp), SOFT_WAY_M);
+                Aim { base_from_part, base_from_tcp }
+            })
+            .collect();
+        if let Some(part) = &held.shape {
+            aims = goal.with_room_for_fingers(part, opening_m, aims, |aim| aim.base_from_tcp);
+        }
+        if aims.is_empty() {
+            let opening_mm = opening_m * 1e3;
+            let why = format!("\"{}\" has no room for fingers that open to {opening_mm:.0} mm", goal.name);
+            return Err(Stop::Failed(GraspStep::Carry, why));
+        }
+        let mut why = None;
+        for height_m in HEIGHTS_M {
+            let mut left = aims.clone();
+            while !left.is_empty() {
+                let (aim_idx, carried) = match self.way_above(&left, height_m)? {
+                    Ok(found) => found,
+                    Err(because) => {
+                        why.get_or_insert(because);
+                        break;
+                    }
+                };
+                let aim = left.remove(aim_idx);
+                let end = match &carried {
+                    Carried::Around(way) => way.approach.as_ref().map(|path| *path.end()),
+                    Carried::Straight(approach) => Some(*approach.path.end()),
+                };
+                // A joint may end what is felt for; in another turn of the part it may not.
+                if let Err(because) = end.map_or(Ok(()), |end| self.goes_on_down(&end)) {
+                    why.get_or_insert(because);
+                    continue;
+                }
+                self.go_above_place(carried)?;
+                return Ok(aim);
+            }
+        }
+        let [x, y] = goal.at_m;
+        let why = why.unwrap_or_default();
+        Err(Stop::Failed(GraspStep::Carry, format!("no way to \"{}\" at ({x:.2}, {y:.2}) m: {why}", goal.name)))
+    }
+
+    /// How to come above one of the aims, and which; else why there is no way.
+    fn way_above(&mut self, aims: &[Aim], height_m: f64) -> Steps<Result<(usize, Carried), String>> {
+        let poses: Vec<Isometry3<f64>> = aims.iter().map(|aim| aim.base_from_tcp).collect();
+        if !self.is_surrounded() {
+            let best = self.straight_down(&poses, height_m)?;
+            return Ok(best.map(|(aim_idx, approach)| (aim_idx, Carried::Straight(approach))));
+        }
+        match self.way_to(&Destination::Approached(&poses, height_m)) {
+            Ok(way) => Ok(Ok((way.goal_idx, Carried::Around(way)))),
+            Err(error) if error.latches() => Err(error.into()),
+            Err(error) => Ok(Err(error.to_string())),
+        }
+    }
+
+    /// Above the pose that the arm reaches best, from which a straight way leads down to it.
+    fn straight_down(&mut self, poses: &[Isometry3<f64>], height_m: f64) -> Steps<Result<(usize, Approach), String>> {
+        let seed = self.robot.commanded()?;
+        let mut best: Option<(usize, Approach)> = None;
+        let mut why = String::new();
+        for (index, pose) in poses.iter().enumerate() {
+            let (ik, line) = (IkOptions::default(), LineOptions::default());
+            let planned =
+                self.robot.panda().approach(&above(pose, height_m), pose, GraspSymmetry::Fixed, &seed, &ik, &line);
+            match planned {
+                Ok(approach) if best.as_ref().is_none_or(|(_, best)| approach.pregrasp.cost < best.pregrasp.cost) => {
+                    best = Some((index, approach));
+                }
+                Ok(_) => {}
+                Err(error) => why = error.to_string(),
+            }
+        }
+        Ok(best.ok_or(why))
+    }
+
+    /// Whether the arm can come down from a configuration as far as a place may be felt; why not.
+    fn goes_on_down(&self, from: &JointVector) -> Result<(), String> {
+        let panda = self.robot.panda();
+        let lowest = above(&panda.forward(from), -(SOFT_WAY_M + BELOW_M));
+        let line = panda.straight_path(from, &lowest, &LineOptions::default());
+        line.map(|_| ()).map_err(|error| error.to_string())
+    }
+
+    fn go_above_place(&mut self, carried: Carried) -> Steps<()> {
+        let path: JointPath = match carried {
+            Carried::Around(way) => self.travel(way, GraspStep::Carry)?.ok_or_else(|| {
+                Stop::Failed(GraspStep::Carry, "the way around the obstacles has no approach".to_owned())
+            })?,
+            Carried::Straight(approach) => {
+                self.move_freely(&approach.pregrasp.q, GraspStep::Carry)?;
+                approach.path
+            }
+        };
+        let hand = self.robot.hand()?;
+        self.judge(GraspStep::Carry, &hand)?;
+        self.robot.set_contact_sensitivity(ContactSensitivity::Contact)?;
+        let planned = self.robot.plan_along(&path, &self.config.pace.approach_limits());
+        let motion = fails_at(GraspStep::PutDown, planned)?;
+        self.follow(motion, GraspStep::PutDown)
+    }
+}
