@@ -1,4 +1,4 @@
-//! Links of documents lead somewhere, files that they name exist, and ARCHITECTURE.md's table says what cargo says.
+//! Links of documents lead somewhere, files that they name exist, no merge has left its marks, and ARCHITECTURE.md's table says what cargo says.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,6 +28,23 @@ fn tracked(pattern: &str) -> Vec<String> {
     assert!(!files.is_empty(), "expected files that match {pattern}, found none: is this a git checkout?");
     // A file that was deleted and not yet committed is still listed.
     files.into_iter().filter(|file| root().join(file).exists()).collect()
+}
+
+/// Documents and scripts with such lines still pass what compiles and runs.
+#[test]
+fn no_merge_has_left_its_marks() {
+    let marks = ["<", ">"].map(|mark| format!("{} ", mark.repeat(7)));
+    let mut faults = Vec::new();
+    for file in
+        ["*.md", "*.rs", "*.toml", "*.py", "*.sh", "*.html", "*.css", "*.js"].iter().flat_map(|kind| tracked(kind))
+    {
+        // What is not UTF-8 is no text that is merged by lines.
+        let Ok(text) = fs::read_to_string(root().join(&file)) else { continue };
+        let lines =
+            text.lines().enumerate().filter(|(_, line)| marks.iter().any(|mark| line.starts_with(mark.as_str())));
+        faults.extend(lines.map(|(idx, line)| format!("{file}:{}: {line}", idx + 1)));
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
 #[test]
