@@ -14,6 +14,9 @@ use crate::error::RosError;
 use crate::messages::{CompressedImage, Header, Image, Time};
 use crate::names::Naming;
 
+/// A message's header, and its picture or why it cannot be read.
+type Taken = (Header, Result<RgbImage, String>);
+
 /// A stamp this far from now is of another clock, as a simulation's or a recording's; the time of arrival then counts.
 const MAX_STAMP_AGE: Duration = Duration::from_secs(60);
 
@@ -127,7 +130,7 @@ impl RosCamera {
     }
 
     /// The next picture with its header; `None` where none comes in time.
-    fn take(&self) -> Result<Option<(Header, Result<RgbImage, String>)>, RosError> {
+    fn take(&self) -> Result<Option<Taken>, RosError> {
         let timeout = self.stall_timeout;
         Ok(match &self.pictures {
             Pictures::Raw(images) => images.receive(timeout)?.map(|received| {
