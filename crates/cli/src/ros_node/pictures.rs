@@ -67,7 +67,7 @@ impl Shared {
         let is_old = |kept: &mut Kept| kept.newest.as_ref().is_none_or(|newest| newest.captured < time);
         let waited = self.changed.wait_timeout_while(self.lock(), timeout, is_old);
         let mut kept = waited.unwrap_or_else(PoisonError::into_inner).0;
-        if is_old(&mut *kept) { None } else { kept.newest.clone() }
+        if is_old(&mut kept) { None } else { kept.newest.clone() }
     }
 
     fn put(&self, picture: Picture) {

@@ -96,10 +96,9 @@ impl Place {
         match &self.source {
             PlaceSource::Unknown => Ok(None),
             PlaceSource::File(over_table) => {
-                match &known.sent {
-                    Some(Ok(sent)) => camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?,
-                    // The file is better than nothing that can be read.
-                    Some(Err(_)) | None => {}
+                // A camera_info that cannot be read says nothing against the file.
+                if let Some(Ok(sent)) = &known.sent {
+                    camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
                 }
                 Ok(Some(*over_table))
             }
