@@ -14,7 +14,7 @@ use crate::dynamics::ArmDynamics;
 use crate::error::KinematicsError;
 use crate::joints::{JointVector, NUM_JOINTS};
 use crate::limits::{CartesianLimits, JointLimits};
-use crate::path::JointPath;
+use crate::path::{JointPath, PathPoint};
 use crate::rounded_path::RoundedPath;
 use crate::timing::{self, MotionLimits, Timing};
 
@@ -256,22 +256,22 @@ impl Trajectory {
             }
             Motion::EachJoint(profiles) => sample_profiles(profiles, time_secs),
             Motion::AlongPath(timed) => {
-                let progress = timed.profile.at(time_secs / timed.stretch);
-                let point = timed.path.at(progress.s);
-                let velocity = progress.velocity / timed.stretch;
-                let acceleration = progress.acceleration / timed.stretch.powi(2);
-                (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
+                let Progress { s, velocity, acceleration, .. } = timed.profile.at(time_secs / timed.stretch);
+                at_progress(&timed.path.at(s), velocity, acceleration, timed.stretch)
             }
             Motion::AlongRoundedPath(timed) => {
-                let (path, timing) = timed.as_ref();
-                let progress = timing.profile.at(time_secs / timing.stretch);
-                let point = path.at(progress.s);
-                let velocity = progress.velocity / timing.stretch;
-                let acceleration = progress.acceleration / timing.stretch.powi(2);
-                (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
+                let (path, Timing { profile, stretch, .. }) = timed.as_ref();
+                let progress = profile.at(time_secs / stretch);
+                at_progress(&path.at(progress.s), progress.velocity, progress.acceleration, *stretch)
             }
         }
     }
+}
+
+/// The state at a point of a path that is passed with `ds/dt` and `d²s/dt²`, these of a profile that is stretched in time.
+fn at_progress(point: &PathPoint, velocity: f64, acceleration: f64, stretch: f64) -> State {
+    let (velocity, acceleration) = (velocity / stretch, acceleration / stretch.powi(2));
+    (point.q, point.dq * velocity, point.dq * acceleration + point.ddq * velocity.powi(2))
 }
 
 fn at_rest(q: &JointVector) -> State {

@@ -208,10 +208,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
             num_corrections += 1;
             self.lying.take(&aim.base_from_part);
             slid = slip(&aim.base_from_part, &found.base_from_tcp, &base_from_tcp, &part_from_tcp, &error);
-            // Perception takes the part to lie on the table.
             // The hand is turned as it let the part go, where its fingers had room.
             let mut target =
                 GraspTarget { base_from_tcp: as_aimed(&aim.base_from_part, &found.base_from_tcp, &error), ..found };
+            // Perception takes the part to lie on the table.
             target.base_from_tcp.translation.z += goal.surface_m - self.robot.limits().table_height_m;
             // It was looked at from above, and others lie beside it: the hand opens no wider than to let go.
             self.opening_margin_m = placing.release_margin_m;
