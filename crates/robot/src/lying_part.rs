@@ -1,6 +1,7 @@
 //! Parts that lie in the cell, as obstacles.
 
-use nalgebra::{Isometry3, Point2, Translation3};
+use nalgebra::{Isometry3, Translation3};
+use sdg_geometry::Polygon;
 use sdg_kinematics::collision::{Obstacle, Shape};
 
 use crate::part_shape::PartShape;
@@ -13,8 +14,6 @@ const CAPSULES_STAND_OUT_M: f64 = 0.0055;
 const THINNER_M: f64 = CAPSULES_STAND_OUT_M + 0.003 - MIN_FINGER_ROOM_M;
 /// A part that is thinner is taken to be so thick, m.
 const MIN_HALF_M: f64 = 0.0005;
-/// An outline that fills at least this share of the circle around it is a disc: a square fills 0.64 of its own.
-const DISC_SHARE: f64 = 0.9;
 /// Grasps of two parts are not nearer to each other than this, m: it is the same one.
 const SAME_WITHIN_M: f64 = 0.015;
 
@@ -34,7 +33,7 @@ impl LyingPart {
     }
 
     /// Its outline on the table, base frame, m.
-    pub(crate) fn outline_in_base(&self) -> Vec<Point2<f64>> {
+    pub(crate) fn outline_in_base(&self) -> Polygon {
         self.shape.outline_in_base(&self.base_from_part)
     }
 
@@ -57,13 +56,13 @@ impl LyingPart {
         let half_height_m = 0.5 * self.shape.top_m();
         // z of the grasp's frame points down: the middle of the height is below the grasp by so much.
         let middle_z_m = self.shape.grasp_height_m() - half_height_m;
-        let (center, shape) = match disc(self.shape.outline()) {
+        let (center, shape) = match self.shape.disc() {
             Some((center, radius_m)) => {
                 let radius_m = (radius_m - thinner_m).max(MIN_HALF_M);
                 (center, Shape::Cylinder { radius_m, half_length_m: half_height_m })
             }
             None => {
-                let (center, half_m) = bounds(self.shape.outline());
+                let (center, half_m) = self.shape.bounds();
                 let [x, y] = half_m.map(|half| (half - thinner_m).max(MIN_HALF_M));
                 (center, Shape::Box { half_m: [x, y, half_height_m] })
             }
@@ -75,25 +74,6 @@ impl LyingPart {
             base_from_obstacle: self.base_from_part * Translation3::new(center.x, center.y, middle_z_m),
         }
     }
-}
-
-/// Middle and halves of the sides of the rectangle around points, along the grasp's axes.
-fn bounds(outline: &[Point2<f64>]) -> (Point2<f64>, [f64; 2]) {
-    let along = |axis: usize| {
-        let values = outline.iter().map(|p| p[axis]);
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
-    };
-    let [(left, right), (front, back)] = [along(0), along(1)];
-    (Point2::new(0.5 * (left + right), 0.5 * (front + back)), [0.5 * (right - left), 0.5 * (back - front)])
-}
-
-/// Middle and radius of an outline that is round.
-fn disc(outline: &[Point2<f64>]) -> Option<(Point2<f64>, f64)> {
-    let (center, _) = bounds(outline);
-    let radius_m = outline.iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
-    let next = outline.iter().cycle().skip(1);
-    let area: f64 = outline.iter().zip(next).map(|(a, b)| 0.5 * (a - center).perp(&(b - center))).sum();
-    (area.abs() >= DISC_SHARE * std::f64::consts::PI * radius_m * radius_m).then_some((center, radius_m))
 }
 
 /// Parts that lie, each once: of those at one place the one that was told last.
@@ -135,7 +115,7 @@ impl LyingParts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Point3, UnitQuaternion, Vector3};
+    use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 
     fn at(x: f64, y: f64) -> Isometry3<f64> {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);

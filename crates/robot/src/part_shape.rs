@@ -1,13 +1,15 @@
 //! What is known of a part's shape.
 
 use nalgebra::{Isometry3, Point2, Point3};
-use sdg_geometry::convex_hull;
+use sdg_geometry::{Polygon, convex_hull};
 use sdg_kinematics::FINGER_HALF_WIDTH_M;
 
 use crate::error::{Result, RobotError};
 
 /// Outlines reach so far from their grasp at most, m.
 const MAX_RADIUS_M: f64 = 1.0;
+/// An outline that fills at least this share of the circle around it is a disc: a square fills 0.64 of its own.
+const DISC_SHARE: f64 = 0.9;
 
 /// A part from above, in the frame of its grasp, and how high it is.
 ///
@@ -15,7 +17,7 @@ const MAX_RADIUS_M: f64 = 1.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartShape {
     /// Convex, m.
-    outline: Vec<Point2<f64>>,
+    outline: Polygon,
     jaw_width_m: f64,
     top_m: f64,
     grasp_height_m: f64,
@@ -56,7 +58,7 @@ impl PartShape {
             let found = format!("{} corners of its convex hull", outline.len());
             return wrong("outline of the part", "points that are not on one line", found);
         }
-        Ok(Self { outline, jaw_width_m, top_m, grasp_height_m })
+        Ok(Self { outline: Polygon { vertices: outline }, jaw_width_m, top_m, grasp_height_m })
     }
 
     /// What a grasp alone tells of a part: that it is this wide (m) where the fingers hold it. It is taken to be as long as these are wide there, and
@@ -72,7 +74,20 @@ impl PartShape {
 
     /// The outline's corners, m, the grasp's frame.
     pub fn outline(&self) -> &[Point2<f64>] {
-        &self.outline
+        &self.outline.vertices
+    }
+
+    /// Middle and radius (m) of the circle around an outline that fills nearly all of it; `None` for others.
+    pub(crate) fn disc(&self) -> Option<(Point2<f64>, f64)> {
+        let center = self.outline.bounds().center();
+        let radius_m = self.outline().iter().map(|p| (p - center).norm()).fold(0.0, f64::max);
+        (self.outline.area() >= DISC_SHARE * std::f64::consts::PI * radius_m * radius_m).then_some((center, radius_m))
+    }
+
+    /// Middle of the rectangle around the outline, along the grasp's axes, and halves of its sides, m.
+    pub(crate) fn bounds(&self) -> (Point2<f64>, [f64; 2]) {
+        let bounds = self.outline.bounds();
+        (bounds.center(), [0.5 * bounds.width(), 0.5 * bounds.height()])
     }
 
     /// Width between the fingers, m.
@@ -91,8 +106,9 @@ impl PartShape {
     }
 
     /// The outline on the table of a part whose grasp is at a pose, m, base frame.
-    pub(crate) fn outline_in_base(&self, base_from_part: &Isometry3<f64>) -> Vec<Point2<f64>> {
-        self.outline.iter().map(|p| (base_from_part * Point3::new(p.x, p.y, 0.0)).xy()).collect()
+    pub(crate) fn outline_in_base(&self, base_from_part: &Isometry3<f64>) -> Polygon {
+        let in_base = |p: &Point2<f64>| (base_from_part * Point3::new(p.x, p.y, 0.0)).xy();
+        Polygon { vertices: self.outline().iter().map(in_base).collect() }
     }
 }
 
@@ -108,8 +124,8 @@ mod tests {
         // The grasp's y is the base's -y, for its z points down.
         let down = Isometry3::rotation(nalgebra::Vector3::x() * std::f64::consts::PI);
         let in_base = shape.outline_in_base(&(Isometry3::translation(0.5, 0.1, 0.0) * down));
-        assert!(in_base.iter().all(|p| ((p.x - 0.5).abs() - 0.02).abs() < 1e-12));
-        assert!(in_base.iter().all(|p| ((p.y - 0.1).abs() - 0.01).abs() < 1e-12));
+        assert!(in_base.vertices.iter().all(|p| ((p.x - 0.5).abs() - 0.02).abs() < 1e-12));
+        assert!(in_base.vertices.iter().all(|p| ((p.y - 0.1).abs() - 0.01).abs() < 1e-12));
     }
 
     #[test]

@@ -14,8 +14,8 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point2, Point3};
-use sdg_geometry::RotationalSymmetry;
+use nalgebra::{Isometry3, Point3};
+use sdg_geometry::{Polygon, RotationalSymmetry};
 use sdg_kinematics::{FINGER_HALF_WIDTH_M, HAND_OPENING_MAX_M, finger_thickness_m};
 
 use crate::error::{Result, RobotError};
@@ -134,7 +134,7 @@ impl PlaceGoal {
     }
 
     /// Outlines of the parts around, base frame, m.
-    fn neighbours(&self, part: &PartShape) -> impl Iterator<Item = Vec<Point2<f64>>> {
+    fn neighbours(&self, part: &PartShape) -> impl Iterator<Item = Polygon> {
         self.neighbours_in_base(0.0).map(|base_from_part| part.outline_in_base(&base_from_part))
     }
 
@@ -175,26 +175,22 @@ fn thickness_m(part: &PartShape) -> f64 {
 }
 
 /// What the fingers take on the table, from where they hold the part to where they are open: corners in the base frame, m.
-fn fingers_in_base(
-    base_from_tcp: &Isometry3<f64>,
-    closed_m: f64,
-    opening_m: f64,
-    thickness_m: f64,
-) -> [Vec<Point2<f64>>; 2] {
+fn fingers_in_base(base_from_tcp: &Isometry3<f64>, closed_m: f64, opening_m: f64, thickness_m: f64) -> [Polygon; 2] {
     let (x, inner, outer) = (FINGER_HALF_WIDTH_M, 0.5 * closed_m, 0.5 * opening_m + thickness_m);
     [1.0, -1.0].map(|side: f64| {
-        [[-x, inner], [x, inner], [x, outer], [-x, outer]]
-            .map(|[x, y]| (base_from_tcp * Point3::new(x, side * y, 0.0)).xy())
-            .to_vec()
+        let corners = [[-x, inner], [x, inner], [x, outer], [-x, outer]];
+        let in_base = corners.map(|[x, y]| (base_from_tcp * Point3::new(x, side * y, 0.0)).xy());
+        Polygon { vertices: in_base.to_vec() }
     })
 }
 
 /// Distance of two convex polygons, m; negative where they overlap, by how far one has to be moved.
-pub(crate) fn gap_m(one: &[Point2<f64>], other: &[Point2<f64>]) -> f64 {
-    let separation_m = [one, other].into_iter().flat_map(edges).filter_map(|[from, to]| {
+pub(crate) fn gap_m(one: &Polygon, other: &Polygon) -> f64 {
+    let edges = one.edges().chain(other.edges());
+    let separation_m = edges.filter_map(|(from, to)| {
         let along = (to - from).try_normalize(0.0)?;
-        let across = |points: &[Point2<f64>]| {
-            let heights = points.iter().map(|p| along.perp(&(p - from)));
+        let across = |polygon: &Polygon| {
+            let heights = polygon.vertices.iter().map(|p| along.perp(&(p - from)));
             heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| (low.min(height), high.max(height)))
         };
         let ((low, high), (other_low, other_high)) = (across(one), across(other));
@@ -204,21 +200,10 @@ pub(crate) fn gap_m(one: &[Point2<f64>], other: &[Point2<f64>]) -> f64 {
     if separation_m <= 0.0 {
         return separation_m;
     }
-    let from_corners = |points: &[Point2<f64>], polygon: &[Point2<f64>]| {
-        let pairs = points.iter().flat_map(|p| edges(polygon).map(move |edge| to_edge_m(p, edge)));
-        pairs.fold(f64::INFINITY, f64::min)
+    let from_corners = |corners: &Polygon, polygon: &Polygon| {
+        corners.vertices.iter().map(|p| polygon.distance_to_edge(p)).fold(f64::INFINITY, f64::min)
     };
     from_corners(one, other).min(from_corners(other, one))
-}
-
-fn edges(polygon: &[Point2<f64>]) -> impl Iterator<Item = [Point2<f64>; 2]> + '_ {
-    polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(&from, &to)| [from, to])
-}
-
-fn to_edge_m(p: &Point2<f64>, [from, to]: [Point2<f64>; 2]) -> f64 {
-    let along = to - from;
-    let share = (p - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
-    (p - (from + along * share.clamp(0.0, 1.0))).norm()
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The simulated Panda driven by torques, and what it feels: for coming down softly.
 
 use nalgebra::{SMatrix, Vector3, Vector6};
+use sdg_kinematics::dynamics::GRAVITY_M_S2;
 use sdg_kinematics::{JointVector, Panda};
 use sdg_robot::{CompliantArm, Descent, Load, PERIOD_SECS, RobotError, TouchDown, Touched, Watch};
 
@@ -14,7 +15,6 @@ use crate::workcell::Workcell;
 const FULL_FRICTION_RAD_S: f64 = 0.02;
 /// Cut-off of what is felt, Hz: a robot's own estimate is filtered.
 const CUTOFF_HZ: f64 = 30.0;
-const GRAVITY_M_S2: f64 = 9.81;
 /// Keeps the least squares bounded at singular poses.
 const DAMPING: f64 = 1e-4;
 

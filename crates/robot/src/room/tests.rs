@@ -1,5 +1,6 @@
 use super::*;
 use crate::place::{Place, PlaceKind};
+use nalgebra::Point2;
 
 /// As the fingers let go unless told otherwise.
 const MARGIN_M: f64 = 0.020;
@@ -95,7 +96,9 @@ fn alone_there_is_always_room() {
 
 #[test]
 fn gaps_of_polygons() {
-    let square = |x: f64, y: f64| [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]].map(Point2::from);
+    let square = |x: f64, y: f64| Polygon {
+        vertices: [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]].map(Point2::from).to_vec(),
+    };
     let gap = |x: f64, y: f64| gap_m(&square(0.0, 0.0), &square(x, y));
     assert!((gap(3.0, 0.5) - 2.0).abs() < 1e-12);
     // From corner to corner.
