@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-compile test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -13,10 +13,8 @@ help: ## Lists the targets
 setup: ## Installs what is missing from Debian (sudo only when not root)
 	@scripts/setup.sh
 
-# The whole workspace, with one example so that the tests' libraries have their say: cargo then chooses the features of
-# the libraries as it does for `make test`, which so finds burn compiled. With `-p sdg-cli` it is compiled twice.
 build: setup ## Builds target/release/sdg
-	$(CARGO) build $(PROFILE) --locked --workspace --bins --example try_views
+	@scripts/build.sh --bin sdg
 
 demo: build ## Teaches the pendulum from one photo, grasps it ten times, writes report/index.html
 	target/release/sdg demo
@@ -27,25 +25,37 @@ web: setup ## Builds the page that detects in the browser into target/web
 edge: setup ## Builds sdg without simulator for small machines, target/edge/sdg, and measures it
 	@scripts/edge.sh $(EDGE)
 
+# Without examples, which cargo would compile along: `make lint` checks those.
+TESTS_ALONE = --lib --bins --tests
+
+test-compile: setup ## Compiles every test
+	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
+		$(CARGO) nextest run $(PROFILE) --locked --workspace $(TESTS_ALONE) --no-run; \
+	else \
+		$(CARGO) test $(PROFILE) --locked --workspace $(TESTS_ALONE) --no-run; \
+	fi
+
 # nextest where it is installed, cargo's own runner elsewhere; nextest leaves the examples in the docs to cargo.
 test: setup ## Runs every test
 	@if $(CARGO) nextest --version >/dev/null 2>&1; then \
-		$(CARGO) nextest run $(PROFILE) --locked --workspace && $(CARGO) test $(PROFILE) --locked --workspace --doc -q; \
+		$(CARGO) nextest run $(PROFILE) --locked --workspace $(TESTS_ALONE); \
 	else \
-		$(CARGO) test $(PROFILE) --locked --workspace; \
+		$(CARGO) test $(PROFILE) --locked --workspace $(TESTS_ALONE); \
 	fi
+	@$(CARGO) test $(PROFILE) --locked --workspace --doc -q
 
 # Tests marked as needing Chromium; screenshots stay in target/browser-test.
 test-browser: build web ## Tests our pages in headless Chromium
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
+	$(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --test-threads 1 browser::
 	$(CARGO) test $(PROFILE) --locked --workspace --test browser -- --ignored --test-threads 1
 
 # A folder has demo.* and further pictures with LabelMe marks beside them; FOLDER=2 where the part looks the same after half a turn.
 walk: build ## From a photograph to a tried model with a stop-watch, through the page in Chromium (SETS="FOLDER …")
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
-	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test walk -- --ignored --nocapture
+	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture walk::
 
 test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB camera of our own (no root, no camera)
 	@scripts/test-v4l.sh
@@ -73,19 +83,21 @@ placing: setup ## 20 parts into a tray, grasps from a table 5 mm higher than tol
 
 test-wgpu: setup ## Tests wgpu against flex, on a graphics card or else on Mesa's software Vulkan
 	@scripts/install.sh libvulkan1 mesa-vulkan-drivers
-	$(call DEVICE_TESTS,wgpu) --test device_parity --test devices
-	$(call DEVICE_TESTS,wgpu) -p sdg-grasp --lib -- device_parity
+	$(call DEVICE_TESTS,wgpu) --test device_parity
+	$(call DEVICE_TESTS,wgpu) --test cli -- devices::
+	$(call DEVICE_TESTS,wgpu) --lib -- device_parity
 
 test-ndarray: setup ## Tests ndarray against flex (ten minutes to compile, three to run)
-	$(call DEVICE_TESTS,ndarray) --test device_parity --test devices
-	$(call DEVICE_TESTS,ndarray) -p sdg-grasp --lib -- device_parity
+	$(call DEVICE_TESTS,ndarray) --test device_parity
+	$(call DEVICE_TESTS,ndarray) --test cli -- devices::
+	$(call DEVICE_TESTS,ndarray) --lib -- device_parity
 
 # Any Python that has torchvision; without one, the peers' of `make bench` (0.9 GB to fetch, once).
 SDG_TORCH_PYTHON ?= $(CURDIR)/target/bench/venv/bin/python
 
 test-torch: setup ## Tests a whole network against torchvision, losses and gradients included
 	@[ -x "$(SDG_TORCH_PYTHON)" ] || benches/peers/install.sh target/bench/venv
-	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked -p sdg-detection --test golden -- --ignored
+	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked --workspace --test detection -- --ignored golden::
 
 # The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
 PACKAGED = geometry kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
@@ -93,9 +105,13 @@ PACKAGED = geometry kinematics sift shape grasp kernels layers detection demonst
 package: ## Packages the libraries that other programs can use, into target/package
 	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify
 
-lint: setup ## Formatting and lints, as CI denies them
+# Every feature of every crate, so that what CI does not run compiles; then the programs of small machines, which have none.
+FEATURES = sdg-cli/ndarray,sdg-cli/wgpu,sdg-cli/cuda,sdg-cli/ros2,sdg-base-weights/wgpu,sdg-base-weights/cuda,sdg-web/webgpu
+
+lint: setup ## Formatting and lints, with every feature, as CI denies them
 	$(CARGO) fmt --all --check
-	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets -- -D warnings
+	$(CARGO) clippy $(PROFILE) --locked --workspace --all-targets --features $(FEATURES) -- -D warnings
+	$(CARGO) clippy $(PROFILE) --locked --package sdg-cli --no-default-features --all-targets -- -D warnings
 
 # What is in target/base-weights is gone on with. DEVICE: flex, wgpu or cuda.
 DEVICE ?= flex
@@ -115,19 +131,21 @@ base-weights: setup ## Pretrains preset edge on generated parts (hours; goes on 
 		--comparison $(BASE_WEIGHTS)/comparison.safetensors --out $(BASE_WEIGHTS)/edge.safetensors \
 		--commit $$(git rev-parse --short HEAD)
 
-bench: build ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
+bench: setup ## Our speed against PyTorch, ONNX Runtime, OpenVINO, albumentations (BENCH=--quick: sooner)
+	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	target/release/sdg-bench compare --results benches/RESULTS.md $(BENCH)
 
 # After `make bench`, which leaves PyTorch and a taught model; npm fetches onnxruntime-web.
-bench-browser: build web ## The page's speed against onnxruntime-web in headless Chromium
+bench-browser: web ## The page's speed against onnxruntime-web in headless Chromium
+	@scripts/build.sh --bin sdg --bin sdg-bench
 	benches/peers/install.sh target/bench/venv
 	benches/browser/install.sh target/bench/onnxruntime-web
 	target/release/sdg-bench browser --results benches/RESULTS.md $(BENCH)
 
 # PyPI's ompl goes into target/plan-peers. A quarter of an hour on two cores.
 bench-planning: setup ## Planning: a thousand random problems followed in MuJoCo, checks a second, and OMPL on the same model
-	$(CARGO) build $(PROFILE) --locked -p sdg-simulation --example planning
+	$(CARGO) build $(PROFILE) --locked --workspace --example planning
 	target/release/examples/planning rate
 	target/release/examples/planning proof 1000
 	[ -x target/plan-peers/bin/python ] || python3 -m venv target/plan-peers

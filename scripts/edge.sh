@@ -1,22 +1,18 @@
 #!/usr/bin/env bash
-# Builds `sdg` for small machines into target/edge/sdg and measures it; further arguments go to `sdg-bench edge`.
-# Called by `make edge`.
+# Builds `sdg` for small machines into target/edge/sdg, in the profile of what goes to other machines, and measures it; further
+# arguments go to `sdg-bench edge`. Called by `make edge`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 cargo=${CARGO:-cargo}
-built=${CARGO_TARGET_DIR:-target}/release
+target=${CARGO_TARGET_DIR:-target}
 edge=target/edge
 
-build_all() { "$cargo" build --quiet --locked --release --workspace --bins --example try_views; }
-
-build_all
-# Beside the simulator, which the program does not link, so that burn has the features that it was compiled with for the
-# workspace: alone (`cargo build --release -p sdg-cli --no-default-features`) it is the same program and five minutes more.
-trap build_all EXIT # target/release/sdg is again the one with the simulator.
-"$cargo" build --locked --release --no-default-features --package sdg-cli --package sdg-simulation
+scripts/build.sh --bin sdg-bench
+# Without simulator, which the program does not link.
+"$cargo" build --locked --profile ship --no-default-features --package sdg-cli
 mkdir -p "$edge"
-cp "$built/sdg" "$edge/sdg.new"
+cp "$target/ship/sdg" "$edge/sdg.new"
 mv "$edge/sdg.new" "$edge/sdg"
 
 for library in libmujoco libEGL libGL; do
@@ -25,4 +21,4 @@ for library in libmujoco libEGL libGL; do
         exit 1
     fi
 done
-"$built/sdg-bench" edge "$edge/sdg" "$@"
+"$target/release/sdg-bench" edge "$edge/sdg" "$@"

@@ -5,14 +5,28 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 attempts=${NETWORK_GRASPS:-20}
-${CARGO:-cargo} build --release --locked -p sdg-simulation --example network_grasps
+scripts/build.sh --example network_grasps
 example=${CARGO_TARGET_DIR:-target}/release/examples/network_grasps
+
+modes=${NETWORK_MODES:-lockstep realtime}
 
 # A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
 realtime=
 if chrt -f 30 true 2>/dev/null; then realtime="chrt -f 30"; fi
 
-echo "== in lockstep"
-"$example" lockstep "$attempts"
-echo "== in real time, real-time priority: ${realtime:-none}"
-$realtime "$example" realtime "$attempts"
+for mode in $modes; do
+    case $mode in
+    lockstep)
+        echo "== in lockstep"
+        "$example" lockstep "$attempts"
+        ;;
+    realtime)
+        echo "== in real time, real-time priority: ${realtime:-none}"
+        $realtime "$example" realtime "$attempts"
+        ;;
+    *)
+        echo "network-grasps: NETWORK_MODES: expected lockstep or realtime, found $mode" >&2
+        exit 2
+        ;;
+    esac
+done

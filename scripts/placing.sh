@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-${CARGO:-cargo} build --release --locked -p sdg-simulation --example placing
+scripts/build.sh --example placing
 example=${CARGO_TARGET_DIR:-target}/release/examples/placing
 for where in process lockstep; do
     for what in tray heights; do

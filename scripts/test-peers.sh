@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Programs of others against ours: libfranka 0.9.2 (panda-python) drives `sdg simulate --fci`; our client drives franka-sim.
 # `make test-peers` runs this; everything is installed below target/peers. test-peers.sh [lockstep|realtime|franka-sim|checks]…
-# runs these parts alone.
+# or PEERS="lockstep checks" runs these parts alone.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -19,9 +19,7 @@ install panda panda-python==1.1.1
 install fr3 franka-sim==1.1.7
 install v10 pylibfranka==0.21.3
 
-cargo=${CARGO:-cargo}
-$cargo build --release --locked --workspace --bins --example try_views
-$cargo build --release --locked -p sdg-fci --examples
+scripts/build.sh --bin sdg --example hand_checks --example limit_checks --example loop_times
 examples=$target/release/examples
 
 # A real robot's program runs with real-time priority; without the right to it, the numbers in real time are this machine's.
@@ -29,7 +27,7 @@ realtime=
 if chrt -f 30 true 2>/dev/null; then realtime="chrt -f 30"; fi
 echo "== real-time priority: ${realtime:-none}"
 
-parts=${*:-lockstep realtime franka-sim checks}
+parts=${*:-${PEERS:-lockstep realtime franka-sim checks}}
 for part in $parts; do
     case $part in lockstep | realtime | franka-sim | checks) ;; *) echo "expected lockstep, realtime, franka-sim or checks, found $part" && exit 2 ;; esac
 done

@@ -16,8 +16,7 @@ if [ ! -x "$peers/fast_peer" ] || [ "$source/fast_peer.cpp" -nt "$peers/fast_pee
 fi
 
 # The whole workspace with the feature: burn is compiled once more, since some crates below it have other features with it.
-cargo=${CARGO:-cargo}
-$cargo build --release --locked --workspace --bins --features sdg-cli/ros2 --example cdr_round_trip --example arm_against_peer --example ros2_cell --example try_views
+scripts/build.sh --bin sdg --features sdg-cli/ros2 --example cdr_round_trip --example arm_against_peer --example ros2_cell
 examples=$target/release/examples
 
 failed=0

@@ -23,9 +23,9 @@ if [ ! -e "$work/kernel/done" ]; then
 fi
 kernel=$(ls "$work/kernel/lib/modules")
 
-# The binary's path is the last word of cargo's line "Executable tests/v4l.rs (PATH)".
-built=$(${CARGO:-cargo} test --release --locked -p sdg-camera --test v4l --no-run 2>&1) || { echo "$built" >&2; exit 1; }
-binary=$(sed -n 's/.*Executable tests\/v4l.rs (\(.*\))$/\1/p' <<<"$built")
+# The binary's path is the last word of cargo's line "Executable tests/main.rs (PATH)".
+built=$(${CARGO:-cargo} test --release --locked -p sdg-camera --test camera --no-run 2>&1) || { echo "$built" >&2; exit 1; }
+binary=$(sed -n 's/.*Executable tests\/main.rs (\(.*\))$/\1/p' <<<"$built")
 
 root=$work/root
 rm -rf "$root"
@@ -58,7 +58,7 @@ while read -r module; do
     [ "$module" != vivid.ko ] || parameters="n_devs=1 node_types=0x1 num_inputs=1 input_types=0x0"
     insmod "$module" $parameters || echo "cannot load $module"
 done <order
-/bin/v4l-test --ignored --test-threads 1 --nocapture
+/bin/v4l-test v4l:: --ignored --test-threads 1 --nocapture
 echo "v4l-test ended with $?"
 poweroff -f
 INIT

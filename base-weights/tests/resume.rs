@@ -1,5 +1,4 @@
 //! A run that was stopped and resumed gives the same bits as one that was not.
-#![allow(clippy::unwrap_used)]
 
 use sdg_base_weights::comparison::ComparisonTask;
 use sdg_base_weights::detector::DetectorTask;

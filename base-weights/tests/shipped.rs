@@ -1,5 +1,4 @@
 //! The shipped weights against their hash, their metadata and the figures in the documents.
-#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 

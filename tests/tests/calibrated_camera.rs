@@ -1,5 +1,4 @@
 //! A part taught with one calibrated camera and found with others: another place, tilted, with another lens.
-#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 

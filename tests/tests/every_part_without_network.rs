@@ -1,5 +1,4 @@
 //! Model S from end to end on every shipped part: one photo, no network, unseen pictures, grasps in MuJoCo.
-#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 

@@ -3,7 +3,6 @@
 //!
 //! The check against the demonstration hides what a network lacks, so it is off here. The part is no shipped one, and its
 //! pictures come from another program than the samples that the network is taught on.
-#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 

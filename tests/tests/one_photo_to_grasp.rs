@@ -1,6 +1,5 @@
 //! From end to end: one photo, teaching, unseen pictures, grasps in MuJoCo. Takes minutes, and is the one
 //! test that says whether the product works.
-#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 

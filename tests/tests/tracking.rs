@@ -1,6 +1,5 @@
 //! Parts that move under a camera at 100 frames a second, followed from frame to frame: exact, lost when they are hidden, found
 //! again elsewhere, and nothing else followed in their stead.
-#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

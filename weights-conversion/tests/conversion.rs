@@ -1,5 +1,4 @@
 //! Whole conversions: Detectron2's own pickles (cut narrower), torchvision's class order, files in and out.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 use std::fs;

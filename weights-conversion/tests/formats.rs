@@ -1,5 +1,4 @@
 //! The same arrays as every writer wrote them. The files come from `fixtures/make_fixtures.py`.
-#![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
 

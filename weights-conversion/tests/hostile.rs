@@ -1,12 +1,9 @@
 //! Files made to do harm: each ends in an error that says why.
-#![allow(clippy::unwrap_used)]
-
-mod forged;
 
 use std::fs;
 use std::path::Path;
 
-use forged::{array_pickle, cat, dict_with, legacy, text, zip};
+use crate::forged::{array_pickle, cat, dict_with, legacy, text, zip};
 use sdg_weights_conversion::{Checkpoint, Source, WeightsError};
 
 fn read(bytes: impl AsRef<[u8]>) -> Result<Checkpoint, WeightsError> {

@@ -1,15 +1,12 @@
 //! Photos taken with a camera, and the model tried on its pictures, on the real server.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-
-mod served;
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use crate::served::{Answer, Served, photo};
 use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 use serde_json::{Value, json};
-use served::{Answer, Served, photo};
 
 /// A camera that shows what the test puts before it.
 #[derive(Debug, Default)]

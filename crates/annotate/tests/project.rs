@@ -1,12 +1,9 @@
 //! A project's folder: left and opened again, versions of the model, pictures without the part, pictures taken out.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-
-mod served;
 
 use std::time::{Duration, Instant};
 
+use crate::served::{Served, photo_png};
 use serde_json::{Value, json};
-use served::{Served, photo_png};
 
 const MARKS: &str = r#"{"box": [40, 40, 140, 60], "grasp": {"start": [80, 50], "end": [100, 50], "jaw_width": 24}}"#;
 

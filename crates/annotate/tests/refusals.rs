@@ -1,8 +1,6 @@
 //! Requests that are refused, on the real server.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod served;
-
+use crate::served;
 use served::Served;
 
 #[test]

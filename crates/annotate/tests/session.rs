@@ -1,10 +1,8 @@
 //! A session from the first mark to another demonstration, on the real server.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-
-mod served;
 
 use std::time::{Duration, Instant};
 
+use crate::served;
 use sdg_demonstration::{Annotation, ImageFacts};
 use serde_json::{Value, json};
 use served::Served;

@@ -1,12 +1,8 @@
 //! What the server makes of bytes that are no good request, and of clients that are slow.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
-
-#[allow(dead_code, reason = "each test binary uses its share of this module")]
-mod served;
 
 use std::time::{Duration, Instant};
 
-use served::{Served, Then};
+use crate::served::{Served, Then};
 
 /// The status of each answer on the connection.
 fn statuses(answer: &str) -> Vec<u16> {

@@ -1,11 +1,8 @@
 //! Boards in rendered pictures: which corners are found, how exactly, and what is said where they are not.
-#![allow(clippy::unwrap_used)]
 
-mod rendering;
-
+use crate::rendering::{Exposure, Random, camera_from_board, render, render_with};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point2};
-use rendering::{Exposure, Random, camera_from_board, render, render_with};
 use sdg_calibration::{Board, CalibrationError, SeenCorner, find_board};
 use sdg_geometry::{PinholeCamera, PlumbBob};
 

@@ -1,15 +1,12 @@
 //! The camera on the robot and beside it, from simulated robots, beside OpenCV's `calibrateHandEye` on the same numbers.
 //!
 //! OpenCV's figures stand in tests/golden/opencv/hand_eye.json; `write_trials` below and hand_eye.py beside that file make them.
-#![allow(clippy::unwrap_used)]
-
-mod rendering;
 
 use std::fs;
 use std::path::Path;
 
+use crate::rendering::{Random, camera_from_board, turn};
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector2, Vector3};
-use rendering::{Random, camera_from_board, turn};
 use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, Mount, SeenCorner, calibrate_hand_eye};
 use sdg_geometry::{PinholeCamera, PlumbBob};
 use serde_json::{Value, json};

@@ -1,17 +1,14 @@
 //! Cameras found from rendered boards, beside OpenCV's `calibrateCamera` on the same pictures.
 //!
 //! OpenCV's figures stand in tests/golden/opencv/calibration.json; `write_pictures` below and calibrate.py beside that file make them.
-#![allow(clippy::unwrap_used)]
-
-mod rendering;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::rendering::cameras::{CAMERAS, board, pictures, poses};
+use crate::rendering::{Random, camera_from_board};
 use nalgebra::Point2;
-use rendering::cameras::{CAMERAS, board, pictures, poses};
-use rendering::{Random, camera_from_board};
 use sdg_calibration::{Advice, Calibration, CalibrationConfig, CalibrationError, SeenCorner, calibrate, find_board};
 use sdg_geometry::PinholeCamera;
 use serde_json::{Value, json};

@@ -1,11 +1,8 @@
 //! The camera over a sheet on the table, with intrinsics and without.
-#![allow(clippy::unwrap_used)]
 
-mod rendering;
-
+use crate::rendering::cameras::WEBCAM;
+use crate::rendering::{Exposure, Random, camera_from_board, render};
 use nalgebra::{Isometry3, Vector2};
-use rendering::cameras::WEBCAM;
-use rendering::{Exposure, Random, camera_from_board, render};
 use sdg_calibration::{
     Board, CalibrationError, SeenCorner, find_board, focal_cost, focal_from_sheet, homography_rms_px, locate_sheet,
 };

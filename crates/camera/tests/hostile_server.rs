@@ -1,13 +1,11 @@
 //! Servers of motion JPEG and snapshots that stall, cut, send garbage, redirect and flood: each is survived, told, and recovered from.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::io::Write;
 use std::net::TcpStream;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::support;
 use sdg_camera::{Camera, CameraError, Fault};
 use support::{Script, Server, jpeg, level_of, open, part};
 

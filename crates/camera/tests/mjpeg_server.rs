@@ -1,6 +1,5 @@
 //! Pictures out and in again: the server's stream read by the client, and by others that are slow, come from
 //! another origin or break the protocol.
-#![allow(clippy::unwrap_used)]
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

@@ -1,5 +1,4 @@
 //! `cmd:`: programs that write pictures, end, hang, or do not exist.
-#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;

@@ -1,13 +1,10 @@
 //! Cameras of Video4Linux 2, read through real drivers: `make test-v4l` boots a kernel with them in QEMU.
 //!
 //! [`UsbCamera`] is a webcam that the test itself plays; `uvcvideo`, the driver of all webcams, does not know the difference. `vivid` is the kernel's own test camera; it draws eight colour bars, which show whether pixels are what they should be.
-#![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used)]
-
-mod usb_camera;
 
 use std::time::{Duration, Instant};
 
+use crate::usb_camera;
 use image::RgbImage;
 use linuxvideo::Device;
 use linuxvideo::format::{PixFormat, PixelFormat};

@@ -14,7 +14,7 @@ macro_rules! shipped {
 }
 
 /// Name, photo, annotation.
-const SHIPPED: [(&str, &[u8], &[u8]); 12] = shipped![
+static SHIPPED: [(&str, &[u8], &[u8]); 12] = shipped![
     "pendulum",
     "fuel_line",
     "rod_end",
@@ -31,7 +31,7 @@ const SHIPPED: [(&str, &[u8], &[u8]); 12] = shipped![
 
 /// The demonstration of a shipped object.
 pub fn demonstration(object: &str) -> Result<Demonstration> {
-    let Some((name, photo, annotation)) = SHIPPED.into_iter().find(|(name, ..)| *name == object) else {
+    let Some((name, photo, annotation)) = SHIPPED.iter().find(|(name, ..)| *name == object) else {
         let known: Vec<&str> = SHIPPED.iter().map(|(name, ..)| *name).collect();
         bail!("expected an object out of {}, found \"{object}\"", known.join(", "));
     };

@@ -1,14 +1,11 @@
 //! `sdg annotation convert`, and annotations of every format as demonstrations.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::support::{sdg, shipped};
 use serde_json::Value;
-use support::{sdg, shipped};
 
 /// A file that another tool wrote.
 fn foreign(name: &str) -> PathBuf {

@@ -1,13 +1,10 @@
 //! Wrong input, as a user would give it: one clear line, the exit code of docs/command-line.md, nothing half-written.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::Path;
 
+use crate::support::{sdg, shipped};
 use sdg_cli::evaluation::{Settings, Store};
-use support::{sdg, shipped};
 
 /// Asserts exit code and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {

@@ -1,7 +1,4 @@
 //! `sdg teach --base-weights` as a user calls it.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -10,6 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Instant;
 
+use crate::support::sdg;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_cli::base_weights;
@@ -18,7 +16,6 @@ use sdg_detection::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchv
 use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS};
 use sdg_layers::state_dict;
 use serde_json::{Map, Value, json};
-use support::sdg;
 
 /// Runs `sdg` with that much address space and no more.
 fn sdg_within(bytes: u64, arguments: &[&str]) -> Output {

@@ -1,16 +1,13 @@
 //! Many pictures at once: folders, standard input, broken files among others, other formats, marks beside their photo.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use crate::support::{Folder, sdg, shipped, stdout};
 use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::Value;
-use support::{Folder, sdg, shipped, stdout};
 
 /// The lever's photo and its marks in a folder, and a model S taught from them by the photo's name alone.
 fn taught(folder: &Folder) -> String {

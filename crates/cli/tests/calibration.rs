@@ -1,21 +1,16 @@
 //! `sdg camera board`, `calibrate`, `table` and `hand-eye`, from the printed sheet to a file that `sdg detect --camera` takes, and what is refused.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../calibration/tests/rendering/mod.rs"]
-mod rendering;
-mod support;
 
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use crate::rendering::cameras::{CAMERAS, board, poses};
+use crate::rendering::{Exposure, Random, camera_from_board, render, render_with, turn};
+use crate::support::{Folder, sdg, stdout};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point2, Vector3};
-use rendering::cameras::{CAMERAS, board, poses};
-use rendering::{Exposure, Random, camera_from_board, render, render_with, turn};
 use sdg_geometry::PinholeCamera;
 use serde_json::Value;
-use support::{Folder, sdg, stdout};
 
 /// The focal length from 15 pictures, as a share of itself.
 const MAX_FOCAL_ERROR: f64 = 0.002;

@@ -1,18 +1,15 @@
 //! `--camera` on the command line: a part taught with one camera, found in metres, and camera files that are none.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::support::{Folder, sdg, shipped};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
-use support::{Folder, sdg, shipped};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
 const CAMERA: &str = include_str!("wrist.yaml");

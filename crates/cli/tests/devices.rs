@@ -1,13 +1,10 @@
 //! `sdg devices`, and `--device` as a user calls it, on whatever this build has.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::path::Path;
 
+use crate::support::sdg;
 use sdg_grasp::ComputeBackend;
 use serde_json::Value;
-use support::sdg;
 
 #[test]
 fn what_there_is_is_listed() {

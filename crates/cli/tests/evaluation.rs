@@ -1,6 +1,5 @@
 //! An evaluation in small, and some axes of pictures and errors in small, in the simulator: model S, which is taught at once,
 //! on one part.
-#![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::Path;

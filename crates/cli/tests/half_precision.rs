@@ -4,7 +4,6 @@
 //! best: where two nearly tie, rounding may decide. The kept box then jumps to its neighbour, though neither moved. So
 //! each detection is compared with the same candidate before suppression, and a jump is counted apart: it must have been
 //! a tie.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::HashMap;
 use std::ops::ControlFlow;

@@ -1,13 +1,10 @@
 //! `sdg evaluate --pictures`: what is counted, against a naive reference and in both formats; wrong folders.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::support::{sdg, shipped, stdout};
 use serde_json::{Value, json};
-use support::{sdg, shipped, stdout};
 
 /// Samples: enough that some lack the part and some show it cut by the border.
 const NUM_SAMPLES: usize = 20;

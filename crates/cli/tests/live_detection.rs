@@ -1,7 +1,4 @@
 //! `sdg detect --from`: parts in live pictures, a line for each frame.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -9,10 +6,10 @@ use std::net::TcpStream;
 
 use std::process::{Command, Output, Stdio};
 
+use crate::support::{sdg, shipped};
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::table_camera::TableCamera;
 use serde_json::Value;
-use support::{sdg, shipped};
 
 fn path(folder: &tempfile::TempDir, name: &str) -> String {
     folder.path().join(name).to_str().unwrap().to_owned()

@@ -1,15 +1,12 @@
 //! `sdg camera list`, `grab` and `watch`, and addresses that are none.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::Path;
 use std::process::Output;
 
+use crate::support::sdg;
 use image::{Rgb, RgbImage};
 use serde_json::Value;
-use support::sdg;
 
 fn lines(output: &Output) -> Vec<Value> {
     String::from_utf8_lossy(&output.stdout).lines().map(|line| serde_json::from_str(line).unwrap()).collect()

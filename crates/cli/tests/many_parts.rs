@@ -1,13 +1,10 @@
 //! `sdg teach --demos`: a folder of demonstrations to a folder of models and a page that says which parts look alike.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::Path;
 
+use crate::support::{Folder, sdg, shipped, stdout};
 use serde_json::Value;
-use support::{Folder, sdg, shipped, stdout};
 
 /// Two parts, one of them under two names, and a photo without marks.
 fn demonstrations(folder: &Folder) -> String {

@@ -1,10 +1,7 @@
 //! `sdg rehearse` on the part that a model was taught from.
-#![allow(clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::{Folder, sdg, shipped, stdout};
 use serde_json::Value;
-use support::{Folder, sdg, shipped, stdout};
 
 /// Model S of the lever, 166 mm long and 16 mm high, which knows neither.
 fn taught(folder: &Folder) -> String {

@@ -1,13 +1,10 @@
 //! `--place` of `sdg grasp` and `sdg rehearse`, cells with obstacles, `sdg workcell show`, and what is refused.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::Path;
 
+use crate::support::{Folder, sdg, shipped};
 use serde_json::Value;
-use support::{Folder, sdg, shipped};
 
 /// A wall between where parts lie and where they are put.
 const PLACES: &str = r#"

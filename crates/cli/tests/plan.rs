@@ -1,16 +1,13 @@
 //! `sdg plan`: a path around a wall, told, as JSON and drawn; and what is refused.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::Path;
 
+use crate::support::{Folder, sdg};
 use sdg_kinematics::{JointVector, NUM_JOINTS, Panda};
 use sdg_robot::workcell::Workcell;
 use sdg_simulation::CollisionWorld;
 use serde_json::Value;
-use support::{Folder, sdg};
 
 /// A wall between the two sides of the table.
 const WALL: &str = r#"

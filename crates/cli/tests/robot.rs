@@ -1,13 +1,11 @@
 //! `sdg grasp` and `sdg robot`: a grasp with the simulated arm, what is refused, and the question before anything moves.
-#![allow(clippy::unwrap_used)]
-
-mod simulated_arm;
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use crate::simulated_arm::Simulated;
+use crate::support::sdg;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_geometry::PinholeCamera;
 use sdg_kinematics::ready_pose;
@@ -16,8 +14,6 @@ use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
 use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
 use serde_json::Value;
-use simulated_arm::Simulated;
-use support::sdg;
 
 fn shipped(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets").join(name)

@@ -1,9 +1,4 @@
 //! Programs and robots that end in a motion: the arm stops, one line says why, and nothing moves until a person has said so.
-#![cfg(unix)]
-#![allow(clippy::unwrap_used)]
-
-mod simulated_arm;
-mod support;
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
@@ -12,9 +7,9 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use crate::simulated_arm::Simulated;
+use crate::support::sdg;
 use serde_json::Value;
-use simulated_arm::Simulated;
-use support::sdg;
 
 /// The shipped workcell, whose home is where joint 1 stands at 50 degrees.
 fn workcell(folder: &Path) -> PathBuf {

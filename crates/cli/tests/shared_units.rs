@@ -1,16 +1,13 @@
 //! An evaluation's units shared by several processes, with model S on one part: the tables are those of the ordinary run, and
 //! whatever is missing, failed, stale or doubled keeps a table from being made.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use crate::support::{Folder, sdg};
 use serde_json::Value;
-use support::{Folder, sdg};
 
 const TEACH: &str = "teach-S-rod_end";
 const LOOK: &str = "look-rod_end";

@@ -1,16 +1,13 @@
 //! What the shell gets: completions, manual pages, and the page of a teaching.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use crate::support::sdg;
 use clap::CommandFactory;
 use sdg_cli::args::Args;
-use support::sdg;
 
 fn commands() -> Vec<String> {
     Args::command().get_subcommands().map(|command| command.get_name().to_owned()).collect()

@@ -4,17 +4,12 @@
 //! What the page makes a person wait for is measured. What a person takes is added by the keystroke-level model (Card, Moran,
 //! Newell 1980) for what is done, and by 238 words a minute (Brysbaert 2019) for every line that the page shows for the first time.
 //! A line in which only numbers or its full stop have changed is not read again, and what is there for screen readers alone is not shown.
-#![allow(clippy::unwrap_used)]
-
-#[path = "browser/page.rs"]
-#[allow(dead_code)]
-mod page;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use page::Page;
+use crate::browser::page::Page;
 use sdg_demonstration::{Annotation, ImageFacts};
 
 /// Issue 19: from a photo to a tried model in under three minutes with model S.

@@ -1,14 +1,11 @@
 //! `sdg weights` as a user calls it.
-#![allow(clippy::unwrap_used)]
-
-mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
+use crate::support::sdg;
 use serde_json::{Value, json};
-use support::sdg;
 
 /// `sdg weights` with these arguments.
 fn sdg_weights(arguments: &[&str]) -> Output {

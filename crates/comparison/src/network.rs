@@ -1,8 +1,8 @@
 //! The network: views in, log-odds out.
 
 use burn::module::Module;
-use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, activation};
+use sdg_kernels::cosines;
 use sdg_layers::{ConvNormRelu, Distribution, Initializer, Linear, Stage};
 
 use crate::alignment::{Alignment, CellCosines};
@@ -12,7 +12,7 @@ use crate::view::{Batch, DIFFERENCES, View};
 /// Side of the first convolution's kernel.
 const FIRST_KERNEL: usize = 5;
 /// Added to the square of a cell's length, so that a cell without features has a direction of zero.
-const SQUARE_EPSILON: f64 = 1e-4;
+const SQUARE_EPSILON: f32 = 1e-4;
 
 /// The comparison network.
 #[derive(Module, Debug)]
@@ -126,7 +126,7 @@ impl ComparisonNetwork {
         let demonstration = through(&self.trunk, demonstrations).select(0, demonstration_of_view);
         let picture = through(&self.trunk, pictures);
         let inside = differences.clone().narrow(1, DIFFERENCES - 1, 1);
-        let cosines = self.correlation(&demonstration, &picture);
+        let cosines = cosines(demonstration.clone(), picture.clone(), self.config.reach, SQUARE_EPSILON);
         Maps { demonstration, picture, differences, inside, cosines }
     }
 
@@ -137,20 +137,6 @@ impl ComparisonNetwork {
         let compared = Tensor::cat(vec![correlated, differing, demonstration, differences], 1);
         let map = through(&self.stages, compared);
         self.output.forward(activation::relu(self.hidden.forward(map.flatten(1, 3))))
-    }
-
-    /// The cosine between each cell of one map and the cells about it in the other, `[N, (2 reach + 1)², M, M]`.
-    fn correlation(&self, demonstration: &Tensor<4>, picture: &Tensor<4>) -> Tensor<4> {
-        let unit = |map: &Tensor<4>| map.clone() / (map.clone().square().sum_dim(1) + SQUARE_EPSILON).sqrt();
-        let reach = self.config.reach;
-        let [_, _, height, width] = picture.dims();
-        let one = unit(demonstration);
-        let other = unit(picture).pad((reach, reach, reach, reach), PadMode::Constant(0.0));
-        let shifted = (0..=2 * reach).flat_map(|dy| (0..=2 * reach).map(move |dx| (dy, dx)));
-        let products = shifted
-            .map(|(dy, dx)| (one.clone() * other.clone().narrow(2, dy, height).narrow(3, dx, width)).sum_dim(1))
-            .collect();
-        Tensor::cat(products, 1)
     }
 }
 
@@ -276,7 +262,10 @@ mod tests {
         // What the picture shows one cell to the right.
         let moved = Tensor::cat(vec![map.clone().narrow(3, 15, 1), map.clone().narrow(3, 0, 15)], 3);
         let strongest = |other: &Tensor<4>| {
-            let values = network.correlation(&map, other).into_data().try_to_vec_as::<f32>().unwrap();
+            let values = cosines(map.clone(), other.clone(), network.config.reach, SQUARE_EPSILON)
+                .into_data()
+                .try_to_vec_as::<f32>()
+                .unwrap();
             let at = |shift: usize| values[shift * 256 + 8 * 16 + 8];
             (0..25).max_by(|a, b| at(*a).total_cmp(&at(*b))).map(|shift| (shift, at(shift))).unwrap()
         };

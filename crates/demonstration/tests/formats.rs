@@ -1,7 +1,5 @@
 //! Files that other tools wrote, read here. `formats/make.py` says how they were made, and with which versions.
 
-#![allow(clippy::unwrap_used)]
-
 use nalgebra::Point2;
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 

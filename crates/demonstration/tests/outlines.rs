@@ -1,12 +1,8 @@
 //! Proposed outlines against those of the shipped demonstrations.
 
-#![allow(clippy::unwrap_used)]
-
-#[path = "outlines/simulated_person.rs"]
-mod simulated_person;
-
 use std::path::Path;
 
+use crate::simulated_person;
 use sdg_demonstration::{Demonstration, propose_outline};
 use sdg_geometry::BoundingBox;
 

@@ -1,6 +1,7 @@
 //! The losses, as sums; each caller divides by its own count.
 
 use burn::tensor::{Int, Tensor, TensorData, activation};
+use sdg_kernels::log_softmax;
 
 use crate::config::RegressionLoss;
 
@@ -82,7 +83,7 @@ pub fn cross_entropy(logits: Tensor<2>, targets: &[Option<usize>]) -> Tensor<1> 
     let device = logits.device();
     let idxs: Vec<i32> = targets.iter().map(|t| t.unwrap_or(0) as i32).collect();
     let idxs = Tensor::<2, Int>::from_data(TensorData::new(idxs, [rows, 1]), &device);
-    let picked = activation::log_softmax(logits, 1).gather(1, idxs);
+    let picked = log_softmax(logits).gather(1, idxs);
     let picked = if targets.iter().all(Option::is_some) {
         picked
     } else {

@@ -2,7 +2,6 @@
 //!
 //! The files and the scripts that made them stand in `tests/golden`. `make test-torch` compares a whole R50 network, too, with a
 //! Python that has torch and torchvision (`SDG_TORCH_PYTHON`).
-#![allow(clippy::unwrap_used)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

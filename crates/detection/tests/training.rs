@@ -1,5 +1,4 @@
 //! A small detector learns, repeatably, and every parameter takes part.
-#![allow(clippy::unwrap_used)]
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::{AdamWConfig, GradientsParams};

@@ -1,16 +1,12 @@
 //! A client of a robot that makes mistakes in everything it sends: errors, no panic, no wait beyond the client's own bounds.
 
-#![allow(clippy::unwrap_used)]
-
-mod mutations;
-
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};
 use std::ops::ControlFlow;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mutations::mutate;
+use crate::mutations::mutate;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::client::{Hand, HandConfig, InternalController, Robot, RobotConfig};

@@ -1,12 +1,8 @@
 //! Messages: their sizes and bytes, there and back, and a hundred thousand of them with mistakes.
 
-#![allow(clippy::unwrap_used)]
-
-mod mutations;
-
 use std::io::{self, Read};
 
-use mutations::mutate;
+use crate::mutations::mutate;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::wire::{

@@ -29,7 +29,7 @@ const FORMAT: &str = "sdg base weights 1";
 
 /// The base weights that are shipped, made by `make base-weights`, and the file's SHA-256.
 #[cfg(feature = "base-weights")]
-pub(crate) const SHIPPED: &[u8] = include_bytes!("../weights/edge.safetensors");
+pub(crate) static SHIPPED: &[u8] = include_bytes!("../weights/edge.safetensors");
 #[cfg(feature = "base-weights")]
 pub(crate) const SHIPPED_SHA256: &str = include_str!("../weights/edge.sha256");
 

@@ -38,13 +38,10 @@ pub fn adamw<const D: usize>(
     let moments = moments.unwrap_or_else(|| Tensor::zeros([2, count], (&param.device(), param.dtype())));
     assert!(moments.dims() == [2, count], "adamw: expected moments of [2, {count}], found {:?}", moments.dims());
     // Two operations, since an operation of the extension has one result.
-    let moments: Tensor<2> = Tensor::from_dispatch(Dispatch::kernel_adamw_moments(
-        grad.reshape([1, count]).into_dispatch(),
-        moments.into_dispatch(),
-        params,
-    ));
+    let moments: Tensor<2> =
+        Tensor::from_dispatch(Dispatch::kernel_adamw_moments(grad.into_dispatch(), moments.into_dispatch(), params));
     let value: Tensor<2> = Tensor::from_dispatch(Dispatch::kernel_adamw_value(
-        param.reshape([1, count]).into_dispatch(),
+        param.into_dispatch(),
         moments.clone().into_dispatch(),
         params,
     ));

@@ -9,9 +9,9 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::flex::FlexTensor;
-use burn::backend::ops::ModuleOps;
+use burn::backend::ops::{ActivationOps, ModuleOps};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Flex};
+use burn::backend::{Autodiff, Flex, TensorMetadata};
 
 use crate::conv::direct::Maps;
 use crate::conv::panels::Direction;
@@ -31,7 +31,7 @@ use crate::resize;
 use crate::resize::kernel::PoolShape;
 use crate::roi_align;
 use crate::simd::Isa;
-use crate::{composed, elementwise, permute};
+use crate::{composed, elementwise, log_softmax, permute};
 
 impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     fn kernel_conv2d(
@@ -183,6 +183,21 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         let output = Flex::kernel_max_pool2d(x.clone(), params);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((x, output.clone(), shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        if !all_f32([x.primitive()]) {
+            return Self::log_softmax(x, 1);
+        }
+        let prepared = LogSoftmaxBackward.prepare::<C>([x.node()]).compute_bound().stateful();
+        let x = x.into_primitive().to_contiguous();
+        let shape = [x.shape()[0], x.shape()[1]];
+        let (output, kept) = log_softmax::forward(Isa::detect(), values(&x), shape[1]);
+        let output = tensor(output, shape);
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -358,6 +373,22 @@ fn input_maps<'a>(tensor: &'a FlexTensor, shape: &ConvShape) -> Maps<'a> {
 fn output_maps<'a>(tensor: &'a FlexTensor, shape: &ConvShape) -> Maps<'a> {
     let (num_images, size, channels) = (shape.num_images, shape.out_size, shape.out_channels);
     Maps { values: last_values(tensor), num_images, size, channels }
+}
+
+#[derive(Debug)]
+struct LogSoftmaxBackward;
+
+impl Backward<Flex, 1> for LogSoftmaxBackward {
+    type State = (log_softmax::Kept, [usize; 2]);
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let (kept, shape) = ops.state;
+        if let [Some(x)] = ops.parents {
+            let grad = log_softmax::backward(Isa::detect(), values(&output_grad), &kept);
+            grads.register::<Flex>(x.id, tensor(grad, shape));
+        }
+    }
 }
 
 #[derive(Debug)]

@@ -9,6 +9,7 @@ use burn::backend::{Backend, TensorMetadata, read_sync};
 use burn::tensor::{Shape, Slice, TensorData};
 
 use crate::params::AdamWParams;
+use crate::params::CosineParams;
 use crate::params::RoiAlignParams;
 use crate::params::{Activation, FusedGroupNormParams};
 use crate::params::{Conv2dParams, FusedConv2dParams};
@@ -64,8 +65,15 @@ fn row<B: Backend>(tensor: FloatTensor<B>, idx: isize) -> FloatTensor<B> {
     B::float_slice(tensor, &[Slice::new(idx, Some(idx + 1), 1), Slice::full()])
 }
 
+/// All values as `[1, count]`.
+fn in_a_row<B: Backend>(tensor: FloatTensor<B>) -> FloatTensor<B> {
+    let count = tensor.shape().num_elements();
+    B::float_reshape(tensor, Shape::from(vec![1, count]))
+}
+
 /// The moments of [`adamw`](crate::adamw()), term by term.
 pub fn adamw_moments<B: Backend>(grad: FloatTensor<B>, moments: FloatTensor<B>, params: AdamWParams) -> FloatTensor<B> {
+    let grad = in_a_row::<B>(grad);
     let grad = match params.max_norm {
         None => grad,
         Some(most) => {
@@ -84,6 +92,7 @@ pub fn adamw_moments<B: Backend>(grad: FloatTensor<B>, moments: FloatTensor<B>, 
 
 /// The value of [`adamw`](crate::adamw()), term by term.
 pub fn adamw_value<B: Backend>(param: FloatTensor<B>, moments: FloatTensor<B>, params: AdamWParams) -> FloatTensor<B> {
+    let param = in_a_row::<B>(param);
     let [first_correction, second_correction] = params.corrections();
     let first = scaled::<B>(row::<B>(moments.clone(), 0), 1.0 / first_correction);
     let root = B::float_sqrt(scaled::<B>(row::<B>(moments, 1), 1.0 / second_correction));
@@ -196,4 +205,30 @@ pub fn upsample_nearest_2x<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
     let x = B::float_reshape(x, Shape::from(vec![n, c, h, 1, w, 1]));
     let x = B::float_expand(x, Shape::from(vec![n, c, h, 2, w, 2]));
     B::float_reshape(x, Shape::from(vec![n, c, 2 * h, 2 * w]))
+}
+
+/// [`cosines`](crate::cosines()) by a product of the two maps for every shift of one against the other.
+pub fn cosines<B: Backend>(one: FloatTensor<B>, other: FloatTensor<B>, params: CosineParams) -> FloatTensor<B> {
+    let CosineParams { reach, epsilon } = params;
+    let shape = one.shape();
+    let [num_images, channels, height, width] = [shape[0], shape[1], shape[2], shape[3]];
+    let unit = |map: FloatTensor<B>| {
+        let squares = B::float_sum_dim(B::float_mul(map.clone(), map.clone()), 1);
+        B::float_div(map, B::float_sqrt(B::float_add_scalar(squares, epsilon.into())))
+    };
+    let (one, other) = (unit(one), unit(other));
+    let all = [Slice::from(0..num_images), Slice::from(0..channels)];
+    let at = |y: usize, x: usize| [all[0], all[1], Slice::from(y..y + height), Slice::from(x..x + width)];
+    let (device, dtype) = (one.device(), one.dtype());
+    let padded = Shape::from(vec![num_images, channels, height + 2 * reach, width + 2 * reach]);
+    let zeros = B::float_zeros(padded, &device, dtype.into());
+    let other = B::float_slice_assign(zeros, &at(reach, reach), other);
+    let shifts = (0..=2 * reach).flat_map(|dy| (0..=2 * reach).map(move |dx| (dy, dx)));
+    let cosines = shifts
+        .map(|(dy, dx)| {
+            let shifted = B::float_slice(other.clone(), &at(dy, dx));
+            B::float_sum_dim(B::float_mul(one.clone(), shifted), 1)
+        })
+        .collect();
+    B::float_cat(cosines, 1)
 }

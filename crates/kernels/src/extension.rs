@@ -7,6 +7,7 @@ use burn::backend::{Backend, backend_extension};
 
 use crate::composed;
 use crate::params::AdamWParams;
+use crate::params::CosineParams;
 use crate::params::FusedGroupNormParams;
 use crate::params::MaxPool2dParams;
 use crate::params::RoiAlignParams;
@@ -78,7 +79,8 @@ pub trait KernelBackend: Backend {
         composed::upsample_nearest_2x::<Self>(x)
     }
 
-    /// The moments of [`adamw`](crate::adamw()): `grad` is `[1, count]`, `moments` and the result are `[2, count]`.
+    /// The moments of [`adamw`](crate::adamw()): `grad` has any shape of `count` values, `moments` and the
+    /// result are `[2, count]`.
     fn kernel_adamw_moments(
         grad: FloatTensor<Self>,
         moments: FloatTensor<Self>,
@@ -87,14 +89,24 @@ pub trait KernelBackend: Backend {
         composed::adamw_moments::<Self>(grad, moments, params)
     }
 
-    /// The value of [`adamw`](crate::adamw()): `param` and the result are `[1, count]`, `moments`, after the step,
-    /// `[2, count]`.
+    /// The value of [`adamw`](crate::adamw()): `param` has any shape of `count` values, `moments`, after the step,
+    /// are `[2, count]`, and the result is `[1, count]`.
     fn kernel_adamw_value(
         param: FloatTensor<Self>,
         moments: FloatTensor<Self>,
         params: AdamWParams,
     ) -> FloatTensor<Self> {
         composed::adamw_value::<Self>(param, moments, params)
+    }
+
+    /// See [`log_softmax`](crate::log_softmax()).
+    fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        Self::log_softmax(x, 1)
+    }
+
+    /// See [`cosines`](crate::cosines()).
+    fn kernel_cosines(one: FloatTensor<Self>, other: FloatTensor<Self>, params: CosineParams) -> FloatTensor<Self> {
+        composed::cosines::<Self>(one, other, params)
     }
 
     /// See [`permute_maps`](crate::permute_maps).

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use burn::backend::flex::FlexTensor;
-use burn::backend::ops::ModuleOps;
+use burn::backend::ops::{ActivationOps, ModuleOps};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
 
@@ -11,11 +11,15 @@ use crate::adamw;
 use crate::conv::kernel as conv;
 use crate::conv::panels::Direction;
 use crate::conv::shape::ConvShape;
+use crate::cosines;
 use crate::extension::KernelBackend;
-use crate::flex_tensor::{all_f32, channels_last, last_values, shape4, tensor, tensor_channels_last, values};
+use crate::flex_tensor::{
+    all_f32, channels_last, contiguous, last_values, shape4, tensor, tensor_channels_last, values,
+};
 use crate::group_norm;
 use crate::packed::{self, Keep};
 use crate::params::AdamWParams;
+use crate::params::CosineParams;
 use crate::params::MaxPool2dParams;
 use crate::params::RoiAlignParams;
 use crate::params::{Activation, FusedGroupNormParams};
@@ -25,7 +29,7 @@ use crate::resize;
 use crate::resize::kernel::PoolShape;
 use crate::roi_align;
 use crate::simd::Isa;
-use crate::{composed, permute};
+use crate::{composed, log_softmax, permute};
 
 impl KernelBackend for Flex {
     fn kernel_conv2d(
@@ -113,6 +117,26 @@ impl KernelBackend for Flex {
         tensor_channels_last(resize::kernel::max_pool(Isa::detect(), last_values(&x), &shape), shape.output())
     }
 
+    fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        if !all_f32([&x]) {
+            return Self::log_softmax(x, 1);
+        }
+        let x = x.to_contiguous();
+        let shape = [x.shape()[0], x.shape()[1]];
+        tensor(log_softmax::forward(Isa::detect(), values(&x), shape[1]).0, shape)
+    }
+
+    fn kernel_cosines(one: FloatTensor<Self>, other: FloatTensor<Self>, params: CosineParams) -> FloatTensor<Self> {
+        if !all_f32([&one, &other]) {
+            return composed::cosines::<Self>(one, other, params);
+        }
+        let shape = shape4(&one);
+        let [one, other] = [one, other].map(channels_last);
+        let found = cosines::forward(Isa::detect(), last_values(&one), last_values(&other), shape, params);
+        let side = 2 * params.reach + 1;
+        tensor(found, [shape[0], side * side, shape[2], shape[3]])
+    }
+
     fn kernel_adamw_moments(
         grad: FloatTensor<Self>,
         moments: FloatTensor<Self>,
@@ -121,9 +145,9 @@ impl KernelBackend for Flex {
         if !all_f32([&grad, &moments]) {
             return composed::adamw_moments::<Self>(grad, moments, params);
         }
-        let [grad, moments] = [grad, moments].map(|tensor| tensor.to_contiguous());
+        let [grad, moments] = [grad, moments].map(contiguous);
         let after = adamw::moments_after(Isa::detect(), values(&grad), values(&moments), params);
-        tensor(after, [2, grad.shape()[1]])
+        tensor(after, [2, values(&grad).len()])
     }
 
     fn kernel_adamw_value(
@@ -134,9 +158,9 @@ impl KernelBackend for Flex {
         if !all_f32([&param, &moments]) {
             return composed::adamw_value::<Self>(param, moments, params);
         }
-        let [param, moments] = [param, moments].map(|tensor| tensor.to_contiguous());
+        let [param, moments] = [param, moments].map(contiguous);
         let after = adamw::value_after(Isa::detect(), values(&param), values(&moments), params);
-        tensor(after, [1, param.shape()[1]])
+        tensor(after, [1, values(&param).len()])
     }
 
     fn kernel_permute_maps(x: FloatTensor<Self>, order: Arc<[usize]>) -> FloatTensor<Self> {

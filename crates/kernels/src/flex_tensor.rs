@@ -54,6 +54,19 @@ pub(crate) fn channels_last(tensor: FlexTensor) -> FlexTensor {
     tensor_channels_last(moved, shape)
 }
 
+/// The same tensor, contiguous. A transposed matrix, as the gradient of a fully connected layer is, is turned by our own kernel.
+pub(crate) fn contiguous(tensor: FlexTensor) -> FlexTensor {
+    let shape = tensor.shape();
+    let strides = tensor.layout().strides();
+    if shape.num_dims() != 2 || shape[0] == 1 || strides[0] != 1 || strides[1] != shape[0] as isize {
+        return tensor.to_contiguous();
+    }
+    let [rows, columns] = [shape[0], shape[1]];
+    let start = tensor.layout().start_offset();
+    let stored = &tensor.storage::<f32>()[start..start + rows * columns];
+    self::tensor(elementwise::channels_last(Isa::detect(), stored, 1, columns, rows), [rows, columns])
+}
+
 /// The values of an `f32` tensor that stands channels last, `[N, H, W, C]`.
 pub(crate) fn last_values(tensor: &FlexTensor) -> &[f32] {
     let start = tensor.layout().start_offset();

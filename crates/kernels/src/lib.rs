@@ -46,6 +46,7 @@ mod adamw;
 mod autodiff;
 pub mod composed;
 mod conv;
+mod cosines;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 mod cube;
 mod elementwise;
@@ -53,6 +54,7 @@ mod extension;
 mod flex;
 mod flex_tensor;
 mod group_norm;
+mod log_softmax;
 mod memory;
 #[cfg(feature = "ndarray")]
 mod ndarray;
@@ -71,11 +73,14 @@ mod simd;
 
 pub use adamw::adamw;
 pub use conv::{Conv2dEpilogue, conv_transpose2d, conv2d, conv2d_fused};
+pub use cosines::cosines;
 pub use extension::KernelBackend;
 pub use group_norm::{group_norm, group_norm_residual};
+pub use log_softmax::log_softmax;
 pub use memory::keep_freed_memory;
 pub use nms::{batched_nms, nms};
 pub use params::AdamWParams;
+pub use params::CosineParams;
 pub use params::MaxPool2dParams;
 pub use params::{Activation, FusedGroupNormParams, GroupNormParams};
 pub use params::{Conv2dParams, FusedConv2dParams};

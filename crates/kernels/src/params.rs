@@ -169,3 +169,12 @@ impl AdamWParams {
         [1.0 - self.beta_1.powi(self.step), 1.0 - self.beta_2.powi(self.step)]
     }
 }
+
+/// Parameters of [`cosines`](crate::cosines()).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CosineParams {
+    /// Cells from a cell to the farthest that it is compared with, along each axis.
+    pub reach: usize,
+    /// Added to the square of a cell's length.
+    pub epsilon: f32,
+}

@@ -1,9 +1,6 @@
 //! Edges and surface together: poses that the edges refined poorly are refined again.
 
-#![allow(clippy::unwrap_used)]
-
-mod scenes;
-
+use crate::scenes;
 use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;

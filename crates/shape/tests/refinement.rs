@@ -1,7 +1,6 @@
 //! Templates laid over images: numbers a reader can check by hand, and rendered scenes with known poses.
 
-mod scenes;
-
+use crate::scenes;
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use proptest::prelude::*;

@@ -1,7 +1,6 @@
 //! Parts looked for in whole images: rendered scenes with known poses, several parts, none, and odd images.
 
-mod scenes;
-
+use crate::scenes;
 use image::{Rgb, RgbImage};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -1,9 +1,6 @@
 //! Pictures with nothing in them, settings out of range, and the same answer every time.
 
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support;
 use sdg_geometry::Mask;
 use sdg_sift::{Features, Plane, Sift, SiftConfig, SiftError, match_features};
 use support::with;

@@ -1,13 +1,9 @@
 //! What turning, scaling and relighting leave as it was, in numbers, on the repository's pictures.
 
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support::{PARTS, picture, relit, warped, with};
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_sift::{Features, Plane, Sift, SiftConfig, match_features};
-use support::{PARTS, picture, relit, warped, with};
 
 fn describe(image: &Plane) -> Features {
     Sift::new(SiftConfig::default()).unwrap().detect_and_describe(image, None).unwrap()

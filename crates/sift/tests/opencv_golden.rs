@@ -1,9 +1,6 @@
 //! The same keypoints as OpenCV 5.0.0 finds, and nearly the same descriptors (`compare/write_golden.py`).
 
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support;
 use sdg_sift::{DescriptorNormalization, Plane, Sift, SiftConfig};
 
 /// The default with a change.

@@ -1,9 +1,6 @@
 //! The turn of the repository's parts against their demonstrations.
 
-#![allow(clippy::unwrap_used)]
-
-mod support;
-
+use crate::support;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, Mask, PlanarSimilarity, Polygon};
 use sdg_sift::{Plane, RotationConfig, RotationEstimator, RotationMethod, Sift, SiftError};

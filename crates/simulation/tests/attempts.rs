@@ -2,8 +2,6 @@
 //!
 //! Twenty attempts a part are run by `examples/oracle.rs`; here are few, for time.
 
-#![allow(clippy::unwrap_used)]
-
 use std::error::Error;
 use std::fs;
 

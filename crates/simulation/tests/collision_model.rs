@@ -1,5 +1,4 @@
 //! The collision model of `sdg-kinematics` against MuJoCo's own collisions.
-#![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;
 

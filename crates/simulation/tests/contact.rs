@@ -1,10 +1,6 @@
 //! Coming down with a soft tcp over the network, in lockstep: a table that is higher than told, and friction in every joint.
 
-#![allow(clippy::unwrap_used)]
-
-mod network;
-
-use network::connect;
+use crate::network::connect;
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
 use sdg_robot::{

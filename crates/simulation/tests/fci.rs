@@ -1,16 +1,11 @@
 //! Our client drives our server on MuJoCo, in lockstep: every generator and controller, and every limit.
 
-#![allow(clippy::unwrap_used)]
-
-mod fci_support;
-#[path = "../../fci/tests/limit_cases/mod.rs"]
-mod limit_cases;
-
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use fci_support::{connect, connect_hand, serve, serve_panda};
+use crate::fci_support::{connect, connect_hand, serve, serve_panda};
+use crate::limit_cases;
 use sdg_fci::client::{Answer, InternalController, Robot};
 use sdg_fci::server::Pace;
 use sdg_fci::wire::{Load, RobotMode, RobotState, Status};

@@ -1,20 +1,14 @@
 //! Faults, injected: the arm stops, the error is one clear line, and nothing moves until the recovery.
 
-#![allow(clippy::unwrap_used)]
-
-#[path = "fci_support/bare_client.rs"]
-mod bare_client;
-mod fci_support;
-mod old_robot;
-
 use std::io::Write;
 use std::net::TcpStream;
 use std::ops::ControlFlow;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use bare_client::{BareClient, SPEED, velocity_after};
-use fci_support::{connect, connect_hand, serve, serve_panda};
+use crate::bare_client::{BareClient, SPEED, velocity_after};
+use crate::fci_support::{connect, connect_hand, serve, serve_panda};
+use crate::old_robot;
 use sdg_fci::client::{InternalController, Robot, RobotConfig};
 use sdg_fci::server::Pace;
 use sdg_fci::wire::{

@@ -1,8 +1,6 @@
 //! A hundred thousand cycles of the simulated robot with requests and commands full of mistakes: no panic, and no number of a
 //! state that is none.
 
-#![allow(clippy::unwrap_used)]
-
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_fci::Limits;

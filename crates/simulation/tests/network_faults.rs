@@ -3,15 +3,11 @@
 //! Faults of the robot itself (NaN and jumps in commands, another version, a failing hand) stand in fci_faults.rs, those of an arm
 //! in this process in robot_faults.rs.
 
-#![allow(clippy::unwrap_used)]
-
-mod network;
-mod old_robot;
-
 use std::thread;
 use std::time::{Duration, Instant};
 
-use network::{Twin, cell, connect, serve, some_motion};
+use crate::network::{Twin, cell, connect, serve, some_motion};
+use crate::old_robot;
 use sdg_fci::server::Pace;
 use sdg_kinematics::{CartesianLimits, JointLimits, LineOptions, Panda, Trajectory};
 use sdg_robot::{

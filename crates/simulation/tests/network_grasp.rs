@@ -2,11 +2,7 @@
 //!
 //! The table of all parts is made by `examples/network_grasps.rs` (`make network-grasps`).
 
-#![allow(clippy::unwrap_used)]
-
-mod network;
-
-use network::{Twin, cell, connect, serve};
+use crate::network::{Twin, cell, connect, serve};
 use sdg_fci::client::{Robot as Client, RobotConfig};
 use sdg_fci::server::Pace;
 use sdg_robot::{GraspConfig, GraspOutcome, Load, Robot, Watch, grasp};

@@ -2,14 +2,10 @@
 //!
 //! Faults of the programs at both ends stand in network_faults.rs.
 
-#![allow(clippy::unwrap_used)]
-
-mod network;
-
 use std::time::{Duration, Instant};
 
-use network::relay::{self, ChangeState, PassCommand, unchanged};
-use network::{cell, serve, some_motion};
+use crate::network::relay::{self, ChangeState, PassCommand, unchanged};
+use crate::network::{cell, serve, some_motion};
 use sdg_fci::server::{Pace, Server};
 use sdg_fci::wire::{RobotState, STATE_SIZE_V5};
 use sdg_robot::{

@@ -1,11 +1,7 @@
 //! A planned way around a wall over TCP and UDP, in lockstep: followed without stopping at its waypoints, and stopped in its corner.
 
-#![allow(clippy::unwrap_used)]
-
-mod network;
-
+use crate::network::{connect, serve};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use network::{connect, serve};
 use sdg_fci::server::Pace as ServerPace;
 use sdg_kinematics::collision::{Obstacle, Shape};
 use sdg_kinematics::{HAND_OPENING_MAX_M, JointVector, Trajectory};

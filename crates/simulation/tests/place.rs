@@ -2,12 +2,8 @@
 //!
 //! The whole tray is `make placing` (examples/placing.rs).
 
-#![allow(clippy::unwrap_used)]
-
-mod placing;
-
+use crate::placing::{Where, beside, cell, config, place, tray};
 use nalgebra::Isometry3;
-use placing::{Where, beside, cell, config, place, tray};
 use sdg_robot::{PlaceOutcome, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 

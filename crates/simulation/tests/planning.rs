@@ -1,5 +1,4 @@
 //! Plans on random problems, followed in MuJoCo at every millisecond; `make bench-planning` does the same with a thousand.
-#![allow(clippy::unwrap_used)]
 
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;

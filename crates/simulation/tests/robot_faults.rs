@@ -1,7 +1,5 @@
 //! What goes wrong with a simulated arm: it stops, says so in one line, and nothing moves by itself afterwards.
 
-#![allow(clippy::unwrap_used)]
-
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 

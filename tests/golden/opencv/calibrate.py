@@ -1,6 +1,6 @@
 """OpenCV's calibrateCamera on the pictures that crates/calibration/tests/intrinsics.rs renders.
 
-    cargo test --release -p sdg-calibration --test intrinsics write_pictures -- --ignored --nocapture   # prints FOLDER
+    cargo test --release -p sdg-calibration --test calibration intrinsics::write_pictures -- --ignored --nocapture   # prints FOLDER
     python tests/golden/opencv/calibrate.py FOLDER > tests/golden/opencv/calibration.json
 
 Needs opencv-contrib-python-headless 4.11. The lens has k1, k2, p1, p2, as ours has without --k3. Corners are those of

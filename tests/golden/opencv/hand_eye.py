@@ -1,6 +1,6 @@
 """OpenCV's calibrateHandEye on the robots that crates/calibration/tests/hand_eye.rs simulates.
 
-    cargo test --release -p sdg-calibration --test hand_eye write_trials -- --ignored --nocapture   # prints FILE
+    cargo test --release -p sdg-calibration --test calibration hand_eye::write_trials -- --ignored --nocapture   # prints FILE
     python tests/golden/opencv/hand_eye.py FILE > tests/golden/opencv/hand_eye.json
 
 Needs opencv-contrib-python-headless 4.11. Each board's pose is solvePnP's (SOLVEPNP_ITERATIVE, which minimises reprojection).

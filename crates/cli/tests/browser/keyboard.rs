@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::page::Page;
+use super::page::Page;
 
 const ENTER: &str = "\u{e007}";
 const ESCAPE: &str = "\u{e00c}";

@@ -5,8 +5,8 @@ use std::path::Path;
 use image::RgbImage;
 use serde_json::json;
 
-use crate::page::{BOX, HOLD, Page, shipped_photo};
-use crate::photo_to_grasp::patiently;
+use super::page::{BOX, HOLD, Page, shipped_photo};
+use super::photo_to_grasp::patiently;
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.
 const CAMERA: &str = include_str!("../wrist.yaml");

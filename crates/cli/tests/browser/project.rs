@@ -7,8 +7,8 @@ use image::{Rgb, RgbImage};
 use sdg_demonstration::Annotation;
 use serde_json::json;
 
-use crate::page::{BOX, HOLD, Page, repository, shipped_photo};
-use crate::photo_to_grasp::patiently;
+use super::page::{BOX, HOLD, Page, repository, shipped_photo};
+use super::photo_to_grasp::patiently;
 
 /// Opens a project that holds the pendulum's photo under these names, each with the marks that are shipped.
 fn open(further: &[&str], photos: &[&str]) -> Page {

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::page::{HOLD, Page};
+use super::page::{HOLD, Page};
 
 const STEPS: [&str; 4] = ["mark", "samples", "teach", "try"];
 

@@ -4,6 +4,7 @@
 //! Built with a feature of those devices: `make test-wgpu`, `make test-ndarray`.
 
 use burn::tensor::Device;
+use sdg_detection::RcnnConfig;
 use sdg_detection::golden::{record, verify};
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 

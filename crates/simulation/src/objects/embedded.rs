@@ -16,7 +16,7 @@ pub(super) type EmbeddedFile = (&'static str, &'static [u8]);
 pub(super) const NUM_PAPER_PARTS: usize = 8;
 
 /// Name and files of every part that is compiled in: the paper's eight, then the held-out four.
-pub(super) const EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
+pub(super) static EMBEDDED: &[(&str, &[EmbeddedFile])] = embedded! {
     "pendulum": [
         "object.json", "object.xml",
         "pendulum_body.obj", "pendulum_raised.obj", "pendulum_bushing.obj", "pendulum_slug.obj",

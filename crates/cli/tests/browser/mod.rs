@@ -2,11 +2,10 @@
 //!
 //! Needs Chromium, and axe-core from npm in target/browser-test: `make test-browser` installs both. Screenshots are kept in
 //! target/browser-test.
-#![allow(clippy::unwrap_used)]
 
 mod keyboard;
 mod live;
-mod page;
+pub(crate) mod page;
 mod photo_to_grasp;
 mod project;
 mod small_screen;

@@ -1,0 +1,9 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod live;
+mod project;
+mod refusals;
+mod served;
+mod session;
+mod transport;

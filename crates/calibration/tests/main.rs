@@ -1,0 +1,8 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod detection;
+mod hand_eye;
+mod intrinsics;
+mod rendering;
+mod table;

@@ -1,0 +1,10 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod hostile_server;
+mod mjpeg_server;
+mod programs;
+mod support;
+mod usb_camera;
+#[cfg(target_os = "linux")]
+mod v4l;

@@ -1,0 +1,7 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod comparison;
+mod refinement;
+mod scenes;
+mod search;

@@ -1,0 +1,8 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod calibrated_camera;
+mod every_part_without_network;
+mod network_learns;
+mod one_photo_to_grasp;
+mod tracking;

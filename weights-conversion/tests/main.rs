@@ -1,0 +1,7 @@
+//! One program for all tests of this folder: each links the whole crate.
+#![allow(clippy::unwrap_used)]
+
+mod conversion;
+mod forged;
+mod formats;
+mod hostile;
