@@ -159,6 +159,7 @@ impl HeldBackFigures {
     }
 
     /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    #[cfg(feature = "annotate")]
     pub fn others_in_photo(&self) -> usize {
         self.others_in_photo
     }

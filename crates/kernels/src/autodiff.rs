@@ -22,6 +22,7 @@ use crate::flex::convolved;
 use crate::flex_tensor::{all_f32, channels_last, last_values, shape4, tensor, tensor_channels_last, values};
 use crate::group_norm::kernel::{self as norm, Statistics};
 use crate::packed::Keep;
+use crate::params::CosineParams;
 use crate::params::MaxPool2dParams;
 use crate::params::RoiAlignParams;
 use crate::params::{Activation, FusedGroupNormParams, GroupNormParams};
@@ -31,7 +32,7 @@ use crate::resize;
 use crate::resize::kernel::PoolShape;
 use crate::roi_align;
 use crate::simd::Isa;
-use crate::{composed, elementwise, log_softmax, permute};
+use crate::{composed, cosines, elementwise, log_softmax, permute};
 
 impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
     fn kernel_conv2d(
@@ -198,6 +199,22 @@ impl<C: CheckpointStrategy> KernelBackend for Autodiff<Flex, C> {
         let output = tensor(output, shape);
         match prepared {
             OpsKind::Tracked(prep) => prep.finish((kept, shape), output),
+            OpsKind::UnTracked(prep) => prep.finish(output),
+        }
+    }
+
+    fn kernel_cosines(one: FloatTensor<Self>, other: FloatTensor<Self>, params: CosineParams) -> FloatTensor<Self> {
+        if !all_f32([one.primitive(), other.primitive()]) {
+            return composed::cosines::<Self>(one, other, params);
+        }
+        let prepared = CosinesBackward.prepare::<C>([one.node(), other.node()]).compute_bound().stateful();
+        let shape = shape4(one.primitive());
+        let [one, other] = [one, other].map(|map| channels_last(map.into_primitive()));
+        let (output, kept) = cosines::forward(Isa::detect(), last_values(&one), last_values(&other), shape, params);
+        let side = 2 * params.reach + 1;
+        let output = tensor(output, [shape[0], side * side, shape[2], shape[3]]);
+        match prepared {
+            OpsKind::Tracked(prep) => prep.finish((Arc::new(kept), shape), output),
             OpsKind::UnTracked(prep) => prep.finish(output),
         }
     }
@@ -387,6 +404,24 @@ impl Backward<Flex, 1> for LogSoftmaxBackward {
         if let [Some(x)] = ops.parents {
             let grad = log_softmax::backward(Isa::detect(), values(&output_grad), &kept);
             grads.register::<Flex>(x.id, tensor(grad, shape));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct CosinesBackward;
+
+impl Backward<Flex, 2> for CosinesBackward {
+    type State = (Arc<cosines::Kept>, [usize; 4]);
+
+    fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let output_grad = grads.consume::<Flex>(&ops.node).to_contiguous();
+        let (kept, shape) = ops.state;
+        let found = cosines::backward(Isa::detect(), values(&output_grad), &kept);
+        for (parent, grad) in ops.parents.into_iter().zip(found) {
+            if let Some(parent) = parent {
+                grads.register::<Flex>(parent.id, tensor(grad, shape));
+            }
         }
     }
 }

@@ -132,7 +132,7 @@ impl KernelBackend for Flex {
         }
         let shape = shape4(&one);
         let [one, other] = [one, other].map(channels_last);
-        let found = cosines::forward(Isa::detect(), last_values(&one), last_values(&other), shape, params);
+        let (found, _) = cosines::forward(Isa::detect(), last_values(&one), last_values(&other), shape, params);
         let side = 2 * params.reach + 1;
         tensor(found, [shape[0], side * side, shape[2], shape[3]])
     }

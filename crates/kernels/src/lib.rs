@@ -40,6 +40,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 // Backward passes are compiled without `autodiff` too, and then nothing calls them.
 #![cfg_attr(not(feature = "autodiff"), allow(dead_code, unused_imports))]
+// burn has deprecated its backend on ndarray; the feature is there for those who ask for it.
+#![cfg_attr(feature = "ndarray", allow(deprecated))]
 
 mod adamw;
 #[cfg(feature = "autodiff")]

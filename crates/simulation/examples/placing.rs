@@ -14,6 +14,8 @@ use nalgebra::Isometry3;
 use sdg_robot::{GraspConfig, PlacingConfig, TouchDown};
 use sdg_simulation::objects::ObjectSpec;
 
+#[path = "../tests/network/mod.rs"]
+mod network;
 #[path = "../tests/placing/mod.rs"]
 mod placing;
 

@@ -149,7 +149,6 @@ impl Pictures<sdg_simulation::Workcell> for SimulatedPictures {
 
 /// Where a part lies: its outline, m in the base frame, and the z of the table and of the outline.
 #[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(not(feature = "simulation"), expect(dead_code, reason = "only what is drawn needs it"))]
 pub(crate) struct SeenOutline {
     pub(crate) outline_in_base: Vec<nalgebra::Point2<f64>>,
     pub(crate) z_m: [f64; 2],

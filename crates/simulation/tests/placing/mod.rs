@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 #![allow(dead_code, reason = "the test and the example use some of it each")]
 
+use crate::network;
 use nalgebra::Isometry3;
 use sdg_fci::server::{Pace, Server, ServerConfig};
 use sdg_kinematics::TCP_OFFSET_M;
@@ -16,9 +17,6 @@ use sdg_simulation::scene::{PlacedObject, SceneVariation, VariationConfig};
 use sdg_simulation::{
     AttemptErrors, PandaPlant, RenderConfig, SharedPositions, Workcell, WorkcellConfig, marked_grasp, part_shape,
 };
-
-#[path = "../network/mod.rs"]
-pub mod network;
 
 /// What each joint's gears take of torques.
 pub const FRICTION_NM: f64 = 1.0;

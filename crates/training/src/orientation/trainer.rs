@@ -3,9 +3,10 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use burn::tensor::{Device, Tensor, TensorData, activation};
+use burn::tensor::{Device, Tensor, TensorData};
 use image::RgbImage;
 use sdg_demonstration::Demonstration;
+use sdg_kernels::log_softmax;
 use sdg_orientation::{OrientationCnn, OrientationConfig, crop_batch};
 
 use super::augmented::AugmentedCrops;
@@ -216,5 +217,5 @@ fn cross_entropy(network: &OrientationCnn, batch: &[LabelledCrop], training: &Or
     let targets: Vec<f32> = batch.iter().flat_map(|one| classes.targets(one.angle, training.labels)).collect();
     let targets = Tensor::<2>::from_data(TensorData::new(targets, [batch.len(), classes.num_classes]), &device);
     let logits = network.forward(crop_batch(&crops, &device));
-    (targets * activation::log_softmax(logits, 1)).sum().neg() / batch.len() as f32
+    (targets * log_softmax(logits)).sum().neg() / batch.len() as f32
 }
