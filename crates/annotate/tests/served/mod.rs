@@ -109,7 +109,6 @@ pub struct Served {
 }
 
 /// What a client does after it has sent.
-#[allow(dead_code, reason = "each test binary uses its share of this module")]
 #[derive(PartialEq)]
 pub enum Then {
     Close,
@@ -119,7 +118,6 @@ pub enum Then {
 /// An answer, taken apart.
 pub struct Answer {
     pub status: u16,
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub head: String,
     pub body: Vec<u8>,
 }
@@ -154,7 +152,6 @@ pub fn photo_png() -> Vec<u8> {
 const PATIENCE: Duration = Duration::from_secs(30);
 
 impl Served {
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn start() -> Self {
         Self::with_patience(PATIENCE)
     }
@@ -169,14 +166,12 @@ impl Served {
     }
 
     /// A server on a project's folder.
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn of_project(folder: tempfile::TempDir) -> Self {
         let options = SessionOptions { project: Some(folder.path().to_owned()), ..SessionOptions::default() };
         Self::open(folder, options, PATIENCE)
     }
 
     /// Ends the server and gives its folder back.
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn end(mut self) -> tempfile::TempDir {
         let folder = std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap());
         drop(self);
@@ -184,7 +179,6 @@ impl Served {
     }
 
     /// A server with a camera and no photo, in an empty folder.
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn with_camera(pictures: Arc<dyn LivePictures>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let live = LiveOptions { pictures, address: "test:".into(), photo_path: folder.path().join("photo.png") };
@@ -205,7 +199,6 @@ impl Served {
     }
 
     /// Sends exactly these bytes, closes that direction unless told to stay silent, and reads to the end.
-    #[allow(dead_code, reason = "each test binary uses its share of this module")]
     pub fn exchange(&self, bytes: &[u8], then: Then) -> String {
         let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();

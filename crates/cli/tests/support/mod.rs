@@ -1,6 +1,5 @@
 //! What tests of the command line share: running `sdg`, the shipped demonstrations, a folder that goes away.
-// Each test file is a program of its own and uses some of it.
-#![allow(dead_code, missing_docs)]
+#![allow(missing_docs)]
 
 use std::ffi::OsStr;
 use std::fs;

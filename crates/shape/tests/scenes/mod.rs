@@ -3,7 +3,7 @@
 //! Parts are height fields in the image plane, evaluated at every pixel at their pose: nothing is
 //! warped from another picture, and the light stays where it is while the part turns.
 
-#![allow(dead_code, reason = "each test binary uses its own share")]
+#![allow(dead_code, reason = "the tests and the example use some of it each")]
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2, Vector3};

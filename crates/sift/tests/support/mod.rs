@@ -1,7 +1,5 @@
 //! Pictures of the repository, turned, scaled and relit by a known amount.
 
-#![allow(dead_code)] // Each test program uses a part of it.
-
 use std::path::PathBuf;
 
 use image::RgbImage;

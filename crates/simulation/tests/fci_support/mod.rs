@@ -29,7 +29,6 @@ pub fn connect(server: &Server) -> Robot {
 }
 
 /// A client of a server's hand.
-#[allow(dead_code, reason = "not every test file has a hand")]
 pub fn connect_hand(server: &Server) -> Hand {
     Hand::connect(&server.hand_address().to_string(), &HandConfig::default()).unwrap()
 }
