@@ -30,7 +30,7 @@ pub fn cosines(one: Tensor<4>, other: Tensor<4>, reach: usize, epsilon: f32) -> 
     Tensor::from_dispatch(Dispatch::kernel_cosines(one.into_dispatch(), other.into_dispatch(), params))
 }
 
-/// What the gradients need.
+/// State kept for the backward pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Kept {
     one: UnitMaps,
@@ -44,7 +44,7 @@ pub(crate) struct Kept {
 struct UnitMaps {
     /// `[N, C, H, W]`; of the other maps with `reach` cells of zeros on each side.
     values: Vec<f32>,
-    /// What the cells were divided by, `[N, H, W]`.
+    /// Lengths of the cells before they were divided by them, `[N, H, W]`.
     lengths: Vec<f32>,
 }
 

@@ -24,7 +24,7 @@ pub fn log_softmax(x: Tensor<2>) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::kernel_log_softmax(x.into_dispatch()))
 }
 
-/// What the gradient needs.
+/// State kept for the backward pass.
 #[derive(Clone, Debug)]
 pub(crate) struct Kept {
     /// `exp z`, `[S, K]`.
@@ -33,7 +33,7 @@ pub(crate) struct Kept {
     sums: Vec<f32>,
 }
 
-/// The result, `[S, K]`, and what its gradient needs.
+/// The result, `[S, K]`, and the state kept for the backward pass.
 pub(crate) fn forward(isa: Isa, x: &[f32], row_len: usize) -> (Vec<f32>, Kept) {
     let num_rows = x.len() / row_len.max(1);
     let [output, exponentials, sums] = [x.len(), x.len(), num_rows].map(Output::new);
