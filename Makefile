@@ -5,7 +5,7 @@ CARGO ?= cargo
 PROFILE := --release
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo web edge test test-compile test-browser walk test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
+.PHONY: help setup build demo web edge test test-compile test-browser walk acceptance test-v4l test-peers test-ros2 test-slurm slurm-image network-grasps placing test-wgpu test-ndarray test-torch package lint base-weights bench bench-browser bench-planning clean
 
 help: ## Lists the targets
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -56,6 +56,11 @@ walk: build ## From a photograph to a tried model with a stop-watch, through the
 	@scripts/install.sh chromium chromium-driver
 	@scripts/axe.sh
 	SDG_WALK="$(SETS)" $(CARGO) test $(PROFILE) --locked --workspace --test cli -- --ignored --nocapture walk::
+
+# Without TUNED=1 it is a look at the reported side, to be recorded in docs/decisions/025-acceptance.md.
+MODELS ?= S
+acceptance: build ## Teaches the sets of datasets/split.toml and counts both sides of the split (SETS=FOLDER, MODELS=S,C; TUNED=1: one side)
+	target/release/sdg evaluate --split datasets/split.toml --sets "$(or $(SETS),../shared)" --models $(MODELS) $(if $(TUNED),--tuned)
 
 test-v4l: setup ## Tests V4L2 cameras in QEMU: Debian's kernel, vivid, and a USB camera of our own (no root, no camera)
 	@scripts/test-v4l.sh

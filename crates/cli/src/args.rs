@@ -45,7 +45,7 @@ pub enum Command {
     #[cfg(feature = "simulation")]
     Simulate(crate::commands::simulate::SimulateArgs),
     /// Measure every model on every part by the paper's protocol; or test a model on your own labelled pictures
-    Evaluate(EvaluateArgs),
+    Evaluate(Box<EvaluateArgs>),
     /// Grasp a part with a real or a simulated arm, from the picture to the lifted part
     Grasp(GraspArgs),
     /// Detect parts in the pictures of a ROS 2 topic and publish their grasps; teach and grasp as services

@@ -106,7 +106,7 @@ impl HeldBackFigures {
             let detections = model.detect(&sample.image, Verification::ByShape)?;
             let of_label = |labelled: LabelledInstance| {
                 let LabelledInstance { annotation, optional, .. } = labelled;
-                Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional }
+                Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }
             };
             let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
             // Demonstrations of a model that knows lengths are plan views: their pixels are all as large.
@@ -124,9 +124,10 @@ impl HeldBackFigures {
                 labels: "augmentation".into(),
                 size: sample.image.dimensions().into(),
                 instances,
+                kind: None,
             };
             let tested = Tested { picture, truths, detections, seconds: 0.0 };
-            Ok(judge(&tested, facts.symmetry, DEFAULT_MIN_SCORE))
+            Ok(judge(&tested, DEFAULT_MIN_SCORE))
         });
         let judged = judged.collect::<Result<Vec<_>>>()?;
         Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })

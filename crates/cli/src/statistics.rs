@@ -65,6 +65,21 @@ pub fn wilson_interval(share: Share) -> [f64; 2] {
     [(middle - half).max(0.0), (middle + half).min(1.0)]
 }
 
+/// Between which values the difference of two independent probabilities lies, the first less the second, with 95 % confidence.
+///
+/// # Source
+/// R. G. Newcombe, "Interval estimation for the difference between independent proportions", 1998, method 10, without
+/// continuity correction: Wilson's intervals of both shares, combined.
+pub fn newcombe_interval(first: Share, second: Share) -> [f64; 2] {
+    if first.of == 0 || second.of == 0 {
+        return [-1.0, 1.0];
+    }
+    let p = |share: Share| share.count as f64 / share.of as f64;
+    let ([low1, high1], [low2, high2]) = (wilson_interval(first), wilson_interval(second));
+    let (p1, p2) = (p(first), p(second));
+    [p1 - p2 - (p1 - low1).hypot(high2 - p2), p1 - p2 + (high1 - p1).hypot(p2 - low2)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +102,19 @@ mod tests {
             assert!((found_high - high).abs() < TOLERANCE, "{count} of {of}: {found_high}");
         }
         assert_eq!(wilson_interval(Share::default()), [0.0, 1.0]);
+    }
+
+    #[test]
+    fn newcombe_agrees_with_his_paper() {
+        // Table II of the paper, column of method 10.
+        for ([a, m, b, n], low, high) in
+            [([56, 70, 48, 80], 0.0524, 0.3339), ([9, 10, 3, 10], 0.1705, 0.8090), ([10, 10, 0, 20], 0.6791, 1.0)]
+        {
+            let [found_low, found_high] = newcombe_interval(Share { count: a, of: m }, Share { count: b, of: n });
+            assert!((found_low - low).abs() < TOLERANCE, "{a} of {m}, {b} of {n}: {found_low}");
+            assert!((found_high - high).abs() < TOLERANCE, "{a} of {m}, {b} of {n}: {found_high}");
+        }
+        assert_eq!(newcombe_interval(Share { count: 1, of: 2 }, Share::default()), [-1.0, 1.0]);
     }
 
     #[test]

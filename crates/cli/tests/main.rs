@@ -26,6 +26,7 @@ mod robot_stops;
 mod shared_units;
 mod shell;
 mod simulated_arm;
+mod split;
 mod support;
 mod walk;
 mod weights;

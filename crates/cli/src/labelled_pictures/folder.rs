@@ -8,56 +8,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use nalgebra::Point2;
 use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
-use sdg_geometry::{BoundingBox, GraspLine};
 use sdg_grasp::GraspModel;
-use serde::Serialize;
 
+use super::picture::{Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
+use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::exit::one_line;
 use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::picture_detector::PictureDetector;
 
 /// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
-
-/// An instance of the part on a picture.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Instance {
-    /// The box around it.
-    pub bbox: BoundingBox,
-    /// The marked grasp; an optional instance may lack it.
-    pub grasp: Option<GraspLine>,
-    /// Neither missed nor wrong: flagged so, or what the model was taught from.
-    pub optional: bool,
-}
-
-/// A picture and what is labelled on it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LabelledPicture {
-    pub path: PathBuf,
-    /// The file that labels it.
-    pub labels: PathBuf,
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// The part's instances; none where it is not on the picture.
-    pub instances: Vec<Instance>,
-}
-
-impl LabelledPicture {
-    /// The file's name.
-    pub fn name(&self) -> String {
-        file_name(&self.path)
-    }
-}
-
-/// A file of the folder that does not count, and the reason.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LeftOut {
-    pub file: String,
-    /// Why it was left out, for people.
-    pub why: String,
-}
 
 /// The pictures to test a model on.
 #[derive(Debug, Clone)]
@@ -72,7 +35,8 @@ pub struct LabelledFolder {
 impl LabelledFolder {
     /// Reads every label and checks it against its picture, before any minute is spent on detection.
     ///
-    /// Where the labels are of several names, those of `label` count; without it, those of the model's object.
+    /// Where the labels are of several names, those of `label` count; without it, those of the model's object. Where there is a
+    /// `truth.json`, no other label is read.
     ///
     /// # Errors
     /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
@@ -80,20 +44,20 @@ impl LabelledFolder {
     /// without a grasp that is not optional, and several labels out of which none is chosen.
     pub fn read(folder: &Path, detector: &PictureDetector, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
-        let assigned = assign(folder, &mut left_out)?;
-        let read = assigned.pictures.iter().map(|(picture, labels)| {
-            let (path, file) = &assigned.label_files[*labels];
-            read_picture(picture, path, file, detector)
-        });
-        let read = read.collect::<Result<Vec<_>>>()?;
-        let label = chosen_label(folder, &read, detector.model(), label)?;
-        let mut pictures = Vec::new();
         let mut others = 0;
-        for picture in read {
-            others += picture.instances.iter().filter(|instance| !is_counted(instance, label.as_deref())).count();
-            let is_taught = !picture.taught.is_empty();
-            let picture = picture.counted(label.as_deref())?;
-            if is_taught && picture.instances.iter().all(|instance| instance.optional) {
+        let read = if folder.join(TRUTH_FILE).exists() {
+            read_truth(folder, detector, &mut left_out)?
+        } else {
+            let read = read_labels(folder, detector, &mut left_out)?;
+            let label = chosen_label(folder, &read, detector.model(), label)?;
+            let all = read.iter().flat_map(|picture| &picture.instances);
+            others = all.filter(|instance| !is_counted(instance, label.as_deref())).count();
+            read.into_iter().map(|picture| picture.counted(label.as_deref())).collect::<Result<_>>()?
+        };
+        let mut pictures = Vec::new();
+        for (mut picture, taught) in read {
+            mark_taught(&mut picture.instances, &taught);
+            if !taught.is_empty() && picture.instances.iter().all(|instance| instance.optional) {
                 left_out.push(LeftOut { file: picture.name(), why: "the model was taught from it".to_owned() });
             } else {
                 pictures.push(picture);
@@ -109,6 +73,15 @@ impl LabelledFolder {
         left_out.sort_by(|a, b| a.file.cmp(&b.file));
         Ok(Self { pictures, left_out, others })
     }
+}
+
+fn read_labels(folder: &Path, detector: &PictureDetector, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
+    let assigned = assign(folder, left_out)?;
+    let read = assigned.pictures.iter().map(|(picture, labels)| {
+        let (path, file) = &assigned.label_files[*labels];
+        read_picture(picture, path, file, detector)
+    });
+    read.collect()
 }
 
 /// Which label file, by its place in the list, labels which picture.
@@ -205,7 +178,7 @@ struct ReadPicture {
     size: [u32; 2],
     instances: Vec<LabelledInstance>,
     /// Where the model's own demonstrations were cut from it.
-    taught: Vec<nalgebra::Point2<f64>>,
+    taught: Vec<Point2<f64>>,
 }
 
 fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &PictureDetector) -> Result<ReadPicture> {
@@ -224,22 +197,32 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Picture
 }
 
 impl ReadPicture {
-    /// The instances that count; what the model was taught from is no test, so it is optional.
-    fn counted(self, label: Option<&str>) -> Result<LabelledPicture> {
+    /// The picture with the instances that count, and what was taught from it.
+    fn counted(self, label: Option<&str>) -> Result<(LabelledPicture, Vec<Point2<f64>>)> {
         let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
         let instances = counted.map(|instance| {
             let annotation = &instance.annotation;
             if !instance.optional {
                 annotation.require_grasp().with_context(|| format!("{}, {}", self.labels.display(), instance.place))?;
             }
-            let is_taught = annotation.grasp.is_some_and(|grasp| {
-                let reach = MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length();
-                self.taught.iter().any(|taught| (taught - grasp.center()).norm() <= reach)
-            });
-            Ok(Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional: instance.optional || is_taught })
+            let (bbox, grasp) = (annotation.bbox, annotation.grasp);
+            Ok(Instance { bbox, grasp, optional: instance.optional, extent: None })
         });
         let instances = instances.collect::<Result<Vec<_>>>()?;
-        Ok(LabelledPicture { path: self.path, labels: self.labels, size: self.size, instances })
+        Ok((
+            LabelledPicture { path: self.path, labels: self.labels, size: self.size, instances, kind: None },
+            self.taught,
+        ))
+    }
+}
+
+/// What the model was taught from is no test, so it is optional.
+fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
+    for instance in instances {
+        instance.optional |= instance.grasp.is_some_and(|grasp| {
+            let reach = MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length();
+            taught.iter().any(|taught| (taught - grasp.center()).norm() <= reach)
+        });
     }
 }
 
@@ -270,8 +253,4 @@ fn chosen_label(
             listed()
         ),
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

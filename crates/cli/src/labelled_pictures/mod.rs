@@ -13,12 +13,16 @@
 
 mod folder;
 mod page;
+mod picture;
 mod records;
 mod score;
 mod taught;
+mod truth_file;
 
 pub use crate::found_text::DEFAULT_MIN_SCORE;
-pub use folder::{Instance, LabelledFolder, LabelledPicture, LeftOut};
+pub use folder::LabelledFolder;
 pub use page::{in_words, page};
-pub use records::{Evaluated, to_json};
-pub use score::{Judged, Outcome, Tested, Totals, Truth, judge, sweep};
+pub use picture::{Instance, LabelledPicture};
+pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
+pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
+pub use truth_file::{TRUTH_FILE, TruthEntry};

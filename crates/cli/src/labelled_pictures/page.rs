@@ -150,7 +150,7 @@ fn at_a_glance(totals: &Totals) -> Section {
 }
 
 fn min_score_chart(evaluated: &Evaluated) -> Chart {
-    let swept = sweep(&evaluated.tested, evaluated.symmetry());
+    let swept = sweep(&evaluated.tested.iter().collect::<Vec<_>>());
     let curve = |share: fn(&Totals) -> Share| -> Vec<(f64, f64)> {
         swept.iter().filter_map(|(min_score, totals)| Some((*min_score, share(totals).percent()?))).collect()
     };

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use sdg_geometry::{BoundingBox, RotationalSymmetry};
+use sdg_geometry::BoundingBox;
 use sdg_grasp::{DetectionRecord, GraspModel, Verification};
 use serde_json::{Value, json};
 
-use super::folder::LeftOut;
-use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, judge, sweep};
+use super::picture::LeftOut;
+use super::score::{Hit, Judged, Tested, Totals, TrueGrasp, by_kind, judge, sweep};
 
 /// A model tested on a folder.
 pub struct Evaluated<'a> {
@@ -27,14 +27,9 @@ pub struct Evaluated<'a> {
 }
 
 impl Evaluated<'_> {
-    /// The turns that the model cannot tell apart.
-    pub fn symmetry(&self) -> RotationalSymmetry {
-        self.model.facts().symmetry
-    }
-
     /// Every picture judged with the least score that counts.
     pub fn judged(&self) -> Vec<Judged> {
-        self.tested.iter().map(|tested| judge(tested, self.symmetry(), self.min_score)).collect()
+        self.tested.iter().map(|tested| judge(tested, self.min_score)).collect()
     }
 }
 
@@ -44,24 +39,13 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     let totals = Totals::of(&judged);
     let pictures: Vec<Value> =
         evaluated.tested.iter().zip(&judged).map(|(tested, judged)| picture(tested, judged)).collect();
-    let swept: Vec<Value> = sweep(&evaluated.tested, evaluated.symmetry())
-        .into_iter()
-        .map(|(min_score, totals)| {
-            json!({
-                "min_score": min_score,
-                "found": totals.found.count,
-                "wrong": totals.wrong,
-                "clean": totals.clean.count,
-                "false_alarms": totals.false_alarms.count,
-            })
-        })
-        .collect();
+    let tested: Vec<&Tested> = evaluated.tested.iter().collect();
     json!({
         "folder": evaluated.folder.display().to_string(),
         "grasp_model": evaluated.model_file.display().to_string(),
         "model": evaluated.model.kind().letter(),
         "object": evaluated.model.object(),
-        "symmetry": evaluated.symmetry(),
+        "symmetry": evaluated.model.facts().symmetry,
         "verified": evaluated.verification == Verification::ByShape,
         "min_score": evaluated.min_score,
         "found": totals.found.count,
@@ -76,11 +60,41 @@ pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
         "pictures_without_part": totals.false_alarms.of,
         "errors": totals.errors,
         "pictures": pictures,
-        "by_min_score": swept,
+        "by_kind": by_kind_json(&tested, evaluated.min_score),
+        "by_min_score": by_min_score(&tested),
         "left_out": evaluated.left_out,
         "other_labels": evaluated.others,
         "report": report.display().to_string(),
     })
+}
+
+/// The counts with other minimum scores.
+pub fn by_min_score(tested: &[&Tested]) -> Vec<Value> {
+    let at = |(min_score, totals): (f64, Totals)| {
+        json!({
+            "min_score": min_score,
+            "found": totals.found.count,
+            "wrong": totals.wrong,
+            "clean": totals.clean.count,
+            "false_alarms": totals.false_alarms.count,
+        })
+    };
+    sweep(tested).into_iter().map(at).collect()
+}
+
+/// The counts of each kind of picture that the labels name.
+pub fn by_kind_json(tested: &[&Tested], min_score: f64) -> Vec<Value> {
+    let of_kind = |(kind, totals): (&str, Totals)| {
+        json!({
+            "kind": kind,
+            "found": totals.found.count,
+            "parts": totals.found.of,
+            "wrong": totals.wrong,
+            "false_alarms": totals.false_alarms.count,
+            "pictures_without_part": totals.false_alarms.of,
+        })
+    };
+    by_kind(tested, min_score).into_iter().map(of_kind).collect()
 }
 
 fn picture(tested: &Tested, judged: &Judged) -> Value {

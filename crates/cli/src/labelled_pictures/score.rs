@@ -2,12 +2,16 @@
 //!
 //! Distances are pixels of the picture, angles degrees; a detection's place is the middle of its grasp.
 
+use std::time::Instant;
+
+use anyhow::{Context, Result};
 use nalgebra::Point2;
 use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry, percentile};
-use sdg_grasp::{GraspDetection, TaughtDemonstration};
+use sdg_grasp::{GraspDetection, TaughtDemonstration, Verification};
 use serde::Serialize;
 
-use super::folder::{Instance, LabelledPicture};
+use super::picture::{Instance, LabelledPicture};
+use crate::files;
 use crate::picture_detector::PictureDetector;
 use crate::statistics::Share;
 
@@ -39,12 +43,15 @@ pub struct TrueGrasp {
     pub angle: Angle,
     /// The demonstration's box diagonal at this instance's size.
     pub diagonal_px: f64,
+    /// The turns that look alike.
+    pub symmetry: RotationalSymmetry,
     /// What a pixel covers there in the plane of the marks, in metres, where the camera is known.
     pub pixel_m: Option<f64>,
 }
 
 impl Truth {
-    /// An instance whose size is read off the length of its marks. With several demonstrations, their mean size counts.
+    /// An instance. Unless its labels say them, its size is read off the length of its marks, the mean over several demonstrations,
+    /// and its symmetry is the model's.
     pub fn new(instance: &Instance, detector: &PictureDetector) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
@@ -52,13 +59,28 @@ impl Truth {
             marks.bbox.width().hypot(marks.bbox.height()) / marks.grasp.length()
         };
         let mean = demonstrations.iter().map(diagonal_per_length).sum::<f64>() / demonstrations.len().max(1) as f64;
+        let symmetry = detector.model().facts().symmetry;
         let grasp = instance.grasp.map(|line| TrueGrasp {
             center: line.center(),
             angle: line.angle(),
-            diagonal_px: mean * line.length(),
+            diagonal_px: instance.extent.map_or(mean * line.length(), |extent| extent.diagonal_px),
+            symmetry: instance.extent.map_or(symmetry, |extent| extent.symmetry),
             pixel_m: detector.metres_per_pixel(&line.center()),
         });
         Self { grasp, bbox: instance.bbox, optional: instance.optional }
+    }
+}
+
+impl TrueGrasp {
+    /// How far off a detected grasp is.
+    pub fn error_of(&self, grasp: &PlanarGrasp) -> HitError {
+        let px = (grasp.center() - self.center).norm();
+        HitError {
+            px,
+            mm: self.pixel_m.map(|pixel_m| 1e3 * pixel_m * px),
+            percent: 100.0 * px / self.diagonal_px,
+            deg: self.symmetry.distance(grasp.angle, self.angle).to_degrees(),
+        }
     }
 }
 
@@ -73,6 +95,22 @@ pub struct Tested {
     pub detections: Vec<GraspDetection>,
     /// How long detection took.
     pub seconds: f64,
+}
+
+impl Tested {
+    /// Reads a picture and runs the model on it.
+    ///
+    /// # Errors
+    /// A picture that cannot be read or detected in.
+    pub fn detect(picture: LabelledPicture, detector: &PictureDetector, verification: Verification) -> Result<Self> {
+        let image = files::read_image(&picture.path)?;
+        let start = Instant::now();
+        let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
+        let seconds = start.elapsed().as_secs_f64();
+        let truths = picture.instances.iter().map(|instance| Truth::new(instance, detector)).collect();
+        let detections = found.into_iter().map(|found| found.detection).collect();
+        Ok(Self { picture, truths, detections, seconds })
+    }
 }
 
 /// A detection on an instance.
@@ -95,6 +133,18 @@ pub struct HitError {
     pub percent: f64,
     /// The turn between both, in degrees, 180 at most.
     pub deg: f64,
+}
+
+impl HitError {
+    /// Whether the place is right.
+    pub fn is_in_place(&self) -> bool {
+        self.percent <= 100.0 * MAX_DISTANCE_DIAGONALS
+    }
+
+    /// Whether place and turn are right.
+    pub fn is_hit(&self) -> bool {
+        self.is_in_place() && self.deg <= MAX_ANGLE_DEG
+    }
 }
 
 /// What a picture comes to.
@@ -185,11 +235,11 @@ impl Judged {
 
 /// Judges the detections that score at least `min_score`: from the best on, each takes the nearest instance that is still
 /// free and that it hits. A detection takes no instance from a better one, so a higher `min_score` only shortens the list.
-pub fn judge(tested: &Tested, symmetry: RotationalSymmetry, min_score: f64) -> Judged {
+pub fn judge(tested: &Tested, min_score: f64) -> Judged {
     let mut found = vec![false; tested.truths.len()];
     let counted = tested.detections.iter().filter(|detection| detection.score >= min_score);
     let hits = counted.map(|detection| {
-        let hit = nearest(&tested.truths, &found, &detection.grasp, symmetry)
+        let hit = nearest(&tested.truths, &found, &detection.grasp)
             .or_else(|| without_grasp(&tested.truths, &found, &detection.bbox))?;
         found[hit.instance_idx] = true;
         Some(hit)
@@ -199,20 +249,12 @@ pub fn judge(tested: &Tested, symmetry: RotationalSymmetry, min_score: f64) -> J
 }
 
 /// The nearest free instance that a grasp hits.
-fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp, symmetry: RotationalSymmetry) -> Option<Hit> {
-    let mut nearest: Option<(usize, HitError)> = None;
-    for (instance_idx, truth) in truths.iter().enumerate().filter(|(instance_idx, _)| !taken[*instance_idx]) {
-        let Some(TrueGrasp { center, angle, diagonal_px, pixel_m }) = truth.grasp else { continue };
-        let px = (grasp.center() - center).norm();
-        let percent = 100.0 * px / diagonal_px;
-        let deg = symmetry.distance(grasp.angle, angle).to_degrees();
-        let is_hit = percent <= 100.0 * MAX_DISTANCE_DIAGONALS && deg <= MAX_ANGLE_DEG;
-        if is_hit && nearest.is_none_or(|(_, best)| px < best.px) {
-            nearest =
-                Some((instance_idx, HitError { px, mm: pixel_m.map(|pixel_m| 1e3 * pixel_m * px), percent, deg }));
-        }
-    }
-    nearest.map(|(instance_idx, error)| Hit { instance_idx, error: Some(error) })
+fn nearest(truths: &[Truth], taken: &[bool], grasp: &PlanarGrasp) -> Option<Hit> {
+    let free = truths.iter().enumerate().filter(|(instance_idx, _)| !taken[*instance_idx]);
+    free.filter_map(|(instance_idx, truth)| Some((instance_idx, truth.grasp?.error_of(grasp))))
+        .filter(|(_, error)| error.is_hit())
+        .min_by(|(_, one), (_, other)| one.px.total_cmp(&other.px))
+        .map(|(instance_idx, error)| Hit { instance_idx, error: Some(error) })
 }
 
 /// The free instance without a grasp whose box is the detection's.
@@ -293,12 +335,26 @@ impl Errors {
     }
 }
 
+/// The pictures of each kind that the labels name, in the order in which the kinds appear.
+pub fn by_kind<'a>(tested: &[&'a Tested], min_score: f64) -> Vec<(&'a str, Totals)> {
+    let mut kinds: Vec<(&str, Vec<Judged>)> = Vec::new();
+    for tested in tested {
+        let Some(kind) = tested.picture.kind.as_deref() else { continue };
+        let judged = judge(tested, min_score);
+        match kinds.iter_mut().find(|(known, _)| *known == kind) {
+            Some((_, of_kind)) => of_kind.push(judged),
+            None => kinds.push((kind, vec![judged])),
+        }
+    }
+    kinds.into_iter().map(|(kind, judged)| (kind, Totals::of(&judged))).collect()
+}
+
 /// Everything counted again with other least scores, from 0 to 1.
-pub fn sweep(tested: &[Tested], symmetry: RotationalSymmetry) -> Vec<(f64, Totals)> {
+pub fn sweep(tested: &[&Tested]) -> Vec<(f64, Totals)> {
     (0..=NUM_SWEEP_STEPS)
         .map(|step| {
             let min_score = f64::from(step) / f64::from(NUM_SWEEP_STEPS);
-            let judged: Vec<Judged> = tested.iter().map(|tested| judge(tested, symmetry, min_score)).collect();
+            let judged: Vec<Judged> = tested.iter().map(|tested| judge(tested, min_score)).collect();
             (min_score, Totals::of(&judged))
         })
         .collect()
@@ -315,6 +371,7 @@ mod tests {
             center: Point2::new(x, 50.0),
             angle: Angle::from_degrees(degrees),
             diagonal_px: 100.0,
+            symmetry: RotationalSymmetry::None,
             pixel_m: None,
         };
         Truth { grasp: Some(grasp), bbox: BoundingBox { x1: x - 5.0, y1: 45.0, x2: x + 5.0, y2: 55.0 }, optional }
@@ -336,13 +393,18 @@ mod tests {
     }
 
     fn tested(truths: Vec<Truth>, detections: Vec<GraspDetection>) -> Tested {
-        let picture =
-            LabelledPicture { path: "a.png".into(), labels: "a.json".into(), size: [640, 480], instances: Vec::new() };
+        let picture = LabelledPicture {
+            path: "a.png".into(),
+            labels: "a.json".into(),
+            size: [640, 480],
+            instances: Vec::new(),
+            kind: None,
+        };
         Tested { picture, truths, detections, seconds: 0.0 }
     }
 
     fn judged(truths: Vec<Truth>, detections: Vec<GraspDetection>) -> Judged {
-        judge(&tested(truths, detections), RotationalSymmetry::None, 0.5)
+        judge(&tested(truths, detections), 0.5)
     }
 
     #[test]
@@ -359,13 +421,17 @@ mod tests {
 
     #[test]
     fn turns_that_cannot_be_seen_are_no_error() {
-        let half_a_turn_off = tested(vec![truth(100.0, 10.0, false)], vec![detection(101.0, -172.0, 0.9)]);
+        let half_a_turn_off = |symmetry: RotationalSymmetry| {
+            let mut truth = truth(100.0, 10.0, false);
+            truth.grasp.as_mut().unwrap().symmetry = symmetry;
+            judged(vec![truth], vec![detection(101.0, -172.0, 0.9)])
+        };
         for (symmetry, count) in
             [(RotationalSymmetry::None, 0), (RotationalSymmetry::Fold(2), 1), (RotationalSymmetry::Full, 1)]
         {
-            assert_eq!(judge(&half_a_turn_off, symmetry, 0.5).parts().count, count, "{symmetry:?}");
+            assert_eq!(half_a_turn_off(symmetry).parts().count, count, "{symmetry:?}");
         }
-        let error = judge(&half_a_turn_off, RotationalSymmetry::Fold(2), 0.5).hits[0].unwrap().error.unwrap();
+        let error = half_a_turn_off(RotationalSymmetry::Fold(2)).hits[0].unwrap().error.unwrap();
         assert!((error.deg - 2.0).abs() < 1e-9 && (error.px - 1.0).abs() < 1e-9, "{error:?}");
         assert!((error.percent - 1.0).abs() < 1e-9, "{error:?}");
     }
@@ -414,9 +480,7 @@ mod tests {
             tested(Vec::new(), vec![detection(100.0, 0.0, 0.8), detection(150.0, 0.0, 0.7)]),
             tested(Vec::new(), vec![detection(100.0, 0.0, 0.3)]),
         ];
-        let at = |min_score: f64| {
-            Totals::of(&pictures.each_ref().map(|tested| judge(tested, RotationalSymmetry::None, min_score)))
-        };
+        let at = |min_score: f64| Totals::of(&pictures.each_ref().map(|tested| judge(tested, min_score)));
         let totals = at(0.5);
         assert_eq!((totals.found, totals.missed, totals.wrong), (Share { count: 2, of: 4 }, 2, 1));
         assert_eq!((totals.clean, totals.false_alarms), (Share { count: 1, of: 3 }, Share { count: 1, of: 2 }));
@@ -429,7 +493,7 @@ mod tests {
         let lax = at(0.0);
         assert_eq!((lax.found.count, lax.false_alarms.count), (3, 2));
         assert_eq!(at(1.0).errors, None);
-        let swept = sweep(&pictures, RotationalSymmetry::None);
+        let swept = sweep(&pictures.each_ref());
         assert_eq!((swept.len(), &swept[25]), (51, &(0.5, totals)));
     }
 }

@@ -6,35 +6,36 @@ use clap::Args as ClapArgs;
 use sdg_grasp::ComputeBackend;
 
 use super::sharing_args::SharingArgs;
+use super::split_args::{SPLIT_HELP, SplitArgs};
 use crate::shared_args::{backend, share};
 
 /// What `sdg evaluate --pictures` reads and writes.
 const PICTURES_HELP: &str = "\
 Labelled pictures (--pictures DIR):
   DIR holds pictures (PNG, JPEG, WebP, BMP, TIFF) and their labels: LabelMe (a JSON file of the same name beside each) or COCO (one
-  JSON file with `images` and `annotations`). Each instance of the part has a box or an outline and the two points of the
+  JSON file with `images` and `annotations`), or truth.json, beside which other labels are not read (docs/file-formats.md). Each instance of the part has a box or an outline and the two points of the
   grasp, grasp_start and grasp_end; in LabelMe its shapes share a group_id. An instance flagged `optional` (LabelMe: in
   `flags`; COCO: in `attributes`) is neither missed nor wrong, and may lack the grasp. A picture whose labels mark nothing is one without the part.
   A picture that the model was taught from is left out. Folders are not searched for folders: call once for each.
 
   A hit lies within 4 % of the instance's diagonal and 10 degrees of the marks, but for turns that `sdg teach --symmetry`
   said look alike; one detection to one instance, the best score first. The diagonal is that of the demonstration's box, as
-  much larger as the instance's marks are longer than the demonstration's. A picture is clean when something on it is right
+  much larger as the instance's marks are longer than the demonstration's; truth.json has diagonal and symmetry of each. A picture is clean when something on it is right
   and nothing wrong.
 
   --json prints one object: found, parts, missed, wrong, optional_found, optional, clean, pictures_with_part, false_alarms,
   pictures_without_part (counts); errors {median_px, median_percent, median_deg, p95_px, p95_percent, p95_deg} or null;
   pictures [{image, outcome: right|missed|wrong|quiet|false_alarm, found, parts, missed, wrong, clean, false_alarm,
   seconds, instances [{grasp: {x, y, angle_deg, diagonal_px} or null, box, optional, found}], detections [{hit: {instance,
-  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_min_score [{min_score, found,
-  wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report.
+  error: {px, percent, deg} or null} or null, detection: as `sdg detect --json`}]}]; by_kind [{kind, found, parts, wrong,
+  false_alarms, pictures_without_part}] where truth.json names kinds; by_min_score [{min_score, found, wrong, clean, false_alarms}]; left_out [{file, why}]; other_labels; report.
   The exit code is 3 where parts are marked and nothing at all was detected.";
 
 /// `sdg evaluate`
 #[derive(Debug, ClapArgs)]
-#[command(after_long_help = PICTURES_HELP)]
+#[command(after_long_help = format!("{PICTURES_HELP}\n\n{SPLIT_HELP}"))]
 pub struct EvaluateArgs {
-    /// Test a taught model on your own labelled pictures instead: a folder of pictures with LabelMe or COCO labels. The
+    /// Test a taught model on your own labelled pictures instead: a folder of pictures with LabelMe or COCO labels or truth.json. The
     /// end of --help says how they are labelled and what is counted
     #[arg(
         long,
@@ -167,6 +168,9 @@ pub struct EvaluateArgs {
     /// Folder for the page; without it, the folder of the results, or target/pictures-report for --pictures
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    /// Sets of pictures on both sides of a split
+    #[command(flatten)]
+    pub split: SplitArgs,
     /// Single units for a cluster
     #[command(flatten)]
     pub sharing: SharingArgs,

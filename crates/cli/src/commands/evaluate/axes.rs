@@ -3,11 +3,13 @@
 use std::fmt::Write;
 
 use anyhow::{Result, bail};
+use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
-use super::selection::{jobs, models, objects, settings};
+use super::model_names::models;
+use super::selection::{jobs, objects, settings};
 use crate::evaluation::axes::{
     Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
 };
@@ -20,7 +22,7 @@ use crate::machine::machine;
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let selection = Selection::parse(names).map_err(|error| Usage(format!("--axes: {error}")))?;
-    let models = models(&args.models)?;
+    let models = models(&args.models, &ModelKind::ALL)?;
     let objects = objects(&args.objects, ObjectSpec::names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;

@@ -6,7 +6,8 @@ use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
-use super::selection::{jobs, models, objects, settings};
+use super::model_names::models;
+use super::selection::{jobs, objects, settings};
 use crate::evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
 use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
@@ -17,7 +18,7 @@ use crate::machine::machine;
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let sets = sets(names)?;
-    let models = if args.models.is_empty() { vec![ModelKind::S, ModelKind::C] } else { models(&args.models)? };
+    let models = models(&args.models, &[ModelKind::S, ModelKind::C])?;
     let objects = objects(&args.objects, ObjectSpec::names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;

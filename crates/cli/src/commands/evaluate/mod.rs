@@ -1,10 +1,11 @@
-//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, or the user's own pictures.
+//! `sdg evaluate`: the paper's protocol, whole or in units; pictures along axes, other cameras, the user's own pictures, or a split of sets.
 
 mod args;
 #[cfg(feature = "simulation")]
 mod axes;
 #[cfg(feature = "simulation")]
 mod cameras;
+mod model_names;
 mod pictures;
 #[cfg(feature = "simulation")]
 mod protocol;
@@ -13,6 +14,8 @@ mod selection;
 #[cfg(feature = "simulation")]
 mod sharing;
 mod sharing_args;
+mod split;
+mod split_args;
 
 use anyhow::Result;
 
@@ -24,6 +27,9 @@ use crate::exit::Outcome;
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     if args.pictures.is_some() {
         return pictures::run(args);
+    }
+    if let Some(split) = &args.split.split {
+        return split::run(args, split);
     }
     #[cfg(feature = "simulation")]
     if args.sharing.is_asked_for() {

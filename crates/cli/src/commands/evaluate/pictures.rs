@@ -2,16 +2,15 @@
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use sdg_grasp::Verification;
 
 use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
-use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, Truth, in_words, judge, page, to_json};
+use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json};
 use crate::picture_detector::PictureDetector;
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
@@ -34,19 +33,12 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     files::prepare_folder(&report_folder)?;
 
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
-    let symmetry = model.facts().symmetry;
     let progress = EvaluationProgress::new();
     progress.expect(labelled.pictures.len());
     let mut tested = Vec::with_capacity(labelled.pictures.len());
     for picture in labelled.pictures {
-        let image = files::read_image(&picture.path)?;
-        let start = Instant::now();
-        let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;
-        let seconds = start.elapsed().as_secs_f64();
-        let truths = picture.instances.iter().map(|instance| Truth::new(instance, &detector)).collect();
-        let detections = found.into_iter().map(|found| found.detection).collect();
-        let of_picture = Tested { picture, truths, detections, seconds };
-        let judged = judge(&of_picture, symmetry, args.min_score);
+        let of_picture = Tested::detect(picture, &detector, verification)?;
+        let judged = judge(&of_picture, args.min_score);
         progress.unit_done(&format!("{}: {}", of_picture.picture.name(), in_words(&of_picture, &judged)));
         tested.push(of_picture);
     }
@@ -97,6 +89,11 @@ fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
     }
     if totals.false_alarms.of > 0 {
         line(format!("false alarms on {} pictures without the part", totals.false_alarms));
+    }
+    for (kind, totals) in by_kind(&evaluated.tested.iter().collect::<Vec<_>>(), evaluated.min_score) {
+        let with_part = format!("found {} parts, {} wrong", totals.found, totals.wrong);
+        let without_part = format!("false alarms on {} pictures", totals.false_alarms);
+        line(format!("{kind}: {}", if totals.clean.of > 0 { with_part } else { without_part }));
     }
     if let Some(errors) = totals.errors {
         let mm = |mm: Option<f64>| mm.map(|mm| format!(" = {mm:.2} mm")).unwrap_or_default();

@@ -4,11 +4,13 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
-use super::selection::{jobs, models, objects, settings};
+use super::model_names::models;
+use super::selection::{jobs, objects, settings};
 use crate::evaluation::{Evaluation, EvaluationProgress, PartGroup, Settings, Store, Summary, markdown, page};
 use crate::exit::Outcome;
 use crate::files;
@@ -17,7 +19,7 @@ use crate::machine::machine;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
-    let models = models(&args.models)?;
+    let models = models(&args.models, &ModelKind::ALL)?;
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;

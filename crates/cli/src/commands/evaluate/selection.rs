@@ -1,8 +1,7 @@
-//! What all kinds of `sdg evaluate` read from its arguments: models, parts, preset and workers.
+//! What all kinds of `sdg evaluate` read from its arguments: parts, preset and workers.
 
 use anyhow::Result;
-use sdg_demonstration::UnknownModel;
-use sdg_grasp::{GraspError, ModelKind, Preset};
+use sdg_grasp::{GraspError, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
 use super::args::EvaluateArgs;
@@ -33,22 +32,6 @@ pub fn settings(args: &EvaluateArgs) -> Result<(Preset, Settings)> {
 /// Units of work side by side: as asked for, else one for each core.
 pub fn jobs(args: &EvaluateArgs) -> usize {
     args.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), |jobs| jobs as usize)
-}
-
-/// The models of these letters or names; without any, all.
-pub fn models(names: &[String]) -> Result<Vec<ModelKind>> {
-    if names.is_empty() {
-        return Ok(ModelKind::ALL.to_vec());
-    }
-    let mut models = Vec::new();
-    for name in names {
-        let model = name.trim().parse().map_err(|error: UnknownModel| Usage(format!("--models: {error}")))?;
-        if models.contains(&model) {
-            return Err(Usage(format!("--models: expected each model once, found {model} again")).into());
-        }
-        models.push(model);
-    }
-    Ok(models)
 }
 
 /// The parts of these names; without a name, `all`.

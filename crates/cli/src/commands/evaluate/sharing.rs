@@ -11,8 +11,9 @@ use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
+use super::model_names::models;
 use super::protocol;
-use super::selection::{models, objects, settings};
+use super::selection::{objects, settings};
 use crate::evaluation::sharing::{
     Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
     planned_units, submit_script,
@@ -39,7 +40,7 @@ impl Asked {
     fn new(args: &EvaluateArgs) -> Result<Self> {
         let (preset, settings) = settings(args)?;
         Ok(Self {
-            models: models(&args.models)?,
+            models: models(&args.models, &ModelKind::ALL)?,
             objects: objects(&args.objects, ObjectSpec::paper_names())?,
             preset,
             settings,

@@ -1,0 +1,75 @@
+//! `sdg evaluate --split`: sets that may be tuned on beside sets that are only reported.
+
+use std::path::Path;
+
+use anyhow::{Result, bail};
+use sdg_grasp::ModelKind;
+use sdg_report::write_atomically;
+use serde_json::json;
+
+use super::args::EvaluateArgs;
+use super::model_names::models;
+use crate::exit::{Outcome, Usage};
+use crate::files;
+use crate::progress::EvaluationProgress;
+use crate::split::{Measured, ReadySet, Side, SplitSet, candidates, read_split, summary, tables};
+
+/// Every set is read first, then taught and measured, one after the other: the detector's speed is part of the result.
+pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
+    let Some(sets_folder) = &args.split.sets else {
+        return Err(Usage("--split: expected --sets DIR beside it, found none".to_owned()).into());
+    };
+    let models = models(&args.models, &[ModelKind::S])?;
+    let seeds = &args.split.seeds;
+    if let Some(twice) = (1..seeds.len()).find(|&idx| seeds[..idx].contains(&seeds[idx])) {
+        return Err(Usage(format!("--seeds: expected each seed once, found {} again", seeds[twice])).into());
+    }
+    let is_measured = |set: &SplitSet| !args.split.tuned || set.side == Side::Tuned;
+    let sets = read_split(file)?.into_iter().filter(is_measured);
+    let sets = sets.map(|set| ReadySet::open(set, sets_folder)).collect::<Result<Vec<_>>>()?;
+    let sides: Vec<Side> =
+        Side::ALL.into_iter().filter(|side| sets.iter().any(|ready| ready.set.side == *side)).collect();
+    if sides.is_empty() {
+        bail!("{}: expected sets to measure, found none", file.display());
+    }
+    for path in [&args.split.results, &args.split.records].into_iter().flatten() {
+        files::check_writable(path)?;
+    }
+
+    let progress = EvaluationProgress::new();
+    progress.expect(models.len() * seeds.len() * sets.len());
+    let mut measured = Vec::with_capacity(models.len());
+    for model in models {
+        let mut of_model = Measured { model, seeds: seeds.clone(), runs: Vec::new() };
+        for &seed in seeds {
+            for ready in &sets {
+                let run = ready.run(model, seed)?;
+                progress.unit_done(&format!("model {model}, seed {seed}, {}: {}", ready.set.name, run.in_words()));
+                of_model.runs.push(run);
+            }
+        }
+        measured.push(of_model);
+    }
+    progress.finish();
+
+    let results = json!({
+        "split": file.display().to_string(),
+        "sides": sides,
+        "version": env!("CARGO_PKG_VERSION"),
+        "models": measured.iter().map(|of_model| summary(of_model, &sides)).collect::<Vec<_>>(),
+    });
+    if let Some(path) = &args.split.results {
+        write_atomically(path, results.to_string().as_bytes())?;
+    }
+    if let Some(path) = &args.split.records {
+        let lines = measured.iter().map(candidates).collect::<Result<String>>()?;
+        write_atomically(path, lines.as_bytes())?;
+    }
+    if args.json {
+        println!("{results}");
+    } else {
+        let tables: Vec<String> = measured.iter().map(|of_model| tables(of_model, &sides)).collect();
+        print!("{}", tables.join("\n"));
+    }
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,62 @@
+//! A labelled picture: its file, and the instances of the part on it.
+
+use std::path::{Path, PathBuf};
+
+use sdg_geometry::{BoundingBox, GraspLine, RotationalSymmetry};
+use serde::Serialize;
+
+/// An instance of the part on a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// The box around it.
+    pub bbox: BoundingBox,
+    /// The marked grasp; an optional instance may lack it.
+    pub grasp: Option<GraspLine>,
+    /// Neither missed nor wrong: flagged so, or what the model was taught from.
+    pub optional: bool,
+    /// Where the labels say it.
+    pub extent: Option<Extent>,
+}
+
+/// What a hit is measured by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// The demonstration's box diagonal at the instance's size.
+    pub diagonal_px: f64,
+    /// The turns that look alike.
+    pub symmetry: RotationalSymmetry,
+}
+
+/// A picture and what is labelled on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledPicture {
+    pub path: PathBuf,
+    /// The file that labels it.
+    pub labels: PathBuf,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The part's instances; none where it is not on the picture.
+    pub instances: Vec<Instance>,
+    /// The kind of picture, where the labels name it.
+    pub kind: Option<String>,
+}
+
+impl LabelledPicture {
+    /// The file's name.
+    pub fn name(&self) -> String {
+        file_name(&self.path)
+    }
+}
+
+/// A file of the folder that does not count, and the reason.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LeftOut {
+    pub file: String,
+    /// Why it was left out, for people.
+    pub why: String,
+}
+
+/// The last part of a path.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,75 @@
+//! The three figures of a set, a kind of picture or a side.
+
+use serde::Serialize;
+
+use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Judged, Tested, Totals, judge};
+use crate::statistics::Share;
+
+/// Found, wrong and false alarms with the score of `sdg detect`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counts {
+    /// Parts found, of those that must be.
+    pub found: Share,
+    /// Detections that hit nothing, of those accepted on pictures with the part.
+    pub wrong: Share,
+    /// Pictures without the part on which something is accepted.
+    pub false_alarms: Share,
+}
+
+/// A figure of the counts.
+pub(super) type Figure = fn(&Counts) -> Share;
+
+/// The figures that sides are compared by.
+pub(super) const FIGURES: [(&str, Figure); 3] = [
+    ("parts found", |counts| counts.found),
+    ("wrong, of accepted detections", |counts| counts.wrong),
+    ("false alarms, of pictures without the part", |counts| counts.false_alarms),
+];
+
+impl Counts {
+    pub fn of<'a>(tested: impl IntoIterator<Item = &'a Tested>) -> Self {
+        let judged: Vec<Judged> = tested.into_iter().map(|tested| judge(tested, DEFAULT_MIN_SCORE)).collect();
+        let totals = Totals::of(&judged);
+        let accepted = totals.found.count + totals.optional.count + totals.wrong;
+        Self {
+            found: totals.found,
+            wrong: Share { count: totals.wrong, of: accepted },
+            false_alarms: totals.false_alarms,
+        }
+    }
+
+    /// As one line; a dash where nothing was counted.
+    pub fn in_words(&self) -> String {
+        let found = format!("{} found, {} wrong", self.found, self.wrong.count);
+        let false_alarms = format!("{} false alarms", self.false_alarms);
+        let parts = [(self.found.of > 0, found), (self.false_alarms.of > 0, false_alarms)];
+        let told: Vec<String> = parts.into_iter().filter_map(|(is_there, words)| is_there.then_some(words)).collect();
+        if told.is_empty() { "–".to_owned() } else { told.join("; ") }
+    }
+
+    /// The lower of found and the higher of wrong and false alarms, each by itself.
+    pub fn worse_of(self, other: Self) -> Self {
+        let count = |share: &Share| share.count;
+        Self {
+            found: std::cmp::min_by_key(self.found, other.found, count),
+            wrong: std::cmp::max_by_key(self.wrong, other.wrong, count),
+            false_alarms: std::cmp::max_by_key(self.false_alarms, other.false_alarms, count),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_of_two_seeds_is_taken_figure_by_figure() {
+        let counts = |found: usize, wrong: usize, alarms: usize| Counts {
+            found: Share { count: found, of: 10 },
+            wrong: Share { count: wrong, of: found + wrong },
+            false_alarms: Share { count: alarms, of: 5 },
+        };
+        let worst = counts(8, 2, 0).worse_of(counts(7, 1, 3));
+        assert_eq!((worst.found.count, worst.wrong, worst.false_alarms.count), (7, Share { count: 2, of: 10 }, 3));
+    }
+}
