@@ -116,8 +116,16 @@ pub struct ScoreConfig {
     pub outside: Term,
     /// Of the mean agreement of other things with the part.
     pub resemblance: Term,
-    /// Of [`sdg_shape::Evidence::likeness`].
+    /// Of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
+    /// Of [`sdg_shape::CloseLook::bare`].
+    pub table: Term,
+    /// Of [`sdg_shape::CloseLook::no_rim`].
+    pub rim: Term,
+    /// Of [`sdg_shape::CloseLook::added`].
+    pub added: Term,
+    /// Of how much better [`sdg_shape::CloseLook::mirrored`] fits than the photo.
+    pub mirror: Term,
     /// Of ln of how much likelier the network's score is on the part than elsewhere.
     pub network: Term,
 }
@@ -132,7 +140,7 @@ impl ScoreConfig {
     }
 
     /// Every term of the score, by name.
-    pub fn terms(&self) -> [(&'static str, Term); 9] {
+    pub fn terms(&self) -> [(&'static str, Term); 13] {
         [
             ("network", self.network),
             ("edges", self.edges),
@@ -143,6 +151,10 @@ impl ScoreConfig {
             ("outside", self.outside),
             ("resemblance", self.resemblance),
             ("likeness", self.likeness),
+            ("table", self.table),
+            ("rim", self.rim),
+            ("added", self.added),
+            ("mirror", self.mirror),
         ]
     }
 }
@@ -159,18 +171,22 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 
 /// Of the squared ln of a size over the demonstration's, which a refined pose gives to about 2.5 % where a slanted view shows a
 /// part's walls: half of the inverse square of that, to 10 %. Chosen by hand from six rendered pictures.
-const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
+const KNOWN_SIZE: Term = term(-1440.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {
     is_size_known: false,
-    bias: 0.3,
-    edges: term(2.64, 0.62, 0.3, 0.95),
-    surface: term(0.87, 0.33, 0.0, 0.7),
-    hue: term(-8.0, 0.1, 0.1, 0.35),
-    visible: term(6.73, 0.66, 0.27, 0.77),
-    size: term(-98.0, 0.0, 0.0, 0.029),
-    outside: term(-2.15, 0.0, 0.0, 0.34),
-    resemblance: term(-2.74, 0.36, 0.2, 0.45),
-    likeness: term(0.777, -0.1, -2.0, 6.0),
-    network: term(0.8, 0.0, -1.0, 0.0),
+    bias: 2.64,
+    edges: term(4.75, 0.62, 0.3, 0.95),
+    surface: term(1.57, 0.33, 0.0, 0.7),
+    hue: term(-14.4, 0.1, 0.1, 0.35),
+    visible: term(12.1, 0.66, 0.27, 0.77),
+    size: term(-176.0, 0.0, 0.0, 0.029),
+    outside: term(-3.87, 0.0, 0.0, 0.34),
+    resemblance: term(-4.93, 0.36, 0.2, 0.45),
+    likeness: term(1.4, -0.1, -2.0, 6.0),
+    network: term(1.44, 0.0, -1.0, 0.0),
+    table: term(-12.0, 0.0, 0.0, 1.0),
+    rim: term(-12.5, 0.0, 0.0, 1.0),
+    added: term(-35.0, 0.0, 0.0, 1.0),
+    mirror: term(-20.0, 0.1, 0.1, 1.0),
 };

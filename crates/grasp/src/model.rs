@@ -13,6 +13,7 @@ use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
+use sdg_shape::CloseLook;
 
 use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
@@ -326,7 +327,7 @@ pub(crate) struct Placement {
     pub(crate) image_from_cutout: PlanarSimilarity,
     pub(crate) image_from_marks: PlanarSimilarity,
     pub(crate) agreement: f64,
-    pub(crate) likeness: Option<f64>,
+    pub(crate) close: Option<CloseLook>,
     pub(crate) network_score: f64,
     pub(crate) keypoint_scores: Vec<f64>,
     pub(crate) turn_source: TurnSource,
@@ -341,7 +342,7 @@ impl Placement {
             image_from_cutout,
             image_from_marks,
             agreement,
-            likeness: evidence.likeness,
+            close: evidence.close,
             network_score: sighting.network_score,
             keypoint_scores: sighting.keypoint_scores.clone(),
             turn_source: sighting.turn_source,

@@ -105,6 +105,10 @@ mod tests {
             outside: -0.25,
             resemblance: 0.0,
             likeness: 0.0,
+            table: 0.0,
+            rim: 0.0,
+            added: 0.0,
+            mirror: 0.0,
         };
         let refused = GraspDetection { evidence: Some(evidence), score: 0.25, ..verified };
         let json = serde_json::to_string(&DetectionRecord::from(&refused)).unwrap();

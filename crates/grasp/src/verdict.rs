@@ -5,13 +5,15 @@
 //! edges, surface, hue ──────────┤
 //! visible share, likeness ───────┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
 //! size, share outside ──────────┤
-//! resemblance ──────────────────┘  how much other things look like this part: known from teaching
+//! resemblance ──────────────────┤  how much other things look like this part: known from teaching
+//! table, rim, added, mirror ────┘  what contradicts the part, without bounds
 //! ```
 //! Each kind of evidence is wrong in its own pictures: gloss spoils edges and surface, a covering hand hides half of the
 //! part, the network detects other parts as well. So each adds log-odds within bounds, and none of them alone takes a pose that all
-//! others support below 0.5. The weights are those of a logistic regression on generated parts ([`crate::fitting`]).
+//! others support below 0.5. What contradicts the part does: bare table where it should be, no edge along its outline, more edges than it
+//! has, its mirror image fitting better. The weights are those of a logistic regression on generated parts ([`crate::fitting`]).
 
-use sdg_shape::Evidence;
+use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
 
 use crate::check_config::{ScoreConfig, Term};
@@ -39,6 +41,14 @@ pub struct Contributions {
     /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
     /// too little for it to be asked.
     pub likeness: f64,
+    /// Table where the part should be.
+    pub table: f64,
+    /// The share of the outline with no edge.
+    pub rim: f64,
+    /// Edges inside the outline that the photo does not have.
+    pub added: f64,
+    /// How much better the mirror image fits where it differs from the photo.
+    pub mirror: f64,
 }
 
 impl Contributions {
@@ -54,6 +64,10 @@ impl Contributions {
             ("outside", self.outside),
             ("resemblance", self.resemblance),
             ("likeness", self.likeness),
+            ("table", self.table),
+            ("rim", self.rim),
+            ("added", self.added),
+            ("mirror", self.mirror),
         ])
     }
 
@@ -101,6 +115,10 @@ impl Contributions {
             "size" => "it has another size",
             "likeness" => "photo and picture, laid over each other, do not show the same part",
             "outside" => "too much of it lies outside the picture",
+            "table" => "bare table is seen where the part should be",
+            "rim" => "a part of its outline is not there",
+            "added" => "there is more inside its outline than in the photo",
+            "mirror" => "the mirror image fits better",
             _ => "other things look much like this part",
         }
     }
@@ -140,6 +158,9 @@ pub(crate) struct Clues {
     pub(crate) resemblance: f64,
 }
 
+/// Photo and rival must differ in this share of the photo's edges.
+const MIN_RIVALS_SHARE: f64 = 0.03;
+
 /// Who is less sure than this is no reference for the size of others. Chosen by hand, not measured.
 const MIN_REFERENCE_SCORE: f64 = 0.3;
 
@@ -173,6 +194,9 @@ pub(crate) fn judge_picture_of_sequence(
 fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -> (f64, Contributions) {
     let seen = &clues.evidence;
     let off_size = reference_log_size.map_or(0.0, |reference| (clues.log_size - reference).powi(2));
+    // What was not looked at closely has no such evidence.
+    let closely =
+        |term: &Term, value: &dyn Fn(&CloseLook) -> f64| seen.close.map_or(0.0, |close| term.log_odds(value(&close)));
     let contributions = Contributions {
         network: clues.network.map(|score| config.network.log_odds(score)),
         edges: config.edges.log_odds(seen.edges),
@@ -182,10 +206,19 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         size: config.size.log_odds(off_size),
         outside: config.outside.log_odds(seen.outside),
         resemblance: config.resemblance.log_odds(clues.resemblance),
-        likeness: config.likeness.log_odds(seen.likeness.unwrap_or(f64::NEG_INFINITY)),
+        likeness: config.likeness.log_odds(seen.close.map_or(f64::NEG_INFINITY, |close| close.likeness)),
+        table: closely(&config.table, &|close| close.bare),
+        rim: closely(&config.rim, &|close| close.no_rim),
+        added: closely(&config.added, &|close| close.added),
+        mirror: closely(&config.mirror, &|close| close.mirrored.map_or(0.0, rivals_gain)),
     };
     let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
+}
+
+/// By how much the rival fits better; 0 where the two differ too little to tell.
+fn rivals_gain(rival: RivalFit) -> f64 {
+    if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin }
 }
 
 impl Term {
@@ -196,8 +229,13 @@ impl Term {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// A close look at the part itself, with another likeness.
+    pub(crate) fn look(likeness: f64) -> CloseLook {
+        CloseLook { likeness, bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
+    }
 
     /// A clear view of the part: what right poses have in the median on generated parts.
     fn clear() -> Clues {
@@ -207,7 +245,7 @@ mod tests {
             hue_shift: 0.05,
             visible: 1.0,
             outside: 0.0,
-            likeness: Some(2.0),
+            close: Some(look(2.0)),
         };
         Clues { evidence, log_size: 0.0, network: None, resemblance: 0.34 }
     }
@@ -225,13 +263,13 @@ mod tests {
             hue_shift: 0.3,
             visible: 0.52,
             outside: 0.0,
-            likeness: Some(-2.6),
+            close: Some(look(-2.6)),
         };
         assert!(score(Clues { evidence: other, ..clear() }) < 0.1);
     }
 
     #[test]
-    fn no_evidence_alone_rejects_what_all_others_support() {
+    fn what_contradicts_the_part_rejects_alone_and_what_is_merely_missing_does_not() {
         let best = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max);
         let worst = |term: &Term| term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MAX, f64::min);
         let config = ScoreConfig::DEFAULT;
@@ -240,7 +278,8 @@ mod tests {
             let terms: Vec<_> = config.terms().into_iter().filter(|(name, _)| asked || *name != "network").collect();
             for (name, term) in &terms {
                 let others: f64 = terms.iter().filter(|(other, _)| other != name).map(|(_, term)| best(term)).sum();
-                assert!(config.bias + others + worst(term) >= 0.0, "{name}, network asked: {asked}");
+                let contradicts = ["table", "rim", "added", "mirror"].contains(name);
+                assert_eq!(config.bias + others + worst(term) < 0.0, contradicts, "{name}, network asked: {asked}");
             }
         }
     }
@@ -255,7 +294,7 @@ mod tests {
         assert!(changed(|c| c.evidence.edges = 0.9) > 0.0 && changed(|c| c.evidence.edges = 0.4) < 0.0);
         assert!(changed(|c| c.evidence.surface = Some(0.7)) > 0.0);
         assert!(changed(|c| c.evidence.hue_shift = 0.8) < 0.0);
-        assert!(changed(|c| c.evidence.likeness = Some(-2.0)) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
+        assert!(changed(|c| c.evidence.close = Some(look(-2.0))) < 0.0 && changed(|c| c.evidence.visible = 0.5) < 0.0);
         assert!(changed(|c| c.evidence.outside = 0.3) < 0.0 && changed(|c| c.resemblance = 0.45) < 0.0);
         assert!(changed(|c| c.network = Some(-0.9)) < 0.0);
         // Networks propose look-alikes as well as the part.
@@ -293,7 +332,8 @@ mod tests {
         let hidden = Clues { evidence: Evidence { visible: 0.2, ..clear().evidence }, ..clear() };
         let (_, contributions) = judge(&hidden, None, &ScoreConfig::DEFAULT);
         assert_eq!(contributions.strongest_objection(), Some("too little of it is visible"));
-        let covered = Clues { evidence: Evidence { likeness: Some(-1.5), edges: 0.6, ..hidden.evidence }, ..clear() };
+        let covered =
+            Clues { evidence: Evidence { close: Some(look(-1.5)), edges: 0.6, ..hidden.evidence }, ..clear() };
         let config = ScoreConfig::DEFAULT;
         let names = |clues: &Clues| -> Vec<_> {
             judge(clues, None, &config).1.objections(&config).into_iter().map(|(name, _)| name).collect()

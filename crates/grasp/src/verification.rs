@@ -13,7 +13,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
-use sdg_shape::{Differences, Evidence, GradientField};
+use sdg_shape::{Differences, Evidence, GradientField, Picture, TableColors};
 
 use crate::models::PoseCandidate;
 use crate::prepared::{Prepared, WorkingSize, scaling};
@@ -31,6 +31,13 @@ struct View<'a> {
     halvings: u32,
     image: Cow<'a, RgbImage>,
     field: GradientField,
+    table: TableColors,
+}
+
+impl View<'_> {
+    fn picture(&self) -> Picture<'_> {
+        Picture { image: &self.image, field: &self.field, table: &self.table }
+    }
 }
 
 /// A demonstration within one range of sizes.
@@ -73,7 +80,8 @@ impl<'a> SearchedImage<'a> {
             view = Cow::Owned(halved(&view));
         }
         let field = GradientField::with_config(&view, &demonstration.check().search.shape.gradient);
-        self.views.push(View { halvings, image: view, field });
+        let table = TableColors::new(&view);
+        self.views.push(View { halvings, image: view, field, table });
         self.views.len() - 1
     }
 }
@@ -126,7 +134,7 @@ impl<'a> SizedDemonstration<'a> {
         if from_end > AT_END {
             return false;
         }
-        let comparison = self.prepared.search.comparison(&view.image, &view.field);
+        let comparison = self.prepared.search.comparison(&view.picture());
         let refined = comparison.refined_by_edges(view_from_working);
         !scales.contains(&refined.scale) && comparison.agreement(&refined).both() > agreement + BETTER_BEYOND
     }
@@ -163,7 +171,7 @@ pub(crate) fn search<'a>(searched: &SearchedImage<'a>) -> Vec<PlacedDemonstratio
     let mut found = Vec::new();
     for sized in &searched.sized {
         let view = &searched.views[sized.view_idx];
-        for found_there in sized.prepared.search.search_field(&view.image, &view.field) {
+        for found_there in sized.prepared.search.search_picture(&view.picture()) {
             let pose = &found_there.image_from_demonstration;
             if sized.is_of_other_size(view, pose, found_there.agreement) {
                 continue;
@@ -199,7 +207,7 @@ fn better_way_round<'a>(
     searched: &SearchedImage<'_>,
 ) -> Option<PlacedDemonstration<'a>> {
     let view = &searched.views[sized.view_idx];
-    let comparison = sized.prepared.search.comparison(&view.image, &view.field);
+    let comparison = sized.prepared.search.comparison(&view.picture());
     let turned = about_middle(sized.demonstration, start, Angle::from_radians(std::f64::consts::PI), 1.0);
     let [straight, turned] = [*start, turned].map(|start| {
         let start = sized.view_from_working(&start);
@@ -223,7 +231,7 @@ pub(crate) fn differences(
     let distance = |sized: &&SizedDemonstration<'_>| sized.range.distance(image_from_cutout.scale);
     let sized = of_it.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let view = &searched.views[sized.view_idx];
-    let comparison = sized.prepared.search.comparison(&view.image, &view.field);
+    let comparison = sized.prepared.search.comparison(&view.picture());
     let mut differences = comparison.differences(&sized.view_from_working(image_from_cutout));
     let image_from_view = scaling(sized.working.shrink());
     let to_image = |point: &mut Point2<f64>| *point = image_from_view.apply(point);

@@ -19,6 +19,7 @@ use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
+use crate::close_look::{CloseLook, CloseUp, Rival, TableColors};
 use crate::config::{AgreementConfig, RefinementConfig};
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
@@ -37,6 +38,11 @@ const MAX_EVALUATIONS: usize = 120;
 /// by hand, not measured.
 const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
+/// A pose that agrees less is refused without a close look. Chosen by hand, for time.
+const MIN_LOOKED_AT: f64 = 0.3;
+/// A pose that fits less is refused without asking for rivals. Chosen by hand, for time.
+const MIN_FIT_FOR_RIVALS: f64 = 0.4;
+
 /// Poses that agree less are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;
 
@@ -51,12 +57,23 @@ pub struct Comparison<'a> {
     pub structure: &'a Structure,
     /// What the comparing network sees of it.
     pub likeness: &'a Likeness,
+    pub(crate) close_up: &'a CloseUp,
+    pub(crate) mirrored: Option<&'a Rival>,
     /// Poses that agree by less are not worth that network's time.
     pub min_agreement: f64,
-    /// The image in which the demonstration is laid over.
+    /// The image over which the demonstration is laid.
+    pub picture: Picture<'a>,
+}
+
+/// An image, and what every comparison reads out of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Picture<'a> {
+    /// The image itself.
     pub image: &'a RgbImage,
-    /// The image's gradients.
+    /// Its gradients.
     pub field: &'a GradientField,
+    /// The colours of its table.
+    pub table: &'a TableColors,
 }
 
 /// How well edges and surface agree at a pose.
@@ -93,8 +110,8 @@ pub struct Evidence {
     pub visible: f64,
     /// The share of the part outside the image, in `[0, 1]`.
     pub outside: f64,
-    /// [`Likeness::log_odds`]; `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`].
-    pub likeness: Option<f64>,
+    /// `None` where edges and surface agree by less than [`crate::SearchConfig::min_agreement`].
+    pub close: Option<CloseLook>,
 }
 
 /// Where, at a pose, the image does not show what the demonstration has, for people to look at; pixels of the image.
@@ -110,31 +127,43 @@ impl Comparison<'_> {
     /// Where edges and surface disagree at a pose. Nothing of it counts in [`Self::evidence`], which is made of the same comparison.
     pub fn differences(&self, image_from_demonstration: &PlanarSimilarity) -> Differences {
         Differences {
-            edges: self.structure.differing(self.field, image_from_demonstration),
-            surface: self.surface.differing(self.image, image_from_demonstration),
+            edges: self.structure.differing(self.picture.field, image_from_demonstration),
+            surface: self.surface.differing(self.picture.image, image_from_demonstration),
         }
     }
 
     /// All measurements at a pose. Slower than [`Self::agreement`], which suffices to climb.
     pub fn evidence(&self, image_from_demonstration: &PlanarSimilarity) -> Evidence {
-        let (evidence, agreement) = self.evidence_without_likeness(image_from_demonstration);
-        let likeness =
-            (agreement >= self.min_agreement).then(|| self.likeness.log_odds(self.image, image_from_demonstration));
-        Evidence { likeness, ..evidence }
+        let (evidence, agreement) = self.evidence_from_afar(image_from_demonstration);
+        let close =
+            (agreement >= self.min_agreement.max(MIN_LOOKED_AT)).then(|| self.close_look(image_from_demonstration));
+        Evidence { close, ..evidence }
     }
 
-    /// As [`Self::evidence`] but for the comparing network, which takes nine tenths of the time; and [`Agreement::both`].
-    pub fn evidence_without_likeness(&self, image_from_demonstration: &PlanarSimilarity) -> (Evidence, f64) {
+    /// A close look at a pose.
+    pub fn close_look(&self, image_from_demonstration: &PlanarSimilarity) -> CloseLook {
+        let seen = self.close_up.seen(self.picture.image, image_from_demonstration);
+        let look = self.close_up.look(&seen, self.picture.table);
+        let rival = |rival: &Rival| rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration);
+        CloseLook {
+            likeness: self.likeness.log_odds(self.picture.image, image_from_demonstration),
+            mirrored: self.mirrored.filter(|_| look.fit >= MIN_FIT_FOR_RIVALS).and_then(rival),
+            ..look
+        }
+    }
+
+    /// As [`Self::evidence`] but for the close look, which takes nine tenths of the time; and [`Agreement::both`].
+    pub fn evidence_from_afar(&self, image_from_demonstration: &PlanarSimilarity) -> (Evidence, f64) {
         let agreement = self.agreement(image_from_demonstration);
         let Agreement { edges, surface, .. } = agreement;
-        let structure = self.structure.agreement(self.field, image_from_demonstration);
+        let structure = self.structure.agreement(self.picture.field, image_from_demonstration);
         let evidence = Evidence {
             edges,
             surface: (!self.surface.is_plain()).then_some(surface),
-            hue_shift: self.surface.hue_shift(self.image, image_from_demonstration),
+            hue_shift: self.surface.hue_shift(self.picture.image, image_from_demonstration),
             visible: structure.visible,
             outside: structure.outside,
-            likeness: None,
+            close: None,
         };
         (evidence, agreement.both())
     }
@@ -145,15 +174,15 @@ impl Comparison<'_> {
     /// Poses map demonstration pixels to pixels of the image.
     pub fn agreement(&self, image_from_demonstration: &PlanarSimilarity) -> Agreement {
         Agreement::new(
-            self.template.agreement(self.field, image_from_demonstration),
-            self.surface.agreement(self.image, image_from_demonstration),
+            self.template.agreement(self.picture.field, image_from_demonstration),
+            self.surface.agreement(self.picture.image, image_from_demonstration),
             &self.template.config.agreement,
         )
     }
 
     /// Refined by the edges alone: quick, and exact where it is right.
     pub fn refined_by_edges(&self, start: &PlanarSimilarity) -> PlanarSimilarity {
-        self.template.refine(self.field, start).image_from_demonstration
+        self.template.refine(self.picture.field, start).image_from_demonstration
     }
 
     /// `refined`, which the edges made of `start`, or a pose nearby of higher agreement where that is poor. Scales stay in

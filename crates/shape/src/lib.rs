@@ -72,12 +72,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod capture_range;
+mod close_look;
 mod comparison;
 mod config;
 mod consensus;
 mod edge_points;
 mod error;
 mod following;
+mod frame;
 mod gradient_field;
 mod likeness;
 pub mod parallel;
@@ -89,7 +91,8 @@ mod structure;
 mod surface;
 mod template;
 
-pub use comparison::{Agreement, Comparison, Differences, Evidence};
+pub use close_look::{CloseLook, Rival, RivalFit, TableColors};
+pub use comparison::{Agreement, Comparison, Differences, Evidence, Picture};
 pub use config::{
     AgreementConfig, GradientConfig, RefinementConfig, ScaleRange, ShapeConfig, StructureConfig, SurfaceConfig,
 };

@@ -109,6 +109,7 @@ mod tests {
     use super::*;
     use crate::check_config::Term;
     use crate::verdict::Clues;
+    use crate::verdict::tests::look;
     use sdg_shape::Evidence;
 
     /// A score of the edges alone: 10 for each unit above 0.5.
@@ -125,13 +126,17 @@ mod tests {
             outside: none,
             resemblance: none,
             likeness: none,
+            table: none,
+            rim: none,
+            added: none,
+            mirror: none,
             network: none,
         }
     }
 
     fn pose(edges: f64, instance_idx: Option<usize>) -> PoseObservation {
         let evidence =
-            Evidence { edges, surface: Some(0.0), hue_shift: 0.0, visible: 0.0, outside: 0.0, likeness: Some(0.0) };
+            Evidence { edges, surface: Some(0.0), hue_shift: 0.0, visible: 0.0, outside: 0.0, close: Some(look(0.0)) };
         PoseObservation { clues: Clues { evidence, log_size: 0.0, network: None, resemblance: 0.3 }, instance_idx }
     }
 

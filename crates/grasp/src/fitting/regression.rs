@@ -89,10 +89,10 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
         .iter()
         .zip(judged)
         .map(|(clues, (_, contributions))| {
-            let Evidence { edges, surface, hue_shift, visible, outside, likeness } = clues.evidence;
+            let Evidence { edges, surface, hue_shift, visible, outside, close } = clues.evidence;
             let off_size = if config.size.weight == 0.0 { 0.0 } else { contributions.size / config.size.weight };
             let surface = surface.unwrap_or(config.surface.neutral);
-            let (resemblance, likeness) = (clues.resemblance, likeness.unwrap_or(f64::NEG_INFINITY));
+            let (resemblance, likeness) = (clues.resemblance, close.map_or(f64::NEG_INFINITY, |close| close.likeness));
             let raw = [edges, surface, hue_shift, visible, off_size, outside, resemblance, likeness];
             let terms = terms(config);
             SVector::from_fn(|k, _| raw[k].clamp(terms[k].range[0], terms[k].range[1]))
@@ -201,6 +201,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
 
+    use crate::verdict::tests::look;
+
     /// Right poses have more edges than wrong ones, by and large; everything else tells nothing.
     fn part(rng: &mut Pcg64Mcg) -> PartObservations {
         let mut pose = |edges: f64, instance_idx| {
@@ -211,7 +213,7 @@ mod tests {
                 hue_shift: 0.0,
                 visible: 0.8 + noise(),
                 outside: 0.0,
-                likeness: Some(2.0),
+                close: Some(look(2.0)),
             };
             let clues = Clues { evidence, log_size: 0.0, network: None, resemblance: 0.33 };
             PoseObservation { clues, instance_idx }

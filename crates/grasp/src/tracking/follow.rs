@@ -11,7 +11,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use sdg_geometry::{BoundingBox, PlanarSimilarity};
 use sdg_orientation::halved;
-use sdg_shape::{Evidence, GradientField, Reach};
+use sdg_shape::{CloseLook, Evidence, GradientField, Picture, Reach, TableColors};
 
 use super::detector::PartDetector;
 use crate::plan::PixelRect;
@@ -23,8 +23,8 @@ use crate::taught::TaughtDemonstration;
 const BORDER_PX: f64 = 9.0;
 /// A pyramid has a level where both sides keep so many pixels; as in `sdg_shape`.
 const MIN_LEVEL_SIDE: u32 = 24;
-/// What the comparing network sees of a part, in lengths of the part: 1.2, and a pixel for interpolation.
-const SEEN_BY_NETWORK: f64 = 1.25;
+/// What a close look sees of a part, in lengths of the part: 1.25, and a pixel for interpolation.
+const SEEN_CLOSELY: f64 = 1.28;
 
 /// A demonstration at the size at which a part is followed.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ pub(super) struct Followed {
     pub(super) image_from_cutout: PlanarSimilarity,
     /// Edges and surface together, in `[0, 1]`.
     pub(super) agreement: f64,
-    /// Without likeness.
+    /// Without a close look.
     pub(super) evidence: Evidence,
     /// ln of its size over the nearest nominal size.
     pub(super) log_size: f64,
@@ -125,7 +125,9 @@ impl SizedPart {
         let step = search.template().coarsest_pixel(start.scale / self.working.shrink() / self.working.cutout_scale);
         let view = self.view(detector, picture, &bounds, margin, step)?;
         let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
-        let comparison = search.comparison(&view.image, &field);
+        // From afar the table's colours are not asked for.
+        let picture = Picture { image: &view.image, field: &field, table: &TableColors::default() };
+        let comparison = search.comparison(&picture);
         let start = self.view_from_working(&view, start);
         let pose = match effort {
             Effort::Snapped => search.template().snapped(&field, &start, &reach),
@@ -135,7 +137,7 @@ impl SizedPart {
         let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
         let corrected = correction.map(|correction| self.view_from_working(&view, &by_edges.compose(correction)));
         let pose = corrected.filter(|corrected| both(corrected) > both(&pose)).unwrap_or(pose);
-        let (evidence, agreement) = comparison.evidence_without_likeness(&pose);
+        let (evidence, agreement) = comparison.evidence_from_afar(&pose);
         let image_from_cutout = self.image_from_cutout(&view, &pose);
         Some(Followed {
             by_edges,
@@ -147,24 +149,25 @@ impl SizedPart {
         })
     }
 
-    /// The output of the comparing network for a pose; `None` where too little of it lies in the frame.
-    pub(super) fn likeness(
+    /// A close look at a pose; `None` where too little of it lies in the frame.
+    pub(super) fn close_look(
         &self,
         detector: &PartDetector,
         picture: &RgbImage,
         image_from_cutout: &PlanarSimilarity,
-    ) -> Option<f64> {
-        let own = self.demonstration(detector).marks.region().bounds();
+    ) -> Option<CloseLook> {
+        let demonstration = self.demonstration(detector);
+        let own = demonstration.marks.region().bounds();
         // A square about the part, however it is turned.
-        let side = SEEN_BY_NETWORK * own.width().max(own.height()) * image_from_cutout.scale;
+        let side = SEEN_CLOSELY * own.width().max(own.height()) * image_from_cutout.scale;
         let half = 0.5 * side * std::f64::consts::SQRT_2;
         let center = image_from_cutout.apply(&own.center());
         let square = BoundingBox { x1: center.x, y1: center.y, x2: center.x, y2: center.y };
         let view = self.view(detector, picture, &square, half, 1)?;
         let pose = self.view_from_working(&view, image_from_cutout);
-        // The network reads colours alone.
-        let no_field = GradientField::new(&RgbImage::new(1, 1));
-        Some(self.prepared.search.comparison(&view.image, &no_field).likeness.log_odds(&view.image, &pose))
+        let field = GradientField::with_config(&view.image, &demonstration.check().search.shape.gradient);
+        let picture = Picture { image: &view.image, field: &field, table: &TableColors::new(&view.image) };
+        Some(self.prepared.search.comparison(&picture).close_look(&pose))
     }
 
     /// The window of the frame `margin` about `bounds`, its corner at a multiple of `step` pixels of the halved picture.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
 use sdg_geometry::{Angle, PlanarSimilarity};
-use sdg_shape::Evidence;
+use sdg_shape::{CloseLook, Evidence};
 
 use super::detector::PartDetector;
 use super::follow::{Effort, Followed, SizedPart};
@@ -36,14 +36,14 @@ const MIN_GAIN: f64 = 0.005;
 /// The comparing network is asked again where the agreement is not within this ratio of what it was when it was asked last, and
 /// after this time. Chosen by hand: asking takes about as long as following.
 const SAME_LOOKS: f64 = 0.85;
-const MAX_LIKENESS_AGE: Duration = Duration::from_secs(1);
+const MAX_LOOK_AGE: Duration = Duration::from_secs(1);
 /// Frames whose poses are kept for searches that have not ended. Chosen by hand: two seconds at 100 frames a second.
 const MAX_HISTORY: usize = 200;
 
 /// The comparing network's log-odds, and when they were computed.
 #[derive(Debug, Clone, Copy)]
-struct Likeness {
-    log_odds: f64,
+struct LastLook {
+    look: CloseLook,
     /// Agreement of edges and surface then.
     agreement: f64,
     at: Duration,
@@ -88,7 +88,7 @@ pub(super) struct Track {
     steady_scale: f64,
     /// `None` before the first frame.
     steady_agreement: Option<f64>,
-    likeness: Option<Likeness>,
+    close: Option<LastLook>,
     /// Where the marks lie against the outline, as the last search refined them.
     cutout_from_marks: PlanarSimilarity,
     network_score: f64,
@@ -123,7 +123,7 @@ impl Track {
             turn_rad_per_s: 0.0,
             steady_scale: found.image_from_cutout.scale,
             steady_agreement: None,
-            likeness: None,
+            close: None,
             cutout_from_marks: PlanarSimilarity::IDENTITY,
             network_score: 0.0,
             keypoint_scores: Vec::new(),
@@ -136,14 +136,14 @@ impl Track {
         Some(made)
     }
 
-    /// Takes over what only a search measures: the marks' shift, the network's score, the likeness.
+    /// Takes over what only a search measures: the marks' shift, the network's score, the close look.
     pub(super) fn take_over(&mut self, found: &Placement, time: Duration) {
         self.cutout_from_marks = found.image_from_cutout.inverse().compose(&found.image_from_marks);
         self.network_score = found.network_score;
         self.keypoint_scores.clone_from(&found.keypoint_scores);
         self.turn_source = found.turn_source;
-        if let Some(log_odds) = found.likeness {
-            self.likeness = Some(Likeness { log_odds, agreement: found.agreement, at: time });
+        if let Some(look) = found.close {
+            self.close = Some(LastLook { look, agreement: found.agreement, at: time });
         }
     }
 
@@ -209,27 +209,27 @@ impl Track {
         Some(followed)
     }
 
-    /// The output of the comparing network for the refined pose; it is computed only where that may have changed.
-    pub(super) fn likeness(
+    /// A close look at the refined pose; a new one only where it may have changed.
+    pub(super) fn close_look(
         &mut self,
         detector: &PartDetector,
         picture: &RgbImage,
         time: Duration,
         followed: &Followed,
-    ) -> Option<f64> {
+    ) -> Option<CloseLook> {
         let min_agreement = self.part.demonstration(detector).check().search.min_agreement;
         if followed.agreement < min_agreement {
             return None;
         }
-        let is_the_same = self.likeness.is_some_and(|last| {
+        let is_the_same = self.close.is_some_and(|last| {
             let ratio = followed.agreement / last.agreement.max(f64::MIN_POSITIVE);
-            (SAME_LOOKS..=1.0 / SAME_LOOKS).contains(&ratio) && time.saturating_sub(last.at) < MAX_LIKENESS_AGE
+            (SAME_LOOKS..=1.0 / SAME_LOOKS).contains(&ratio) && time.saturating_sub(last.at) < MAX_LOOK_AGE
         });
         if !is_the_same {
-            let log_odds = self.part.likeness(detector, picture, &followed.image_from_cutout)?;
-            self.likeness = Some(Likeness { log_odds, agreement: followed.agreement, at: time });
+            let look = self.part.close_look(detector, picture, &followed.image_from_cutout)?;
+            self.close = Some(LastLook { look, agreement: followed.agreement, at: time });
         }
-        self.likeness.map(|likeness| likeness.log_odds)
+        self.close.map(|last| last.look)
     }
 
     /// ln of its size over the nearest nominal size, without the noise from frame to frame.
@@ -252,7 +252,7 @@ impl Track {
         &self,
         detector: &'a PartDetector,
         followed: &Followed,
-        likeness: Option<f64>,
+        close: Option<CloseLook>,
     ) -> Sighting<'a> {
         let placed = PlacedDemonstration {
             demonstration: self.part.demonstration(detector),
@@ -260,7 +260,7 @@ impl Track {
             image_from_cutout: followed.image_from_cutout,
             image_from_marks: followed.image_from_cutout.compose(&self.cutout_from_marks),
             agreement: followed.agreement,
-            evidence: Evidence { likeness, ..followed.evidence },
+            evidence: Evidence { close, ..followed.evidence },
             log_size: followed.log_size,
             light: followed.light,
         };

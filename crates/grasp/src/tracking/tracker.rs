@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
+use sdg_shape::CloseLook;
 
 use super::arrival::{BufferedFrame, Carried, FrameBuffer, Match, carry, compare};
 use super::detector::{PartDetector, PartSearch, SearchOutcome};
@@ -69,7 +70,7 @@ struct Tracked {
 /// A track refined in the newest frame, before it is judged.
 struct Refined {
     followed: Followed,
-    likeness: Option<f64>,
+    close: Option<CloseLook>,
 }
 
 impl Tracker {
@@ -217,8 +218,8 @@ impl Tracker {
                 if matches!(track.standing, Standing::Lost(_)) && track.is_poor(&followed) {
                     return None;
                 }
-                let likeness = track.likeness(detector, picture, captured, &followed);
-                Some(Refined { followed, likeness })
+                let close = track.close_look(detector, picture, captured, &followed);
+                Some(Refined { followed, close })
             })
             .collect()
     }
@@ -231,8 +232,8 @@ impl Tracker {
             self.tracks.iter().map(|tracked| &tracked.track).chain(&arrived).zip(refined.iter().chain(&newcomers));
         let clues: Vec<Option<Clues>> = all
             .map(|(track, refined)| {
-                let Refined { followed, likeness } = refined.as_ref()?;
-                Some(detector.model().clues(&track.sighting(&detector, followed, *likeness)))
+                let Refined { followed, close } = refined.as_ref()?;
+                Some(detector.model().clues(&track.sighting(&detector, followed, *close)))
             })
             .collect();
         let asked: Vec<Clues> = clues.iter().flatten().copied().collect();
@@ -243,7 +244,7 @@ impl Tracker {
         let of_newcomers = verdicts.split_off(self.tracks.len());
 
         let output = |track: &Track, refined: &Refined, (score, evidence), size: [u32; 2]| {
-            let sighting = track.sighting(&detector, &refined.followed, refined.likeness);
+            let sighting = track.sighting(&detector, &refined.followed, refined.close);
             let mut detection = sighting.detection(score, evidence, detector.model().num_keypoints());
             detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
             detector.output(detection)

@@ -1,10 +1,9 @@
 //! Photo and picture side by side, in the frame of the photo, as the network sees them.
 
 use image::RgbImage;
-use nalgebra::{Point2, Vector2};
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use crate::pixel_cell::PixelCell;
+use crate::frame::Frame;
 
 /// Rows and columns of what the network sees.
 pub const SIDE: usize = 64;
@@ -21,9 +20,7 @@ const DARK: f32 = 0.02;
 /// A photo's colours, and which of them count.
 #[derive(Debug, Clone)]
 pub(super) struct Photo {
-    /// Pixels of the cut-out for one of the network's.
-    step: f64,
-    center: Point2<f64>,
+    frame: Frame,
     colors: Vec<Option<[f32; 3]>>,
     inside: Vec<bool>,
 }
@@ -41,57 +38,21 @@ pub struct Pair {
 
 impl Photo {
     pub(super) fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
-        let bounds = outline.bounds();
-        let step = bounds.width().max(bounds.height()) / PART_SIDE;
-        let mut made = Self { step, center: bounds.center(), colors: Vec::new(), inside: Vec::new() };
-        made.colors = made.sampled(cutout, &PlanarSimilarity::IDENTITY);
-        made.inside = pixels().map(|at| outline.contains(&made.place(at))).collect();
-        made
+        let frame = Frame::about(&outline.bounds(), PART_SIDE, SIDE);
+        let colors = frame.sampled(cutout, &PlanarSimilarity::IDENTITY);
+        let inside = frame.pixels().map(|at| outline.contains(&frame.place(at))).collect();
+        Self { frame, colors, inside }
     }
 
     /// [`Pair::values`] of [`Self::beside`].
     pub(super) fn values_beside(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<f32> {
-        values(&self.colors, &self.sampled(image, image_from_cutout), &self.inside)
+        values(&self.colors, &self.frame.sampled(image, image_from_cutout), &self.inside)
     }
 
     pub(super) fn beside(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Pair {
-        let picture = self.sampled(image, image_from_cutout);
+        let picture = self.frame.sampled(image, image_from_cutout);
         Pair { photo: self.colors.clone(), picture, inside: self.inside.clone() }
     }
-
-    /// Where a point of what the network sees lies in the cut-out.
-    fn place(&self, at: [f64; 2]) -> Point2<f64> {
-        self.center + self.step * Vector2::from(at.map(|coordinate| coordinate - 0.5 * SIDE as f64))
-    }
-
-    /// Mean colours over the network's pixels.
-    fn sampled(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Option<[f32; 3]>> {
-        // So many samples a side that no pixel is skipped.
-        let num = (self.step * image_from_cutout.scale).ceil().max(1.0) as usize;
-        let origin = image_from_cutout.apply(&self.place([0.5 / num as f64; 2]));
-        let across = image_from_cutout.apply(&self.place([1.0 + 0.5 / num as f64, 0.5 / num as f64])) - origin;
-        let down = Vector2::new(-across.y, across.x);
-        let one_more = 1.0 / num as f64;
-        pixels()
-            .map(|[x, y]| {
-                let corner = origin + (x - 0.5) * across + (y - 0.5) * down;
-                let (mut sum, mut count) = ([0.0; 3], 0);
-                for i in 0..num * num {
-                    let [right, below] = [i % num, i / num].map(|k| k as f64 * one_more);
-                    if let Some(color) = color_at(image, &(corner + right * across + below * down)) {
-                        count += 1;
-                        (0..3).for_each(|c| sum[c] += color[c]);
-                    }
-                }
-                (count > 0).then(|| sum.map(|value| value / (255.0 * count as f32)))
-            })
-            .collect()
-    }
-}
-
-/// Middles of the network's pixels, row by row.
-fn pixels() -> impl Iterator<Item = [f64; 2]> {
-    (0..SIDE * SIDE).map(|i| [i % SIDE, i / SIDE].map(|k| k as f64 + 0.5))
 }
 
 impl Pair {
@@ -127,15 +88,11 @@ fn exposed(color: &Option<[f32; 3]>, gain: f32) -> [f32; 3] {
     color.map_or([0.0; 3], |color| color.map(|value| ((value + DARK) * gain).min(MAX)))
 }
 
-/// The colour at a point, by bilinear interpolation; `None` outside the image.
-fn color_at(image: &RgbImage, point: &Point2<f64>) -> Option<[f32; 3]> {
-    PixelCell::at(image, point).map(|cell| cell.color_f32())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use image::Rgb;
+    use nalgebra::Point2;
     use sdg_geometry::{Angle, BoundingBox};
 
     /// A plate with a bright corner on a table.

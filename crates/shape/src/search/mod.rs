@@ -23,7 +23,8 @@ use nalgebra::Point2;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
 use crate::capture_range::CaptureRange;
-use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED};
+use crate::close_look::{CloseUp, Rival, TableColors};
+use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED, Picture};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
@@ -158,6 +159,9 @@ pub struct ShapeSearch {
     surface: Surface,
     structure: Structure,
     likeness: Likeness,
+    close_up: CloseUp,
+    /// `None` where the mirror image has too few edges.
+    mirrored: Option<Rival>,
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
@@ -183,6 +187,8 @@ impl ShapeSearch {
             surface: Surface::new(image, outline, &config.shape.surface),
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             likeness: Likeness::new(image, outline),
+            close_up: CloseUp::new(image, outline),
+            mirrored: Rival::mirrored(image, outline, &field, &config.shape).ok(),
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
@@ -194,23 +200,25 @@ impl ShapeSearch {
     ///
     /// Several may lie there, turned in any way; deterministic.
     pub fn search(&self, image: &RgbImage) -> Vec<Match> {
-        self.search_field(image, &GradientField::with_config(image, &self.config.shape.gradient))
+        let field = GradientField::with_config(image, &self.config.shape.gradient);
+        self.search_picture(&Picture { image, field: &field, table: &TableColors::new(image) })
     }
 
-    /// As [`search`](Self::search), with the field of `image` at hand because others read it too.
-    pub fn search_field(&self, image: &RgbImage, field: &GradientField) -> Vec<Match> {
+    /// As [`search`](Self::search), with what is read out of the image at hand because others read it too.
+    pub fn search_picture(&self, picture: &Picture<'_>) -> Vec<Match> {
+        let field = picture.field;
         if self.sweep_level_idx >= field.num_levels() || field.width().min(field.height()) == 0 {
             // The image is smaller than the part.
             return Vec::new();
         }
         let responses = Responses::new(field.level(self.sweep_level_idx), self.bank.reach);
         let starts = sweep(&responses, &self.bank, self.config.max_starts, MIN_RESPONSE);
-        let best = self.apart(self.follow_best(image, field, starts));
-        let polished = self.polish(image, field, best);
+        let best = self.apart(self.follow_best(picture, starts));
+        let polished = self.polish(picture, best);
         let mut matches = self.apart(polished);
         matches.retain(|found| found.agreement >= self.config.min_agreement);
         matches.truncate(self.config.max_matches);
-        let comparison = self.comparison(image, field);
+        let comparison = self.comparison(picture);
         parallel::map(&matches, |found| Match {
             image_from_demonstration: found.pose,
             agreement: found.agreement,
@@ -219,13 +227,13 @@ impl ShapeSearch {
     }
 
     /// Follows starts, the best first; once parts are found, further starts that resemble theirs, and else none.
-    fn follow_best(&self, image: &RgbImage, field: &GradientField, mut starts: Vec<Start>) -> Vec<Found> {
+    fn follow_best(&self, picture: &Picture<'_>, mut starts: Vec<Start>) -> Vec<Found> {
         let mut climbed_before: Vec<Pose> = Vec::new();
         let mut all = Vec::new();
         while !starts.is_empty() {
             let later = starts.split_off(starts.len().min(STARTS_AT_ONCE));
-            let climbed = self.climb_starts(image, field, &starts, &climbed_before);
-            let found = self.follow(image, field, &climbed);
+            let climbed = self.climb_starts(picture, &starts, &climbed_before);
+            let found = self.follow(picture, &climbed);
             starts = self.resembling(later, &starts, &found);
             all.extend(found);
             climbed_before.extend(climbed);
@@ -247,12 +255,12 @@ impl ShapeSearch {
     }
 
     /// Follows climbed starts to the full size, as long as that finds something.
-    fn follow(&self, image: &RgbImage, field: &GradientField, climbed: &[Pose]) -> Vec<Found> {
+    fn follow(&self, picture: &Picture<'_>, climbed: &[Pose]) -> Vec<Found> {
         let mut all = Vec::new();
         for few in climbed.chunks(FOLLOWED_AT_ONCE) {
             let found = parallel::map(few, |&pose| {
-                let pose = self.template.follow(field, &self.range_about(pose), pose);
-                self.found(image, field, pose.to_similarity(self.template.center))
+                let pose = self.template.follow(picture.field, &self.range_about(pose), pose);
+                self.found(picture, pose.to_similarity(self.template.center))
             });
             let is_worth_more = found.iter().any(Found::is_worth_more);
             all.extend(found);
@@ -263,8 +271,8 @@ impl ShapeSearch {
         all
     }
 
-    fn found(&self, image: &RgbImage, field: &GradientField, pose: PlanarSimilarity) -> Found {
-        Found { pose, agreement: self.comparison(image, field).agreement(&pose).both() }
+    fn found(&self, picture: &Picture<'_>, pose: PlanarSimilarity) -> Found {
+        Found { pose, agreement: self.comparison(picture).agreement(&pose).both() }
     }
 
     /// Mean brightness of the part at a pose over that of the demonstration; 1 where it lies outside the image.
@@ -282,31 +290,31 @@ impl ShapeSearch {
         &self.template
     }
 
-    /// The demonstration over an image, whose gradients are `field`.
-    pub fn comparison<'a>(&'a self, image: &'a RgbImage, field: &'a GradientField) -> Comparison<'a> {
-        let Self { template, surface, structure, likeness, .. } = self;
-        let min_agreement = self.config.min_agreement;
-        Comparison { template, surface, structure, likeness, min_agreement, image, field }
+    /// The demonstration over an image.
+    pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
+        let Self { template, surface, structure, likeness, close_up, mirrored, .. } = self;
+        let (min_agreement, mirrored) = (self.config.min_agreement, mirrored.as_ref());
+        Comparison { template, surface, structure, likeness, close_up, mirrored, min_agreement, picture: *picture }
     }
 
     /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
-    fn polish(&self, image: &RgbImage, field: &GradientField, found: Vec<Found>) -> Vec<Found> {
+    fn polish(&self, picture: &Picture<'_>, found: Vec<Found>) -> Vec<Found> {
         let sure = self.config.shape.refinement.sure_agreement;
         let (poor, mut others): (Vec<Found>, Vec<Found>) =
             found.into_iter().partition(|found| (MIN_REFINED..sure).contains(&found.agreement));
         let count =
             poor.iter().filter(|found| found.agreement >= WORTH_MORE).count().clamp(MIN_NUM_POLISHED, MAX_NUM_POLISHED);
         let (first, rest) = poor.split_at(count.min(poor.len()));
-        others.extend(parallel::map(first, |found| self.polished(image, field, found)));
+        others.extend(parallel::map(first, |found| self.polished(picture, found)));
         others.extend(rest);
         others
     }
 
-    fn polished(&self, image: &RgbImage, field: &GradientField, found: &Found) -> Found {
-        let comparison = self.comparison(image, field);
+    fn polished(&self, picture: &Picture<'_>, found: &Found) -> Found {
+        let comparison = self.comparison(picture);
         let refined =
             comparison.refine_pose(&found.pose, comparison.refined_by_edges(&found.pose), &self.config.scales);
-        let refined = self.found(image, field, refined);
+        let refined = self.found(picture, refined);
         let is_in_range = self.config.scales.contains(&refined.pose.scale);
         if is_in_range && refined.agreement > found.agreement { refined } else { *found }
     }
@@ -335,11 +343,11 @@ impl ShapeSearch {
 
     /// Climbs from every start at the template's coarsest level; the best by edges and surface first, no two alike and none
     /// like those before.
-    fn climb_starts(&self, image: &RgbImage, field: &GradientField, starts: &[Start], before: &[Pose]) -> Vec<Pose> {
+    fn climb_starts(&self, picture: &Picture<'_>, starts: &[Start], before: &[Pose]) -> Vec<Pose> {
         let mut climbed = parallel::map(starts, |start| {
             let pose = self.pose_of(start);
-            let (pose, edges) = self.template.climb_coarsest(field, &self.range_about(pose), pose);
-            let surface = self.surface.agreement(image, &pose.to_similarity(self.template.center));
+            let (pose, edges) = self.template.climb_coarsest(picture.field, &self.range_about(pose), pose);
+            let surface = self.surface.agreement(picture.image, &pose.to_similarity(self.template.center));
             (pose, Agreement::new(edges, surface, &self.config.shape.agreement).both())
         });
         climbed.sort_by(|a, b| b.1.total_cmp(&a.1));
