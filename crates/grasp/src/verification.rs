@@ -216,7 +216,7 @@ fn better_way_round<'a>(
     });
     let (start, refined, _) = if turned.2 > straight.2 { turned } else { straight };
     let scales = sized.prepared.search.scales();
-    let refined = comparison.refine_pose(&start, refined, scales);
+    let refined = comparison.best_turn(&comparison.refine_pose(&start, refined, scales), scales);
     let agreement = comparison.agreement(&refined).both();
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }

@@ -40,9 +40,8 @@ const MAX_LOSS_BY_EDGES: f64 = 0.005;
 
 /// A pose that agrees less is refused without a close look. Chosen by hand, for time.
 const MIN_LOOKED_AT: f64 = 0.3;
-/// A pose that fits less is refused without asking for rivals. Chosen by hand, for time.
-const MIN_FIT_FOR_RIVALS: f64 = 0.4;
-
+/// A pose that agrees less is not turned. Chosen by hand, for time.
+const MIN_TURNED: f64 = 0.45;
 /// Poses that agree less are not refined further. Chosen by hand, not measured.
 pub(crate) const MIN_REFINED: f64 = 0.25;
 
@@ -59,6 +58,7 @@ pub struct Comparison<'a> {
     pub likeness: &'a Likeness,
     pub(crate) close_up: &'a CloseUp,
     pub(crate) mirrored: Option<&'a Rival>,
+    pub(crate) turned: &'a Rival,
     /// Poses that agree by less are not worth that network's time.
     pub min_agreement: f64,
     /// The image over which the demonstration is laid.
@@ -140,6 +140,15 @@ impl Comparison<'_> {
         Evidence { close, ..evidence }
     }
 
+    /// `pose`, or a turn at which the part resembles itself and what differs between the two is seen. Scales stay in `scales`.
+    pub fn best_turn(&self, pose: &PlanarSimilarity, scales: &RangeInclusive<f64>) -> PlanarSimilarity {
+        if self.agreement(pose).both() < MIN_TURNED {
+            return *pose;
+        }
+        let turned = self.turned.better_turn(&self.picture, pose);
+        turned.filter(|turned| scales.contains(&turned.scale)).unwrap_or(*pose)
+    }
+
     /// A close look at a pose.
     pub fn close_look(&self, image_from_demonstration: &PlanarSimilarity) -> CloseLook {
         let seen = self.close_up.seen(self.picture.image, image_from_demonstration);
@@ -147,7 +156,7 @@ impl Comparison<'_> {
         let rival = |rival: &Rival| rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration);
         CloseLook {
             likeness: self.likeness.log_odds(self.picture.image, image_from_demonstration),
-            mirrored: self.mirrored.filter(|_| look.fit >= MIN_FIT_FOR_RIVALS).and_then(rival),
+            mirrored: self.mirrored.filter(|_| look.is_plausible()).and_then(rival),
             ..look
         }
     }

@@ -44,10 +44,28 @@ impl Frame {
         (0..side * side).map(move |i| [i % side, i / side].map(|k| k as f64 + 0.5))
     }
 
-    /// Mean colours over the pixels, from 0 to 1, row by row; `None` where there is no image.
+    /// Mean colours over the pixels, from 0 to 1, row by row; `None` where there is no image. So many samples a side are taken that no
+    /// pixel of the image is skipped.
     pub(crate) fn sampled(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Option<[f32; 3]>> {
-        // So many samples a side that no pixel is skipped.
-        let num = (self.step * image_from_cutout.scale).ceil().max(1.0) as usize;
+        self.sampled_by(image, image_from_cutout, (self.step * image_from_cutout.scale).ceil())
+    }
+
+    /// The same with fewer samples where few pixels are skipped.
+    pub(crate) fn sampled_sparsely(
+        &self,
+        image: &RgbImage,
+        image_from_cutout: &PlanarSimilarity,
+    ) -> Vec<Option<[f32; 3]>> {
+        self.sampled_by(image, image_from_cutout, (self.step * image_from_cutout.scale).round())
+    }
+
+    fn sampled_by(
+        &self,
+        image: &RgbImage,
+        image_from_cutout: &PlanarSimilarity,
+        samples_a_side: f64,
+    ) -> Vec<Option<[f32; 3]>> {
+        let num = samples_a_side.max(1.0) as usize;
         let origin = image_from_cutout.apply(&self.place([0.5 / num as f64; 2]));
         let across = image_from_cutout.apply(&self.place([1.0 + 0.5 / num as f64, 0.5 / num as f64])) - origin;
         let down = Vector2::new(-across.y, across.x);

@@ -14,6 +14,7 @@ pub(super) const CELL: usize = 3;
 const RIM_PX: f32 = 2.5;
 /// How far a window may be shifted, squared, in pixels: two along a row or column and one across.
 const MAX_SHIFT_SQUARED: isize = 5;
+const REACH: usize = 2;
 /// Gradients below this are noise, in grey levels a pixel, and below the second value as a share of the root mean square.
 const NOISE: f32 = 1.5;
 const NOISE_SHARE: f32 = 0.4;
@@ -89,10 +90,18 @@ impl Gradients {
 #[derive(Debug, Clone)]
 pub(super) struct Expected {
     side: usize,
-    /// Pixels of surface and of the outline's edge: index, whether it is of the surface, and the direction.
-    pixels: Vec<(usize, bool, [f32; 2])>,
+    pixels: Vec<ExpectedPixel>,
     /// Mean squared length in each window.
     pub(super) energy: Vec<f32>,
+}
+
+/// A pixel of the surface or of the outline's edge, no nearer to the frame's border than shifts reach.
+#[derive(Debug, Clone)]
+struct ExpectedPixel {
+    idx: usize,
+    cell: usize,
+    is_surface: bool,
+    direction: [f32; 2],
 }
 
 impl Expected {
@@ -105,7 +114,10 @@ impl Expected {
             let is_surface = *depth > RIM_PX;
             let direction = if is_surface { gradients.signed[i] } else { gradients.doubled[i] };
             cells[cell_of(i, side)] += gradients.energy[i];
-            pixels.push((i, is_surface, direction));
+            let [x, y] = [i % side, i / side];
+            if x.min(y) >= REACH && x.max(y) < side - REACH {
+                pixels.push(ExpectedPixel { idx: i, cell: cell_of(i, side), is_surface, direction });
+            }
         }
         Self { side, pixels, energy: window_means(&cells, side) }
     }
@@ -114,22 +126,19 @@ impl Expected {
     pub(super) fn fit(&self, picture: &Gradients) -> Vec<f32> {
         let side = self.side as isize;
         let mut best = vec![-1.0f32; num_cells(self.side)];
-        for (dx, dy) in (-2..=2isize).flat_map(|dy| (-2..=2isize).map(move |dx| (dx, dy))) {
+        for (dx, dy) in (-(REACH as isize)..=REACH as isize)
+            .flat_map(|dy| (-(REACH as isize)..=REACH as isize).map(move |dx| (dx, dy)))
+        {
             if dx * dx + dy * dy > MAX_SHIFT_SQUARED {
                 continue;
             }
             let mut products = vec![0.0f32; best.len()];
             let mut seen = vec![0.0f32; best.len()];
-            for &(i, is_surface, [x, y]) in &self.pixels {
-                let (column, row) = (i as isize % side + dx, i as isize / side + dy);
-                if column < 0 || row < 0 || column >= side || row >= side {
-                    continue;
-                }
-                let j = (row * side + column) as usize;
-                let [u, v] = if is_surface { picture.signed[j] } else { picture.doubled[j] };
-                let cell = cell_of(i, self.side);
-                products[cell] += x * u + y * v;
-                seen[cell] += picture.energy[j];
+            for pixel in &self.pixels {
+                let j = (pixel.idx as isize + dy * side + dx) as usize;
+                let [u, v] = if pixel.is_surface { picture.signed[j] } else { picture.doubled[j] };
+                products[pixel.cell] += pixel.direction[0] * u + pixel.direction[1] * v;
+                seen[pixel.cell] += picture.energy[j];
             }
             let (products, seen) = (window_means(&products, self.side), window_means(&seen, self.side));
             for (cell, best) in best.iter_mut().enumerate() {

@@ -57,6 +57,13 @@ pub struct CloseLook {
     pub mirrored: Option<RivalFit>,
 }
 
+impl CloseLook {
+    /// Whether the pose is worth asking for rivals: others are refused. Chosen by hand, for time.
+    pub(crate) fn is_plausible(&self) -> bool {
+        self.fit >= 0.45 && self.bare < 0.25 && self.no_rim < 0.35
+    }
+}
+
 /// A demonstration, ready to be looked at closely.
 #[derive(Debug, Clone)]
 pub(crate) struct CloseUp {
@@ -83,7 +90,7 @@ impl CloseUp {
     /// Reads the part out of its cut-out; `outline` in its pixels.
     pub(crate) fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
         let frame = Frame::about(&outline.bounds(), PART_SIDE, SIDE);
-        let colors = frame.sampled(cutout, &PlanarSimilarity::IDENTITY);
+        let colors = frame.sampled_sparsely(cutout, &PlanarSimilarity::IDENTITY);
         let depth: Vec<f32> = frame
             .pixels()
             .map(|at| {
@@ -110,7 +117,7 @@ impl CloseUp {
     }
 
     pub(crate) fn seen(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Seen {
-        let colors = self.frame.sampled(image, image_from_cutout);
+        let colors = self.frame.sampled_sparsely(image, image_from_cutout);
         let gradients = Gradients::new(&colors, SIDE, |i| colors[i].is_some());
         Seen { colors, gradients }
     }

@@ -8,10 +8,12 @@
 
 use image::RgbImage;
 use image::imageops;
+use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 
 use super::gradients::{Expected, Gradients};
 use super::{CloseUp, MIN_EDGES, SIDE, Seen};
+use crate::comparison::Picture;
 use crate::config::ShapeConfig;
 use crate::error::ShapeError;
 use crate::following::Reach;
@@ -20,13 +22,55 @@ use crate::template::ShapeTemplate;
 
 /// Turns at which the rival is laid over the photo, and how many of the best are tried in pictures.
 const NUM_TURNS: usize = 36;
-const NUM_STARTS: usize = 5;
-/// Starts are at least so far apart.
+const NUM_STARTS: usize = 4;
+/// Starts are at least so far apart, the second as a share of the edges' mean distance from the middle.
 const APART_RAD: f64 = 0.2;
+const APART_SHARE: f64 = 0.25;
 /// How far it may lie from a start in a picture, which shows the part in perspective.
 const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
+/// A turn at which the photo's edges agree with themselves by this much is tried in pictures, and compared closely where the picture's
+/// agree with it by at most so much less than before.
+const MIN_RESEMBLANCE: f64 = 0.4;
+const MAX_LOSS_BY_TURN: f64 = 0.15;
+/// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
+const MIN_SHARE: f64 = 0.03;
+/// What a turn must differ in and gain. Chosen by hand.
+const MIN_SHARE_OF_TURN: f64 = 0.004;
+const MIN_GAIN_BY_TURN: f64 = 0.05;
 /// A window differs where the other's edges correlate with its own by less.
 const SAME: f32 = 0.6;
+
+/// Where `template` resembles the photo most, from its own pixels to the cut-out's: of `further` places and of all turns about the
+/// middle those that agree best with the photo's gradients and `count`.
+fn resembling(
+    template: &ShapeTemplate,
+    field: &GradientField,
+    middles: [Point2<f64>; 2],
+    further: &[PlanarSimilarity],
+    counts: impl Fn(&PlanarSimilarity, f64) -> bool,
+) -> Vec<PlanarSimilarity> {
+    let about_middle = (0..NUM_TURNS).map(|k| {
+        let turn = Angle::from_radians(k as f64 * std::f64::consts::TAU / NUM_TURNS as f64);
+        template.refine(field, &PlanarSimilarity::about(middles[0], middles[1], turn, 1.0)).image_from_demonstration
+    });
+    let mut fits: Vec<(PlanarSimilarity, f64)> = about_middle
+        .chain(further.iter().copied())
+        .map(|pose| (pose, template.agreement(field, &pose)))
+        .filter(|(pose, agreement)| counts(pose, *agreement))
+        .collect();
+    fits.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let apart_px = APART_SHARE * template.radius_px();
+    let are_apart = |a: &PlanarSimilarity, b: &PlanarSimilarity| {
+        a.angle.distance(b.angle) > APART_RAD || (a.apply(&middles[0]) - b.apply(&middles[0])).norm() > apart_px
+    };
+    let mut starts: Vec<PlanarSimilarity> = Vec::new();
+    for (pose, _) in fits {
+        if starts.len() < NUM_STARTS && starts.iter().all(|kept| are_apart(kept, &pose)) {
+            starts.push(pose);
+        }
+    }
+    starts
+}
 
 /// How a rival fits a picture compared with the photo, where the two differ.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +92,8 @@ pub struct Rival {
 }
 
 impl Rival {
-    /// The mirror image of a demonstration whose gradients are `field`.
+    /// The mirror image of a demonstration whose gradients are `field`; `None` where it is the same. `places` finds where a template's
+    /// part may be in the photo.
     ///
     /// # Errors
     /// As [`ShapeTemplate::new`].
@@ -57,28 +102,54 @@ impl Rival {
         outline: &Polygon,
         field: &GradientField,
         config: &ShapeConfig,
-    ) -> Result<Self, ShapeError> {
+        places: impl Fn(&RgbImage, &Polygon, &ShapeTemplate) -> Vec<PlanarSimilarity>,
+        photo: &CloseUp,
+    ) -> Result<Option<Self>, ShapeError> {
         let flipped = imageops::flip_horizontal(cutout);
         let width = f64::from(cutout.width());
         let mut mirrored = outline.clone();
         mirrored.vertices.iter_mut().for_each(|vertex| vertex.x = width - vertex.x);
         let template = ShapeTemplate::new(&flipped, &mirrored, config)?;
-        let (from, to) = (mirrored.bounds().center(), outline.bounds().center());
-        let mut fits: Vec<(PlanarSimilarity, f64)> = (0..NUM_TURNS)
-            .map(|k| {
-                let turn = Angle::from_radians(k as f64 * std::f64::consts::TAU / NUM_TURNS as f64);
-                let refined = template.refine(field, &PlanarSimilarity::about(from, to, turn, 1.0));
-                (refined.image_from_demonstration, refined.agreement)
-            })
-            .collect();
-        fits.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let mut starts: Vec<PlanarSimilarity> = Vec::new();
-        for (pose, _) in fits {
-            if starts.len() < NUM_STARTS && starts.iter().all(|kept| kept.angle.distance(pose.angle) > APART_RAD) {
-                starts.push(pose);
-            }
+        let middles = [&mirrored, outline].map(|outline| outline.bounds().center());
+        let places = places(&flipped, &mirrored, &template);
+        let starts = resembling(&template, field, middles, &places, |_, _| true);
+        let made = Self { close_up: CloseUp::new(&flipped, &mirrored), template, starts };
+        let is_the_same = made.starts.iter().any(|start| made.close_up.share_differing(photo, start) < MIN_SHARE);
+        Ok((!is_the_same).then_some(made))
+    }
+
+    /// The part itself, turned and shifted to where it resembles itself.
+    pub(crate) fn turned(
+        close_up: &CloseUp,
+        template: &ShapeTemplate,
+        field: &GradientField,
+        middle: Point2<f64>,
+        places: &[PlanarSimilarity],
+    ) -> Self {
+        let is_turn = |pose: &PlanarSimilarity, agreement: f64| {
+            agreement >= MIN_RESEMBLANCE && pose.angle.radians().abs() > APART_RAD
+        };
+        let mut starts = resembling(template, field, [middle; 2], places, is_turn);
+        starts.retain(|start| close_up.share_differing(close_up, start) >= MIN_SHARE_OF_TURN);
+        Self { close_up: close_up.clone(), template: template.clone(), starts }
+    }
+
+    /// The turn at which the photo fits the picture better than at `pose`, where the two differ; `None` where none does.
+    pub(crate) fn better_turn(&self, picture: &Picture<'_>, pose: &PlanarSimilarity) -> Option<PlanarSimilarity> {
+        let agreement = self.template.agreement(picture.field, pose);
+        let turns = self.starts.iter().map(|start| self.template.captured(picture.field, &pose.compose(start), &REACH));
+        let is_likely =
+            |turn: &PlanarSimilarity| self.template.agreement(picture.field, turn) >= agreement - MAX_LOSS_BY_TURN;
+        let likely: Vec<PlanarSimilarity> = turns.filter(is_likely).collect();
+        if likely.is_empty() {
+            return None;
         }
-        Ok(Self { close_up: CloseUp::new(&flipped, &mirrored), template, starts })
+        let seen = self.close_up.seen(picture.image, pose);
+        let judged = likely
+            .into_iter()
+            .map(|turn| (turn, self.close_up.duel(&self.close_up, &seen.gradients, &turn.inverse().compose(pose))));
+        let better = judged.filter(|(_, fit)| fit.share >= MIN_SHARE_OF_TURN && fit.margin <= -MIN_GAIN_BY_TURN);
+        better.min_by(|a, b| a.1.margin.total_cmp(&b.1.margin)).map(|(turn, _)| turn)
     }
 
     /// Fits the rival about a pose of the photo, and compares the two there.
@@ -95,15 +166,20 @@ impl Rival {
         });
         let (pose, _) = fitted.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let rival_from_cutout = pose.inverse().compose(image_from_cutout);
-        Some(self.close_up.duel(photo, seen, &rival_from_cutout))
+        Some(self.close_up.duel(photo, &seen.gradients, &rival_from_cutout))
     }
 }
 
 impl CloseUp {
+    /// How much of the photo's edges this one differs in where it lies on it by `photo_from_own`.
+    fn share_differing(&self, photo: &CloseUp, photo_from_own: &PlanarSimilarity) -> f64 {
+        self.duel(photo, &photo.gradients, &photo_from_own.inverse()).share
+    }
+
     /// The photo against this one, which lies there by `own_from_photo`.
-    fn duel(&self, photo: &CloseUp, seen: &Seen, own_from_photo: &PlanarSimilarity) -> RivalFit {
+    fn duel(&self, photo: &CloseUp, seen: &Gradients, own_from_photo: &PlanarSimilarity) -> RivalFit {
         let depth: Vec<f32> = photo.frame.pixels().map(|at| self.depth_at(photo, at, own_from_photo)).collect();
-        let colors = photo.frame.sampled(&self.image, own_from_photo);
+        let colors = photo.frame.sampled_sparsely(&self.image, own_from_photo);
         let gradients = Gradients::new(&colors, SIDE, |i| depth[i] > -3.0);
         let expected = Expected::new(&gradients, &depth);
         // As pictures, each shows its part alone.
@@ -128,9 +204,9 @@ impl CloseUp {
 }
 
 /// The edges that `expected` has and `other` lacks: how many, and how they correlate with what is seen.
-fn differing(expected: &Expected, other: &Gradients, seen: &Seen) -> (f32, f32) {
+fn differing(expected: &Expected, other: &Gradients, seen: &Gradients) -> (f32, f32) {
     let strongest = expected.energy.iter().fold(0.0f32, |a, b| a.max(*b));
-    let (with_other, with_picture) = (expected.fit(other), expected.fit(&seen.gradients));
+    let (with_other, with_picture) = (expected.fit(other), expected.fit(seen));
     let (mut weight, mut fit) = (0.0, 0.0);
     for i in (0..with_other.len()).filter(|&i| expected.energy[i] > MIN_EDGES * strongest) {
         let differs = expected.energy[i] * (SAME - with_other[i]).clamp(0.0, 1.0);

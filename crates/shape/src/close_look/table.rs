@@ -5,9 +5,9 @@ use image::RgbImage;
 /// Colours that a picture is described by.
 const NUM_COLORS: usize = 8;
 /// The longer side of the shrunk picture that they are read from.
-const SIDE: u32 = 80;
+const SIDE: u32 = 60;
 /// Rounds of the clustering. It has settled before.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 8;
 /// Each further colour starts at the pixel that is farther from all before it than this share of the pixels: the farthest would
 /// be a highlight.
 const START_QUANTILE: f64 = 0.97;
@@ -40,8 +40,9 @@ impl TableColors {
         let mut distances: Vec<f32> = pixels.iter().map(|pixel| squared(pixel, &centers[0])).collect();
         while centers.len() < NUM_COLORS {
             let mut order: Vec<usize> = (0..pixels.len()).collect();
-            order.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
-            let next = pixels[order[(START_QUANTILE * (pixels.len() - 1) as f64) as usize]];
+            let nth = (START_QUANTILE * (pixels.len() - 1) as f64) as usize;
+            let (_, next, _) = order.select_nth_unstable_by(nth, |a, b| distances[*a].total_cmp(&distances[*b]));
+            let next = pixels[*next];
             for (distance, pixel) in distances.iter_mut().zip(pixels) {
                 *distance = distance.min(squared(pixel, &next));
             }
@@ -49,7 +50,7 @@ impl TableColors {
         }
         let mut members = vec![Vec::new(); centers.len()];
         for _ in 0..ROUNDS {
-            members = vec![Vec::new(); centers.len()];
+            members.iter_mut().for_each(Vec::clear);
             for (i, pixel) in pixels.iter().enumerate() {
                 members[nearest(pixel, &centers)].push(i);
             }

@@ -28,6 +28,7 @@ use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED, Picture};
 use crate::config::ShapeConfig;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
+use crate::following::Reach;
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::parallel;
@@ -160,8 +161,9 @@ pub struct ShapeSearch {
     structure: Structure,
     likeness: Likeness,
     close_up: CloseUp,
-    /// `None` where the mirror image has too few edges.
+    /// `None` where the mirror image is the same, or has too few edges.
     mirrored: Option<Rival>,
+    turned: Rival,
     outline: Polygon,
     bank: Bank,
     sweep_level_idx: usize,
@@ -182,13 +184,19 @@ impl ShapeSearch {
         let field = GradientField::with_config(image, &config.shape.gradient);
         let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
         let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
+        let close_up = CloseUp::new(image, outline);
+        let places = |part: &RgbImage, outline: &Polygon, template: &ShapeTemplate| {
+            places_in_photo(part, outline, template, &field, config)
+        };
+        let own_places = places(image, outline, &template);
         Ok(Self {
             config: config.clone(),
             surface: Surface::new(image, outline, &config.shape.surface),
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             likeness: Likeness::new(image, outline),
-            close_up: CloseUp::new(image, outline),
-            mirrored: Rival::mirrored(image, outline, &field, &config.shape).ok(),
+            turned: Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places),
+            mirrored: Rival::mirrored(image, outline, &field, &config.shape, places, &close_up).ok().flatten(),
+            close_up,
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
             template,
@@ -219,10 +227,10 @@ impl ShapeSearch {
         matches.retain(|found| found.agreement >= self.config.min_agreement);
         matches.truncate(self.config.max_matches);
         let comparison = self.comparison(picture);
-        parallel::map(&matches, |found| Match {
-            image_from_demonstration: found.pose,
-            agreement: found.agreement,
-            evidence: comparison.evidence(&found.pose),
+        parallel::map(&matches, |found| {
+            let pose = comparison.best_turn(&found.pose, &self.config.scales);
+            let agreement = if pose == found.pose { found.agreement } else { comparison.agreement(&pose).both() };
+            Match { image_from_demonstration: pose, agreement, evidence: comparison.evidence(&pose) }
         })
     }
 
@@ -292,9 +300,19 @@ impl ShapeSearch {
 
     /// The demonstration over an image.
     pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
-        let Self { template, surface, structure, likeness, close_up, mirrored, .. } = self;
+        let Self { template, surface, structure, likeness, close_up, mirrored, turned, .. } = self;
         let (min_agreement, mirrored) = (self.config.min_agreement, mirrored.as_ref());
-        Comparison { template, surface, structure, likeness, close_up, mirrored, min_agreement, picture: *picture }
+        Comparison {
+            template,
+            surface,
+            structure,
+            likeness,
+            close_up,
+            mirrored,
+            turned,
+            min_agreement,
+            picture: *picture,
+        }
     }
 
     /// Refined from all around, where a match is poor: its start may have been on the wrong side of a shadow.
@@ -363,15 +381,12 @@ impl ShapeSearch {
     }
 
     fn pose_of(&self, start: &Start) -> Pose {
-        let variant = &self.bank.variants[start.variant_idx];
-        let pitch = self.place_pitch();
-        let [x, y] = start.place.map(|place| (place as f64 + 0.5) * pitch);
-        Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
+        pose_of(start, &self.bank, self.sweep_level_idx)
     }
 
     /// Image pixels from one place to the next.
     fn place_pitch(&self) -> f64 {
-        (PITCH << self.sweep_level_idx) as f64
+        place_pitch(self.sweep_level_idx)
     }
 
     /// Whether two matches can both be there: parts do not lie in each other.
@@ -379,6 +394,39 @@ impl ShapeSearch {
         let one_from_other = one.inverse().compose(other);
         self.surface.share_inside(&self.outline, &one_from_other) <= MAX_OVERLAP
     }
+}
+
+fn place_pitch(sweep_level_idx: usize) -> f64 {
+    (PITCH << sweep_level_idx) as f64
+}
+
+fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
+    let variant = &bank.variants[start.variant_idx];
+    let [x, y] = start.place.map(|place| (place as f64 + 0.5) * place_pitch(sweep_level_idx));
+    Pose { center: Point2::new(x, y), angle_rad: variant.angle_rad, log_scale: variant.log_scale }
+}
+
+/// Where in a photo, whose gradients are `photo`, a part of about its size may lie, wholly or partly: its own other places, or its
+/// mirror image's. The part is cut out in `cutout`.
+fn places_in_photo(
+    cutout: &RgbImage,
+    outline: &Polygon,
+    template: &ShapeTemplate,
+    photo: &GradientField,
+    config: &SearchConfig,
+) -> Vec<PlanarSimilarity> {
+    /// Places that are refined. Chosen by hand, for time.
+    const MAX_PLACES: usize = 48;
+    const SAME_LOG_SCALES: [f64; 2] = [-0.02, 0.02];
+    const REACH: Reach = Reach { shift_px: 8.0, turn_rad: 0.1, log_scale: 0.02 };
+    let field = GradientField::with_config(cutout, &config.shape.gradient);
+    let (level_idx, points) = sweep_points(&field, template, outline, config);
+    let bank = Bank::new(&points, config.num_points, (1u32 << level_idx) as f64, SAME_LOG_SCALES);
+    let starts = sweep(&Responses::new(photo.level(level_idx), bank.reach), &bank, MAX_PLACES, MIN_RESPONSE);
+    parallel::map(&starts, |start| {
+        let pose = pose_of(start, &bank, level_idx).to_similarity(template.center);
+        template.captured(photo, &pose, &REACH)
+    })
 }
 
 /// The coarsest level that still shows the part well, and its edge points there.
