@@ -175,7 +175,7 @@ const KNOWN_SIZE: Term = term(-1440.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {
     is_size_known: false,
-    bias: 2.64,
+    bias: 2.34,
     edges: term(4.75, 0.62, 0.3, 0.95),
     surface: term(1.57, 0.33, 0.0, 0.7),
     hue: term(-14.4, 0.1, 0.1, 0.35),
@@ -185,8 +185,8 @@ const SCORE: ScoreConfig = ScoreConfig {
     resemblance: term(-4.93, 0.36, 0.2, 0.45),
     likeness: term(1.4, -0.1, -2.0, 6.0),
     network: term(1.44, 0.0, -1.0, 0.0),
-    table: term(-12.0, 0.0, 0.0, 1.0),
-    rim: term(-12.5, 0.0, 0.0, 1.0),
+    table: term(-16.0, 0.0, 0.0, 1.0),
+    rim: term(-12.5, 0.05, 0.05, 1.0),
     added: term(-35.0, 0.0, 0.0, 1.0),
     mirror: term(-20.0, 0.1, 0.1, 1.0),
 };

@@ -31,12 +31,12 @@ const REACH: Reach = Reach { shift_px: 16.0, turn_rad: 0.2, log_scale: 0.05 };
 /// A turn at which the photo's edges agree with themselves by this much is tried in pictures, and compared closely where the picture's
 /// agree with it by at most so much less than before.
 const MIN_RESEMBLANCE: f64 = 0.4;
-const MAX_LOSS_BY_TURN: f64 = 0.15;
+const MAX_LOSS_BY_TURN: f64 = 0.03;
 /// The mirror image must differ from the photo in this share of its edges. Chosen by hand.
 const MIN_SHARE: f64 = 0.03;
 /// What a turn must differ in and gain. Chosen by hand.
-const MIN_SHARE_OF_TURN: f64 = 0.004;
-const MIN_GAIN_BY_TURN: f64 = 0.05;
+const MIN_SHARE_OF_TURN: f64 = 0.02;
+const MIN_GAIN_BY_TURN: f64 = 0.1;
 /// A window differs where the other's edges correlate with its own by less.
 const SAME: f32 = 0.6;
 

@@ -227,11 +227,13 @@ impl ShapeSearch {
         matches.retain(|found| found.agreement >= self.config.min_agreement);
         matches.truncate(self.config.max_matches);
         let comparison = self.comparison(picture);
-        parallel::map(&matches, |found| {
+        let mut matches = parallel::map(&matches, |found| {
             let pose = comparison.best_turn(&found.pose, &self.config.scales);
             let agreement = if pose == found.pose { found.agreement } else { comparison.agreement(&pose).both() };
             Match { image_from_demonstration: pose, agreement, evidence: comparison.evidence(&pose) }
-        })
+        });
+        matches.sort_by(|a, b| b.agreement.total_cmp(&a.agreement));
+        matches
     }
 
     /// Follows starts, the best first; once parts are found, further starts that resemble theirs, and else none.
