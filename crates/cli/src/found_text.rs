@@ -8,7 +8,7 @@ use crate::picture_detector::{Found, PictureDetector};
 /// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
 pub const DEFAULT_MIN_SCORE: f64 = 0.5;
 /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
-pub const MIN_ADVISED_SCORE: f64 = 0.1;
+pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
 const SAME_SIZE: f64 = 0.03;
 

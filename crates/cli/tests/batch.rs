@@ -122,7 +122,10 @@ fn a_refusal_says_why_and_what_would_help() {
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains(": nothing accepted; ") && text.contains(" refused, the best of them at ("), "{text}");
     assert!(text.contains("(see --all)") && text.contains("agreement 0."), "{text}");
-    assert!(text.contains("edges are there; if it is the part, a second --demo"), "{text}");
+    assert!(
+        text.contains("a part of its outline is not there") && text.contains("; if it is the part, a second --demo"),
+        "{text}"
+    );
     assert!(!text.contains("network"), "model S has none: {text}");
     // Red dots where its edges are covered.
     let drawn = image::open(Path::new(&drawn).join("covered.png")).unwrap().to_rgb8();
@@ -136,7 +139,7 @@ fn a_refusal_says_why_and_what_would_help() {
         let line = lines(&output).remove(0);
         (output.status.code(), line["detections"].as_array().unwrap().len(), line["num_refused"].as_u64())
     };
-    let (low, default) = (json("0.2"), json("0.5"));
+    let (low, default) = (json("0.02"), json("0.5"));
     assert_eq!((low.0, low.1, default.0, default.1), (Some(0), 1, Some(3), 0));
     assert_eq!(default.2, low.2.map(|refused| refused + 1));
 }

@@ -171,22 +171,22 @@ const fn term(weight: f64, neutral: f64, low: f64, high: f64) -> Term {
 
 /// Of the squared ln of a size over the demonstration's, which a refined pose gives to about 2.5 % where a slanted view shows a
 /// part's walls: half of the inverse square of that, to 10 %. Chosen by hand from six rendered pictures.
-const KNOWN_SIZE: Term = term(-1440.0, 0.0, 0.0, 0.01);
+const KNOWN_SIZE: Term = term(-800.0, 0.0, 0.0, 0.01);
 
 const SCORE: ScoreConfig = ScoreConfig {
     is_size_known: false,
-    bias: 2.34,
-    edges: term(4.75, 0.62, 0.3, 0.95),
-    surface: term(1.57, 0.33, 0.0, 0.7),
-    hue: term(-14.4, 0.1, 0.1, 0.35),
-    visible: term(12.1, 0.66, 0.27, 0.77),
-    size: term(-176.0, 0.0, 0.0, 0.029),
-    outside: term(-3.87, 0.0, 0.0, 0.34),
-    resemblance: term(-4.93, 0.36, 0.2, 0.45),
-    likeness: term(1.4, -0.1, -2.0, 6.0),
-    network: term(1.44, 0.0, -1.0, 0.0),
-    table: term(-16.0, 0.0, 0.0, 1.0),
-    rim: term(-12.5, 0.05, 0.05, 1.0),
-    added: term(-35.0, 0.0, 0.0, 1.0),
-    mirror: term(-20.0, 0.1, 0.1, 1.0),
+    bias: 0.3,
+    edges: term(2.64, 0.62, 0.3, 0.95),
+    surface: term(0.87, 0.33, 0.0, 0.7),
+    hue: term(-8.0, 0.1, 0.1, 0.35),
+    visible: term(6.73, 0.66, 0.27, 0.77),
+    size: term(-98.0, 0.0, 0.0, 0.029),
+    outside: term(-2.15, 0.0, 0.0, 0.34),
+    resemblance: term(-2.74, 0.36, 0.2, 0.45),
+    likeness: term(0.777, -0.1, -2.0, 6.0),
+    network: term(0.8, 0.0, -1.0, 0.0),
+    table: term(-9.0, 0.0, 0.0, 1.0),
+    rim: term(-4.0, 0.05, 0.05, 1.0),
+    added: term(-10.0, 0.0, 0.0, 1.0),
+    mirror: term(-55.0, 0.07, 0.07, 1.0),
 };

@@ -145,7 +145,7 @@ impl Comparison<'_> {
         if self.agreement(pose).both() < MIN_TURNED {
             return *pose;
         }
-        let turned = self.turned.better_turn(&self.picture, pose);
+        let turned = self.turned.better_turn(self.picture.image, self.picture.field, pose);
         turned.filter(|turned| scales.contains(&turned.scale)).unwrap_or(*pose)
     }
 

@@ -11,9 +11,9 @@ use image::imageops;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 
+use super::close_up::{CloseUp, MIN_EDGES, SIDE, Seen};
 use super::gradients::{Expected, Gradients};
-use super::{CloseUp, MIN_EDGES, SIDE, Seen};
-use crate::comparison::Picture;
+use super::look::RivalFit;
 use crate::config::ShapeConfig;
 use crate::error::ShapeError;
 use crate::following::Reach;
@@ -72,16 +72,6 @@ fn resembling(
     starts
 }
 
-/// How a rival fits a picture compared with the photo, where the two differ.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RivalFit {
-    /// Mean correlation of the photo's edges that the rival lacks, less that of the rival's that the photo lacks: below 0 the rival fits
-    /// better.
-    pub margin: f64,
-    /// How much of the photo's edges they differ in: with little, the margin says little.
-    pub share: f64,
-}
-
 /// Another part that may lie there instead.
 #[derive(Debug, Clone)]
 pub struct Rival {
@@ -135,16 +125,20 @@ impl Rival {
     }
 
     /// The turn at which the photo fits the picture better than at `pose`, where the two differ; `None` where none does.
-    pub(crate) fn better_turn(&self, picture: &Picture<'_>, pose: &PlanarSimilarity) -> Option<PlanarSimilarity> {
-        let agreement = self.template.agreement(picture.field, pose);
-        let turns = self.starts.iter().map(|start| self.template.captured(picture.field, &pose.compose(start), &REACH));
-        let is_likely =
-            |turn: &PlanarSimilarity| self.template.agreement(picture.field, turn) >= agreement - MAX_LOSS_BY_TURN;
+    pub(crate) fn better_turn(
+        &self,
+        image: &RgbImage,
+        field: &GradientField,
+        pose: &PlanarSimilarity,
+    ) -> Option<PlanarSimilarity> {
+        let agreement = self.template.agreement(field, pose);
+        let turns = self.starts.iter().map(|start| self.template.captured(field, &pose.compose(start), &REACH));
+        let is_likely = |turn: &PlanarSimilarity| self.template.agreement(field, turn) >= agreement - MAX_LOSS_BY_TURN;
         let likely: Vec<PlanarSimilarity> = turns.filter(is_likely).collect();
         if likely.is_empty() {
             return None;
         }
-        let seen = self.close_up.seen(picture.image, pose);
+        let seen = self.close_up.seen(image, pose);
         let judged = likely
             .into_iter()
             .map(|turn| (turn, self.close_up.duel(&self.close_up, &seen.gradients, &turn.inverse().compose(pose))));
@@ -190,6 +184,7 @@ impl CloseUp {
         let all: f32 = photo.expected.energy.iter().sum();
         RivalFit {
             margin: f64::from(fit - rivals_fit),
+            fit: f64::from(rivals_fit),
             share: f64::from((weight + rivals_weight) / all.max(f32::MIN_POSITIVE)),
         }
     }
