@@ -12,7 +12,7 @@ const REACH_PX = matchMedia("(pointer: coarse)").matches ? 20 : 11;
 export const KNOB_PX = 20;
 const JAW_PX = 12;
 /** Where nothing is accepted, the best refused one is shown if it scores so much. */
-export const MIN_SHOWN = 0.00001;
+export const MIN_SHOWN = 0.002;
 
 const CORNERS = { nw: [0, 1], n: [0.5, 1], ne: [2, 1], e: [2, 1.5], se: [2, 3], s: [0.5, 3], sw: [0, 3], w: [0, 1.5] };
 const SIDES = { nw: "top left", n: "top", ne: "top right", e: "right", se: "bottom right", s: "bottom", sw: "bottom left", w: "left" };

@@ -91,7 +91,7 @@ mod structure;
 mod surface;
 mod template;
 
-pub use close_look::{CloseLook, Rival, RivalFit, TableColors};
+pub use close_look::{CloseLook, RivalFit, TableColors};
 pub use comparison::{Agreement, Comparison, Differences, Evidence, Picture};
 pub use config::{
     AgreementConfig, GradientConfig, RefinementConfig, ScaleRange, ShapeConfig, StructureConfig, SurfaceConfig,

@@ -17,5 +17,5 @@ mod table;
 
 pub(crate) use self::close_up::CloseUp;
 pub use self::look::{CloseLook, RivalFit};
-pub use self::rival::Rival;
+pub(crate) use self::rival::Rival;
 pub use self::table::TableColors;

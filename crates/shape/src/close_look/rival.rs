@@ -74,7 +74,7 @@ fn resembling(
 
 /// Another part that may lie there instead.
 #[derive(Debug, Clone)]
-pub struct Rival {
+pub(crate) struct Rival {
     close_up: CloseUp,
     template: ShapeTemplate,
     /// Where it resembles the photo most: from its own pixels to the cut-out's.

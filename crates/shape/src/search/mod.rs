@@ -185,17 +185,21 @@ impl ShapeSearch {
         let (sweep_level_idx, points) = sweep_points(&field, &template, outline, config);
         let log_scales = [config.scales.start().ln(), config.scales.end().ln()];
         let close_up = CloseUp::new(image, outline);
-        let places = |part: &RgbImage, outline: &Polygon, template: &ShapeTemplate| {
-            places_in_photo(part, outline, template, &field, config)
+        let own_places = places_in_photo(&points, sweep_level_idx, &template, &field, config);
+        let places_of_mirrored = |flipped: &RgbImage, outline: &Polygon, template: &ShapeTemplate| {
+            let flipped = GradientField::with_config(flipped, &config.shape.gradient);
+            let (level_idx, points) = sweep_points(&flipped, template, outline, config);
+            places_in_photo(&points, level_idx, template, &field, config)
         };
-        let own_places = places(image, outline, &template);
         Ok(Self {
             config: config.clone(),
             surface: Surface::new(image, outline, &config.shape.surface),
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             likeness: Likeness::new(image, outline),
             turned: Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places),
-            mirrored: Rival::mirrored(image, outline, &field, &config.shape, places, &close_up).ok().flatten(),
+            mirrored: Rival::mirrored(image, outline, &field, &config.shape, places_of_mirrored, &close_up)
+                .ok()
+                .flatten(),
             close_up,
             outline: outline.clone(),
             bank: Bank::new(&points, config.num_points, (1u32 << sweep_level_idx) as f64, log_scales),
@@ -409,10 +413,10 @@ fn pose_of(start: &Start, bank: &Bank, sweep_level_idx: usize) -> Pose {
 }
 
 /// Where in a photo, whose gradients are `photo`, a part of about its size may lie, wholly or partly: its own other places, or its
-/// mirror image's. The part is cut out in `cutout`.
+/// mirror image's. `points` are the part's at the level that is swept.
 fn places_in_photo(
-    cutout: &RgbImage,
-    outline: &Polygon,
+    points: &[EdgePoint],
+    level_idx: usize,
     template: &ShapeTemplate,
     photo: &GradientField,
     config: &SearchConfig,
@@ -421,9 +425,7 @@ fn places_in_photo(
     const MAX_PLACES: usize = 48;
     const SAME_LOG_SCALES: [f64; 2] = [-0.02, 0.02];
     const REACH: Reach = Reach { shift_px: 8.0, turn_rad: 0.1, log_scale: 0.02 };
-    let field = GradientField::with_config(cutout, &config.shape.gradient);
-    let (level_idx, points) = sweep_points(&field, template, outline, config);
-    let bank = Bank::new(&points, config.num_points, (1u32 << level_idx) as f64, SAME_LOG_SCALES);
+    let bank = Bank::new(points, config.num_points, (1u32 << level_idx) as f64, SAME_LOG_SCALES);
     let starts = sweep(&Responses::new(photo.level(level_idx), bank.reach), &bank, MAX_PLACES, MIN_RESPONSE);
     parallel::map(&starts, |start| {
         let pose = pose_of(start, &bank, level_idx).to_similarity(template.center);
