@@ -118,7 +118,7 @@ fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
     stdout(&["teach", "--model", "S", "--demo", &format!("{set}/demo.png"), "--out", &model]);
     let expected = counted_naively(&set, &model);
     let [parts, found, accepted, wrong, negatives, false_alarms] = expected;
-    assert!(found > 1 && wrong >= 2 && parts >= found + 2 && negatives == 2 && false_alarms == 1, "{expected:?}");
+    assert!(found > 1 && wrong > 0 && parts >= found + 2 && negatives == 2 && false_alarms == 1, "{expected:?}");
 
     let arguments =
         ["evaluate", "--pictures", &set, "--grasp-model", &model, "--report", &folder.path("report"), "--json"];
