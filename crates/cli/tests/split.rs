@@ -6,8 +6,8 @@ use std::path::Path;
 use crate::support::{Folder, sdg, shipped, stdout};
 use serde_json::{Value, json};
 
-/// Samples: enough that each difference of [`write_set`] is there and some parts are left as they are.
-const NUM_SAMPLES: &str = "12";
+/// Samples: enough that some with each difference of [`write_set`] are accepted, and some that are left as they are.
+const NUM_SAMPLES: &str = "20";
 
 fn read_json(path: &str) -> Value {
     serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
@@ -39,7 +39,7 @@ fn write_set(folder: &Folder, name: &str) -> String {
             ((k[0] + k[3]) / 2.0, dy.atan2(dx).to_degrees(), 360.0, false);
         // The part is about twice as long as its marks.
         let diag_px = 2.0 * dx.hypot(dy);
-        match num_with_part {
+        match num_with_part % 6 {
             0 => x += 0.06 * diag_px,
             1 => angle_deg += 15.0,
             2 => optional = true,
@@ -163,7 +163,7 @@ fn the_tuned_side_is_counted_by_the_rule_and_nothing_else_is_read() {
     assert_eq!(seed_1().filter(|candidate| candidate["hit"] == "part").count() as u64, found);
     let moved = seed_1().filter(|candidate| candidate["place"] == "misplaced").count();
     let turned = seed_1().filter(|candidate| candidate["place"] == "wrong_turn").count();
-    assert_eq!([moved, turned], [1, 1]);
+    assert!(moved > 0 && turned > 0, "{moved} moved, {turned} turned");
     assert!(candidates.iter().any(|candidate| candidate["refused"].is_string() && candidate["evidence"].is_object()));
 
     let refused = |arguments: &[&str], code: i32, part: &str| {
