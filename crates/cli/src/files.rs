@@ -1,13 +1,16 @@
 //! Files at the edge: read with a bound, named in every error, written whole or not at all.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{ImageLimits, decode_image};
-use sdg_grasp::{Device, GraspModel};
+use sdg_grasp::{Device, GraspModel, summarize};
+use sdg_report::write_atomically;
 
 /// Larger photos than any camera makes.
 const MAX_IMAGE_BYTES: u64 = 256 << 20;
@@ -33,6 +36,37 @@ pub fn check_readable(path: &Path) -> Result<()> {
     open(path).map(drop)
 }
 
+/// What this command was given to read: [`write`] replaces none of it.
+static INPUTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Takes a file for an input before it is read; reading takes it for one, too.
+pub fn note_input(path: &Path) {
+    if let Ok(path) = path.canonicalize() {
+        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
+    }
+}
+
+/// Makes sure that no input of this command would be replaced.
+///
+/// # Errors
+/// A path that names one, whatever links lead to it.
+fn check_is_no_input(path: &Path) -> Result<()> {
+    let is_input = |path: PathBuf| INPUTS.lock().unwrap_or_else(PoisonError::into_inner).contains(&path);
+    if path.canonicalize().is_ok_and(is_input) {
+        bail!("{}: expected a name of its own for what is written, found an input of this command", path.display());
+    }
+    Ok(())
+}
+
+/// Writes a file whole or not at all, and never over an input of this command.
+///
+/// # Errors
+/// A path that names an input; what the system says.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    check_is_no_input(path)?;
+    Ok(write_atomically(path, bytes)?)
+}
+
 /// The file and its length.
 fn open(path: &Path) -> Result<(File, u64)> {
     let named = || format!("{}: cannot read", path.display());
@@ -41,6 +75,7 @@ fn open(path: &Path) -> Result<(File, u64)> {
     if metadata.is_dir() {
         bail!("{}: expected a file, found a folder", path.display());
     }
+    note_input(path);
     Ok((file, metadata.len()))
 }
 
@@ -100,8 +135,9 @@ pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
     GraspModel::from_bytes(&bytes, device).with_context(|| path.display().to_string())
 }
 
-/// Makes sure, before minutes of work, that a file can be written beside `path` later.
+/// Makes sure, before minutes of work, that a file can be written at `path` later, and that it is no input.
 pub fn check_writable(path: &Path) -> Result<()> {
+    check_is_no_input(path)?;
     if path.is_dir() {
         bail!("{}: expected a file to write, found a folder", path.display());
     }
@@ -110,6 +146,22 @@ pub fn check_writable(path: &Path) -> Result<()> {
         _ => Path::new("."),
     };
     check_folder_writable(folder)
+}
+
+/// Makes sure that a model file to be written replaces a model file or nothing.
+///
+/// # Errors
+/// Another file of that name.
+pub fn check_replaces_a_model(path: &Path) -> Result<()> {
+    let bytes = match File::open(path) {
+        Ok(file) => read_bounded(file, path, MAX_MODEL_BYTES)?,
+        Err(_) => return Ok(()),
+    };
+    if !bytes.is_empty() {
+        summarize(&bytes)
+            .with_context(|| format!("{}: expected a new name, or a grasp model to replace", path.display()))?;
+    }
+    Ok(())
 }
 
 /// Makes sure that files can be written into an existing folder.
@@ -139,6 +191,23 @@ mod tests {
     fn a_folder_that_is_not_there_cannot_be_written() {
         let error = check_writable(Path::new("/nowhere/at/all.sdg")).unwrap_err();
         assert!(crate::exit::one_line(&error).starts_with("/nowhere/at: cannot write into this folder"));
+    }
+
+    #[test]
+    fn an_input_is_not_replaced_whatever_path_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let [photo, other] = ["photo.png", "other.png"].map(|name| folder.path().join(name));
+        fs::write(&photo, "photo").unwrap();
+        read(&photo, 10).unwrap();
+        let by_detour = folder.path().join(".").join("photo.png");
+        for path in [&photo, &by_detour] {
+            let error = write(path, b"drawing").unwrap_err().to_string();
+            assert!(error.contains("found an input of this command"), "{error}");
+            assert!(check_writable(path).is_err());
+        }
+        assert_eq!(fs::read(&photo).unwrap(), b"photo");
+        write(&other, b"drawing").unwrap();
+        assert_eq!(fs::read(&other).unwrap(), b"drawing");
     }
 
     #[test]

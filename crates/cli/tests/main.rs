@@ -15,6 +15,7 @@ mod labelled_pictures;
 mod live_detection;
 mod live_pictures;
 mod many_parts;
+mod outputs;
 mod own_part;
 mod place;
 mod plan;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
-use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::annotation_files::{AnnotationFile, DATA_YAML};
@@ -69,7 +68,7 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let written = format.write(&image, &objects)?;
 
     let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
-    write_atomically(&args.output, written.text.as_bytes())?;
+    files::write(&args.output, written.text.as_bytes())?;
     for left_out in &written.left_out {
         eprintln!("left out: {left_out}");
     }
@@ -163,7 +162,7 @@ fn write_data_yaml(
     let Some(text) = &written.data_yaml else { return Ok(None) };
     let path = output.with_file_name(DATA_YAML);
     if !path.exists() {
-        write_atomically(&path, text.as_bytes())?;
+        files::write(&path, text.as_bytes())?;
         return Ok(Some(path));
     }
     let there = files::read(&path, files::MAX_ANNOTATION_BYTES)?;

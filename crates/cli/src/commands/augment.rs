@@ -8,7 +8,6 @@ use clap::Args as ClapArgs;
 use image::ImageFormat;
 use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile};
 use sdg_grasp::CheckConfig;
-use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::demonstrations;
@@ -72,13 +71,13 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         let name = format!("{i:06}.png");
         let mut png = Cursor::new(Vec::new());
         sample.image.write_to(&mut png, ImageFormat::Png)?;
-        write_atomically(&args.out.join(&name), &png.into_inner())?;
+        files::write(&args.out.join(&name), &png.into_inner())?;
 
         let instances = labels_of(&sample, &label);
         with_part += usize::from(!instances.is_empty());
         coco.push_labelled(&name, sample.image.width(), sample.image.height(), &instances);
     }
-    write_atomically(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
+    files::write(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
 
     let out = args.out.display();
     if args.json {

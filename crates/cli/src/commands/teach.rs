@@ -13,7 +13,6 @@ use sdg_grasp::{
     CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
 };
 use sdg_kinematics::HAND_OPENING_MAX_M;
-use sdg_report::write_atomically;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
@@ -144,6 +143,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         options.lengths = Some(lengths);
     }
     files::check_writable(&args.out)?;
+    files::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
         files::prepare_folder(folder)?;
     }
@@ -160,7 +160,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         error => anyhow::Error::from(error),
     })?;
     let bytes = taught.model.to_bytes()?;
-    write_atomically(&args.out, &bytes)?;
+    files::write(&args.out, &bytes)?;
     // What was written, and no network apart from it, is what will be used.
     let written = GraspModel::from_bytes(&bytes, &options.device)?;
     let figures = HeldBackFigures::of(&written, &demonstrations, args.seed)?;

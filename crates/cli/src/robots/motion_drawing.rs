@@ -53,10 +53,10 @@ impl MotionDrawing {
         let animation = Animation::encode(&frames, &options)?;
         crate::files::prepare_folder(folder)?;
         let [gif, still] = ["gif", "png"].map(|ending| folder.join(format!("{}.{ending}", self.name)));
-        sdg_report::write_atomically(&gif, animation.gif())?;
+        crate::files::write(&gif, animation.gif())?;
         let mut png = Vec::new();
         animation.still().write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png)?;
-        sdg_report::write_atomically(&still, &png)?;
+        crate::files::write(&still, &png)?;
         Ok(vec![gif, still])
     }
 }

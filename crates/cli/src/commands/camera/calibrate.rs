@@ -8,7 +8,6 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use rayon::prelude::*;
 use sdg_calibration::{Board, CalibratedCamera, Calibration, CalibrationConfig, SeenCorner, calibrate, find_board};
-use sdg_report::write_atomically;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
@@ -138,7 +137,7 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     } else {
         camera.update_yaml(&existing).with_context(|| named(&args.out))?
     };
-    Ok(write_atomically(&args.out, text.as_bytes())?)
+    files::write(&args.out, text.as_bytes())
 }
 
 /// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.

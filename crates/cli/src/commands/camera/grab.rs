@@ -8,7 +8,6 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use image::ImageFormat;
 use sdg_camera::{Camera, Frame, LatestFrame};
-use sdg_report::write_atomically;
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
@@ -103,7 +102,7 @@ fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
 fn write_png(path: &Path, frame: &Frame) -> Result<()> {
     let mut png = Cursor::new(Vec::new());
     frame.picture.write_to(&mut png, ImageFormat::Png)?;
-    Ok(write_atomically(path, &png.into_inner())?)
+    files::write(path, &png.into_inner())
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

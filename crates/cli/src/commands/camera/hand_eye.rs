@@ -11,7 +11,6 @@ use sdg_calibration::{
     read_robot_poses,
 };
 use sdg_geometry::upper_median;
-use sdg_report::write_atomically;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
@@ -97,7 +96,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
         let camera = placed(args, camera, &found, mount);
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
-        write_atomically(out, text.as_bytes())?;
+        files::write(out, text.as_bytes())?;
     }
     for (k, pose) in seen.iter().enumerate() {
         let [metres, radians] = found.spread[k];

@@ -11,7 +11,6 @@ use sdg_calibration::{
     focal_from_sheet, homography_rms_px, locate_sheet,
 };
 use sdg_geometry::{PinholeCamera, PlumbBob};
-use sdg_report::write_atomically;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
@@ -121,7 +120,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     // What `detect --camera` would refuse is refused here.
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
-    write_atomically(out, text.as_bytes())?;
+    files::write(out, text.as_bytes())?;
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
 }

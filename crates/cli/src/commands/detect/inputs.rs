@@ -50,6 +50,29 @@ impl Input {
     }
 }
 
+/// Drawings are called like their pictures and end in `.png`: in the folder of these they would replace them or their neighbours, and a
+/// second run would take them for pictures.
+///
+/// # Errors
+/// A folder that a picture lies in.
+pub fn check_drawn_elsewhere<'a>(folder: &Path, pictures: impl Iterator<Item = &'a Input>) -> Result<()> {
+    let Ok(folder_of_drawings) = folder.canonicalize() else {
+        return Ok(());
+    };
+    for picture in pictures {
+        let Input::File(path) = picture else { continue };
+        if path.canonicalize().is_ok_and(|path| path.parent() == Some(&folder_of_drawings)) {
+            bail!(
+                "--draw: expected another folder than that of the pictures, found {}, where {} lies: drawings end in .png \
+                 and would replace pictures",
+                folder.display(),
+                path.display()
+            );
+        }
+    }
+    Ok(())
+}
+
 /// An argument's pictures, and what else stands in the folder that it names.
 #[derive(Debug)]
 pub struct Inputs {
@@ -134,6 +157,20 @@ mod tests {
             .map(|path| Input::File(path.into()).drawn_name(&mut taken))
             .collect();
         assert_eq!(names, ["1.png", "1-2.png", "1-2-2.png", "1-3.png"]);
+    }
+
+    #[test]
+    fn drawings_go_to_another_folder_than_the_pictures() {
+        let folder = tempfile::tempdir().unwrap();
+        let picture = folder.path().join("x.bmp");
+        fs::write(&picture, "").unwrap();
+        let pictures = [Input::StandardInput, Input::File(picture)];
+        let error = check_drawn_elsewhere(&folder.path().join("."), pictures.iter()).unwrap_err().to_string();
+        assert!(error.contains("--draw") && error.contains("x.bmp"), "{error}");
+        assert!(check_drawn_elsewhere(&folder.path().join("drawn"), pictures.iter()).is_ok());
+        let below = folder.path().join("below");
+        fs::create_dir(&below).unwrap();
+        assert!(check_drawn_elsewhere(&below, pictures.iter()).is_ok());
     }
 
     #[test]

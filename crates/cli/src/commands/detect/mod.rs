@@ -11,7 +11,6 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use image::{ImageFormat, RgbImage};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
-use sdg_report::write_atomically;
 use serde::Serialize;
 
 pub use args::DetectArgs;
@@ -57,9 +56,6 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if let Some(address) = &args.from {
         return live::run(args, address, detector);
     }
-    if let Some(folder) = &args.draw {
-        files::prepare_folder(folder)?;
-    }
     inputs::check_standard_input(&args.images)?;
     let mut batch = Batch {
         args,
@@ -70,8 +66,14 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         num_failed: 0,
         found_any: false,
     };
-    for argument in &args.images {
-        match inputs::of_argument(argument) {
+    let inputs: Vec<_> = args.images.iter().map(|argument| (argument, inputs::of_argument(argument))).collect();
+    if let Some(folder) = &args.draw {
+        let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
+        inputs::check_drawn_elsewhere(folder, pictures)?;
+        files::prepare_folder(folder)?;
+    }
+    for (argument, inputs) in inputs {
+        match inputs {
             Ok(Inputs { pictures, skipped }) => {
                 if let Some(skipped) = skipped {
                     eprintln!("{skipped}");
@@ -140,7 +142,7 @@ impl<W: Write> Batch<'_, W> {
             let drawn = drawn(image, &seen.detections, &wording);
             let mut png = std::io::Cursor::new(Vec::new());
             drawn.write_to(&mut png, ImageFormat::Png)?;
-            write_atomically(&folder.join(input.drawn_name(&mut self.drawn)), &png.into_inner())?;
+            files::write(&folder.join(input.drawn_name(&mut self.drawn)), &png.into_inner())?;
         }
         Ok(seen)
     }

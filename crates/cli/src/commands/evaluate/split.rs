@@ -4,7 +4,6 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use sdg_grasp::ModelKind;
-use sdg_report::write_atomically;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
@@ -59,11 +58,11 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
         "models": measured.iter().map(|of_model| summary(of_model, &sides)).collect::<Vec<_>>(),
     });
     if let Some(path) = &args.split.results {
-        write_atomically(path, results.to_string().as_bytes())?;
+        files::write(path, results.to_string().as_bytes())?;
     }
     if let Some(path) = &args.split.records {
         let lines = measured.iter().map(candidates).collect::<Result<String>>()?;
-        write_atomically(path, lines.as_bytes())?;
+        files::write(path, lines.as_bytes())?;
     }
     if args.json {
         println!("{results}");

@@ -60,7 +60,7 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
     let picture = map.draw(&workcell, &reach);
     let mut png = Vec::new();
     picture.write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png)?;
-    sdg_report::write_atomically(&args.out, &png)?;
+    files::write(&args.out, &png)?;
     eprintln!("{}", args.out.display());
     Ok(Outcome::Done)
 }

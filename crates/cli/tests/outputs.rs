@@ -1,0 +1,59 @@
+//! No output replaces a file that the command reads, and a model replaces nothing but a model.
+
+use std::fs;
+
+use crate::support::{Folder, sdg, shipped, stdout};
+
+/// A folder with the key's photo and its marks.
+fn photographed() -> (Folder, String, String) {
+    let folder = Folder::new();
+    let [photo, marks] = [("image.png", "photo.png"), ("annotation.json", "photo.json")].map(|(shipped_name, name)| {
+        fs::copy(shipped("key", shipped_name), folder.path(name)).unwrap();
+        folder.path(name)
+    });
+    (folder, photo, marks)
+}
+
+/// The call fails with one line that contains `part`, and changes no byte of the files.
+fn refused(arguments: &[&str], part: &str, files: &[&str]) {
+    let before: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
+    let output = sdg(arguments);
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && error.contains(part), "expected {part} in: {error}");
+    let after: Vec<Vec<u8>> = files.iter().map(|file| fs::read(file).unwrap()).collect();
+    assert_eq!(before, after, "{arguments:?}");
+}
+
+#[test]
+fn a_model_replaces_neither_photo_nor_marks_nor_other_files() {
+    let (folder, photo, marks) = photographed();
+    let teach = ["teach", "--model", "S", "--demo", &photo, "--out"];
+    for out in [&photo, &marks, &folder.path("./photo.png")] {
+        refused(&[&teach[..], &[out]].concat(), "found an input of this command", &[&photo, &marks]);
+    }
+    let notes = folder.text("notes.sdg", "not a model");
+    refused(&[&teach[..], &[&notes]].concat(), "a grasp model to replace", &[&notes]);
+    // A model, and an empty file as mktemp makes it, are replaced.
+    let model = folder.text("model.sdg", "");
+    for _ in 0..2 {
+        stdout(&[&teach[..], &[&model]].concat());
+        assert!(fs::metadata(&model).unwrap().len() > 10_000);
+    }
+}
+
+#[test]
+fn drawings_replace_no_picture() {
+    let (folder, photo, marks) = photographed();
+    let model = folder.path("model.sdg");
+    stdout(&["teach", "--model", "S", "--demo", &photo, "--out", &model]);
+    let bitmap = folder.path("photo.bmp");
+    image::open(&photo).unwrap().save(&bitmap).unwrap();
+    let here = folder.path("");
+    for pictures in [&photo, &bitmap, &here] {
+        let detect = ["detect", "--grasp-model", &model, "--draw", &here, pictures];
+        refused(&detect, "--draw: expected another folder", &[&photo, &marks, &bitmap]);
+    }
+    let drawn = folder.path("drawn");
+    stdout(&["detect", "--grasp-model", &model, "--draw", &drawn, &photo]);
+    assert!(fs::metadata(folder.path("drawn/photo.png")).is_ok());
+}
