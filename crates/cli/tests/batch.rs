@@ -217,3 +217,14 @@ fn another_of_the_part_in_the_photo_does_not_count_as_wrong() {
     // With the other part among the background every sample has something wrong.
     assert!(held_back["wrong"].as_u64().unwrap() <= 2, "{held_back}");
 }
+
+#[test]
+fn a_monochrome_cameras_picture_shows_the_coloured_part() {
+    let folder = Folder::new();
+    let (model, gray) = (taught(&folder), folder.path("gray.jpg"));
+    image::open(shipped("pendulum", "image.png")).unwrap().to_luma8().save(&gray).unwrap();
+    let printed = stdout(&["detect", "--grasp-model", &model, "--json", &gray]);
+    let printed: Value = serde_json::from_str(&printed).unwrap();
+    let score = printed["detections"][0]["score"].as_f64();
+    assert!(score >= Some(0.9), "{printed}");
+}

@@ -57,6 +57,7 @@ mod base_weights_file;
 mod calibration;
 mod calibrations;
 mod check_config;
+mod colors;
 mod decimal;
 mod device;
 mod error;

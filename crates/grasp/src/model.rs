@@ -17,6 +17,7 @@ use sdg_shape::CloseLook;
 
 use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
+use crate::colors::Colors;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::models::{Network, PoseCandidate, Proposals};
@@ -326,6 +327,8 @@ pub(crate) struct Placement {
     pub(crate) demonstration_idx: usize,
     pub(crate) image_from_cutout: PlanarSimilarity,
     pub(crate) image_from_marks: PlanarSimilarity,
+    /// Whether the image has colours.
+    pub(crate) colors: Colors,
     pub(crate) agreement: f64,
     pub(crate) close: Option<CloseLook>,
     pub(crate) network_score: f64,
@@ -335,12 +338,20 @@ pub(crate) struct Placement {
 
 impl Placement {
     fn of(sighting: &Sighting<'_>) -> Self {
-        let PlacedDemonstration { demonstration_idx, image_from_cutout, image_from_marks, agreement, evidence, .. } =
-            sighting.placed;
+        let PlacedDemonstration {
+            demonstration_idx,
+            image_from_cutout,
+            image_from_marks,
+            colors,
+            agreement,
+            evidence,
+            ..
+        } = sighting.placed;
         Self {
             demonstration_idx,
             image_from_cutout,
             image_from_marks,
+            colors,
             agreement,
             close: evidence.close,
             network_score: sighting.network_score,

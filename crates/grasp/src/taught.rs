@@ -8,6 +8,7 @@ use sdg_geometry::{BoundingBox, GraspLine, Keypoint, PlanarGrasp, PlanarSimilari
 use std::sync::{Arc, OnceLock};
 
 use crate::check_config::CheckConfig;
+use crate::colors::{Colors, gray};
 use crate::decimal::decimal;
 use crate::prepared::{Prepared, PreparedSizes, WorkingSize};
 use crate::sizes::SizeRange;
@@ -25,6 +26,9 @@ pub struct TaughtDemonstration {
     /// The marks on it.
     pub marks: TaughtMarks,
     prepared: PreparedSizes,
+    /// The cut-out without colours, for pictures that have none.
+    gray: OnceLock<RgbImage>,
+    prepared_gray: PreparedSizes,
     reference: OnceLock<Reference>,
     finer_reference: OnceLock<Reference>,
     check: CheckConfig,
@@ -88,24 +92,34 @@ impl TaughtDemonstration {
             cutout,
             marks,
             prepared: PreparedSizes::default(),
+            gray: OnceLock::new(),
+            prepared_gray: PreparedSizes::default(),
             reference: OnceLock::new(),
             finer_reference: OnceLock::new(),
             check,
         };
         // What is wrong with a demonstration should come out here, not at the first picture.
         let own_size = &SizeRange::all(None, [1, 1], &made.check.search.scales)[0];
-        made.prepared(own_size)?;
+        made.prepared(own_size, Colors::There)?;
         Ok(made)
     }
 
-    /// Ready for pictures in which the part is as large as `range` says, and how those are to be resized.
+    /// Ready for pictures in which the part is as large as `range` says, with colours or without, and how those are to be resized.
     ///
     /// # Errors
     /// A part with nothing to compare at that size.
-    pub(crate) fn prepared(&self, range: &SizeRange) -> Result<(WorkingSize, Arc<Prepared>), GraspError> {
+    pub(crate) fn prepared(
+        &self,
+        range: &SizeRange,
+        colors: Colors,
+    ) -> Result<(WorkingSize, Arc<Prepared>), GraspError> {
         let bounds = self.marks.region().bounds();
         let working = WorkingSize::new(bounds.width().max(bounds.height()), range.middle());
-        let prepared = self.prepared.get(&self.cutout, &self.marks, &working, range, &self.check.search)?;
+        let (cutout, prepared) = match colors {
+            Colors::There => (&self.cutout, &self.prepared),
+            Colors::None => (self.gray.get_or_init(|| gray(&self.cutout)), &self.prepared_gray),
+        };
+        let prepared = prepared.get(cutout, &self.marks, &working, range, &self.check.search)?;
         Ok((working, prepared))
     }
 

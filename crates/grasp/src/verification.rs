@@ -15,6 +15,7 @@ use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
 use sdg_shape::{Differences, Evidence, GradientField, Picture, TableColors};
 
+use crate::colors::Colors;
 use crate::models::PoseCandidate;
 use crate::prepared::{Prepared, WorkingSize, scaling};
 use crate::sizes::SizeRange;
@@ -47,6 +48,7 @@ struct SizedDemonstration<'a> {
     range: SizeRange,
     working: WorkingSize,
     prepared: Arc<Prepared>,
+    colors: Colors,
     view_idx: usize,
 }
 
@@ -56,13 +58,21 @@ impl<'a> SearchedImage<'a> {
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
         let (width, height) = image.dimensions();
         let mut searched = Self { views: Vec::new(), sized: Vec::new() };
+        let colors = Colors::of(image);
         for (demonstration_idx, demonstration) in demonstrations.iter().enumerate() {
             let tolerance = &demonstration.check().search.scales;
             for range in SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance) {
-                if let Ok((working, prepared)) = demonstration.prepared(&range) {
+                if let Ok((working, prepared)) = demonstration.prepared(&range, colors) {
                     let view_idx = searched.view(image, working.halvings, demonstration);
-                    let sized =
-                        SizedDemonstration { demonstration, demonstration_idx, range, working, prepared, view_idx };
+                    let sized = SizedDemonstration {
+                        demonstration,
+                        demonstration_idx,
+                        range,
+                        working,
+                        prepared,
+                        colors,
+                        view_idx,
+                    };
                     searched.sized.push(sized);
                 }
             }
@@ -94,6 +104,8 @@ pub(crate) struct PlacedDemonstration<'a> {
     pub(crate) image_from_cutout: PlanarSimilarity,
     /// The same for the marks and what surrounds them, which may be shifted against the outline.
     pub(crate) image_from_marks: PlanarSimilarity,
+    /// Whether the image has colours.
+    pub(crate) colors: Colors,
     /// Edges and surface together, in `[0, 1]`.
     pub(crate) agreement: f64,
     pub(crate) evidence: Evidence,
@@ -158,6 +170,7 @@ impl<'a> SizedDemonstration<'a> {
             demonstration_idx: self.demonstration_idx,
             image_from_cutout,
             image_from_marks: self.image_from_cutout(&marks),
+            colors: self.colors,
             agreement,
             evidence,
             log_size: self.range.log_size(image_from_cutout.scale),

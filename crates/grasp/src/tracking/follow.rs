@@ -14,6 +14,8 @@ use sdg_orientation::halved;
 use sdg_shape::{CloseLook, Evidence, GradientField, Picture, Reach, TableColors};
 
 use super::detector::PartDetector;
+use crate::colors::Colors;
+use crate::model::Placement;
 use crate::plan::PixelRect;
 use crate::prepared::{Prepared, WorkingSize, scaling};
 use crate::sizes::SizeRange;
@@ -33,6 +35,7 @@ pub(super) struct SizedPart {
     range: SizeRange,
     working: WorkingSize,
     prepared: Arc<Prepared>,
+    pub(super) colors: Colors,
 }
 
 /// How far from where it is expected a part is looked for.
@@ -79,20 +82,17 @@ struct View {
 }
 
 impl SizedPart {
-    /// The demonstration for parts `scale` times as large as in it; `None` where it shows nothing to compare at that size.
-    pub(super) fn new(
-        detector: &PartDetector,
-        demonstration_idx: usize,
-        frame_size: [u32; 2],
-        scale: f64,
-    ) -> Option<Self> {
+    /// The demonstration for parts as large as one that was found; `None` where it shows nothing to compare at that size.
+    pub(super) fn new(detector: &PartDetector, found: &Placement, frame_size: [u32; 2]) -> Option<Self> {
+        let &Placement { demonstration_idx, colors, .. } = found;
+        let scale = found.image_from_cutout.scale;
         let demonstration = &detector.model().demonstrations()[demonstration_idx];
         let tolerance = &demonstration.check().search.scales;
         let range = SizeRange::all(demonstration.marks.photo_size, frame_size, tolerance)
             .into_iter()
             .min_by(|a, b| a.distance(scale).total_cmp(&b.distance(scale)))?;
-        let (working, prepared) = demonstration.prepared(&range).ok()?;
-        Some(Self { demonstration_idx, range, working, prepared })
+        let (working, prepared) = demonstration.prepared(&range, colors).ok()?;
+        Some(Self { demonstration_idx, range, working, prepared, colors })
     }
 
     pub(super) fn demonstration<'a>(&self, detector: &'a PartDetector) -> &'a TaughtDemonstration {

@@ -110,7 +110,7 @@ impl Track {
         number: u64,
         time: Duration,
     ) -> Option<Self> {
-        let part = SizedPart::new(detector, found.demonstration_idx, frame_size, found.image_from_cutout.scale)?;
+        let part = SizedPart::new(detector, found, frame_size)?;
         let mut made = Self {
             id: 0,
             standing: Standing::Arriving { replaces: None },
@@ -259,6 +259,7 @@ impl Track {
             demonstration_idx: self.part.demonstration_idx,
             image_from_cutout: followed.image_from_cutout,
             image_from_marks: followed.image_from_cutout.compose(&self.cutout_from_marks),
+            colors: self.part.colors,
             agreement: followed.agreement,
             evidence: Evidence { close, ..followed.evidence },
             log_size: followed.log_size,
