@@ -9,7 +9,8 @@ pub const EXIT_CODES: &str = "Exit codes:\n  \
     0  done\n  \
     1  failed; of several pictures at least one, the others have their results\n  \
     2  wrong usage\n  \
-    3  ran, but found nothing to grasp";
+    3  ran, but found nothing to grasp\n  \
+    4  taught and written, but the model fails its own held-back samples";
 
 /// The command and all below it, each with the exit codes at the end of its help.
 pub fn with_exit_codes(command: clap::Command) -> clap::Command {
@@ -31,6 +32,8 @@ pub enum Outcome {
     Done,
     /// 3: it ran, but found nothing to grasp.
     NothingToGrasp,
+    /// 4: the model was written, but fails its own held-back samples.
+    ModelFails,
 }
 
 impl From<Outcome> for ExitCode {
@@ -38,6 +41,7 @@ impl From<Outcome> for ExitCode {
         match outcome {
             Outcome::Done => Self::SUCCESS,
             Outcome::NothingToGrasp => Self::from(3),
+            Outcome::ModelFails => Self::from(4),
         }
     }
 }

@@ -133,6 +133,20 @@ impl HeldBackFigures {
         Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
     }
 
+    /// Why the model is of no use, in words: it finds fewer than half of the parts, or accepts something in more than half of the samples
+    /// without. `None` for a model that may be.
+    pub fn failure(&self) -> Option<String> {
+        let Totals { found, false_alarms, .. } = &self.totals;
+        let reason = if 2 * found.count < found.of {
+            format!("it finds {} of {} parts", found.count, found.of)
+        } else if 2 * false_alarms.count > false_alarms.of {
+            format!("it accepts something in {} of {} without the part", false_alarms.count, false_alarms.of)
+        } else {
+            return None;
+        };
+        Some(format!("the model fails its own held-back samples: {reason}; are the marks where the part is?"))
+    }
+
     /// The share of parts that it found.
     pub fn found(&self) -> Share {
         self.totals.found
@@ -199,5 +213,31 @@ impl HeldBackFigures {
             "errors": self.totals.errors,
             "others_in_photo": self.others_in_photo,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(found: usize, false_alarms: usize) -> HeldBackFigures {
+        let share = |count, of| Share { count, of };
+        let totals = Totals {
+            found: share(found, 18),
+            missed: 18 - found,
+            wrong: 0,
+            optional: share(0, 0),
+            clean: share(found, 18),
+            false_alarms: share(false_alarms, 6),
+            errors: None,
+        };
+        HeldBackFigures { samples: COUNT, totals, photo_px: 1.0, others_in_photo: 0 }
+    }
+
+    #[test]
+    fn a_model_fails_that_finds_less_than_half_or_accepts_more_than_half_without() {
+        assert_eq!(figures(9, 3).failure(), None);
+        assert!(figures(8, 0).failure().unwrap().contains("finds 8 of 18 parts"));
+        assert!(figures(18, 4).failure().unwrap().contains("in 4 of 6 without the part"));
     }
 }

@@ -57,6 +57,52 @@ impl Annotation {
         })
     }
 
+    /// Whether box, grasp and outline can be those of one part.
+    ///
+    /// # Errors
+    /// [`Error::Contradictory`]: an outline whose own box is another one, a grasp line that does not touch the box, and a box that is only that of
+    /// the line's two points.
+    pub fn check(&self) -> Result<()> {
+        /// Least overlap of the box and that of the outline: a box with a wide margin has a third.
+        const MIN_IOU: f64 = 0.25;
+        /// Files round coordinates.
+        const ROUNDING_PX: f64 = 1.5;
+        let contradictory = |expected, found| Err(Error::Contradictory { label: self.label.clone(), expected, found });
+        let in_words = |bounds: &BoundingBox| {
+            format!("({:.0}, {:.0}) to ({:.0}, {:.0})", bounds.x1, bounds.y1, bounds.x2, bounds.y2)
+        };
+        if let Some(outline) = self.outline.as_ref().filter(|outline| outline.bounds().iou(&self.bbox) < MIN_IOU) {
+            let found = format!("the box {} and an outline {}", in_words(&self.bbox), in_words(&outline.bounds()));
+            return contradictory("a box around the outline (x, y, width, height in COCO)", found);
+        }
+        let Some(GraspLine { start, end }) = self.grasp else {
+            return Ok(());
+        };
+        let of_line = BoundingBox {
+            x1: start.x.min(end.x),
+            y1: start.y.min(end.y),
+            x2: start.x.max(end.x),
+            y2: start.y.max(end.y),
+        };
+        const STEPS: u32 = 64;
+        let touches =
+            (0..=STEPS).any(|i| self.bbox.contains(&(start + (end - start) * f64::from(i) / f64::from(STEPS))));
+        if !touches {
+            let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
+            return contradictory("a grasp line that crosses the box", found);
+        }
+        let is_near = |a: f64, b: f64| (a - b).abs() <= ROUNDING_PX;
+        let is_the_line_s = is_near(of_line.x1, self.bbox.x1)
+            && is_near(of_line.y1, self.bbox.y1)
+            && is_near(of_line.x2, self.bbox.x2)
+            && is_near(of_line.y2, self.bbox.y2);
+        if self.outline.is_none() && is_the_line_s {
+            let found = format!("{}, the box of the two grasp points", in_words(&self.bbox));
+            return contradictory("a box around the whole part", found);
+        }
+        Ok(())
+    }
+
     /// The outline, or an error that says who needs it.
     ///
     /// # Errors
@@ -69,5 +115,40 @@ impl Annotation {
                   made from it"
                 .into(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    fn marked(bbox: [f64; 4], grasp: [f64; 4], outline: Option<[f64; 4]>) -> Annotation {
+        let of = |[x1, y1, x2, y2]: [f64; 4]| BoundingBox { x1, y1, x2, y2 };
+        Annotation {
+            label: "part".to_owned(),
+            bbox: of(bbox),
+            grasp: Some(GraspLine::new(Point2::new(grasp[0], grasp[1]), Point2::new(grasp[2], grasp[3]))),
+            jaw_width: None,
+            outline: outline.map(|outline| Polygon::from_box(&of(outline))),
+        }
+    }
+
+    #[test]
+    fn marks_that_cannot_be_of_one_part_are_refused() {
+        const BOX: [f64; 4] = [100.0, 80.0, 300.0, 200.0];
+        // Across a jutting piece the line begins and ends outside.
+        for grasp in [[180.0, 150.0, 220.0, 140.0], [90.0, 100.0, 140.0, 100.0], [200.0, 60.0, 200.0, 220.0]] {
+            marked(BOX, grasp, None).check().unwrap();
+            marked(BOX, grasp, Some([110.0, 90.0, 290.0, 190.0])).check().unwrap();
+        }
+        let refused = |marks: Annotation, part: &str| {
+            let error = marks.check().unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        };
+        refused(marked(BOX, [30.0, 30.0, 60.0, 60.0], None), "a grasp line that crosses the box");
+        refused(marked(BOX, [100.5, 200.0, 299.0, 80.0], None), "the box of the two grasp points");
+        // COCO's width and height written as the lower right corner.
+        refused(marked([100.0, 80.0, 400.0, 330.0], [180.0, 150.0, 220.0, 140.0], Some(BOX)), "x, y, width, height");
     }
 }

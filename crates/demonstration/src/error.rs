@@ -128,6 +128,9 @@ pub enum Error {
         /// Who needs it, and how to add it.
         why: String,
     },
+    /// Marks of one part that cannot all be right.
+    #[error("contradictory marks of `{label}`: expected {expected}, found {found}")]
+    Contradictory { label: String, expected: &'static str, found: String },
     /// An augmentation setting makes no sense.
     #[error("augmentation, {setting}: expected {expected}, found {found}")]
     Setting { setting: &'static str, expected: String, found: String },

@@ -42,6 +42,7 @@ impl TaughtDemonstration {
     pub fn new(demonstration: &Demonstration) -> Result<Self, GraspError> {
         let Annotation { label, bbox, jaw_width, outline, .. } = &demonstration.annotation;
         let grasp = *demonstration.annotation.require_grasp()?;
+        demonstration.annotation.check()?;
         let (width, height) = demonstration.image.dimensions();
         let cut = BoundingBox {
             x1: bbox.x1.min(grasp.start.x).min(grasp.end.x) - MARGIN_PX,

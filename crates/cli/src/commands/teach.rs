@@ -180,6 +180,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     };
 
     let facts = taught.model.facts();
+    let failure = figures.failure();
+    if let Some(failure) = &failure {
+        eprintln!("warning: {failure}");
+    }
     if args.json {
         let line = json!({
             "model": taught.model.kind(),
@@ -190,6 +194,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "teach_seconds": facts.seconds,
             "teaching": facts,
             "held_back": figures.to_json(),
+            "failure": failure,
             "base_weights": report,
             "report": page.map(|path| path.display().to_string()),
         });
@@ -221,7 +226,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             println!("report: {}", path.display());
         }
     }
-    Ok(Outcome::Done)
+    Ok(if failure.is_some() { Outcome::ModelFails } else { Outcome::Done })
 }
 
 /// The command that makes the same model again.
