@@ -25,8 +25,8 @@ fn read(argument: &str) -> Result<Demonstration> {
 /// Files that cannot be read; other than one marked object.
 pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
     let image = files::read_image(image_path)?;
-    let file_name = image_path.file_name().and_then(|name| name.to_str());
-    let facts = ImageFacts { width: image.width(), height: image.height(), file_name };
+    let path = std::path::absolute(image_path).unwrap_or_else(|_| image_path.to_owned());
+    let facts = ImageFacts { width: image.width(), height: image.height(), file_name: path.to_str() };
     let mut objects = AnnotationFile::read(annotation_path)?.objects(&facts)?;
     if objects.len() != 1 {
         let labels: Vec<&str> = objects.iter().map(|object| object.label.as_str()).collect();

@@ -56,18 +56,49 @@ pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// The image of that name; the only image whatever its name, since people rename files.
+/// How many parts of two paths are the same, from the last one on, whichever system wrote them.
+fn common_parts(one: &str, other: &str) -> usize {
+    let parts = |path: &'_ str| -> Vec<String> {
+        path.rsplit(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").map(str::to_owned).collect()
+    };
+    parts(one).iter().zip(&parts(other)).take_while(|(a, b)| a == b).count()
+}
+
+/// The image of that name, of several the one whose folders fit best; the only image whatever its name, since people rename files.
 fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>> {
     if let [only] = images {
         return Ok(only.clone());
     }
     let mut names = Vec::new();
+    let mut fitting: Vec<(usize, &Node<'a>, &str)> = Vec::new();
     for node in images {
-        let name = base_name(node.field("file_name", "the image's name")?.text()?);
-        if image.file_name.is_some_and(|wanted| base_name(wanted) == name) {
-            return Ok(node.clone());
+        let name = node.field("file_name", "the image's name")?.text()?;
+        if let Some(wanted) = image.file_name.filter(|wanted| base_name(wanted) == base_name(name)) {
+            fitting.push((common_parts(wanted, name), node, name));
         }
-        names.push(shorten(name));
+        names.push(shorten(base_name(name)));
+    }
+    if let Some(most) = fitting.iter().map(|(parts, ..)| *parts).max() {
+        fitting.retain(|(parts, ..)| *parts == most);
+        let [(_, chosen, _)] = fitting[..] else {
+            let several: Vec<String> =
+                fitting.iter().map(|(_, node, name)| format!("{} `{}`", node.place, shorten(name))).collect();
+            return Err(Error::ImageNotFound {
+                expected: "one image of that name and folder".into(),
+                found: several.join(" and "),
+            });
+        };
+        let id = chosen.field("id", "the image's number")?.value;
+        if let Some(other) =
+            images.iter().find(|other| other.place != chosen.place && other.value.get("id") == Some(id))
+        {
+            return Err(Error::Malformed {
+                place: format!("{}.id", chosen.place),
+                expected: "a number of its own".into(),
+                found: format!("{id}, as {} has", other.place),
+            });
+        }
+        return Ok(chosen.clone());
     }
     const SHOWN: usize = 6;
     let count = names.len();
@@ -323,6 +354,29 @@ mod tests {
         assert!(found.contains("an image named `c.png`") && found.contains("2 images: a.png, b.png"), "{found}");
         assert!(read_named(&value, None).unwrap_err().to_string().contains("a single image"));
         assert!(read_named(&full(), Some("renamed.png")).is_ok(), "the only image needs no name");
+    }
+
+    #[test]
+    fn of_images_of_one_name_the_folders_choose_or_both_are_named() {
+        let other = Annotation { label: "rod".into(), grasp: None, jaw_width: None, outline: None, ..pendulum() };
+        let of = |names: [&str; 2]| {
+            let mut file = CocoFile::new();
+            file.push_image(names[0], 640, 480, &[pendulum()]);
+            file.push_image(names[1], 640, 480, std::slice::from_ref(&other));
+            serde_json::from_str::<Value>(&file.to_json()).unwrap()
+        };
+        let value = of(["cam_a/image.jpg", "cam_b/image.jpg"]);
+        assert_eq!(read_named(&value, Some("/data/cam_b/image.jpg")).unwrap(), [other.clone()]);
+        assert_eq!(read_named(&value, Some("C:\\data\\cam_b\\image.jpg")).unwrap(), [other.clone()]);
+        assert_ne!(read_named(&value, Some("./cam_a/image.jpg")).unwrap(), [other.clone()]);
+        for (value, wanted) in [(&value, "image.jpg"), (&of(["image.jpg", "image.jpg"]), "cam_b/image.jpg")] {
+            let found = read_named(value, Some(wanted)).unwrap_err().to_string();
+            assert!(found.contains("images[0]") && found.contains("images[1]"), "{found}");
+        }
+        let mut twice = of(["other.jpg", "image.jpg"]);
+        twice["images"][1]["id"] = json!(1);
+        let found = read_named(&twice, Some("image.jpg")).unwrap_err().to_string();
+        assert!(found.contains("images[1].id: expected a number of its own"), "{found}");
     }
 
     #[test]

@@ -64,7 +64,11 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let input = AnnotationFile::read(&args.input)?;
     let (width, height, file_name) = image_of(args, &input)?;
     let image = ImageFacts { width, height, file_name: file_name.as_deref() };
-    let objects = input.objects(&image)?;
+    let path = args.image.as_ref().and_then(|path| std::path::absolute(path).ok());
+    let objects = input.objects(&ImageFacts {
+        file_name: path.as_ref().and_then(|path| path.to_str()).or(image.file_name),
+        ..image
+    })?;
     let written = format.write(&image, &objects)?;
 
     let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
