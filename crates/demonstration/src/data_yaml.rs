@@ -1,4 +1,4 @@
-//! The two entries of a YOLO dataset's `data.yaml` that its labels need: `names` and `kpt_shape`.
+//! The entries of a YOLO dataset's `data.yaml` that its labels need: `names`, `kpt_shape` and `kpt_names`.
 //!
 //! Read are the ways in which such files are written: a list in brackets, a list of dashes, a map from numbers. Other
 //! entries are left alone.
@@ -15,6 +15,8 @@ pub(crate) struct DataYaml {
     pub names: Vec<String>,
     /// Keypoints an object, and numbers a keypoint: 2 or 3.
     pub keypoint_shape: Option<[usize; 2]>,
+    /// The keypoints' names, by class; a list for all classes has none.
+    pub keypoint_names: Vec<(Option<usize>, Vec<String>)>,
 }
 
 impl DataYaml {
@@ -49,7 +51,16 @@ impl DataYaml {
             }
             data.names[class] = name;
         }
+        data.keypoint_names = keypoint_names(text);
         Ok(data)
+    }
+
+    /// Where the grasp's start and end stand among the keypoints of a class; `None` where no names say it.
+    pub fn grasp_among_keypoints(&self, class: usize, num_keypoints: usize) -> Option<[usize; 2]> {
+        let of_class = self.keypoint_names.iter().find(|(of, _)| of.is_none_or(|of| of == class));
+        let names = of_class.map(|(_, names)| names).filter(|names| names.len() == num_keypoints)?;
+        let place = |wanted: &str| names.iter().position(|name| name == wanted);
+        Some([place("grasp_start")?, place("grasp_end")?])
     }
 
     /// As Ultralytics reads it; paths are for the user to fill in.
@@ -66,6 +77,29 @@ impl DataYaml {
         }
         text
     }
+}
+
+/// The names of `kpt_names`: a list, or a list for each class.
+fn keypoint_names(text: &str) -> Vec<(Option<usize>, Vec<String>)> {
+    let mut lines = text.lines().map(without_comment);
+    let Some(first) = lines.find_map(|line| line.strip_prefix("kpt_names")?.trim_start().strip_prefix(':')) else {
+        return Vec::new();
+    };
+    let goes_on = |line: &&str| line.trim().is_empty() || line.starts_with([' ', '-', '\t', ']', '}']);
+    let block: Vec<&str> = std::iter::once(first).chain(lines.take_while(goes_on)).collect();
+    let mut all: Vec<(Option<usize>, Vec<String>)> = Vec::new();
+    let words = block.join(" ").replace(['[', ']', '{', '}', ','], " ").replace(':', ": ");
+    for word in words.split_whitespace().filter(|word| *word != "-") {
+        let word = word.trim_matches(['\'', '"']);
+        match word.strip_suffix(':').map(|key| key.trim_matches(['\'', '"']).parse().ok()) {
+            Some(class) => all.push((class, Vec::new())),
+            None => match all.last_mut() {
+                Some((_, names)) => names.push(word.to_owned()),
+                None => all.push((None, vec![word.to_owned()])),
+            },
+        }
+    }
+    all
 }
 
 /// The items of a top-level entry, each with its key if it has one.
@@ -171,11 +205,30 @@ mod tests {
             let data = DataYaml::parse(text.as_bytes()).unwrap();
             assert_eq!(
                 data,
-                DataYaml { names: expected.map(str::to_owned).to_vec(), keypoint_shape: Some([2, 3]) },
+                DataYaml {
+                    names: expected.map(str::to_owned).to_vec(),
+                    keypoint_shape: Some([2, 3]),
+                    ..DataYaml::default()
+                },
                 "{text}"
             );
         }
         assert_eq!(DataYaml::parse(b"train: images\n"), Ok(DataYaml::default()));
+    }
+
+    #[test]
+    fn keypoints_are_named_by_class_or_for_all() {
+        let grasp = |text: &str, class| DataYaml::parse(text.as_bytes()).unwrap().grasp_among_keypoints(class, 2);
+        let swapped = Some([1, 0]);
+        assert_eq!(grasp("names: [rod]\nkpt_names:\n  0:\n    - grasp_end\n    - grasp_start\nnc: 1\n", 0), swapped);
+        assert_eq!(grasp("kpt_names: {0: [a, b], 1: ['grasp_end', \"grasp_start\"]}  # order\n", 1), swapped);
+        assert_eq!(grasp("kpt_names:\n- grasp_end\n- grasp_start\n", 3), swapped);
+        assert_eq!(grasp("kpt_names:\n  0: [grasp_start, grasp_end]\n", 0), Some([0, 1]));
+        for none in
+            ["kpt_names: [tail, head]\n", "kpt_names: {1: [grasp_end, grasp_start]}\n", "names: [grasp_start]\n"]
+        {
+            assert_eq!(grasp(none, 0), None, "{none}");
+        }
     }
 
     #[test]
@@ -195,7 +248,7 @@ mod tests {
         #[test]
         fn any_name_comes_back(name in "[^\\n\\r\\x00]{0,12}[a-z]") {
             let name = name.trim().to_owned();
-            let data = DataYaml { names: vec![name.clone(), "b".into()], keypoint_shape: Some([2, 3]) };
+            let data = DataYaml { names: vec![name.clone(), "b".into()], keypoint_shape: Some([2, 3]), ..DataYaml::default() };
             prop_assert_eq!(DataYaml::parse(data.to_text().as_bytes()).unwrap().names[0].clone(), name);
         }
 

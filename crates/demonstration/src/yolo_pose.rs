@@ -54,7 +54,12 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
                 found: "more".into(),
             });
         }
-        objects.push(read_line(line, &format!("line {number}"), &data, image)?);
+        let place = format!("line {number}");
+        let read = read_line(line, &place, &data, image)?;
+        if data.keypoint_shape.is_none() {
+            check_is_pose(line, &read, &place, beside.is_some(), image)?;
+        }
+        objects.push(read);
     }
     if objects.is_empty() {
         return Err(Error::NoObject { expected: "a line of numbers for each object".into(), found: "none".into() });
@@ -122,8 +127,51 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
             (!unlabelled).then(|| Point2::new(keypoint[0] * across, keypoint[1] * down))
         })
         .collect();
-    read_grasp(&keypoints, place, &mut draft)?;
+    match data.grasp_among_keypoints(class as usize, keypoints.len()) {
+        Some([start, end]) => read_grasp(&[keypoints[start], keypoints[end]], place, &mut draft)?,
+        None => read_grasp(&keypoints, place, &mut draft)?,
+    }
     draft.finish(image)
+}
+
+/// Refuses what may be corners of an oriented box or of a segment, which have as many numbers as a box and keypoints without visibilities: all
+/// of it beside a data.yaml without `kpt_shape`, and without one four corners of a rectangle and keypoints outside the box.
+fn check_is_pose(line: &str, read: &Annotation, place: &str, has_data_yaml: bool, image: &ImageFacts) -> Result<()> {
+    /// How far a keypoint may lie outside the box, as a share of its sides.
+    const MARGIN: f64 = 0.1;
+    let numbers: Vec<f64> = line.split_whitespace().skip(1).filter_map(|word| word.parse().ok()).collect();
+    let rest = &numbers[4..];
+    if rest.is_empty() || keypoint_stride(rest, &DataYaml::default()) == Some(3) {
+        return Ok(());
+    }
+    let [across, down] = [f64::from(image.width), f64::from(image.height)];
+    let points: Vec<Point2<f64>> =
+        numbers.chunks_exact(2).map(|point| Point2::new(point[0] * across, point[1] * down)).collect();
+    let bbox = read.bbox;
+    let is_outside = |point: &Point2<f64>| {
+        let [dx, dy] = [MARGIN * bbox.width(), MARGIN * bbox.height()];
+        point.x < bbox.x1 - dx || point.x > bbox.x2 + dx || point.y < bbox.y1 - dy || point.y > bbox.y2 + dy
+    };
+    let keypoints = &points[2..];
+    let is_unlabelled = |point: &&Point2<f64>| point.x < 0.0 || point.y < 0.0;
+    let strays = keypoints.iter().filter(|point| !is_unlabelled(point)).any(is_outside);
+    if has_data_yaml || strays || is_rectangle(&points) {
+        return Err(Error::Malformed {
+            place: place.to_owned(),
+            expected: "a box and keypoints, which `kpt_shape` of data.yaml announces".into(),
+            found: format!("{} numbers, which may be an oriented box or a segment", numbers.len() + 1),
+        });
+    }
+    Ok(())
+}
+
+/// Whether four points are the corners of a rectangle, one after the other.
+fn is_rectangle(points: &[Point2<f64>]) -> bool {
+    let [a, b, c, d] = points else { return false };
+    let [one, other] = [(c - a).norm(), (d - b).norm()];
+    let about = |x: f64, y: f64| (x - y).abs() <= 1.0 + 0.02 * one.max(other);
+    let sides = [(b - a).norm(), (c - b).norm(), (d - c).norm(), (a - d).norm()];
+    about(one, other) && about(sides[0], sides[2]) && about(sides[1], sides[3]) && sides[0].min(sides[1]) > 2.0
 }
 
 /// Numbers a keypoint: as data.yaml says, or as the numbers themselves allow.
@@ -178,7 +226,7 @@ pub(crate) fn write(image: &ImageFacts, objects: &[Annotation]) -> WrittenAnnota
             ));
         }
     }
-    let data_yaml = DataYaml { names, keypoint_shape: Some([2, 3]) }.to_text();
+    let data_yaml = DataYaml { names, keypoint_shape: Some([2, 3]), ..DataYaml::default() }.to_text();
     WrittenAnnotation { text, data_yaml: Some(data_yaml), left_out }
 }
 
@@ -217,6 +265,28 @@ mod tests {
         let row = b"1 0.5 0.5 0.9 0.9 0.25 0.5 0.5 0.5 0.75 0.5";
         let made = Annotation::read_with(row, Some(yaml), &IMAGE).unwrap();
         assert_eq!((made[0].label.as_str(), made[0].grasp.unwrap().length()), ("pendulum", 320.0));
+    }
+
+    #[test]
+    fn corners_are_not_taken_for_a_box_and_keypoints() {
+        let refused = |text: &str, yaml: Option<&[u8]>| {
+            let error = Annotation::read_with(text.as_bytes(), yaml, &IMAGE).unwrap_err().to_string();
+            assert!(error.contains("line 1") && error.contains("an oriented box or a segment"), "{error}");
+        };
+        let oriented = "0 0.404687 0.35 0.60625 0.35 0.60625 0.579167 0.404687 0.579167";
+        refused(oriented, None);
+        refused("0 0.596094 0.575 0.460156 0.458333 0.919531 0.360417 0.489063 0.421875", None);
+        // In any picture of a dataset of another task, whatever its numbers are.
+        refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", Some(b"names: [rod]\n"));
+        let announced = Some(&b"kpt_shape: [2, 2]\nnames: [rod]\n"[..]);
+        assert!(Annotation::read_with(b"0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", announced, &IMAGE).is_ok());
+    }
+
+    #[test]
+    fn names_of_keypoints_say_which_is_the_start() {
+        let yaml = b"kpt_shape: [2, 3]\nkpt_names:\n  0:\n    - grasp_end\n    - grasp_start\n";
+        let made = Annotation::read_with(b"0 0.5 0.5 0.25 0.5 0.4 0.5 2 0.6 0.5 2", Some(yaml), &IMAGE).unwrap();
+        assert_eq!(made[0].grasp.unwrap().start, Point2::new(384.0, 240.0));
     }
 
     #[test]
