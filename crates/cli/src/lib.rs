@@ -62,7 +62,7 @@ mod run_page;
 mod shared_args;
 #[cfg(feature = "simulation")]
 pub mod shipped;
-mod split;
+pub mod split;
 mod statistics;
 mod teaching_page;
 mod teaching_progress;

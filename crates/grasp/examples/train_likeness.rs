@@ -1,17 +1,22 @@
 //! Trains the network that compares photo and picture, `sdg_shape::LikenessNetwork`, on generated parts.
 //!
 //! `cargo run --release -p sdg-grasp --example train_likeness -- [--parts N] [--held-out N] [--epochs N] [--seed S] [--pairs
-//! FILE] [--out FILE]`
+//! FILE] [--rendered FILE [--hold-out]] [--out FILE]`
 //!
 //! Draws N parts (700) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
 //! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: parts
-//! that it holds already are not drawn again. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
+//! that it holds already are not drawn again. A third of each batch comes from the FILE of `--rendered`, which the example
+//! `rendered_pairs` of sdg-cli writes; with `--hold-out` every fourth of its parts is not trained on, but told. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
 
 mod drawn;
+#[path = "train_likeness/edits.rs"]
+mod edits;
 #[path = "train_likeness/network.rs"]
 mod network;
 #[path = "train_likeness/pairs.rs"]
 mod pairs;
+#[path = "train_likeness/rendered.rs"]
+mod rendered;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -20,6 +25,7 @@ use sdg_report::write_atomically;
 
 use crate::drawn::Result;
 use crate::pairs::{Pairs, Stream};
+use crate::rendered::Rendered;
 
 struct Arguments {
     parts: usize,
@@ -27,6 +33,8 @@ struct Arguments {
     epochs: usize,
     seed: u64,
     pairs: Option<PathBuf>,
+    rendered: Option<PathBuf>,
+    holds_out: bool,
     out: PathBuf,
 }
 
@@ -38,10 +46,16 @@ impl Arguments {
             epochs: 40,
             seed: 31,
             pairs: None,
+            rendered: None,
+            holds_out: false,
             out: PathBuf::from("likeness.safetensors"),
         };
         let mut arguments = arguments;
         while let Some(name) = arguments.next() {
+            if name == "--hold-out" {
+                read.holds_out = true;
+                continue;
+            }
             let value = arguments.next().ok_or_else(|| format!("expected a value after {name}, found none"))?;
             match name.as_str() {
                 "--parts" => read.parts = value.parse()?,
@@ -49,9 +63,10 @@ impl Arguments {
                 "--epochs" => read.epochs = value.parse()?,
                 "--seed" => read.seed = value.parse()?,
                 "--pairs" => read.pairs = Some(value.into()),
+                "--rendered" => read.rendered = Some(value.into()),
                 "--out" => read.out = value.into(),
                 _ => {
-                    let known = "--parts, --held-out, --epochs, --seed, --pairs or --out";
+                    let known = "--parts, --held-out, --epochs, --seed, --pairs, --rendered, --hold-out or --out";
                     return Err(format!("expected {known}, found {name}").into());
                 }
             }
@@ -77,7 +92,11 @@ fn main() -> Result<()> {
         let (right, wrong) = pairs.counts(stream);
         eprintln!("{:6.0} s  {stream:?}: {right} right, {wrong} wrong", start.elapsed().as_secs_f64());
     }
-    let bytes = network::train(&pairs, arguments.epochs, arguments.seed, &mut |text| {
+    let rendered = match &arguments.rendered {
+        Some(path) => Rendered::read(path, arguments.holds_out)?,
+        None => Rendered::EMPTY,
+    };
+    let bytes = network::train(&pairs, &rendered, arguments.epochs, arguments.seed, &mut |text| {
         eprintln!("{:6.0} s  {text}", start.elapsed().as_secs_f64());
     })?;
     write_atomically(&arguments.out, &bytes)?;

@@ -218,7 +218,7 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
 
 /// By how much the rival fits better, as far as it fits at all: in another light, or rolled, a part fits neither; 0 where the two differ too
 /// little to tell.
-fn rivals_gain(rival: RivalFit) -> f64 {
+pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
     /// A rival that fits no better than this explains nothing, one that fits by the second all. Chosen on the tuned sets and parts.
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);

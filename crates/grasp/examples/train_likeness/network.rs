@@ -14,13 +14,16 @@ use safetensors::tensor::{Dtype, TensorView};
 use sdg_kernels::{Conv2dParams, conv2d};
 use sdg_layers::Linear;
 use sdg_layers::initialization::{Distribution, Initializer};
-use sdg_shape::{LAYERS, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, SIDE};
+use sdg_shape::{LAYERS, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
 use sdg_training::{AdamW, OneCycle};
 
 use crate::drawn::Result;
 use crate::pairs::{Pairs, Stream};
+use crate::rendered::Rendered;
 
 const BATCH: usize = 128;
+/// Of each batch. Chosen by hand.
+const RENDERED_SHARE: f64 = 0.35;
 const SCHEDULE: OneCycle = OneCycle { peak: 2e-3, warm_up: 0.1 };
 const WEIGHT_DECAY: f64 = 0.02;
 const MAX_GRADIENT_NORM: f64 = 1.0;
@@ -112,41 +115,53 @@ impl Network {
 }
 
 /// Trains on the examples for training; says after every epoch how the held-out ones are told. The file's bytes.
-pub fn train(pairs: &Pairs, epochs: usize, seed: u64, say: &mut dyn FnMut(String)) -> Result<Vec<u8>> {
+pub fn train(
+    pairs: &Pairs,
+    rendered: &Rendered,
+    epochs: usize,
+    seed: u64,
+    say: &mut dyn FnMut(String),
+) -> Result<Vec<u8>> {
     let device = Device::flex().autodiff();
     let mut network = Network::new(&device, seed);
     let mut optimizer = AdamW::new(WEIGHT_DECAY, MAX_GRADIENT_NORM);
     let mut order = pairs.of(Stream::Training);
-    let steps = epochs * (order.len() / BATCH);
+    let num_rendered = if rendered.is_empty() { 0 } else { (RENDERED_SHARE * BATCH as f64) as usize };
+    let num_drawn = BATCH - num_rendered;
+    let steps = epochs * (order.len() / num_drawn);
     let (mut step, mut rng) = (0, Pcg64Mcg::seed_from_u64(seed));
     for epoch in 0..epochs {
         order.shuffle(&mut rng);
         let mut sum = 0.0;
-        for idxs in order.chunks_exact(BATCH) {
-            let batch = batch(pairs, idxs, rng.random());
+        for idxs in order.chunks_exact(num_drawn) {
+            let batch = batch(pairs, idxs, rendered, num_rendered, rng.random());
             let loss = network.loss(&batch, &device);
             sum += f64::from(loss.clone().into_scalar::<f32>());
             let gradients = GradientsParams::from_grads(loss.backward(), &network);
             network = optimizer.step(SCHEDULE.learning_rate(step as f64 / steps as f64), network, gradients);
             step += 1;
         }
-        let mean = sum / (order.len() / BATCH) as f64;
-        let told = held_out(pairs, &LikenessNetwork::read(&network.valid().file()?)?);
+        let mean = sum / (order.len() / num_drawn) as f64;
+        let told = held_out(pairs, rendered, &LikenessNetwork::read(&network.valid().file()?)?);
         say(format!("epoch {epoch}: loss {mean:.4}; {told}"));
     }
     network.valid().file()
 }
 
-/// Every example changed by a random stream of its own, on all cores.
-fn batch(pairs: &Pairs, idxs: &[usize], seed: u64) -> Vec<(Vec<f32>, bool)> {
+/// Every example changed by a random stream of its own, on all cores: those of the indices, and `num_rendered` more.
+fn batch(pairs: &Pairs, idxs: &[usize], rendered: &Rendered, num_rendered: usize, seed: u64) -> Vec<(Vec<f32>, bool)> {
     let make = |k: usize| {
         let rng = &mut Pcg64Mcg::seed_from_u64(seed.wrapping_add(k as u64));
-        (pairs.changed_pair(idxs[k], rng).values(), pairs.is_right(idxs[k]))
+        let (pair, is_right) = match idxs.get(k) {
+            Some(&idx) => (pairs.changed_pair(idx, rng), pairs.is_right(idx)),
+            None => rendered.sample(rng),
+        };
+        (pair.values(), is_right)
     };
-    let half = idxs.len() / 2;
+    let count = idxs.len() + num_rendered;
     std::thread::scope(|scope| {
-        let first = scope.spawn(|| (0..half).map(make).collect::<Vec<_>>());
-        let second: Vec<_> = (half..idxs.len()).map(make).collect();
+        let first = scope.spawn(|| (0..count / 2).map(make).collect::<Vec<_>>());
+        let second: Vec<_> = (count / 2..count).map(make).collect();
         let mut all = first.join().expect("nothing in it panics");
         all.extend(second);
         all
@@ -154,14 +169,41 @@ fn batch(pairs: &Pairs, idxs: &[usize], seed: u64) -> Vec<(Vec<f32>, bool)> {
 }
 
 /// Loss and share told right, by the network as it is shipped.
-fn held_out(pairs: &Pairs, network: &LikenessNetwork) -> String {
-    let idxs = pairs.of(Stream::HeldOut);
-    let (mut loss, mut hits) = (0.0, 0);
-    for &idx in &idxs {
-        let log_odds = f64::from(network.log_odds(&pairs.pair(idx).values()));
-        let signed = if pairs.is_right(idx) { log_odds } else { -log_odds };
-        loss += (-signed).exp().ln_1p() / idxs.len() as f64;
-        hits += usize::from(signed > 0.0);
+fn held_out(pairs: &Pairs, rendered: &Rendered, network: &LikenessNetwork) -> String {
+    let drawn = pairs.of(Stream::HeldOut).into_iter().map(|idx| (pairs.pair(idx), pairs.is_right(idx)));
+    let drawn = Told::of(network, drawn);
+    let rendered = Told::of(network, rendered.held_out().map(|(pair, is_right)| (pair.clone(), is_right)));
+    format!("held out: {drawn}; rendered: {rendered}")
+}
+
+/// How held-out examples are told.
+struct Told {
+    loss: f64,
+    hits: usize,
+    count: usize,
+    /// The chance that a right one has more than a wrong one.
+    area: f64,
+}
+
+impl Told {
+    fn of(network: &LikenessNetwork, examples: impl Iterator<Item = (Pair, bool)>) -> Self {
+        let mut told: Vec<(f64, bool)> =
+            examples.map(|(pair, is_right)| (f64::from(network.log_odds(&pair.values())), is_right)).collect();
+        let signed = told.iter().map(|(log_odds, is_right)| if *is_right { *log_odds } else { -log_odds });
+        let loss = signed.clone().map(|signed| (-signed).exp().ln_1p()).sum::<f64>() / told.len() as f64;
+        let hits = signed.filter(|signed| *signed > 0.0).count();
+        told.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut wrong, mut below) = (0usize, 0usize);
+        for (_, is_right) in &told {
+            if *is_right { below += wrong } else { wrong += 1 }
+        }
+        let area = below as f64 / (wrong * (told.len() - wrong)) as f64;
+        Self { loss, hits, count: told.len(), area }
     }
-    format!("held out: loss {loss:.4}, {hits} of {} told", idxs.len())
+}
+
+impl std::fmt::Display for Told {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "loss {:.4}, {} of {} told, area {:.3}", self.loss, self.hits, self.count, self.area)
+    }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
-use sdg_grasp::fitting::likeness_examples;
+use sdg_grasp::fitting::{PAIR_RECORD_BYTES as RECORD, PairFacts, append_pair, likeness_examples, pair_facts, pair_of};
 use sdg_part_generator::{Condition, SceneConfig};
 use sdg_report::write_atomically;
 use sdg_shape::{Pair, SIDE};
@@ -13,13 +13,7 @@ use sdg_shape::{Pair, SIDE};
 use crate::drawn::{Result, absent, draw_parts};
 
 /// Pixels of a pair.
-const AREA: usize = SIDE * SIDE;
-/// Bytes of an example: stream, whether right, index of the part in two bytes, photo, picture, flags.
-const RECORD: usize = 4 + 7 * AREA;
-/// Bits of a flag.
-const INSIDE: u8 = 1;
-const PHOTO: u8 = 2;
-const PICTURE: u8 = 4;
+pub const AREA: usize = SIDE * SIDE;
 /// Parts drawn at once: all of them are in memory with their pictures.
 const PARTS_AT_ONCE: usize = 20;
 /// Picture sizes, in turn.
@@ -68,7 +62,13 @@ impl Pairs {
                 let drawn = draw_parts(PARTS_AT_ONCE.min(count - begin), SIZES[chunk_idx % SIZES.len()], &kinds, seed)?;
                 for (i, part) in drawn.iter().enumerate() {
                     for example in likeness_examples(part)? {
-                        append(&mut bytes, stream, begin + i, example.is_right, &example.pair);
+                        let facts = PairFacts {
+                            stream: stream as u8,
+                            part_idx: u16::try_from(begin + i)?,
+                            is_right: example.is_right,
+                            is_clear: false,
+                        };
+                        append_pair(&mut bytes, facts, &example.pair);
                     }
                 }
                 say(format!("{stream:?}: {} parts, {} examples", begin + drawn.len(), bytes.len() / RECORD));
@@ -79,14 +79,14 @@ impl Pairs {
 
     /// Which parts are there, by stream, [`PARTS_AT_ONCE`] together.
     fn chunks(&self) -> BTreeSet<(u8, usize)> {
-        let chunk = |record: &[u8]| (record[0], part_idx(record) / PARTS_AT_ONCE);
-        self.bytes.chunks_exact(RECORD).map(chunk).collect()
+        let chunk = |facts: PairFacts| (facts.stream, usize::from(facts.part_idx) / PARTS_AT_ONCE);
+        self.bytes.chunks_exact(RECORD).map(pair_facts).map(chunk).collect()
     }
 
     /// In the order in which they are drawn at once.
     fn sorted(self) -> Self {
         let mut records: Vec<&[u8]> = self.bytes.chunks_exact(RECORD).collect();
-        records.sort_by_key(|record| (record[0], part_idx(record)));
+        records.sort_by_key(|record| (pair_facts(record).stream, pair_facts(record).part_idx));
         Self { bytes: records.concat() }
     }
 
@@ -109,7 +109,7 @@ impl Pairs {
 
     /// Indices of the examples for training, or of those held out.
     pub fn of(&self, stream: Stream) -> Vec<usize> {
-        (0..self.len()).filter(|&idx| self.record(idx)[0] == stream as u8).collect()
+        (0..self.len()).filter(|&idx| pair_facts(self.record(idx)).stream == stream as u8).collect()
     }
 
     /// Right and wrong ones.
@@ -120,7 +120,7 @@ impl Pairs {
     }
 
     pub fn is_right(&self, idx: usize) -> bool {
-        self.record(idx)[1] == 1
+        pair_facts(self.record(idx)).is_right
     }
 
     fn record(&self, idx: usize) -> &[u8] {
@@ -129,45 +129,19 @@ impl Pairs {
 
     /// As it was found.
     pub fn pair(&self, idx: usize) -> Pair {
-        let record = &self.record(idx)[4..];
-        let flags = &record[6 * AREA..];
-        let colors = |from: usize, bit: u8| {
-            let color = |i: usize| {
-                let value = |c: usize| f32::from(record[from + 3 * i + c]) / 255.0;
-                (flags[i] & bit != 0).then(|| [value(0), value(1), value(2)])
-            };
-            (0..AREA).map(color).collect()
-        };
-        Pair {
-            photo: colors(0, PHOTO),
-            picture: colors(3 * AREA, PICTURE),
-            inside: flags.iter().map(|flag| flag & INSIDE != 0).collect(),
-        }
+        pair_of(self.record(idx))
     }
 
     /// Turned and mirrored together, and each in another light.
     pub fn changed_pair(&self, idx: usize, rng: &mut Pcg64Mcg) -> Pair {
-        let pair = turned(&self.pair(idx), rng);
-        Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
+        changed(&self.pair(idx), rng)
     }
 }
 
-fn part_idx(record: &[u8]) -> usize {
-    usize::from(u16::from_le_bytes([record[2], record[3]]))
-}
-
-fn append(bytes: &mut Vec<u8>, stream: Stream, part_idx: usize, is_right: bool, pair: &Pair) {
-    bytes.extend([stream as u8, u8::from(is_right)]);
-    bytes.extend((part_idx as u16).to_le_bytes());
-    for colors in [&pair.photo, &pair.picture] {
-        for color in colors {
-            bytes.extend(color.unwrap_or_default().map(|value| (255.0 * value).round() as u8));
-        }
-    }
-    for ((photo, picture), inside) in pair.photo.iter().zip(&pair.picture).zip(&pair.inside) {
-        let flag = |is: bool, bit| if is { bit } else { 0 };
-        bytes.push(flag(*inside, INSIDE) | flag(photo.is_some(), PHOTO) | flag(picture.is_some(), PICTURE));
-    }
+/// Turned and mirrored together, and each in another light.
+pub fn changed(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
+    let pair = turned(pair, rng);
+    Pair { photo: in_other_light(&pair.photo, 0.6, rng), picture: in_other_light(&pair.picture, 1.0, rng), ..pair }
 }
 
 /// Both turned by the same angle about the middle, and mirrored or not.
@@ -194,7 +168,7 @@ fn turned(pair: &Pair, rng: &mut Pcg64Mcg) -> Pair {
 }
 
 /// The colour between four pixels; `None` where the nearest has none.
-fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3]> {
+pub fn between(colors: &[Option<[f32; 3]>], [x, y]: &[f32; 2]) -> Option<[f32; 3]> {
     let at = |x: f32, y: f32| {
         let is_inside = x >= 0.0 && y >= 0.0 && x < SIDE as f32 && y < SIDE as f32;
         if is_inside { colors[y as usize * SIDE + x as usize] } else { None }

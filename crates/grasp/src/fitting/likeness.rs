@@ -2,7 +2,7 @@
 
 use sdg_shape::{Likeness, Pair};
 
-use super::observation::is_right;
+use super::observation::{error_of, is_right};
 use super::pictures::{FitPart, FitPicture};
 use crate::error::Result;
 use crate::taught::TaughtDemonstration;
@@ -11,6 +11,10 @@ use crate::verification::{PlacedDemonstration, SearchedImage, search};
 
 /// Wrong poses of a picture that count: those that agree best.
 const WRONG_A_PICTURE: usize = 3;
+
+/// A pose that is no farther from an instance than this, as a share of its diagonal and in radians, is neither right nor wrong if it is not
+/// right: the part's height displaces it.
+const NEARLY: (f64, f64) = (0.15, 0.3);
 
 /// Photo and picture laid over each other.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +51,10 @@ pub fn likeness_examples(part: &FitPart) -> Result<Vec<LikenessExample>> {
                     is_instance_seen[idx] = true;
                     example(placed, true);
                 }
-                None if num_wrong < WRONG_A_PICTURE && !picture.is_undecided(placed) => {
+                None if num_wrong < WRONG_A_PICTURE
+                    && !picture.is_undecided(placed)
+                    && !is_nearly_right(placed, picture, part, &turns) =>
+                {
                     num_wrong += 1;
                     example(placed, false);
                 }
@@ -65,4 +72,16 @@ fn instance_of(
     turns: &HiddenTurns,
 ) -> Option<usize> {
     picture.instances.iter().position(|instance| is_right(placed, instance, part, turns))
+}
+
+fn is_nearly_right(
+    placed: &PlacedDemonstration<'_>,
+    picture: &FitPicture,
+    part: &FitPart,
+    turns: &HiddenTurns,
+) -> bool {
+    picture.instances.iter().any(|instance| {
+        let (share, turn) = error_of(placed, instance, part, turns);
+        share <= NEARLY.0 && turn <= NEARLY.1
+    })
 }

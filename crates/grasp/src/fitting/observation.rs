@@ -128,13 +128,24 @@ pub(super) fn is_right(
     part: &FitPart,
     turns: &HiddenTurns,
 ) -> bool {
+    let (share, turn) = error_of(placed, instance, part, turns);
+    share <= RIGHT_SHARE && turn <= Angle::from_degrees(RIGHT_DEGREES).radians()
+}
+
+/// How far a pose's grasp is from that of an instance: as a share of the instance's diagonal, and in radians, turns that look the same
+/// not counted.
+pub(super) fn error_of(
+    placed: &PlacedDemonstration<'_>,
+    instance: &FitInstance,
+    part: &FitPart,
+    turns: &HiddenTurns,
+) -> (f64, f64) {
     let truth = PlanarGrasp::from_line(&instance.grasp, 0.0);
     let found = placed.demonstration.grasp(&placed.image_from_marks);
     let found = turns.nearest(&found, truth.angle, 0, &instance.image_from_demonstration);
     let bbox = &part.demonstration.annotation.bbox;
     let diagonal = bbox.width().hypot(bbox.height()) * instance.image_from_demonstration.scale;
-    (found.center() - truth.center()).norm() <= RIGHT_SHARE * diagonal
-        && found.angle.distance(truth.angle) <= Angle::from_degrees(RIGHT_DEGREES).radians()
+    ((found.center() - truth.center()).norm() / diagonal, found.angle.distance(truth.angle))
 }
 
 impl FitPicture {

@@ -13,10 +13,10 @@ use sdg_shape::Evidence;
 use super::loss::COST_OF_WRONG;
 use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::{ScoreConfig, Term};
-use crate::verdict::judge_picture;
+use crate::verdict::{judge_picture, rivals_gain};
 
 /// Terms that are fitted: all but the network's, which is not asked here.
-const NUM_TERMS: usize = 8;
+const NUM_TERMS: usize = 12;
 /// Weights and bias.
 type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 
@@ -93,7 +93,24 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
             let off_size = if config.size.weight == 0.0 { 0.0 } else { contributions.size / config.size.weight };
             let surface = surface.unwrap_or(config.surface.neutral);
             let (resemblance, likeness) = (clues.resemblance, close.map_or(f64::NEG_INFINITY, |close| close.likeness));
-            let raw = [edges, surface, hue_shift, visible, off_size, outside, resemblance, likeness];
+            let closely = close.map_or([0.0; 4], |close| {
+                [close.bare, close.no_rim, close.added, close.mirrored.map_or(0.0, rivals_gain)]
+            });
+            let [bare, no_rim, added, mirrored] = closely;
+            let raw = [
+                edges,
+                surface,
+                hue_shift,
+                visible,
+                off_size,
+                outside,
+                resemblance,
+                likeness,
+                bare,
+                no_rim,
+                added,
+                mirrored,
+            ];
             let terms = terms(config);
             SVector::from_fn(|k, _| raw[k].clamp(terms[k].range[0], terms[k].range[1]))
         })
@@ -103,12 +120,27 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
 /// The fitted terms, in the order of [`values`].
 fn terms(config: &ScoreConfig) -> [Term; NUM_TERMS] {
     let ScoreConfig { edges, surface, hue, visible, size, outside, resemblance, likeness, .. } = *config;
-    [edges, surface, hue, visible, size, outside, resemblance, likeness]
+    let ScoreConfig { table, rim, added, mirror, .. } = *config;
+    [edges, surface, hue, visible, size, outside, resemblance, likeness, table, rim, added, mirror]
 }
 
 fn terms_mut(config: &mut ScoreConfig) -> [&mut Term; NUM_TERMS] {
-    let ScoreConfig { edges, surface, hue, visible, size, outside, resemblance, likeness, .. } = config;
-    [edges, surface, hue, visible, size, outside, resemblance, likeness]
+    let ScoreConfig {
+        edges,
+        surface,
+        hue,
+        visible,
+        size,
+        outside,
+        resemblance,
+        likeness,
+        table,
+        rim,
+        added,
+        mirror,
+        ..
+    } = config;
+    [edges, surface, hue, visible, size, outside, resemblance, likeness, table, rim, added, mirror]
 }
 
 /// Weights, and the bias as if every neutral value were 0.
@@ -186,6 +218,8 @@ fn neutral_in_the_middle(parts: &[&PartObservations], config: &ScoreConfig) -> S
         term.neutral = match k {
             0..=3 | 7 => 0.5 * (median(k, Some(true)) + median(k, Some(false))),
             6 => median(k, None),
+            // What contradicts the part is neutral up to where its range begins.
+            8.. => term.range[0],
             _ => 0.0,
         };
         term.neutral = (term.neutral * 100.0).round() / 100.0;
