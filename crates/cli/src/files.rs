@@ -67,6 +67,21 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(write_atomically(path, bytes)?)
 }
 
+/// The same for a file that may be `own`, which the command read to keep what stands in it.
+///
+/// # Errors
+/// As [`write`].
+pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
+    check_is_no_other_input(path, own)?;
+    Ok(write_atomically(path, bytes)?)
+}
+
+fn check_is_no_other_input(path: &Path, own: Option<&Path>) -> Result<()> {
+    let is_own =
+        own.is_some_and(|own| path.canonicalize().is_ok_and(|path| own.canonicalize().is_ok_and(|own| own == path)));
+    if is_own { Ok(()) } else { check_is_no_input(path) }
+}
+
 /// The file and its length.
 fn open(path: &Path) -> Result<(File, u64)> {
     let named = || format!("{}: cannot read", path.display());
@@ -137,7 +152,15 @@ pub fn read_model(path: &Path, device: &Device) -> Result<GraspModel> {
 
 /// Makes sure, before minutes of work, that a file can be written at `path` later, and that it is no input.
 pub fn check_writable(path: &Path) -> Result<()> {
-    check_is_no_input(path)?;
+    check_extendable(path, None)
+}
+
+/// The same of a file that may be `own`, as for [`extend`].
+///
+/// # Errors
+/// As [`check_writable`].
+pub fn check_extendable(path: &Path, own: Option<&Path>) -> Result<()> {
+    check_is_no_other_input(path, own)?;
     if path.is_dir() {
         bail!("{}: expected a file to write, found a folder", path.display());
     }
@@ -206,6 +229,8 @@ mod tests {
             assert!(check_writable(path).is_err());
         }
         assert_eq!(fs::read(&photo).unwrap(), b"photo");
+        assert!(extend(&photo, Some(&other), b"more").is_err());
+        extend(&photo, Some(&by_detour), b"photo").unwrap();
         write(&other, b"drawing").unwrap();
         assert_eq!(fs::read(&other).unwrap(), b"drawing");
     }

@@ -73,10 +73,11 @@ impl Rendered {
             let other = &part.right[*part.clear.choose(rng).expect("it is not empty")];
             pair.photo.clone_from(&other.picture);
         }
-        if is_right && rng.random_bool(EDITED_SHARE) {
-            if let Some(edited) = edited(&pair, rng) {
-                (pair, is_right) = (edited, false);
-            }
+        if is_right
+            && rng.random_bool(EDITED_SHARE)
+            && let Some(edited) = edited(&pair, rng)
+        {
+            (pair, is_right) = (edited, false);
         }
         (changed(&pair, rng), is_right)
     }

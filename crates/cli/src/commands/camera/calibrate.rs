@@ -51,7 +51,7 @@ const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 /// Finds the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
-    files::check_writable(&args.out)?;
+    files::check_extendable(&args.out, Some(&args.out))?;
     let looked: Vec<(&Path, Result<Seen<'_>>)> =
         args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
     let mut lines: Vec<Value> = Vec::new();
@@ -137,7 +137,7 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     } else {
         camera.update_yaml(&existing).with_context(|| named(&args.out))?
     };
-    files::write(&args.out, text.as_bytes())
+    files::extend(&args.out, Some(&args.out), text.as_bytes())
 }
 
 /// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.

@@ -72,7 +72,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let bytes = files::read(&args.poses, MAX_BYTES)?;
     let poses = read_robot_poses(&String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
     if let Some(out) = &args.out {
-        files::check_writable(out)?;
+        files::check_extendable(out, Some(&args.camera))?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
     let looked: Vec<(&RobotPose, Result<HandEyeView>)> =
@@ -96,7 +96,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
         let camera = placed(args, camera, &found, mount);
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
-        files::write(out, text.as_bytes())?;
+        files::extend(out, Some(&args.camera), text.as_bytes())?;
     }
     for (k, pose) in seen.iter().enumerate() {
         let [metres, radians] = found.spread[k];

@@ -95,7 +95,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     let Some(out) = args.out.as_ref().or(args.camera.as_ref()) else {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
-    files::check_writable(out)?;
+    files::check_extendable(out, args.camera.as_deref())?;
     let picture = files::read_image(&args.picture)?;
     if let Some((camera, _)) = &existing {
         camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
@@ -120,7 +120,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     // What `detect --camera` would refuse is refused here.
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
-    files::write(out, text.as_bytes())?;
+    files::extend(out, args.camera.as_deref(), text.as_bytes())?;
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
 }
