@@ -366,9 +366,9 @@ mod tests {
             serde_json::from_str::<Value>(&file.to_json()).unwrap()
         };
         let value = of(["cam_a/image.jpg", "cam_b/image.jpg"]);
-        assert_eq!(read_named(&value, Some("/data/cam_b/image.jpg")).unwrap(), [other.clone()]);
-        assert_eq!(read_named(&value, Some("C:\\data\\cam_b\\image.jpg")).unwrap(), [other.clone()]);
-        assert_ne!(read_named(&value, Some("./cam_a/image.jpg")).unwrap(), [other.clone()]);
+        assert_eq!(read_named(&value, Some("/data/cam_b/image.jpg")).unwrap(), std::slice::from_ref(&other));
+        assert_eq!(read_named(&value, Some("C:\\data\\cam_b\\image.jpg")).unwrap(), std::slice::from_ref(&other));
+        assert_ne!(read_named(&value, Some("./cam_a/image.jpg")).unwrap(), std::slice::from_ref(&other));
         for (value, wanted) in [(&value, "image.jpg"), (&of(["image.jpg", "image.jpg"]), "cam_b/image.jpg")] {
             let found = read_named(value, Some(wanted)).unwrap_err().to_string();
             assert!(found.contains("images[0]") && found.contains("images[1]"), "{found}");

@@ -82,11 +82,11 @@ mod tests {
 
     #[test]
     fn a_record_gives_back_what_was_written() {
-        let color = |i: usize| (i % 5 != 0).then_some([(i % 256) as f32 / 255.0, 0.0, 1.0]);
+        let color = |i: usize| (!i.is_multiple_of(5)).then_some([(i % 256) as f32 / 255.0, 0.0, 1.0]);
         let pair = Pair {
             photo: (0..AREA).map(|i| color(i + 1)).collect(),
             picture: (0..AREA).map(color).collect(),
-            inside: (0..AREA).map(|i| i % 3 == 0).collect(),
+            inside: (0..AREA).map(|i| i.is_multiple_of(3)).collect(),
         };
         let facts = PairFacts { stream: 1, part_idx: 700, is_right: true, is_clear: false };
         let mut bytes = Vec::new();
