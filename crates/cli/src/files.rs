@@ -36,23 +36,21 @@ pub fn check_readable(path: &Path) -> Result<()> {
     open(path).map(drop)
 }
 
-/// What this command was given to read: [`write`] replaces none of it.
+/// What this command has opened to read: [`write`] replaces none of it.
 static INPUTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Takes a file for an input before it is read; reading takes it for one, too.
-pub fn note_input(path: &Path) {
-    if let Ok(path) = path.canonicalize() {
-        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
-    }
+/// Whether two paths lead to one file that is there, whatever links they go through.
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
-/// Makes sure that no input of this command would be replaced.
+/// Makes sure that no input of this command would be replaced, but for `own`.
 ///
 /// # Errors
-/// A path that names one, whatever links lead to it.
-fn check_is_no_input(path: &Path) -> Result<()> {
+/// A path that leads to one.
+fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
     let is_input = |path: PathBuf| INPUTS.lock().unwrap_or_else(PoisonError::into_inner).contains(&path);
-    if path.canonicalize().is_ok_and(is_input) {
+    if !own.is_some_and(|own| is_same_file(path, own)) && path.canonicalize().is_ok_and(is_input) {
         bail!("{}: expected a name of its own for what is written, found an input of this command", path.display());
     }
     Ok(())
@@ -61,10 +59,9 @@ fn check_is_no_input(path: &Path) -> Result<()> {
 /// Writes a file whole or not at all, and never over an input of this command.
 ///
 /// # Errors
-/// A path that names an input; what the system says.
+/// A path that leads to an input; what the system says.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    check_is_no_input(path)?;
-    Ok(write_atomically(path, bytes)?)
+    extend(path, None, bytes)
 }
 
 /// The same for a file that may be `own`, which the command read to keep what stands in it.
@@ -72,14 +69,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// As [`write`].
 pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
-    check_is_no_other_input(path, own)?;
+    check_is_no_input(path, own)?;
     Ok(write_atomically(path, bytes)?)
-}
-
-fn check_is_no_other_input(path: &Path, own: Option<&Path>) -> Result<()> {
-    let is_own =
-        own.is_some_and(|own| path.canonicalize().is_ok_and(|path| own.canonicalize().is_ok_and(|own| own == path)));
-    if is_own { Ok(()) } else { check_is_no_input(path) }
 }
 
 /// The file and its length.
@@ -90,7 +81,9 @@ fn open(path: &Path) -> Result<(File, u64)> {
     if metadata.is_dir() {
         bail!("{}: expected a file, found a folder", path.display());
     }
-    note_input(path);
+    if let Ok(path) = path.canonicalize() {
+        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
+    }
     Ok((file, metadata.len()))
 }
 
@@ -160,7 +153,7 @@ pub fn check_writable(path: &Path) -> Result<()> {
 /// # Errors
 /// As [`check_writable`].
 pub fn check_extendable(path: &Path, own: Option<&Path>) -> Result<()> {
-    check_is_no_other_input(path, own)?;
+    check_is_no_input(path, own)?;
     if path.is_dir() {
         bail!("{}: expected a file to write, found a folder", path.display());
     }

@@ -112,6 +112,15 @@ fn from_the_sheet_to_a_camera_file_that_detects() {
             files.picture(&format!("{k}.png"), &picture)
         })
         .collect();
+    for input in [&svg, &pictures[0]] {
+        let before = fs::read(input).unwrap();
+        let mut arguments = vec!["camera", "calibrate", "--board", &svg, "--out", input];
+        arguments.extend(pictures.iter().map(String::as_str));
+        let refused = sdg(&arguments);
+        let error = String::from_utf8(refused.stderr).unwrap();
+        assert!(!refused.status.success() && error.contains("found an input of this command"), "{error}");
+        assert_eq!(fs::read(input).unwrap(), before);
+    }
     let out = files.text("camera.yaml", "# the one above the bench\nexposure_us: 4000\n");
     let mut arguments = vec!["camera", "calibrate", "--board", &svg, "--out", &out, "--camera-name", "bench", "--json"];
     arguments.extend(pictures.iter().map(String::as_str));

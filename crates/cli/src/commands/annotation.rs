@@ -57,7 +57,7 @@ pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
 /// What the output has no room for is listed on standard error, and in the JSON.
 fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let format = format_of_output(args)?;
-    if args.output.exists() && same_file(&args.input, &args.output) {
+    if files::is_same_file(&args.input, &args.output) {
         return Err(Usage(format!("{}: expected another file to write than to read", args.output.display())).into());
     }
     files::check_writable(&args.output)?;
@@ -121,13 +121,6 @@ fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
             ))
             .into()),
         },
-    }
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
     }
 }
 

@@ -51,7 +51,7 @@ const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 /// Finds the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
-    files::check_extendable(&args.out, Some(&args.out))?;
+    files::check_writable(&args.out)?;
     let looked: Vec<(&Path, Result<Seen<'_>>)> =
         args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
     let mut lines: Vec<Value> = Vec::new();
@@ -118,6 +118,8 @@ fn warn_of_squares(board: &Board, seen: &[Seen<'_>]) {
 }
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
+    // Board and pictures are read by now, and the file itself is not: it may be completed, they may not be replaced.
+    files::check_writable(&args.out)?;
     let existing = match fs::exists(&args.out) {
         Ok(true) => String::from_utf8(files::read(&args.out, MAX_BYTES)?)
             .map_err(|_| anyhow!("{}: expected YAML, found bytes that are no text", args.out.display()))?,
