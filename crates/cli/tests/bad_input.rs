@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::{sdg, shipped};
+use crate::support::{Folder, sdg, shipped};
 use sdg_cli::evaluation::{Settings, Store};
 
 /// Asserts exit code and one line on standard error that contains every part.
@@ -248,4 +248,26 @@ fn a_picture_of_another_size_with_nothing_in_it_is_answered_with_advice() {
         let advice = "it has 320x200 pixels and the photo had 640x480";
         assert_eq!(stdout.contains(advice) && stdout.contains("--size-tolerance"), advised, "{stdout}");
     }
+}
+
+#[test]
+fn a_model_that_fails_its_own_samples_is_written_and_ends_with_4() {
+    let folder = Folder::new();
+    // A patch of a checkerboard, which is everywhere.
+    let photo = folder.path("checks.png");
+    let checks =
+        image::GrayImage::from_fn(640, 480, |x, y| image::Luma([if (x / 40 + y / 40) % 2 == 0 { 200 } else { 60 }]));
+    checks.save(&photo).unwrap();
+    let marks = serde_json::json!({
+        "images": [{"id": 1, "file_name": "checks.png"}],
+        "annotations": [{"id": 1, "image_id": 1, "category_id": 1, "bbox": [240, 160, 160, 160], "keypoints": [300, 240, 2, 340, 240, 2]}],
+        "categories": [{"id": 1, "name": "patch", "keypoints": ["grasp_start", "grasp_end"]}]});
+    folder.text("checks.json", &marks.to_string());
+    let model = folder.path("model.sdg");
+    let taught = sdg(&["teach", "--model", "S", "--demo", &photo, "--out", &model, "--json"]);
+    let said = String::from_utf8(taught.stderr).unwrap();
+    assert_eq!(taught.status.code(), Some(4), "{said}");
+    assert!(said.contains("fails its own held-back samples"), "{said}");
+    let line: serde_json::Value = serde_json::from_slice(&taught.stdout).unwrap();
+    assert!(line["failure"].is_string() && fs::metadata(&model).is_ok(), "{line}");
 }
