@@ -118,6 +118,8 @@ pub struct ScoreConfig {
     pub resemblance: Term,
     /// Of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
+    /// Of [`sdg_shape::CloseLook::details`]; against a pose alone. From the tuned side of a split (docs/decisions/026-details.md).
+    pub details: Term,
     /// Of [`sdg_shape::CloseLook::bare`].
     pub table: Term,
     /// Of [`sdg_shape::CloseLook::no_rim`].
@@ -140,7 +142,7 @@ impl ScoreConfig {
     }
 
     /// Every term of the score, by name.
-    pub fn terms(&self) -> [(&'static str, Term); 13] {
+    pub fn terms(&self) -> [(&'static str, Term); 14] {
         [
             ("network", self.network),
             ("edges", self.edges),
@@ -151,6 +153,7 @@ impl ScoreConfig {
             ("outside", self.outside),
             ("resemblance", self.resemblance),
             ("likeness", self.likeness),
+            ("details", self.details),
             ("table", self.table),
             ("rim", self.rim),
             ("added", self.added),
@@ -184,6 +187,7 @@ const SCORE: ScoreConfig = ScoreConfig {
     outside: term(-2.15, 0.0, 0.0, 0.34),
     resemblance: term(-2.74, 0.36, 0.2, 0.45),
     likeness: term(0.777, -0.1, -2.0, 6.0),
+    details: term(1.0, -3.0, -9.0, -3.0),
     network: term(0.8, 0.0, -1.0, 0.0),
     table: term(-9.0, 0.0, 0.0, 1.0),
     rim: term(-4.0, 0.05, 0.05, 1.0),

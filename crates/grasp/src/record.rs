@@ -105,6 +105,7 @@ mod tests {
             outside: -0.25,
             resemblance: 0.0,
             likeness: 0.0,
+            details: 0.0,
             table: 0.0,
             rim: 0.0,
             added: 0.0,

@@ -3,7 +3,7 @@
 //! ```text
 //! network score ────────────────┐
 //! edges, surface, hue ──────────┤
-//! visible share, likeness ───────┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
+//! visible, likeness, details ───┼─ log-odds of each, bounded ─ sum ─ logistic ─ score; 0.5 decides
 //! size, share outside ──────────┤
 //! resemblance ──────────────────┤  how much other things look like this part: known from teaching
 //! table, rim, added, mirror ────┘  what contradicts the part, without bounds
@@ -41,6 +41,9 @@ pub struct Contributions {
     /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
     /// too little for it to be asked.
     pub likeness: f64,
+    /// The log-odds of the network that knows parts from their look-alikes, where they speak clearly against the part; 0 where it was not
+    /// asked.
+    pub details: f64,
     /// Table where the part should be.
     pub table: f64,
     /// The share of the outline with no edge.
@@ -64,6 +67,7 @@ impl Contributions {
             ("outside", self.outside),
             ("resemblance", self.resemblance),
             ("likeness", self.likeness),
+            ("details", self.details),
             ("table", self.table),
             ("rim", self.rim),
             ("added", self.added),
@@ -90,7 +94,9 @@ impl Contributions {
             .named()
             .filter(|(name, _)| Some(*name) != strongest)
             // These say nothing of where the part and the picture differ, unless they speak against the part.
-            .filter(|(name, log_odds)| !["network", "resemblance", "likeness"].contains(name) || *log_odds < 0.0)
+            .filter(|(name, log_odds)| {
+                !["network", "resemblance", "likeness", "details"].contains(name) || *log_odds < 0.0
+            })
             .filter_map(|(name, log_odds)| Some((name, best(name)? - log_odds)))
             .filter(|(_, loss)| *loss >= MIN_LOSS)
             .collect();
@@ -114,6 +120,7 @@ impl Contributions {
             "visible" => "too little of it is visible",
             "size" => "it has another size",
             "likeness" => "photo and picture, laid over each other, do not show the same part",
+            "details" => "a feature or print of the part is not there, or is elsewhere",
             "outside" => "too much of it lies outside the picture",
             "table" => "bare table is seen where the part should be",
             "rim" => "a part of its outline is not there",
@@ -207,6 +214,7 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         outside: config.outside.log_odds(seen.outside),
         resemblance: config.resemblance.log_odds(clues.resemblance),
         likeness: config.likeness.log_odds(seen.close.map_or(f64::NEG_INFINITY, |close| close.likeness)),
+        details: details(seen).map_or(0.0, |details| config.details.log_odds(details)),
         table: closely(&config.table, &|close| close.bare),
         rim: closely(&config.rim, &|close| close.no_rim),
         added: closely(&config.added, &|close| close.added),
@@ -214,6 +222,13 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     };
     let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
+}
+
+/// What the details say, of a part that lies bare: what covers one covers its details.
+pub(crate) fn details(seen: &Evidence) -> Option<f64> {
+    /// From this share of the part in view on it lies bare. Chosen by hand: the cap of [`ScoreConfig::visible`].
+    const BARE: f64 = 0.77;
+    seen.close.and_then(|close| close.details).filter(|_| seen.visible >= BARE)
 }
 
 /// By how much the rival fits better, as far as it fits at all: in another light, or rolled, a part fits neither; 0 where the two differ too
@@ -238,7 +253,7 @@ pub(crate) mod tests {
 
     /// A close look at the part itself, with another likeness.
     pub(crate) fn look(likeness: f64) -> CloseLook {
-        CloseLook { likeness, bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
+        CloseLook { likeness, details: Some(1.5), bare: 0.0, fit: 0.75, no_rim: 0.02, added: 0.0, mirrored: None }
     }
 
     /// A clear view of the part: what right poses have in the median on generated parts.

@@ -21,6 +21,7 @@ use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
 
 use crate::close_look::{CloseLook, CloseUp, Rival, TableColors};
 use crate::config::{AgreementConfig, RefinementConfig};
+use crate::details::Details;
 use crate::gradient_field::GradientField;
 use crate::likeness::Likeness;
 use crate::structure::Structure;
@@ -56,6 +57,8 @@ pub struct Comparison<'a> {
     pub structure: &'a Structure,
     /// What the comparing network sees of it.
     pub likeness: &'a Likeness,
+    /// Its features, for a network.
+    pub details: &'a Details,
     pub(crate) close_up: &'a CloseUp,
     pub(crate) mirrored: Option<&'a Rival>,
     pub(crate) turned: &'a Rival,
@@ -96,6 +99,9 @@ impl Agreement {
         (1.0 - self.surface_share) * self.edges + self.surface_share * self.surface
     }
 }
+
+/// Whose likeness is less than this is refused: the details are not asked, for time. Chosen by hand.
+const MIN_LIKENESS: f64 = -4.0;
 
 /// All measurements of a pose in an image, from which a caller makes a score.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,8 +160,11 @@ impl Comparison<'_> {
         let seen = self.close_up.seen(self.picture.image, image_from_demonstration);
         let look = self.close_up.look(&seen, self.picture.table);
         let rival = |rival: &Rival| rival.against(self.close_up, &seen, self.picture.field, image_from_demonstration);
+        let likeness = self.likeness.log_odds(self.picture.image, image_from_demonstration);
+        let is_open = look.is_plausible() && likeness >= MIN_LIKENESS;
         CloseLook {
-            likeness: self.likeness.log_odds(self.picture.image, image_from_demonstration),
+            likeness,
+            details: is_open.then(|| self.details.log_odds(self.picture.image, image_from_demonstration)).flatten(),
             mirrored: self.mirrored.filter(|_| look.is_plausible()).and_then(rival),
             ..look
         }

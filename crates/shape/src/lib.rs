@@ -32,6 +32,7 @@
 //! | bank | the template turned and scaled in all variants that the search tries |
 //! | place, pitch | where the search puts the part's centre, and the distance between two such places |
 //! | likeness | log-odds of a small network that photo and picture show the same part |
+//! | details | log-odds of a second one, trained on parts and their look-alikes |
 //!
 //! What this crate leaves out: it knows no grasp and no camera, and a part lies flat: poses are turns, shifts and scales
 //! in the image plane. Threads only with the feature `parallel`, and results do not depend on them.
@@ -76,11 +77,13 @@ mod close_look;
 mod comparison;
 mod config;
 mod consensus;
+mod details;
 mod edge_points;
 mod error;
 mod following;
 mod frame;
 mod gradient_field;
+mod layers;
 mod likeness;
 pub mod parallel;
 mod pixel_cell;
@@ -96,10 +99,12 @@ pub use comparison::{Agreement, Comparison, Differences, Evidence, Picture};
 pub use config::{
     AgreementConfig, GradientConfig, RefinementConfig, ScaleRange, ShapeConfig, StructureConfig, SurfaceConfig,
 };
+pub use details::Details;
 pub use error::ShapeError;
 pub use following::Reach;
 pub use gradient_field::GradientField;
-pub use likeness::{LAYERS, Layer, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
+pub use layers::Layer;
+pub use likeness::{LAYERS, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};
 pub use refinement::Refinement;
 pub use search::{Match, SearchConfig, ShapeSearch};
 pub use structure::{Structure, StructureAgreement};

@@ -126,6 +126,7 @@ mod tests {
             outside: none,
             resemblance: none,
             likeness: none,
+            details: none,
             table: none,
             rim: none,
             added: none,

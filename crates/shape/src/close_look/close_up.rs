@@ -103,6 +103,7 @@ impl CloseUp {
         }
         CloseLook {
             likeness: 0.0,
+            details: None,
             bare: self.bare(seen, table),
             fit: f64::from(fit / edges.max(f32::MIN_POSITIVE)),
             no_rim: self.share_without_rim(&fits, &is_seen),

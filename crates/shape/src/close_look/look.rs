@@ -5,6 +5,8 @@
 pub struct CloseLook {
     /// [`crate::Likeness::log_odds`].
     pub likeness: f64,
+    /// [`crate::Details::log_odds`]; `None`, too, where the rest leaves no doubt that it is not the part.
+    pub details: Option<f64>,
     /// Share of the part where the picture shows its table and the photo does not, in `[0, 1]`.
     pub bare: f64,
     /// Mean correlation of signed gradients in windows, in `[-1, 1]`.

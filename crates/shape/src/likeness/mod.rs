@@ -15,8 +15,9 @@ mod pair;
 use image::RgbImage;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-pub use self::network::{LAYERS, Layer, LikenessNetwork, NUM_HIDDEN};
+pub use self::network::{LAYERS, LikenessNetwork, NUM_HIDDEN};
 use self::pair::Photo;
+pub(crate) use self::pair::exposed_values;
 pub use self::pair::{NUM_CHANNELS, Pair, SIDE};
 
 /// A demonstration, ready to be compared with pictures by the network.

@@ -64,14 +64,20 @@ impl Pair {
 }
 
 fn values(photo: &[Option<[f32; 3]>], picture: &[Option<[f32; 3]>], inside: &[bool]) -> Vec<f32> {
-    let [of_photo, of_picture] = [photo, picture].map(|colors| gain(colors, inside));
     let mut values = Vec::with_capacity(NUM_CHANNELS * inside.len());
-    for ((photo, picture), inside) in photo.iter().zip(picture).zip(inside) {
-        values.extend(exposed(photo, of_photo));
-        values.extend(exposed(picture, of_picture));
+    let colors = exposed_values(photo, inside).zip(exposed_values(picture, inside));
+    for (((of_photo, of_picture), picture), inside) in colors.zip(picture).zip(inside) {
+        values.extend(of_photo);
+        values.extend(of_picture);
         values.extend([*inside, picture.is_some()].map(|is| f32::from(u8::from(is))));
     }
     values
+}
+
+/// Colours with the exposure taken out: their mean inside is [`MEAN`]; 0 where there is none.
+pub(crate) fn exposed_values(colors: &[Option<[f32; 3]>], inside: &[bool]) -> impl Iterator<Item = [f32; 3]> {
+    let gain = gain(colors, inside);
+    colors.iter().map(move |color| exposed(color, gain))
 }
 
 /// What brings the mean colour inside to [`MEAN`].

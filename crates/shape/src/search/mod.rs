@@ -26,6 +26,7 @@ use crate::capture_range::CaptureRange;
 use crate::close_look::{CloseUp, Rival, TableColors};
 use crate::comparison::{Agreement, Comparison, Evidence, MIN_REFINED, Picture};
 use crate::config::ShapeConfig;
+use crate::details::Details;
 use crate::edge_points::{EdgePoint, EdgeSelection, select_edge_points};
 use crate::error::ShapeError;
 use crate::following::Reach;
@@ -160,6 +161,7 @@ pub struct ShapeSearch {
     surface: Surface,
     structure: Structure,
     likeness: Likeness,
+    details: Details,
     close_up: CloseUp,
     /// `None` where the mirror image is the same, or has too few edges.
     mirrored: Option<Rival>,
@@ -196,6 +198,7 @@ impl ShapeSearch {
             surface: Surface::new(image, outline, &config.shape.surface),
             structure: Structure::new(&field, outline, &config.shape.structure, &config.shape.agreement),
             likeness: Likeness::new(image, outline),
+            details: Details::new(image, outline),
             turned: Rival::turned(&close_up, &template, &field, outline.bounds().center(), &own_places),
             mirrored: Rival::mirrored(image, outline, &field, &config.shape, places_of_mirrored, &close_up)
                 .ok()
@@ -306,13 +309,14 @@ impl ShapeSearch {
 
     /// The demonstration over an image.
     pub fn comparison<'a>(&'a self, picture: &Picture<'a>) -> Comparison<'a> {
-        let Self { template, surface, structure, likeness, close_up, mirrored, turned, .. } = self;
+        let Self { template, surface, structure, likeness, details, close_up, mirrored, turned, .. } = self;
         let (min_agreement, mirrored) = (self.config.min_agreement, mirrored.as_ref());
         Comparison {
             template,
             surface,
             structure,
             likeness,
+            details,
             close_up,
             mirrored,
             turned,

@@ -27,8 +27,8 @@ const MAX_PAGE_GAP_MS: f64 = 150.0;
 /// A page that freezes by its own fault does so each time; one that another process keeps from its core does not.
 const GAP_TRIALS: usize = 3;
 const MAX_DOWNLOAD_BYTES: usize = 4_000_000;
-/// What is fetched besides where somebody turns to the graphics card: compilers of shaders come along.
-const MAX_CARD_DOWNLOAD_BYTES: usize = 4_500_000;
+/// What is fetched besides where somebody turns to the graphics card: compilers of shaders come along, and the weights once more.
+const MAX_CARD_DOWNLOAD_BYTES: usize = 4_700_000;
 
 const PROCESSOR: &str = "processor";
 const CARD: &str = "webgpu";

@@ -1,0 +1,112 @@
+//! Whether the picture has the photo's own features where the photo has them: holes, lugs, print, lengths.
+//!
+//! A second network beside the likeness ([`crate::likeness`]), which sees 64 pixels and knows parts from background: this one sees 128, and was
+//! trained on rendered parts and their look-alikes alone, in which one feature is moved, absent, added or of another size, or
+//! the print is another (docs/decisions/026-details.md).
+
+mod network;
+
+use image::RgbImage;
+use sdg_geometry::{PlanarSimilarity, Polygon};
+
+use self::network::{Features, NUM_CHANNELS, Network, SIDE};
+use crate::frame::Frame;
+use crate::likeness::exposed_values;
+
+/// Pixels that the part's longer side has at least in photo and picture: in the pictures that the network was trained on it has 80 to 190.
+const MIN_PX: f64 = 75.0;
+/// The part's longer side in what the network sees.
+const PART_SIDE: f64 = SIDE as f64 / 1.2;
+
+/// A demonstration, ready to be compared with pictures by the network.
+#[derive(Debug, Clone)]
+pub struct Details {
+    frame: Frame,
+    colors: Vec<Option<[f32; 3]>>,
+    inside: Vec<bool>,
+    /// Of a picture that fills the frame.
+    features: Features,
+}
+
+impl Details {
+    /// Reads the part out of its cut-out; `outline` in its pixels.
+    pub fn new(cutout: &RgbImage, outline: &Polygon) -> Self {
+        let frame = Frame::about(&outline.bounds(), PART_SIDE, SIDE);
+        let colors = frame.sampled(cutout, &PlanarSimilarity::IDENTITY);
+        let inside: Vec<bool> = frame.pixels().map(|at| outline.contains(&frame.place(at))).collect();
+        let features = features(&colors, &inside, &vec![true; inside.len()]);
+        Self { frame, colors, inside, features }
+    }
+
+    /// ln of how much likelier the image shows the part at the pose than a look-alike or anything else, as the network was trained: with three wrong
+    /// poses for two right ones. `None` where photo or picture shows the part too small for its details.
+    pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<f64> {
+        if PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0) < MIN_PX {
+            return None;
+        }
+        let picture = self.frame.sampled(image, image_from_cutout);
+        let is_seen: Vec<bool> = picture.iter().map(Option::is_some).collect();
+        let of_picture = features(&picture, &self.inside, &is_seen);
+        // Beyond the picture's edge both are compared with nothing.
+        let cut = is_seen.contains(&false).then(|| features(&self.colors, &self.inside, &is_seen));
+        let of_photo = cut.as_ref().unwrap_or(&self.features);
+        Some(f64::from(Network::shipped().log_odds(of_photo, &of_picture, &self.inside)))
+    }
+}
+
+fn features(colors: &[Option<[f32; 3]>], inside: &[bool], is_seen: &[bool]) -> Features {
+    let mut values = Vec::with_capacity(NUM_CHANNELS * inside.len());
+    for ((color, inside), is_seen) in exposed_values(colors, inside).zip(inside).zip(is_seen) {
+        values.extend(color);
+        values.extend([*inside, *is_seen].map(|is| f32::from(u8::from(is))));
+    }
+    Network::shipped().features(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+    use sdg_geometry::BoundingBox;
+
+    /// A plate with two holes on a table; the second hole at `hole_x`.
+    fn plate(hole_x: f32, light: f32) -> RgbImage {
+        RgbImage::from_fn(320, 240, |x, y| {
+            let is_hole = |cx: f32, cy: f32| (x as f32 - cx).hypot(y as f32 - cy) < 9.0;
+            let on_plate = (80..240).contains(&x) && (70..170).contains(&y);
+            let color = match () {
+                () if on_plate && !is_hole(110.0, 100.0) && !is_hole(hole_x, 140.0) => [60.0, 62.0, 70.0],
+                () if on_plate => [25.0, 25.0, 28.0],
+                () => [180.0, 170.0, 160.0],
+            };
+            Rgb(color.map(|value: f32| (value * light) as u8))
+        })
+    }
+
+    #[test]
+    fn a_hole_elsewhere_speaks_against_the_part_and_other_light_does_not() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
+        let taught = Details::new(&plate(205.0, 1.0), &outline);
+        let seen = |picture: &RgbImage| taught.log_odds(picture, &PlanarSimilarity::IDENTITY).unwrap();
+        let (same, darker, moved) = (seen(&plate(205.0, 1.0)), seen(&plate(205.0, 0.6)), seen(&plate(165.0, 1.0)));
+        assert!(same > 0.5 && darker > 0.5 && moved < same - 2.0, "{same} {darker} {moved}");
+    }
+
+    #[test]
+    fn a_part_at_the_picture_s_edge_is_compared_where_it_is_seen() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
+        let taught = Details::new(&plate(205.0, 1.0), &outline);
+        let cut = image::imageops::crop_imm(&plate(205.0, 1.0), 0, 0, 225, 240).to_image();
+        let whole = taught.log_odds(&plate(205.0, 1.0), &PlanarSimilarity::IDENTITY).unwrap();
+        let at_edge = taught.log_odds(&cut, &PlanarSimilarity::IDENTITY).unwrap();
+        assert!(at_edge > 1.0 && at_edge < whole, "{at_edge} {whole}");
+    }
+    #[test]
+    fn a_part_of_few_pixels_is_not_judged() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
+        let taught = Details::new(&plate(205.0, 1.0), &outline);
+        let at =
+            |scale: f64| taught.log_odds(&plate(205.0, 1.0), &PlanarSimilarity { scale, ..PlanarSimilarity::IDENTITY });
+        assert!(at(0.4).is_none() && at(0.5).is_some() && at(2.0).is_some());
+    }
+}

@@ -1,0 +1,205 @@
+//! The network's weights, what it makes of one picture, and how it compares two.
+//!
+//! ```text
+//! photo ──── tower (3 convolutions) ─ 32×32×24 ─┐
+//!                                               ├─ |a − b|, a, b ─ 2 convolutions ─ 16×16×48 ─┬─ cells: differs there?
+//! picture ── tower, the same weights ───────────┘                                             └─ 2 convolutions ─ pooled ─ log-odds
+//! ```
+
+use std::sync::LazyLock;
+
+use pulp::{Arch, Simd, WithSimd};
+use safetensors::SafeTensors;
+
+use crate::error::ShapeError;
+use crate::layers::{Layer, Linear, add_products, convolved, layer, rectified};
+
+/// Rows and columns of what the network sees.
+pub(super) const SIDE: usize = 128;
+/// Values of a pixel: colour, whether it lies in the outline, whether it lies in the picture.
+pub(super) const NUM_CHANNELS: usize = 5;
+const TOWER: [Layer; 3] = [layer(NUM_CHANNELS, 16, 2), layer(16, 32, 2), layer(32, NUM_FEATURES, 1)];
+const NUM_FEATURES: usize = 24;
+const COMPARED: [Layer; 4] = [layer(3 * NUM_FEATURES, 48, 2), layer(48, 48, 1), layer(48, 64, 2), layer(64, 64, 1)];
+/// Convolutions of [`COMPARED`] before the cells.
+const NUM_BEFORE_CELLS: usize = 2;
+/// Rows and columns of the cells.
+const CELLS_SIDE: usize = 16;
+/// Pixels of a cell's side.
+const CELL: usize = SIDE / CELLS_SIDE;
+/// A cell counts from this share of it on that lies in the outline.
+const MIN_INSIDE: f32 = 0.3;
+const NUM_OUTPUTS: usize = 64;
+/// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, the mean probability of the cells.
+const NUM_POOLED: usize = 2 * NUM_OUTPUTS + 2;
+const NUM_HIDDEN: usize = 64;
+
+/// Weights of the network.
+#[derive(Debug, Clone)]
+pub(super) struct Network {
+    tower: Vec<Linear>,
+    compared: Vec<Linear>,
+    cells: Linear,
+    hidden: Linear,
+    answer: Linear,
+}
+
+/// What the tower makes of one picture, row by row.
+#[derive(Debug, Clone)]
+pub(super) struct Features(Vec<f32>);
+
+static SHIPPED: LazyLock<Network> = LazyLock::new(|| {
+    Network::read(include_bytes!("../../details.safetensors"))
+        .expect("the shipped weights are read by a test of this module")
+});
+
+impl Network {
+    /// The one trained by us.
+    pub(super) fn shipped() -> &'static Self {
+        &SHIPPED
+    }
+
+    /// Reads a safetensors file: `tower.N.weight`, `compared.N.weight`, `cells.weight`, `hidden.weight`, `answer.weight`, each with outputs
+    /// first, and a `.bias` for each.
+    fn read(bytes: &[u8]) -> Result<Self, ShapeError> {
+        let file = SafeTensors::deserialize(bytes).map_err(|error| ShapeError::Weights(error.to_string()))?;
+        let convolutions = |name: &str, layers: &[Layer]| {
+            let read = |(i, layer): (usize, &Layer)| {
+                Linear::read(&file, &format!("{name}.{i}"), &[layer.outputs, layer.inputs, 3, 3])
+            };
+            layers.iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()
+        };
+        Ok(Self {
+            tower: convolutions("tower", &TOWER)?,
+            compared: convolutions("compared", &COMPARED)?,
+            cells: Linear::read(&file, "cells", &[1, COMPARED[NUM_BEFORE_CELLS - 1].outputs])?,
+            hidden: Linear::read(&file, "hidden", &[NUM_HIDDEN, NUM_POOLED])?,
+            answer: Linear::read(&file, "answer", &[1, NUM_HIDDEN])?,
+        })
+    }
+
+    /// Of [`NUM_CHANNELS`] values a pixel, row by row.
+    pub(super) fn features(&self, values: Vec<f32>) -> Features {
+        Arch::new().dispatch(Tower { network: self, values })
+    }
+
+    /// ln of how much likelier the picture shows the part than not. `inside` says which pixels lie in the outline.
+    pub(super) fn log_odds(&self, photo: &Features, picture: &Features, inside: &[bool]) -> f32 {
+        Arch::new().dispatch(Comparing { network: self, photo, picture, inside })
+    }
+}
+
+struct Tower<'a> {
+    network: &'a Network,
+    values: Vec<f32>,
+}
+
+impl WithSimd for Tower<'_> {
+    type Output = Features;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Features {
+        let weights = &self.network.tower;
+        let map = convolved::<16>(&self.values, SIDE, &TOWER[0], &weights[0]);
+        let map = convolved::<32>(&map, SIDE / 2, &TOWER[1], &weights[1]);
+        Features(convolved::<NUM_FEATURES>(&map, SIDE / 4, &TOWER[2], &weights[2]))
+    }
+}
+
+struct Comparing<'a> {
+    network: &'a Network,
+    photo: &'a Features,
+    picture: &'a Features,
+    inside: &'a [bool],
+}
+
+impl WithSimd for Comparing<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        let Self { network, photo, picture, inside } = self;
+        let weights = &network.compared;
+        let mut map = Vec::with_capacity(3 * photo.0.len());
+        for (a, b) in photo.0.chunks_exact(NUM_FEATURES).zip(picture.0.chunks_exact(NUM_FEATURES)) {
+            map.extend(a.iter().zip(b).map(|(a, b)| (a - b).abs()));
+            map.extend(a);
+            map.extend(b);
+        }
+        let map = convolved::<48>(&map, SIDE / 4, &COMPARED[0], &weights[0]);
+        let map = convolved::<48>(&map, CELLS_SIDE, &COMPARED[1], &weights[1]);
+        let [largest, mean] = cells(&map, network, inside);
+        let map = convolved::<64>(&map, CELLS_SIDE, &COMPARED[2], &weights[2]);
+        let map = convolved::<NUM_OUTPUTS>(&map, CELLS_SIDE / 2, &COMPARED[3], &weights[3]);
+        let mut pooled = vec![0.0; NUM_POOLED];
+        let num = map.len() / NUM_OUTPUTS;
+        for pixel in map.chunks_exact(NUM_OUTPUTS) {
+            for c in 0..NUM_OUTPUTS {
+                pooled[c] += pixel[c] / num as f32;
+                pooled[NUM_OUTPUTS + c] = f32::max(pooled[NUM_OUTPUTS + c], pixel[c]);
+            }
+        }
+        pooled[2 * NUM_OUTPUTS..].copy_from_slice(&[largest / 4.0, mean]);
+        let mut hidden = [0.0; NUM_HIDDEN];
+        hidden.copy_from_slice(&network.hidden.bias);
+        add_products(&mut hidden, &pooled, &network.hidden.weights);
+        let mut answer = [network.answer.bias[0]];
+        add_products(&mut answer, &hidden.map(rectified), &network.answer.weights);
+        answer[0]
+    }
+}
+
+/// The largest log-odds of a difference in a cell, and the mean probability of one.
+fn cells(map: &[f32], network: &Network, inside: &[bool]) -> [f32; 2] {
+    /// Log-odds where no cell counts.
+    const NONE: f32 = -20.0;
+    let channels = map.len() / (CELLS_SIDE * CELLS_SIDE);
+    let (mut largest, mut sum, mut count) = (NONE, 0.0, 0.0f32);
+    for (i, pixel) in map.chunks_exact(channels).enumerate() {
+        let [x, y] = [i % CELLS_SIDE, i / CELLS_SIDE].map(|k| k * CELL);
+        let num_inside =
+            (0..CELL).flat_map(|dy| &inside[(y + dy) * SIDE + x..][..CELL]).filter(|is_inside| **is_inside).count();
+        if num_inside as f32 > MIN_INSIDE * (CELL * CELL) as f32 {
+            let mut log_odds = [network.cells.bias[0]];
+            add_products(&mut log_odds, pixel, &network.cells.weights);
+            largest = largest.max(log_odds[0]);
+            sum += 1.0 / (1.0 + (-log_odds[0]).exp());
+            count += 1.0;
+        }
+    }
+    [largest, sum / count.max(1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The expected values are PyTorch's, in double precision with the shipped weights.
+    #[test]
+    fn the_shipped_network_answers_as_pytorch_does() {
+        const OF_PAIR: usize = 8;
+        for (seed, expected) in [(13, -0.005_517), (500, -0.684_771)] {
+            let value = |i: usize| ((i * 7919 + seed * (i / 512)) % 1000) as f32 / 1000.0;
+            let is_set = |i: usize| f64::from(value(i)) > 0.3;
+            let mask = |i: usize| f32::from(u8::from(is_set(i)));
+            let values = |first: usize| {
+                let pixel = move |p: usize| {
+                    let at = p * OF_PAIR;
+                    [value(at + first), value(at + first + 1), value(at + first + 2), mask(at + 6), mask(at + 7)]
+                };
+                (0..SIDE * SIDE).flat_map(pixel).collect::<Vec<_>>()
+            };
+            let inside: Vec<bool> = (0..SIDE * SIDE).map(|p| is_set(p * OF_PAIR + 6)).collect();
+            let network = Network::shipped();
+            let [photo, picture] = [0, 3].map(|first| network.features(values(first)));
+            let log_odds = network.log_odds(&photo, &picture, &inside);
+            assert!((log_odds - expected).abs() < 1e-3, "{log_odds}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let other = Network::read(include_bytes!("../../likeness.safetensors")).unwrap_err();
+        assert!(other.to_string().contains("tower.0"), "{other}");
+    }
+}

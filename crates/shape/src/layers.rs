@@ -1,0 +1,156 @@
+//! Convolutions and sums of small networks in plain loops, compiled for the widest instructions that the machine has where their caller is.
+
+use safetensors::SafeTensors;
+
+use crate::error::ShapeError;
+
+/// A convolution of 3×3 pixels, with a border of zeros, and a rectifier behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layer {
+    /// Channels that it reads.
+    pub inputs: usize,
+    /// Channels that it makes.
+    pub outputs: usize,
+    /// Pixels from one place to the next.
+    pub stride: usize,
+}
+
+pub(crate) const fn layer(inputs: usize, outputs: usize, stride: usize) -> Layer {
+    Layer { inputs, outputs, stride }
+}
+
+/// Weights by what is read, then by what is made; and what is added.
+#[derive(Debug, Clone)]
+pub(crate) struct Linear {
+    pub(crate) weights: Vec<f32>,
+    pub(crate) bias: Vec<f32>,
+}
+
+impl Linear {
+    pub(crate) fn read(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Self, ShapeError> {
+        let weights = tensor(file, &format!("{name}.weight"), shape)?;
+        let bias = tensor(file, &format!("{name}.bias"), &shape[..1])?;
+        Ok(Self { weights: outputs_last(&weights, shape[0], shape[1]), bias })
+    }
+}
+
+/// From output, input, tap to tap, input, output: outputs lie next to each other where the loops add them up.
+fn outputs_last(weights: &[f32], outputs: usize, inputs: usize) -> Vec<f32> {
+    let taps = weights.len() / (outputs * inputs);
+    let place = |i: usize| {
+        let (output, rest) = (i % outputs, i / outputs);
+        let (input, tap) = (rest % inputs, rest / inputs);
+        (output * inputs + input) * taps + tap
+    };
+    (0..weights.len()).map(|i| weights[place(i)]).collect()
+}
+
+fn tensor(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, ShapeError> {
+    let wrong = |found: String| ShapeError::Weights(format!("expected {name} of shape {shape:?}, found {found}"));
+    let view = file.tensor(name).map_err(|error| wrong(error.to_string()))?;
+    if view.shape() != shape {
+        return Err(wrong(format!("{:?}", view.shape())));
+    }
+    match view.dtype() {
+        safetensors::Dtype::F16 => {
+            Ok(view.data().chunks_exact(2).map(|pair| half::f16::from_le_bytes([pair[0], pair[1]]).to_f32()).collect())
+        }
+        safetensors::Dtype::F32 => Ok(view
+            .data()
+            .chunks_exact(4)
+            .map(|four| f32::from_le_bytes([four[0], four[1], four[2], four[3]]))
+            .collect()),
+        other => Err(wrong(format!("elements of {other:?}"))),
+    }
+}
+
+/// One convolution and its rectifier.
+#[inline(always)]
+pub(crate) fn convolved<const OUTPUTS: usize>(
+    map: &[f32],
+    side: usize,
+    layer: &Layer,
+    convolution: &Linear,
+) -> Vec<f32> {
+    let (inputs, stride) = (layer.inputs, layer.stride);
+    let out_side = side / stride;
+    let mut out = Vec::with_capacity(out_side * out_side * OUTPUTS);
+    for i in 0..out_side * out_side {
+        let [x, y] = [i % out_side, i / out_side].map(|k| k * stride);
+        let mut sums = [0.0; OUTPUTS];
+        sums.copy_from_slice(&convolution.bias);
+        for tap in 0..9 {
+            // The border is zero.
+            let [x, y] = [x + tap % 3, y + tap / 3].map(|k| k.wrapping_sub(1));
+            if x < side && y < side {
+                let pixel = &map[(y * side + x) * inputs..][..inputs];
+                add_products(&mut sums, pixel, &convolution.weights[tap * inputs * OUTPUTS..][..inputs * OUTPUTS]);
+            }
+        }
+        out.extend(sums.map(rectified));
+    }
+    out
+}
+
+/// Adds values times weights to the sums.
+#[inline(always)]
+pub(crate) fn add_products<const OUTPUTS: usize>(sums: &mut [f32; OUTPUTS], values: &[f32], weights: &[f32]) {
+    for (value, row) in values.iter().zip(weights.chunks_exact(OUTPUTS)) {
+        for (sum, weight) in sums.iter_mut().zip(row) {
+            *sum += value * weight;
+        }
+    }
+}
+
+#[inline(always)]
+pub(crate) fn rectified(value: f32) -> f32 {
+    value.max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    fn random(len: usize, rng: &mut Pcg64Mcg) -> Vec<f32> {
+        (0..len).map(|_| rng.random_range(-1.0..1.0)).collect()
+    }
+
+    /// By the definitions, one value at a time, in double precision.
+    fn naive(map: &[f32], side: usize, layer: &Layer, convolution: &Linear) -> Vec<f64> {
+        let out_side = side / layer.stride;
+        let mut out = vec![0.0; out_side * out_side * layer.outputs];
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = f64::from(convolution.bias[i % layer.outputs]);
+            let (o, x, y) = (i % layer.outputs, i / layer.outputs % out_side, i / layer.outputs / out_side);
+            for (tap, input) in (0..9).flat_map(|tap| (0..layer.inputs).map(move |input| (tap, input))) {
+                let column = (x * layer.stride + tap % 3) as isize - 1;
+                let row = (y * layer.stride + tap / 3) as isize - 1;
+                if (0..side as isize).contains(&column) && (0..side as isize).contains(&row) {
+                    let at = (row as usize * side + column as usize) * layer.inputs + input;
+                    let weight = convolution.weights[(tap * layer.inputs + input) * layer.outputs + o];
+                    *value += f64::from(map[at]) * f64::from(weight);
+                }
+            }
+            *value = value.max(0.0);
+        }
+        out
+    }
+
+    #[test]
+    fn a_convolution_is_what_its_definition_says() {
+        let rng = &mut Pcg64Mcg::seed_from_u64(2);
+        for stride in [1, 2] {
+            let layer = Layer { inputs: 5, outputs: 16, stride };
+            let convolution = Linear { weights: random(9 * 5 * 16, rng), bias: random(16, rng) };
+            let map = random(8 * 8 * 5, rng);
+            let made = convolved::<16>(&map, 8, &layer, &convolution);
+            let expected = naive(&map, 8, &layer, &convolution);
+            assert_eq!(made.len(), expected.len());
+            for (a, b) in made.iter().zip(&expected) {
+                assert!((f64::from(*a) - b).abs() < 1e-4, "{a} {b}");
+            }
+        }
+    }
+}
