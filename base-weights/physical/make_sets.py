@@ -118,6 +118,8 @@ class Setting:
 class SetMaker:
     """Renders one part's set. `index` is the part's number in its group: it shifts the variants of the kinds."""
 
+    scene_type = Scene
+
     def __init__(self, group, name, root, spp, only, resume):
         self.group, self.name, self.spp, self.only, self.resume = group, name, spp, only, resume
         self.spec = group.parts[name]
@@ -182,7 +184,7 @@ class SetMaker:
         table = surfaces.table(rng, setting.ground)
         if setting.style == "glare":
             table.rough = rng.uniform(0.12, 0.25)
-        scene = Scene()
+        scene = self.scene_type()
         scene.sensor(setting.cam, self.spp)
         scene.light(light)
         scene.table(rng, table)

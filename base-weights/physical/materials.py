@@ -1,7 +1,8 @@
 """Surfaces of bodies as Mitsuba BSDF dictionaries.
 
 A material's name is one of `NAMES`, or `KIND:R,G,B` with an sRGB colour from 0 to 1 and one of the kinds paint,
-plastic, rubber, board (solder mask), metal, glass; or `print:NAME`, a picture drawn by `prints.py`.
+plastic, rubber, board (solder mask), metal, glass, blank (an empty print, grey by R); or `print:NAME`, a picture drawn
+by `prints.py`.
 
 Numbers that differ between materials are pictures of one size, not numbers in the dictionary: so Dr.Jit compiles its
 kernels once for all scenes.
@@ -142,6 +143,7 @@ COLOURED = dict(
     rubber=lambda p, c: p.metal(c, p.u(0.6, 0.75), "fine", 0.02, 0.0),
     metal=lambda p, c: p.metal(c, p.u(0.22, 0.34), "scratch", 0.01, 1.0),
     glass=lambda p, c: p.metal(c, 0.07, "fine", 0.0005, 0.0),
+    blank=lambda p, c: p.printed(np.full((512, 1024, 3), int(255 * c[0]), np.uint8)),
 )
 
 
