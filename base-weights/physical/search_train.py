@@ -1,0 +1,49 @@
+"""Lets the program look for the random parts in their rendered pictures. Usage: search_train.py RENDERED SDG
+
+RENDERED has the folders of make_train.py, SDG is the program. Writes FOLDER/found.jsonl, all that
+`sdg detect --all --json` finds in the pictures: what model S accepts and what it refuses. These are the poses that the
+comparer is asked about. A folder that has `found.jsonl` is left out.
+"""
+
+import argparse
+import glob
+import os
+import subprocess
+import tempfile
+
+TAUGHT = (0, 4)  # exit statuses of `sdg teach` with which it has written a model
+
+
+def search(folder, sdg):
+    """Teaches the part from its demonstration and looks for it in the folder's pictures."""
+    with tempfile.TemporaryDirectory() as scratch:
+        model = os.path.join(scratch, "part.sdg")
+        demo = f"{folder}/demo.jpg:{folder}/demo.json"
+        teach = [sdg, "teach", "--model", "shape", "--demo", demo, "--out", model, "--seed", "1"]
+        made = subprocess.run(teach, capture_output=True, text=True)
+        if made.returncode not in TAUGHT:
+            print(folder, made.stderr[-200:], flush=True)
+            return
+        pictures = sorted(glob.glob(os.path.join(folder, "mixed_*.jpg")))
+        detect = [sdg, "detect", "--grasp-model", model, "--json", "--all", *pictures]
+        found = subprocess.run(detect, capture_output=True, text=True)
+    out = os.path.join(folder, "found.jsonl")
+    # Renamed when complete: an interrupted run leaves no half file.
+    with open(out + ".tmp", "w") as file:
+        file.write(found.stdout)
+    os.replace(out + ".tmp", out)
+
+
+def main():
+    args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    args.add_argument("rendered")
+    args.add_argument("sdg")
+    args = args.parse_args()
+    for folder in sorted(glob.glob(os.path.join(args.rendered, "r_*"))):
+        is_rendered = os.path.exists(os.path.join(folder, "pairs.json"))
+        if is_rendered and not os.path.exists(os.path.join(folder, "found.jsonl")):
+            search(folder, args.sdg)
+
+
+if __name__ == "__main__":
+    main()
