@@ -1,7 +1,7 @@
 """Fits what a close look adds to the score, on candidates with truth. Usage: fit_score.py RECORDS.jsonl ...
 
 `sdg evaluate --split FILE --sets DIR --tuned --records RECORDS.jsonl` writes the records. A logistic regression combines
-the sum of the bounded terms with the four terms of the close look; each set has the same weight, and so have its right
+the sum of the bounded terms with the five terms of the close look; each set has the same weight, and so have its right
 and its wrong poses. What is printed was fitted without the set that is judged; the last line is the fit on all sets.
 Look-alikes other than mirror images are judged, but not fitted on: no term tells them yet.
 
@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-CLOSE = ["table", "rim", "added", "mirror"]
+CLOSE = ["table", "rim", "added", "mirror", "details"]
 
 
 def read(paths):
