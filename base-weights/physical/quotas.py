@@ -5,9 +5,6 @@ The random parts (make_train.py) have too many mixtures of materials to compile 
 the same slots, and unused ones are filled with a mesh below the table.
 """
 
-import numpy as np
-
-import meshes
 from scene import Scene
 
 # Slots of a scene for materials of one BSDF type.
@@ -41,32 +38,14 @@ def fits(names):
     return all(kinds.count(k) <= quota for k, quota in QUOTAS.items())
 
 
-def slots(names):
-    """The materials of all slots as (material, is used), in an order of types that is the same for all scenes."""
-    out = []
-    for kind, quota in QUOTAS.items():
-        own = sorted(n for n in set(names) if bsdf_type(n) == kind)
-        rest = [n for n in FILLERS[kind] if n not in own][: quota - len(own)]
-        out += [(n, True) for n in own]
-        out += [(n, False) for n in rest]
-    return out
-
-
 class QuotaScene(Scene):
     """A scene with the slots of QUOTAS in place of `scene.SLOTS`; its materials must fit."""
 
-    def bodies(self, items, material_of):
-        by_material = {}
-        for body, m in items:
-            for g in body.groups:
-                faces = (g["v"] @ m[:3, :3].T + m[:3, 3], g["f"], g["n"] @ m[:3, :3].T, g["uv"])
-                by_material.setdefault(g["mat"], []).append(faces)
-        below_table = dict(
-            v=np.array([[0, 0, -60], [1, 0, -60], [0, 1, -60.0]]),
-            n=np.tile([0, 0, 1.0], (3, 1)),
-            uv=np.zeros((3, 2)),
-            f=np.array([[0, 1, 2]]),
-        )
-        for k, (name, is_used) in enumerate(slots(by_material)):
-            mesh = meshes.join(by_material[name], name) if is_used else below_table
-            self.mesh(f"m{k}", mesh, material_of(name))
+    def slots(self, names):
+        out = []
+        for kind, quota in QUOTAS.items():
+            own = sorted(n for n in names if bsdf_type(n) == kind)
+            rest = [n for n in FILLERS[kind] if n not in own][: quota - len(own)]
+            out += [(n, True) for n in own]
+            out += [(n, False) for n in rest]
+        return out

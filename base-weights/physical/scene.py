@@ -253,21 +253,21 @@ class Scene:
             for g in body.groups:
                 faces = (g["v"] @ m[:3, :3].T + m[:3, 3], g["f"], g["n"] @ m[:3, :3].T, g["uv"])
                 by_material.setdefault(g["mat"], []).append(faces)
-        for name in materials.ONE_OF_EACH_TYPE:
-            by_material.setdefault(name, [])
-        slots = list(by_material)
-        slots += ["blank" if k % 2 else materials.FILLER for k in range(len(slots), SLOTS)]
         below_table = dict(
             v=np.array([[0, 0, -60], [1, 0, -60], [0, 1, -60.0]]),
             n=np.tile([0, 0, 1.0], (3, 1)),
             uv=np.zeros((3, 2)),
             f=np.array([[0, 1, 2]]),
         )
-        used = set()
-        for k, name in enumerate(slots):
-            faces = by_material[name] if name not in used else []
-            used.add(name)
-            self.mesh(f"m{k}", meshes.join(faces, name) if faces else below_table, material_of(name))
+        for k, (name, is_used) in enumerate(self.slots(by_material)):
+            mesh = meshes.join(by_material[name], name) if is_used else below_table
+            self.mesh(f"m{k}", mesh, material_of(name))
+
+    def slots(self, names):
+        """The materials of all slots as (material, is used): those of the bodies, then others up to SLOTS."""
+        out = list(dict.fromkeys([*names, *materials.ONE_OF_EACH_TYPE]))
+        out += ["blank" if k % 2 else materials.FILLER for k in range(len(out), SLOTS)]
+        return [(name, k < len(names)) for k, name in enumerate(out)]
 
     def render(self, spp, seed):
         """Linear RGB, denoised, (HEIGHT + 2 PAD, WIDTH + 2 PAD, 3)."""
