@@ -102,8 +102,34 @@ pub(crate) fn add_products<const OUTPUTS: usize>(sums: &mut [f32; OUTPUTS], valu
     }
 }
 
+/// Means of the channels over all pixels, then maxima.
 #[inline(always)]
-pub(crate) fn rectified(value: f32) -> f32 {
+pub(crate) fn pooled<const CHANNELS: usize>(map: &[f32]) -> Vec<f32> {
+    let count = (map.len() / CHANNELS) as f32;
+    let mut pooled = vec![0.0; 2 * CHANNELS];
+    let (mean, max) = pooled.split_at_mut(CHANNELS);
+    for pixel in map.chunks_exact(CHANNELS) {
+        for c in 0..CHANNELS {
+            mean[c] += pixel[c] / count;
+            max[c] = f32::max(max[c], pixel[c]);
+        }
+    }
+    pooled
+}
+
+/// One value of many, by way of `HIDDEN` rectified units.
+#[inline(always)]
+pub(crate) fn answered<const HIDDEN: usize>(values: &[f32], hidden: &Linear, answer: &Linear) -> f32 {
+    let mut units = [0.0; HIDDEN];
+    units.copy_from_slice(&hidden.bias);
+    add_products(&mut units, values, &hidden.weights);
+    let mut sum = [answer.bias[0]];
+    add_products(&mut sum, &units.map(rectified), &answer.weights);
+    sum[0]
+}
+
+#[inline(always)]
+fn rectified(value: f32) -> f32 {
     value.max(0.0)
 }
 

@@ -12,7 +12,7 @@ use pulp::{Arch, Simd, WithSimd};
 use safetensors::SafeTensors;
 
 use crate::error::ShapeError;
-use crate::layers::{Layer, Linear, add_products, convolved, layer, rectified};
+use crate::layers::{Layer, Linear, add_products, answered, convolved, layer, pooled};
 
 /// Rows and columns of what the network sees.
 pub(super) const SIDE: usize = 128;
@@ -131,21 +131,9 @@ impl WithSimd for Comparing<'_> {
         let [largest, mean] = cells(&map, network, inside);
         let map = convolved::<64>(&map, CELLS_SIDE, &COMPARED[2], &weights[2]);
         let map = convolved::<NUM_OUTPUTS>(&map, CELLS_SIDE / 2, &COMPARED[3], &weights[3]);
-        let mut pooled = vec![0.0; NUM_POOLED];
-        let num = map.len() / NUM_OUTPUTS;
-        for pixel in map.chunks_exact(NUM_OUTPUTS) {
-            for c in 0..NUM_OUTPUTS {
-                pooled[c] += pixel[c] / num as f32;
-                pooled[NUM_OUTPUTS + c] = f32::max(pooled[NUM_OUTPUTS + c], pixel[c]);
-            }
-        }
-        pooled[2 * NUM_OUTPUTS..].copy_from_slice(&[largest / 4.0, mean]);
-        let mut hidden = [0.0; NUM_HIDDEN];
-        hidden.copy_from_slice(&network.hidden.bias);
-        add_products(&mut hidden, &pooled, &network.hidden.weights);
-        let mut answer = [network.answer.bias[0]];
-        add_products(&mut answer, &hidden.map(rectified), &network.answer.weights);
-        answer[0]
+        let mut values = pooled::<NUM_OUTPUTS>(&map);
+        values.extend([largest / 4.0, mean]);
+        answered::<NUM_HIDDEN>(&values, &network.hidden, &network.answer)
     }
 }
 

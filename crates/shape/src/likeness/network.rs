@@ -8,7 +8,7 @@ use safetensors::SafeTensors;
 
 use super::pair::{NUM_CHANNELS, SIDE};
 use crate::error::ShapeError;
-use crate::layers::{Layer, Linear, add_products, convolved, layer, rectified};
+use crate::layers::{Layer, Linear, answered, convolved, layer, pooled};
 
 /// The convolutions: 64, 32, 16, 16, 8, 8 and 4 pixels a side.
 pub const LAYERS: [Layer; 6] = [
@@ -88,21 +88,7 @@ impl WithSimd for Forward<'_> {
             };
             side /= layer.stride;
         }
-        let num = NUM_POOLED / 2;
-        let mut pooled = vec![0.0; NUM_POOLED];
-        let (mean, max) = pooled.split_at_mut(num);
-        for pixel in map.chunks_exact(num) {
-            for c in 0..num {
-                mean[c] += pixel[c] / (side * side) as f32;
-                max[c] = f32::max(max[c], pixel[c]);
-            }
-        }
-        let mut hidden = [0.0; NUM_HIDDEN];
-        hidden.copy_from_slice(&network.hidden.bias);
-        add_products(&mut hidden, &pooled, &network.hidden.weights);
-        let mut answer = [network.answer.bias[0]];
-        add_products(&mut answer, &hidden.map(rectified), &network.answer.weights);
-        answer[0]
+        answered::<NUM_HIDDEN>(&pooled::<{ NUM_POOLED / 2 }>(&map), &network.hidden, &network.answer)
     }
 }
 
