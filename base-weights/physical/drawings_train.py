@@ -4,6 +4,7 @@ A recipe is a dictionary, made by `parts_train.py`; lengths are in mm, angles in
 
     outline   kind, size (x, y) and `numbers`, 6 to 10 random numbers from 0 to 1 that shape the outline of the kind
     thick     height in z; a bent part takes its own from its numbers
+    rise      factor of the heights of ribs, bosses, fins and bends
     edge      size of the chamfer at the upper edges, 0 to 1
     mat       material (materials.py)
     features  list of dictionaries: type, x, y, lengths a and b, turn, deep (0 to 1), possibly mat
@@ -109,7 +110,7 @@ def bent(r):
     """A bent sheet (one or two bends) with its notches, and the sheet's thickness."""
     lx, ly = r["outline"]["size"]
     n = r["outline"]["numbers"]
-    up = 4 + 14 * n[0]
+    up = (4 + 14 * n[0]) * r["rise"]
     w = 1.2 + 1.5 * n[1]
     x0 = -lx / 2 + lx * (0.45 + 0.3 * n[2])
     if n[3] > 0.5:
@@ -160,9 +161,15 @@ def carve_and_raise(r, solid, t):
         elif f["type"] == "sink":
             solid = solid - post(x, y, floor, a / 2, 40)
         elif f["type"] == "rib":
-            raised.append((block(x, y, t * 0.5, a, c, t * 0.5 + 1 + 4 * f["deep"]), f.get("mat") or r["mat"]))
+            high = t * 0.5 + (1 + 4 * f["deep"]) * r["rise"]
+            raised.append((block(x, y, t * 0.5, a, c, high), f.get("mat") or r["mat"]))
+        elif f["type"] == "fins":
+            high = t * 0.5 + (2 + 4 * f["deep"]) * r["rise"]
+            count = 3 + int(f["turn"] / 40)
+            for k in range(count):
+                raised.append((block(x + a * (k / (count - 1) - 0.5), y, t * 0.5, a / count / 2, c, high), r["mat"]))
         elif f["type"] == "boss":
-            s = post(x, y, t * 0.5, a / 2, t * 0.5 + 1 + 5 * f["deep"])
+            s = post(x, y, t * 0.5, a / 2, t * 0.5 + (1 + 5 * f["deep"]) * r["rise"])
             if f["turn"] > 60:
                 s = s - post(x, y, 0, a / 4, 60)
             raised.append((s, f.get("mat") or r["mat"]))

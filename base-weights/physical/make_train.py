@@ -7,7 +7,7 @@ writes them), pictures `mixed_K.jpg` that show the part and its look-alikes apar
 thing at each pixel: 0 the table, k + 1 the k-th thing) and `pairs.json`: for each thing in a picture the ends of the
 grasp line, in pixels, where the part would be laid on it, at the turn and place at which the two look most alike from
 above, and its difference from the part (null: it is the part). A part whose folder has `pairs.json` is not rendered
-again. The number decides the part.
+again. The number decides the part; from 1000 on parts are tall.
 """
 
 import argparse
@@ -35,6 +35,7 @@ from scene import stream
 
 SEED = "train 2026-1"
 STYLES = ["soft", "plain", "plain", "sun", "lamp", "glare", "dark", "colour"]
+TALL_FROM = 1000  # parts from this number on are tall
 NUM_CHANGED = 7  # look-alikes with one thing changed
 MIN_LOOKS = 4  # look-alikes that differ enough: a part with fewer is drawn anew
 MAX_ATTEMPTS = 20
@@ -87,7 +88,7 @@ class TrainMaker(SetMaker):
         """Draws parts until one has a certain pose and enough look-alikes; returns the random generator it left."""
         for attempt in range(MAX_ATTEMPTS):
             rng = stream(SEED, number, attempt)
-            r = parts_train.recipe(rng)
+            r = parts_train.recipe(rng, number >= TALL_FROM)
             name = f"{self.name}_{attempt}"
             try:
                 self.body = Body(f"{name}_0", lambda r=r, name=name: parts_train.build(r, name))

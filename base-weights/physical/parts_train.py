@@ -31,6 +31,7 @@ COATINGS = ["plastic", "paint", "rubber", "board"]
 # Repeated names are drawn more often.
 OUTLINES = ["polygon", "polygon", "spline", "link", "disc", "tool", "ell", "ell", "rect", "rect", "rect", "bent"]
 FEATURES = ["hole"] * 4 + ["slot", "pocket", "sink", "rib", "boss", "lug", "notch"]
+TALL_FEATURES = FEATURES + ["fins", "boss", "rib"]
 BENT_FEATURES = ["hole"] * 4 + ["slot", "notch"]
 ADDED_FEATURES = ["hole", "slot", "pocket", "rib", "boss", "lug", "notch"]
 ADDED_BENT_FEATURES = ["hole", "slot"]
@@ -75,7 +76,7 @@ def feature(rng, kind, lx, ly):
         else:
             f["y"] = (ly / 2) * (1 if side == 3 else -1)
         f["a"], f["b"] = (float(v) for v in rng.uniform(0.15, 0.4, 2) * small)
-    elif kind in ("pocket", "rib"):
+    elif kind in ("pocket", "rib", "fins"):
         f["a"], f["b"] = (float(v) for v in rng.uniform(0.15, 0.45, 2) * small)
         if kind == "rib" and rng.random() < 0.5:
             f["a"] = float(rng.uniform(1.2, 3))
@@ -152,20 +153,32 @@ def printed_face(rng, lx, ly):
     return dict(size=(w, h), at=(0.0, 0.0), ground=[int(v) for v in ground], elements=elements)
 
 
-def recipe(rng):
+def heights(rng, ly, is_tall):
+    """Thickness of a part in mm, and the factor of what is raised on it. Tall parts show their sides to the camera."""
+    thin = float(rng.choice([1.5, 2.5, 4, 6, 9]) * rng.uniform(0.8, 1.2))
+    if not is_tall:
+        return thin, 1.0
+    thick = float(np.clip(rng.uniform(0.3, 1.0) * ly, 8, 32))
+    return (thick, float(rng.uniform(0.8, 2.0))) if rng.random() < 0.6 else (thin, float(rng.uniform(2.0, 4.5)))
+
+
+def recipe(rng, is_tall=False):
     """A random recipe."""
     kind = draw(rng, OUTLINES)
     lx = float(rng.uniform(40, 80))
     ly = lx * float(rng.uniform(0.2, 0.4) if kind == "tool" else rng.uniform(0.3, 0.8))
+    numbers = [float(v) for v in rng.random(int(rng.integers(6, 11)))]
+    thick, rise = heights(rng, ly, is_tall)
     r = dict(
-        outline=dict(kind=kind, size=(lx, ly), numbers=[float(v) for v in rng.random(int(rng.integers(6, 11)))]),
-        thick=float(rng.choice([1.5, 2.5, 4, 6, 9]) * rng.uniform(0.8, 1.2)),
+        outline=dict(kind=kind, size=(lx, ly), numbers=numbers),
+        thick=thick,
+        rise=rise,
         edge=float(rng.random()),
         mat=material(rng),
         features=[],
     )
     is_printed = kind in ("rect", "polygon", "disc") and rng.random() < 0.6
-    wanted = BENT_FEATURES if kind == "bent" else FEATURES
+    wanted = BENT_FEATURES if kind == "bent" else TALL_FEATURES if is_tall else FEATURES
     count = int(rng.integers(0, 4) if is_printed else rng.integers(1, 8))
     for _ in range(count):
         r["features"].append(feature(rng, draw(rng, wanted), lx, ly))

@@ -63,24 +63,31 @@ pub fn draw_detections<'a>(
 /// Colours of the dots where edges and surface differ: apart in lightness, too.
 const EDGES: Color = Color([255, 40, 60]);
 const SURFACE: Color = Color([90, 150, 255]);
+/// Colour of the frames of squares in which a feature or print differs.
+const FEATURES: Color = Color([255, 190, 0]);
 /// Dots of a picture this large are a pixel wide; those of larger ones grow with it.
 const DOT_PX_PER_SIDE: f64 = 400.0;
 
-/// Draws a dot wherever edges (red) or surface (blue) differ from the demonstration, and what the colours mean; nothing where
-/// nothing differs.
+/// Draws a dot wherever edges (red) or surface (blue) differ from the demonstration, a frame (yellow) where a feature does, and what the colours
+/// mean; nothing where nothing differs.
 pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
     let side = f64::from(drawn.width().max(drawn.height()));
     let radius = (0.5 * side / DOT_PX_PER_SIDE).max(0.5);
     for differences in differences {
         differences.surface.iter().for_each(|at| dot(drawn, at, radius, SURFACE));
         differences.edges.iter().for_each(|at| dot(drawn, at, radius, EDGES));
+        differences
+            .features
+            .iter()
+            .for_each(|square| draw_polygon(drawn, square, &Pen::new(FEATURES).width(2.0 * radius).without_halo()));
     }
     let text_px = (side / 60.0).max(8.0);
     let mut bottom = f64::from(drawn.height());
-    let shows = |places: fn(&Differences) -> &[Point2<f64>]| differences.iter().any(|one| !places(one).is_empty());
+    let shows = |is_there: fn(&Differences) -> bool| differences.iter().any(is_there);
     let legend = [
-        (shows(|one| &one.surface), "surface differs from the photo", SURFACE),
-        (shows(|one| &one.edges), "edges differ from the photo", EDGES),
+        (shows(|one| !one.surface.is_empty()), "surface differs from the photo", SURFACE),
+        (shows(|one| !one.edges.is_empty()), "edges differ from the photo", EDGES),
+        (shows(|one| !one.features.is_empty()), "a feature differs from the photo", FEATURES),
     ];
     for (_, text, color) in legend.into_iter().filter(|(is_shown, ..)| *is_shown) {
         draw_label(drawn, Point2::new(0.0, bottom), text, color, text_px);
@@ -128,6 +135,7 @@ fn dot(drawn: &mut RgbImage, at: &Point2<f64>, radius: f64, color: Color) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sdg_geometry::Polygon;
 
     #[test]
     fn tags_of_refused_ones_do_not_cover_each_other() {
@@ -162,9 +170,16 @@ mod tests {
         draw_differences(&mut drawn, &[Differences::default()]);
         assert_eq!(drawn, RgbImage::new(400, 300));
         let at = [Point2::new(100.5, 50.5), Point2::new(399.9, 299.9), Point2::new(-5.0, 10.0)];
-        draw_differences(&mut drawn, &[Differences { edges: at.to_vec(), surface: Vec::new() }]);
+        draw_differences(&mut drawn, &[Differences { edges: at.to_vec(), ..Differences::default() }]);
         assert_eq!(drawn.get_pixel(100, 50).0, EDGES.0);
         assert_eq!(drawn.get_pixel(0, 10).0, [0; 3]);
-        assert!(count(&drawn, EDGES) > 100 && count(&drawn, SURFACE) == 0);
+        assert!(count(&drawn, EDGES) > 100 && count(&drawn, SURFACE) == 0 && count(&drawn, FEATURES) == 0);
+        let square = BoundingBox { x1: 100.0, y1: 100.0, x2: 140.0, y2: 140.0 };
+        let mut drawn = RgbImage::new(400, 300);
+        draw_differences(
+            &mut drawn,
+            &[Differences { features: vec![Polygon::from_box(&square)], ..Differences::default() }],
+        );
+        assert!(drawn.get_pixel(120, 100).0 != [0; 3] && drawn.get_pixel(120, 120).0 == [0; 3]);
     }
 }

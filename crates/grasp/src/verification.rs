@@ -248,7 +248,8 @@ pub(crate) fn differences(
     let mut differences = comparison.differences(&sized.view_from_working(image_from_cutout));
     let image_from_view = scaling(sized.working.shrink());
     let to_image = |point: &mut Point2<f64>| *point = image_from_view.apply(point);
-    differences.edges.iter_mut().chain(&mut differences.surface).for_each(to_image);
+    let corners = differences.features.iter_mut().flat_map(|square| &mut square.vertices);
+    differences.edges.iter_mut().chain(&mut differences.surface).chain(corners).for_each(to_image);
     Some(differences)
 }
 

@@ -17,7 +17,7 @@ use std::ops::RangeInclusive;
 
 use image::RgbImage;
 use nalgebra::{Point2, Vector2};
-use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity};
+use sdg_geometry::{Angle, CompassSearch, PlanarSimilarity, Polygon};
 
 use crate::close_look::{CloseLook, CloseUp, Rival, TableColors};
 use crate::config::{AgreementConfig, RefinementConfig};
@@ -127,14 +127,17 @@ pub struct Differences {
     pub edges: Vec<Point2<f64>>,
     /// Points of the surface whose brightness and colour do not follow the demonstration's.
     pub surface: Vec<Point2<f64>>,
+    /// Squares in which a feature or print differs ([`Details::differing`]).
+    pub features: Vec<Polygon>,
 }
 
 impl Comparison<'_> {
-    /// Where edges and surface disagree at a pose. Nothing of it counts in [`Self::evidence`], which is made of the same comparison.
+    /// Where edges, surface and features disagree at a pose. Nothing of it counts in [`Self::evidence`], which is made of the same comparison.
     pub fn differences(&self, image_from_demonstration: &PlanarSimilarity) -> Differences {
         Differences {
             edges: self.structure.differing(self.picture.field, image_from_demonstration),
             surface: self.surface.differing(self.picture.image, image_from_demonstration),
+            features: self.details.differing(self.picture.image, image_from_demonstration),
         }
     }
 

@@ -9,7 +9,7 @@ mod network;
 use image::RgbImage;
 use sdg_geometry::{PlanarSimilarity, Polygon};
 
-use self::network::{Features, NUM_CHANNELS, Network, SIDE};
+use self::network::{Answer, CELL, CELLS_SIDE, Features, NUM_CHANNELS, Network, SIDE};
 use crate::frame::Frame;
 use crate::likeness::exposed_values;
 
@@ -41,6 +41,23 @@ impl Details {
     /// ln of how much likelier the image shows the part at the pose than a look-alike or anything else, as the network was trained: with three wrong
     /// poses for two right ones. `None` where photo or picture shows the part too small for its details.
     pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<f64> {
+        self.compared(image, image_from_cutout).map(|answer| f64::from(answer.log_odds))
+    }
+
+    /// Squares of the image, in its pixels, in which it rather differs from the photo; none where [`Self::log_odds`] has no answer.
+    pub fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Polygon> {
+        let cells = self.compared(image, image_from_cutout).map(|answer| answer.cells).unwrap_or_default();
+        let square = |cell: usize| {
+            let [x, y] = [cell % CELLS_SIDE, cell / CELLS_SIDE].map(|k| (k * CELL) as f64);
+            let side = CELL as f64;
+            let corners = [[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
+            Polygon { vertices: corners.map(|corner| image_from_cutout.apply(&self.frame.place(corner))).to_vec() }
+        };
+        let differs = |(cell, log_odds): (usize, Option<f32>)| (log_odds? > 0.0).then(|| square(cell));
+        cells.into_iter().enumerate().filter_map(differs).collect()
+    }
+
+    fn compared(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<Answer> {
         if PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0) < MIN_PX {
             return None;
         }
@@ -50,7 +67,7 @@ impl Details {
         // Beyond the picture's edge both are compared with nothing.
         let cut = is_seen.contains(&false).then(|| features(&self.colors, &self.inside, &is_seen));
         let of_photo = cut.as_ref().unwrap_or(&self.features);
-        Some(f64::from(Network::shipped().log_odds(of_photo, &of_picture, &self.inside)))
+        Some(Network::shipped().compared(of_photo, &of_picture, &self.inside))
     }
 }
 
@@ -93,6 +110,17 @@ mod tests {
     }
 
     #[test]
+    fn what_differs_is_marked_where_the_hole_was_or_is() {
+        let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
+        let taught = Details::new(&plate(205.0, 1.0), &outline);
+        let marked = |picture: &RgbImage| taught.differing(picture, &PlanarSimilarity::IDENTITY);
+        assert!(marked(&plate(205.0, 0.6)).is_empty());
+        let squares = marked(&plate(165.0, 1.0));
+        let has = |x: f64, y: f64| squares.iter().any(|square| square.contains(&nalgebra::Point2::new(x, y)));
+        assert!((has(205.0, 140.0) || has(165.0, 140.0)) && !has(110.0, 100.0), "{squares:?}");
+    }
+
+    #[test]
     fn a_part_at_the_picture_s_edge_is_compared_where_it_is_seen() {
         let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
         let taught = Details::new(&plate(205.0, 1.0), &outline);
@@ -101,6 +129,7 @@ mod tests {
         let at_edge = taught.log_odds(&cut, &PlanarSimilarity::IDENTITY).unwrap();
         assert!(at_edge > 1.0 && at_edge < whole, "{at_edge} {whole}");
     }
+
     #[test]
     fn a_part_of_few_pixels_is_not_judged() {
         let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });

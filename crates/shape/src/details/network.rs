@@ -24,11 +24,13 @@ const COMPARED: [Layer; 4] = [layer(3 * NUM_FEATURES, 48, 2), layer(48, 48, 1), 
 /// Convolutions of [`COMPARED`] before the cells.
 const NUM_BEFORE_CELLS: usize = 2;
 /// Rows and columns of the cells.
-const CELLS_SIDE: usize = 16;
+pub(super) const CELLS_SIDE: usize = 16;
 /// Pixels of a cell's side.
-const CELL: usize = SIDE / CELLS_SIDE;
+pub(super) const CELL: usize = SIDE / CELLS_SIDE;
 /// A cell counts from this share of it on that lies in the outline.
 const MIN_INSIDE: f32 = 0.3;
+/// Log-odds of the surest cell where no cell counts.
+const NO_CELL: f32 = -20.0;
 const NUM_OUTPUTS: usize = 64;
 /// Mean and maximum of the last convolution's channels, the largest log-odds of a cell, the mean probability of the cells.
 const NUM_POOLED: usize = 2 * NUM_OUTPUTS + 2;
@@ -42,6 +44,15 @@ pub(super) struct Network {
     cells: Linear,
     hidden: Linear,
     answer: Linear,
+}
+
+/// How photo and picture compare.
+#[derive(Debug, Clone)]
+pub(super) struct Answer {
+    /// ln of how much likelier the picture shows the part than not.
+    pub(super) log_odds: f32,
+    /// Of [`CELLS_SIDE`] rows of cells, ln of how much likelier the two differ there than not; `None` outside of the outline.
+    pub(super) cells: Vec<Option<f32>>,
 }
 
 /// What the tower makes of one picture, row by row.
@@ -83,8 +94,8 @@ impl Network {
         Arch::new().dispatch(Tower { network: self, values })
     }
 
-    /// ln of how much likelier the picture shows the part than not. `inside` says which pixels lie in the outline.
-    pub(super) fn log_odds(&self, photo: &Features, picture: &Features, inside: &[bool]) -> f32 {
+    /// `inside` says which pixels lie in the outline.
+    pub(super) fn compared(&self, photo: &Features, picture: &Features, inside: &[bool]) -> Answer {
         Arch::new().dispatch(Comparing { network: self, photo, picture, inside })
     }
 }
@@ -114,10 +125,10 @@ struct Comparing<'a> {
 }
 
 impl WithSimd for Comparing<'_> {
-    type Output = f32;
+    type Output = Answer;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f32 {
+    fn with_simd<S: Simd>(self, _: S) -> Answer {
         let Self { network, photo, picture, inside } = self;
         let weights = &network.compared;
         let mut map = Vec::with_capacity(3 * photo.0.len());
@@ -128,34 +139,32 @@ impl WithSimd for Comparing<'_> {
         }
         let map = convolved::<48>(&map, SIDE / 4, &COMPARED[0], &weights[0]);
         let map = convolved::<48>(&map, CELLS_SIDE, &COMPARED[1], &weights[1]);
-        let [largest, mean] = cells(&map, network, inside);
+        let cells = cells(&map, network, inside);
         let map = convolved::<64>(&map, CELLS_SIDE, &COMPARED[2], &weights[2]);
         let map = convolved::<NUM_OUTPUTS>(&map, CELLS_SIDE / 2, &COMPARED[3], &weights[3]);
         let mut values = pooled::<NUM_OUTPUTS>(&map);
-        values.extend([largest / 4.0, mean]);
-        answered::<NUM_HIDDEN>(&values, &network.hidden, &network.answer)
+        let counted = || cells.iter().flatten().copied();
+        let probability = |log_odds: f32| 1.0 / (1.0 + (-log_odds).exp());
+        values.push(counted().fold(NO_CELL, f32::max) / 4.0);
+        values.push(counted().map(probability).sum::<f32>() / counted().count().max(1) as f32);
+        Answer { log_odds: answered::<NUM_HIDDEN>(&values, &network.hidden, &network.answer), cells }
     }
 }
 
-/// The largest log-odds of a difference in a cell, and the mean probability of one.
-fn cells(map: &[f32], network: &Network, inside: &[bool]) -> [f32; 2] {
-    /// Log-odds where no cell counts.
-    const NONE: f32 = -20.0;
+/// The log-odds of a difference in each cell, as [`Answer::cells`].
+fn cells(map: &[f32], network: &Network, inside: &[bool]) -> Vec<Option<f32>> {
     let channels = map.len() / (CELLS_SIDE * CELLS_SIDE);
-    let (mut largest, mut sum, mut count) = (NONE, 0.0, 0.0f32);
-    for (i, pixel) in map.chunks_exact(channels).enumerate() {
+    let cell = |(i, pixel): (usize, &[f32])| {
         let [x, y] = [i % CELLS_SIDE, i / CELLS_SIDE].map(|k| k * CELL);
         let num_inside =
             (0..CELL).flat_map(|dy| &inside[(y + dy) * SIDE + x..][..CELL]).filter(|is_inside| **is_inside).count();
-        if num_inside as f32 > MIN_INSIDE * (CELL * CELL) as f32 {
+        (num_inside as f32 > MIN_INSIDE * (CELL * CELL) as f32).then(|| {
             let mut log_odds = [network.cells.bias[0]];
             add_products(&mut log_odds, pixel, &network.cells.weights);
-            largest = largest.max(log_odds[0]);
-            sum += 1.0 / (1.0 + (-log_odds[0]).exp());
-            count += 1.0;
-        }
-    }
-    [largest, sum / count.max(1.0)]
+            log_odds[0]
+        })
+    };
+    map.chunks_exact(channels).enumerate().map(cell).collect()
 }
 
 #[cfg(test)]
@@ -180,7 +189,7 @@ mod tests {
             let inside: Vec<bool> = (0..SIDE * SIDE).map(|p| is_set(p * OF_PAIR + 6)).collect();
             let network = Network::shipped();
             let [photo, picture] = [0, 3].map(|first| network.features(values(first)));
-            let log_odds = network.log_odds(&photo, &picture, &inside);
+            let log_odds = network.compared(&photo, &picture, &inside).log_odds;
             assert!((log_odds - expected).abs() < 1e-3, "{log_odds}, expected {expected}");
         }
     }

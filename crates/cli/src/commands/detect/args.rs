@@ -53,7 +53,7 @@ pub struct DetectArgs {
     /// A JSON line for each image
     #[arg(long)]
     pub json: bool,
-    /// Write each image with its grasps drawn on it into this folder, under what was refused dots where edges and surface differ
+    /// Write each image with its grasps drawn on it into this folder, under what was refused marks where edges, surface and features differ
     /// from the photo; with --from, show them in browsers at this port of 127.0.0.1 instead, 0 for any
     #[arg(long, value_name = "DIR|PORT")]
     pub draw: Option<PathBuf>,
