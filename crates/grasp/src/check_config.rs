@@ -118,8 +118,10 @@ pub struct ScoreConfig {
     pub resemblance: Term,
     /// Of [`sdg_shape::CloseLook::likeness`].
     pub likeness: Term,
-    /// Of [`sdg_shape::CloseLook::details`]; against a pose alone. From the tuned side of a split (docs/decisions/026-details.md).
+    /// Of [`sdg_shape::CloseLook::details`], against a pose. From the tuned side of a split (docs/decisions/026-details.md), as the next.
     pub details: Term,
+    /// Of the same, for a pose. Between the two the network is not sure, and its level differs from part to part: nothing counts.
+    pub details_for: Term,
     /// Of [`sdg_shape::CloseLook::bare`].
     pub table: Term,
     /// Of [`sdg_shape::CloseLook::no_rim`].
@@ -142,7 +144,7 @@ impl ScoreConfig {
     }
 
     /// Every term of the score, by name.
-    pub fn terms(&self) -> [(&'static str, Term); 14] {
+    pub fn terms(&self) -> [(&'static str, Term); 15] {
         [
             ("network", self.network),
             ("edges", self.edges),
@@ -154,6 +156,7 @@ impl ScoreConfig {
             ("resemblance", self.resemblance),
             ("likeness", self.likeness),
             ("details", self.details),
+            ("details_for", self.details_for),
             ("table", self.table),
             ("rim", self.rim),
             ("added", self.added),
@@ -187,7 +190,8 @@ const SCORE: ScoreConfig = ScoreConfig {
     outside: term(-2.15, 0.0, 0.0, 0.34),
     resemblance: term(-2.74, 0.36, 0.2, 0.45),
     likeness: term(0.777, -0.1, -2.0, 6.0),
-    details: term(1.0, -3.0, -9.0, -3.0),
+    details: term(1.0, -2.0, -10.0, -2.0),
+    details_for: term(0.5, 0.5, 0.5, 2.0),
     network: term(0.8, 0.0, -1.0, 0.0),
     table: term(-9.0, 0.0, 0.0, 1.0),
     rim: term(-4.0, 0.05, 0.05, 1.0),

@@ -41,8 +41,7 @@ pub struct Contributions {
     /// The log-odds of the small network whose input is photo and picture laid over each other; its least where edges and surface agree
     /// too little for it to be asked.
     pub likeness: f64,
-    /// The log-odds of the network that knows parts from their look-alikes, where they speak clearly against the part; 0 where it was not
-    /// asked.
+    /// What the network that knows parts from their look-alikes says, where it is sure; 0 where it is not, or was not asked.
     pub details: f64,
     /// Table where the part should be.
     pub table: f64,
@@ -214,7 +213,10 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         outside: config.outside.log_odds(seen.outside),
         resemblance: config.resemblance.log_odds(clues.resemblance),
         likeness: config.likeness.log_odds(seen.close.map_or(f64::NEG_INFINITY, |close| close.likeness)),
-        details: details(seen).map_or(0.0, |details| config.details.log_odds(details)),
+        details: seen
+            .close
+            .and_then(|close| close.details)
+            .map_or(0.0, |details| config.details.log_odds(details) + config.details_for.log_odds(details)),
         table: closely(&config.table, &|close| close.bare),
         rim: closely(&config.rim, &|close| close.no_rim),
         added: closely(&config.added, &|close| close.added),
@@ -222,13 +224,6 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
     };
     let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
-}
-
-/// What the details say, of a part that lies bare: what covers one covers its details.
-pub(crate) fn details(seen: &Evidence) -> Option<f64> {
-    /// From this share of the part in view on it lies bare. Chosen by hand: the cap of [`ScoreConfig::visible`].
-    const BARE: f64 = 0.77;
-    seen.close.and_then(|close| close.details).filter(|_| seen.visible >= BARE)
 }
 
 /// By how much the rival fits better, as far as it fits at all: in another light, or rolled, a part fits neither; 0 where the two differ too

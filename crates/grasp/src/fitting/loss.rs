@@ -127,6 +127,7 @@ mod tests {
             resemblance: none,
             likeness: none,
             details: none,
+            details_for: none,
             table: none,
             rim: none,
             added: none,

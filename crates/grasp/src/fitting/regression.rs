@@ -13,10 +13,10 @@ use sdg_shape::Evidence;
 use super::loss::COST_OF_WRONG;
 use super::observation::{PartObservations, PictureObservations};
 use crate::check_config::{ScoreConfig, Term};
-use crate::verdict::{details, judge_picture, rivals_gain};
+use crate::verdict::{judge_picture, rivals_gain};
 
 /// Terms that are fitted: all but the network's, which is not asked here.
-const NUM_TERMS: usize = 13;
+const NUM_TERMS: usize = 14;
 /// Weights and bias.
 type Weights = SVector<f64, { NUM_TERMS + 1 }>;
 
@@ -93,7 +93,9 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
             let off_size = if config.size.weight == 0.0 { 0.0 } else { contributions.size / config.size.weight };
             let surface = surface.unwrap_or(config.surface.neutral);
             let (resemblance, likeness) = (clues.resemblance, close.map_or(f64::NEG_INFINITY, |close| close.likeness));
-            let details = details(&clues.evidence).unwrap_or(config.details.neutral);
+            let details = close.and_then(|close| close.details);
+            let [details, details_for] =
+                [config.details, config.details_for].map(|term| details.unwrap_or(term.neutral));
             let closely = close.map_or([0.0; 4], |close| {
                 [close.bare, close.no_rim, close.added, close.mirrored.map_or(0.0, rivals_gain)]
             });
@@ -108,6 +110,7 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
                 resemblance,
                 likeness,
                 details,
+                details_for,
                 bare,
                 no_rim,
                 added,
@@ -122,8 +125,23 @@ fn values(picture: &PictureObservations, config: &ScoreConfig) -> Vec<SVector<f6
 /// The fitted terms, in the order of [`values`].
 fn terms(config: &ScoreConfig) -> [Term; NUM_TERMS] {
     let ScoreConfig { edges, surface, hue, visible, size, outside, resemblance, likeness, details, .. } = *config;
-    let ScoreConfig { table, rim, added, mirror, .. } = *config;
-    [edges, surface, hue, visible, size, outside, resemblance, likeness, details, table, rim, added, mirror]
+    let ScoreConfig { details_for, table, rim, added, mirror, .. } = *config;
+    [
+        edges,
+        surface,
+        hue,
+        visible,
+        size,
+        outside,
+        resemblance,
+        likeness,
+        details,
+        details_for,
+        table,
+        rim,
+        added,
+        mirror,
+    ]
 }
 
 fn terms_mut(config: &mut ScoreConfig) -> [&mut Term; NUM_TERMS] {
@@ -137,13 +155,29 @@ fn terms_mut(config: &mut ScoreConfig) -> [&mut Term; NUM_TERMS] {
         resemblance,
         likeness,
         details,
+        details_for,
         table,
         rim,
         added,
         mirror,
         ..
     } = config;
-    [edges, surface, hue, visible, size, outside, resemblance, likeness, details, table, rim, added, mirror]
+    [
+        edges,
+        surface,
+        hue,
+        visible,
+        size,
+        outside,
+        resemblance,
+        likeness,
+        details,
+        details_for,
+        table,
+        rim,
+        added,
+        mirror,
+    ]
 }
 
 /// Weights, and the bias as if every neutral value were 0.
