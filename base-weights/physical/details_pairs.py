@@ -23,6 +23,12 @@ MIN_INSIDE = 0.3  # a cell counts from this share of it on that lies in the outl
 MIN_CHANGE = 0.05  # mean change from which on an edited cell differs
 MIN_DOUBT = 0.015  # mean change from which on an edited cell is not known to be the same
 BAR_SHARE = 0.08  # of right pairs and look-alikes
+THING_SHARE = 0.15  # of right pairs and look-alikes: something else lies on the part
+COARSE_SHARE = 0.25  # of pairs whose picture is small, half of them with a small photo
+SHADE_SHARE = 0.15  # of pictures with the edge of a shadow
+MAX_RIVAL_COVER = 0.12  # of a look-alike: more may hide the difference
+MAX_COVER = 0.45  # of the part
+LARGE_ERROR_SHARE, LARGE_ERROR = 0.25, 2.5  # of poses
 
 
 @dataclass
@@ -53,6 +59,12 @@ def sample(x, a, t, mode="bilinear"):
 def sample_numbers(x, a, t):
     """Whole numbers [B, N, N] out of crops [B, S, S]; -1 outside."""
     return sample((x + 1)[:, None].float(), a, t, "nearest")[:, 0] - 1
+
+
+def coarse(x, side):
+    """Pictures [., 3, N, N] with the resolution of `side` pixels."""
+    small = F.interpolate(x, size=(side, side), mode="area")
+    return F.interpolate(small, size=(SIDE, SIDE), mode="bilinear", align_corners=False)
 
 
 def cell_means(x):
@@ -104,7 +116,7 @@ class Pairs:
         none = torch.zeros(n, device=self.device)
         scale = self.uniform(n, 0.97, 1.06)
         a, t = affine(turn, scale, none, self.uniform(n, -2, 2), self.uniform(n, -2, 2), flip)
-        large = torch.where(self.uniform(n) < 0.15, 2.0, 1.0)
+        large = torch.where(self.uniform(n) < LARGE_ERROR_SHARE, LARGE_ERROR, 1.0)
 
         def error(sigma):
             return torch.randn(n, device=self.device) * sigma * large
@@ -141,6 +153,42 @@ class Pairs:
             cover[i] = m
         return cover
 
+    def lay_things(self, kind, picture, cover):
+        """Lays other parts on some right pairs and look-alikes in place; adds where they are to `cover`."""
+        i = ((self.uniform(len(kind)) < THING_SHARE) & (kind <= RIVAL)).nonzero()[:, 0]
+        if not len(i):
+            return
+        rows = self.right.pick(self.random_parts(len(i)))
+        m = len(i)
+        direction, distance = self.uniform(m, 0, 2 * math.pi), self.uniform(m, 20, 70)
+        shift_x, shift_y = distance * torch.cos(direction), distance * torch.sin(direction)
+        none = torch.zeros(m, device=self.device)
+        a, t = affine(self.uniform(m, 0, 2 * math.pi), self.uniform(m, 0.8, 2.0), none, shift_x, shift_y, none + 1)
+        lies = (sample_numbers(self.crops.ids[rows], a, t) == crops_.SELF).float()
+        colours = sample(self.crops.images[rows].float() / 255, a, t)
+        picture[i] = picture[i] * (1 - lies[:, None]) + colours * lies[:, None]
+        cover[i] = torch.maximum(cover[i], lies)
+
+    def make_coarse(self, photo, picture):
+        """Shows some pictures, and some of their photos, as if the part were small, in place."""
+        i = (self.uniform(len(photo)) < COARSE_SHARE).nonzero()[:, 0]
+        for k, j in enumerate(i.split(max(1, len(i) // 4 + 1))):
+            side = int(torch.randint(40, 100, ()))
+            picture[j] = coarse(picture[j], side)
+            if k % 2:
+                photo[j] = coarse(photo[j], side)
+
+    def shade(self, x):
+        """Darkens what lies beyond a line in some pictures, in place."""
+        i = (self.uniform(len(x)) < SHADE_SHARE).nonzero()[:, 0]
+        if len(i):
+            m = len(i)
+            axis = torch.linspace(-64, 64, SIDE, device=self.device)
+            turn, at = self.uniform(m, 0, 2 * math.pi)[:, None, None], self.uniform(m, -50, 50)[:, None, None]
+            distance = axis[None, :, None] * torch.sin(turn) + axis[None, None, :] * torch.cos(turn) - at
+            dark = torch.sigmoid(distance / self.uniform(m, 0.5, 8)[:, None, None])
+            x[i] = x[i] * (1 - dark * self.uniform(m, 0.2, 0.7)[:, None, None])[:, None]
+
     def targets(self, kind, inside, seen, labels, change, cover):
         """Targets and weights of pairs and of cells."""
         changed = cell_means(change * inside)
@@ -148,6 +196,8 @@ class Pairs:
         is_weak = is_edited & (changed.flatten(1).max(1)[0] < MIN_CHANGE)
         weight = torch.ones(len(kind), device=self.device)
         weight[is_weak] = 0
+        share = (cover * inside).flatten(1).sum(1) / inside.flatten(1).sum(1).clamp(min=1)
+        weight[share > torch.where(kind == RIVAL, MAX_RIVAL_COVER, MAX_COVER)] = 0
         others = (seen == crops_.OTHER).float()
         covered = cell_means((others + cover).clamp(max=1) * inside) > 0.25
         in_doubt = covered | ((changed > MIN_DOUBT) & (changed < MIN_CHANGE))
@@ -179,6 +229,9 @@ class Pairs:
         picture_valid = ((seen >= 0) & (seen != crops_.OUTSIDE)).float()
         change = self.edit_pairs(kind, photo, picture, inside)
         cover = self.cover_pairs(kind, picture)
+        self.lay_things(kind, picture, cover)
+        self.shade(picture)
+        self.make_coarse(photo, picture)
         photo, picture = camera(photo), camera(picture)
         is_grey = column(self.uniform(n) < 0.05)
         photo = torch.where(is_grey, photo.mean(1, keepdim=True).expand(-1, 3, -1, -1), photo)
