@@ -1,6 +1,7 @@
-"""The network of the details, and its export for crates/shape. Usage: details_net.py FILE.pt OUT.safetensors [--parity]
+"""The network of the details, and its export for crates/shape. Usage: details_net.py FILE.pt... OUT.safetensors [--parity]
 
-Writes the weights of train_details.py in half precision, batch norms folded in. `--parity` prints the log-odds that the
+Writes the weights of train_details.py in half precision, batch norms folded in; of several trainings their mean, which
+works where one began from the other's weights. `--parity` prints the log-odds that the
 test of crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in
 double precision.
 
@@ -139,11 +140,12 @@ def main():
     from safetensors.torch import save_file  # the training does not need it
 
     args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    args.add_argument("weights")
+    args.add_argument("weights", nargs="+")
     args.add_argument("out")
     args.add_argument("--parity", action="store_true", help="print the values of the Rust test")
     args = args.parse_args()
-    weights = folded(torch.load(args.weights, map_location="cpu"))
+    states = [torch.load(path, map_location="cpu") for path in args.weights]
+    weights = folded({k: sum(state[k] for state in states) / len(states) for k in states[0]})
     save_file(weights, args.out)
     if args.parity:
         for seed in PARITY_SEEDS:
