@@ -117,6 +117,10 @@ impl Source for Folder {
             Err(found) => Err(Missing::Torn(format!("{}: {found}", path.display()))),
         }
     }
+
+    fn is_on_request(&self) -> bool {
+        true
+    }
 }
 
 /// The names of pictures in a folder, sorted. Hidden files are left out: programs write under such names first.

@@ -59,4 +59,8 @@ impl Source for Snapshots {
         let picture = decode(&bytes).map_err(Missing::Torn)?;
         Ok(Some(Taken { picture, captured, num_skipped: 0 }))
     }
+
+    fn is_on_request(&self) -> bool {
+        true
+    }
 }
