@@ -60,7 +60,7 @@ impl Detector {
     ) -> Result<String, WebError> {
         let max_pixels = ImageLimits::default().max_pixels;
         if u64::from(width) * u64::from(height) > max_pixels {
-            return Err(sdg_demonstration::Error::EnormousImage { width, height, max_pixels }.into());
+            return Err(sdg_demonstration::PictureError::EnormousImage { width, height, max_pixels }.into());
         }
         let pixels = || WebError::Pixels { width, height, found: rgba.len() };
         if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use sdg_camera::{Address, LatestFrame};
+use sdg_camera::{Address, LatestFrame, PixelFrame};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -103,6 +103,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
         RobotChoice::Network(address) => {
             let mut options = args.request.options();
             [options.width, options.height] = prepared.camera.size_px();
+            options.frame = PixelFrame::Sensor;
             let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
             arm.check_model(prepared.workcell.robot)?;

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
+use sdg_demonstration::PixelFrame;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
@@ -129,8 +130,14 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
+    let mut pixel_frame = PixelFrame::Upright;
+    if args.camera.file.is_some() {
+        demonstrations::check_are_not_turned(&args.demonstrations)?;
+        pixel_frame = PixelFrame::Sensor;
+    }
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
-    options.negatives = args.negatives.iter().map(|path| files::read_image(path)).collect::<Result<_>>()?;
+    options.negatives =
+        args.negatives.iter().map(|path| files::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
     if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;
         for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {

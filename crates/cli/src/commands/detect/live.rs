@@ -42,7 +42,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
             Some(server)
         }
     };
-    let mut frames = Frames::open(address, args, detector.picture_size())?;
+    let mut frames = Frames::open(address, args, &detector)?;
     let mut finder = FrameDetector::new(args, address, frames.wait(), detector)?;
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
@@ -92,9 +92,10 @@ enum Next {
 
 impl Frames {
     /// A calibrated camera is asked for the size that it was calibrated with.
-    fn open(address: &Address, args: &DetectArgs, calibrated_size: Option<[u32; 2]>) -> Result<Self> {
+    fn open(address: &Address, args: &DetectArgs, detector: &PictureDetector) -> Result<Self> {
         let mut options = args.request.options();
-        if let Some([width, height]) = calibrated_size {
+        options.frame = detector.pixel_frame();
+        if let Some([width, height]) = detector.picture_size() {
             (options.width, options.height) = (width, height);
         }
         let camera = live_pictures::open(address, &options)?;

@@ -133,7 +133,7 @@ impl<W: Write> Batch<'_, W> {
 
     fn detect(&mut self, input: &Input) -> Result<Seen> {
         let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
-        let image = input.read()?;
+        let image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
         let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
         let seen = Seen { size: image.dimensions().into(), seconds: start.elapsed().as_secs_f64(), detections };
