@@ -98,6 +98,12 @@ fn pictures_of_a_folder_and_on_request_show_what_files_show() {
     let expected: Vec<Vec<Value>> = detect(&[frames.to_str().unwrap()]);
     assert_eq!(expected.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1, 0, 1]);
     assert_eq!(detect(&["--from", &format!("dir:{}", frames.display())]), expected);
+    let line = &lines(&sdg(&["detect", "--grasp-model", &model, "--json", frames.join("0.png").to_str().unwrap()]))[0];
+    let detection = &line["detections"][0];
+    assert_eq!((&line["object"], &detection["network_score"]), (&"pendulum".into(), &Value::Null), "{line}");
+    let digits = |number: &Value| number.to_string().split_once('.').map_or(0, |(_, digits)| digits.len());
+    let polygon = detection["polygon"].as_array().unwrap().iter().flat_map(|corner| corner.as_array().unwrap());
+    assert!(polygon.chain([&detection["score"], &detection["grasp"]["x"]]).all(|number| digits(number) <= 6), "{line}");
     assert_eq!(detect(&["--from", &format!("dir:{}?fps=30", frames.display())]), expected);
     assert_eq!(detect(&["--from", &format!("file:{}", frames.join("1.png").display())]), expected[1..2]);
 

@@ -73,7 +73,7 @@ impl Detector {
 
     async fn detect_in(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
         let found = self.model.detect_async(image, verification).await?;
-        let detections = found.iter().map(DetectionRecord::from).collect();
+        let detections = found.iter().map(|one| DetectionRecord::new(one, self.model.kind())).collect();
         Ok(to_json(&ImageRecord { width: image.width(), height: image.height(), detections }))
     }
 }

@@ -19,6 +19,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{
     self, Consent, DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
@@ -254,7 +255,7 @@ fn dry_run<A: Arm>(
 /// The closing lines, or the one object.
 fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
-        println!("{}", to_json(prepared, ended, secs, robot));
+        println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
     }
     let Ended { grasp, failed, beside, .. } = ended;
     match (failed, &prepared.place) {

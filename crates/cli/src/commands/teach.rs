@@ -25,6 +25,7 @@ use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::held_back::HeldBackFigures;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
 use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
@@ -205,7 +206,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "base_weights": report,
             "report": page.map(|path| path.display().to_string()),
         });
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
         println!("{}", figures.in_words());

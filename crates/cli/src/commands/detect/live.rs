@@ -20,6 +20,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::found_record::FoundRecord;
 use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::live_pictures;
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
@@ -222,7 +223,7 @@ fn write_line(
     let shown = || parts.iter().filter(|part| args.all || part.is_seen(args.min_score));
     if args.json {
         let record = |part: &Part| PartLine {
-            found: FoundRecord::new(&part.found, detector.frame()),
+            found: FoundRecord::new(&part.found, detector),
             track: part.track.map(|(id, ..)| id),
             state: part.track.map(|(_, state, _)| state_name(state)),
             age_s: part.track.map(|(.., age)| age.as_secs_f64()),
@@ -230,6 +231,7 @@ fn write_line(
         let fault = |fault: &sdg_camera::Fault| FaultLine { fault: fault.name(), why: fault.to_string() };
         let line = FrameLine {
             camera: &frame.camera,
+            object: detector.model().object(),
             frame: frame.number,
             captured: frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
             width,
@@ -238,7 +240,7 @@ fn write_line(
             faults: frame.faults.iter().map(fault).collect(),
             detections: shown().map(record).collect(),
         };
-        writeln!(out, "{}", serde_json::to_string(&line)?)?;
+        writeln!(out, "{}", json_line(&line)?)?;
     } else {
         for fault in &frame.faults {
             writeln!(out, "frame {}: {fault}", frame.number)?;
@@ -273,6 +275,8 @@ fn write_error(out: &mut impl Write, args: &DetectArgs, address: &Address, error
 #[derive(Serialize)]
 struct FrameLine<'a> {
     camera: &'a str,
+    /// The part that the model looks for.
+    object: &'a str,
     frame: u64,
     /// Seconds since 1970.
     captured: f64,
