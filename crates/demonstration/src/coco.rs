@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, ImageFacts};
 use crate::draft::{Border, Draft};
+use crate::foreign::is_foreign_annotation;
 use crate::json::{Node, describe, shorten};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
@@ -38,17 +39,24 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
         None => Vec::new(),
     };
 
-    let mut objects = Vec::new();
+    let mut of_image = Vec::new();
     for annotation in root.field("annotations", "the list of annotations")?.items()? {
         if annotation.field("image_id", "the number of its image")?.value == image_id.value {
-            objects.push(LabelledInstance {
-                optional: is_optional(annotation.optional("attributes")?.as_ref())?,
-                annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
-                place: annotation.place,
-            });
+            of_image.push(annotation);
         }
     }
-    Ok(objects)
+    // A mask that is all there is gets its error.
+    if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
+        of_image.retain(|annotation| !is_foreign_annotation(annotation));
+    }
+    let instance = |annotation: Node| {
+        Ok(LabelledInstance {
+            optional: is_optional(annotation.optional("attributes")?.as_ref())?,
+            annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
+            place: annotation.place,
+        })
+    };
+    of_image.into_iter().map(instance).collect()
 }
 
 /// A path's last part, whichever system wrote it.
@@ -329,6 +337,34 @@ mod tests {
         let mut value = full();
         change(&mut value);
         read_named(&value, None).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_crowd_beside_the_part_is_passed_over_and_told() {
+        let expected = read_named(&full(), None).unwrap();
+        let image_id = full()["images"][0]["id"].clone();
+        for crowd in [
+            json!({"id": 9, "image_id": image_id, "iscrowd": 1, "segmentation": {"counts": [0, 9], "size": [480, 640]}}),
+            json!({"id": 9, "image_id": image_id, "iscrowd": 0, "segmentation": {"counts": "ab", "size": [480, 640]}, "keypoints": []}),
+        ] {
+            let mut file = full();
+            file["annotations"].as_array_mut().unwrap().push(crowd);
+            assert_eq!(read_named(&file, None).unwrap(), expected);
+            let told = Annotation::passed_over(file.to_string().as_bytes());
+            assert_eq!(told, ["annotations[1]: a crowd or a mask without keypoints"]);
+        }
+    }
+
+    #[test]
+    fn an_area_that_is_no_number_is_not_needed() {
+        let text = full().to_string();
+        let area = full()["annotations"][0]["area"].to_string();
+        let expected = read_named(&full(), None).unwrap();
+        for literal in ["NaN", "Infinity", "-Infinity"] {
+            let text = text.replace(&format!("\"area\":{area}"), &format!("\"area\": {literal}"));
+            assert!(text.contains(literal));
+            assert_eq!(Annotation::read(text.as_bytes(), &IMAGE).unwrap(), expected, "{literal}");
+        }
     }
 
     #[test]

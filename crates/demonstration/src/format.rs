@@ -3,7 +3,7 @@
 use crate::json::{self, Node, describe};
 use crate::npy;
 use crate::written::WrittenAnnotation;
-use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, labelme, opendr, yolo_pose};
+use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, foreign, labelme, opendr, yolo_pose};
 
 /// A kind of annotation file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,6 +111,12 @@ impl AnnotationFormat {
 }
 
 impl Annotation {
+    /// What of a COCO or LabelMe file is passed over because it marks no part, in words: circles, lines, masks, points of other
+    /// names, crowds.
+    pub fn passed_over(bytes: &[u8]) -> Vec<String> {
+        foreign::passed_over(bytes)
+    }
+
     /// Reads every object that a file marks on the image; the content says which [`AnnotationFormat`] it is.
     ///
     /// # Errors

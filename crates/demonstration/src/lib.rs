@@ -42,6 +42,7 @@ mod data_yaml;
 mod demonstration;
 mod draft;
 mod error;
+mod foreign;
 mod format;
 mod json;
 mod keypoint_row;
