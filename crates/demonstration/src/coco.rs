@@ -41,7 +41,7 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
 
     let mut of_image = Vec::new();
     for annotation in root.field("annotations", "the list of annotations")?.items()? {
-        if annotation.field("image_id", "the number of its image")?.value == image_id.value {
+        if is_same_id(annotation.field("image_id", "the number of its image")?.value, image_id.value) {
             of_image.push(annotation);
         }
     }
@@ -97,8 +97,9 @@ fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>>
             });
         };
         let id = chosen.field("id", "the image's number")?.value;
-        if let Some(other) =
-            images.iter().find(|other| other.place != chosen.place && other.value.get("id") == Some(id))
+        if let Some(other) = images
+            .iter()
+            .find(|other| other.place != chosen.place && other.value.get("id").is_some_and(|own| is_same_id(own, id)))
         {
             return Err(Error::Malformed {
                 place: format!("{}.id", chosen.place),
@@ -123,9 +124,9 @@ fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>>
 fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
     let mut draft = Draft { place: node.place.clone(), ..Draft::default() };
     let category_id = node.optional("category_id")?;
-    let category = categories
-        .iter()
-        .find(|category| category_id.as_ref().is_some_and(|id| category.value.get("id") == Some(id.value)));
+    let category = categories.iter().find(|category| {
+        category_id.as_ref().is_some_and(|id| category.value.get("id").is_some_and(|own| is_same_id(own, id.value)))
+    });
     if let Some(name) = category.map(|category| category.optional("name")).transpose()?.flatten() {
         draft.label = Some(name.text()?.to_string());
     }
@@ -166,6 +167,12 @@ fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
         draft.outline = Some((points, polygon.place.clone()));
     }
     Ok(draft)
+}
+
+/// Whether two ids are the same number, which some programs write as 1.0 or as text, or the same text.
+fn is_same_id(one: &Value, other: &Value) -> bool {
+    let number = |id: &Value| id.as_f64().or_else(|| id.as_str()?.trim().parse().ok());
+    one == other || number(one).is_some_and(|one| Some(one) == number(other))
 }
 
 /// Exporters write `[]` for what is not there.
@@ -352,6 +359,19 @@ mod tests {
             assert_eq!(read_named(&file, None).unwrap(), expected);
             let told = Annotation::passed_over(file.to_string().as_bytes());
             assert_eq!(told, ["annotations[1]: a crowd or a mask without keypoints"]);
+        }
+    }
+
+    #[test]
+    fn ids_are_compared_as_numbers() {
+        let expected = read_named(&full(), None).unwrap();
+        for other in [json!("1"), json!(1.0)] {
+            for key in ["image_id", "category_id"] {
+                let mut file = full();
+                assert_eq!(file["annotations"][0][key], 1);
+                file["annotations"][0][key] = other.clone();
+                assert_eq!(read_named(&file, None).unwrap(), expected, "{key} {other}");
+            }
         }
     }
 

@@ -54,6 +54,9 @@ impl AnnotationFormat {
         if yolo_pose::looks_like(bytes) {
             return Ok(Self::YoloPose);
         }
+        if let Some(found) = other_kind(bytes) {
+            return Err(Error::WrongFile { found: found.into() });
+        }
         json_format(&json::parse(bytes)?)
     }
 
@@ -107,6 +110,22 @@ impl AnnotationFormat {
             Self::LabelMe => labelme::read(&Node::root(&json::parse(bytes)?), image),
             Self::Coco => coco::read(&Node::root(&json::parse(bytes)?), image),
         }
+    }
+}
+
+/// What a file is, by its first bytes, that is none of the formats.
+fn other_kind(bytes: &[u8]) -> Option<&'static str> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let is_number = |field: &[u8]| std::str::from_utf8(field).is_ok_and(|field| field.trim().parse::<f64>().is_ok());
+    match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16: save it as UTF-8"),
+        _ if text.is_empty() => Some("nothing: the file is empty"),
+        _ if text.starts_with(b"<") => Some("XML: export the marks as COCO or YOLO-pose"),
+        _ if first.contains(&b',') && first.split(|byte| *byte == b',').all(is_number) => {
+            Some("a row of numbers with commas: YOLO-pose has blanks between them")
+        }
+        _ => None,
     }
 }
 

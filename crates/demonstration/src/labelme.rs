@@ -327,7 +327,14 @@ mod tests {
     #[test]
     fn other_files_are_refused() {
         let message = |text: &str| Annotation::read(text.as_bytes(), &IMAGE).unwrap_err().to_string();
-        assert!(message("").contains("is empty"));
+        for empty in ["", " \n"] {
+            assert!(message(empty).contains("found nothing: the file is empty"));
+        }
+        assert!(message("<annotation></annotation>").contains("found XML"));
+        assert!(message("0,0.5,0.46,0.2,0.22,0.52,0.48,2\n").contains("commas: YOLO-pose has blanks"));
+        let utf16 =
+            [b"\xff\xfe".as_slice(), &"{}".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>()].concat();
+        assert!(Annotation::read(&utf16, &IMAGE).unwrap_err().to_string().contains("UTF-16: save it as UTF-8"));
         assert!(message("{\"shapes\": [").contains("not JSON (line 1"));
         assert!(message("[1, 2]").contains("found a list of 2"));
         assert!(message("{\"model\": 3}").contains("an object with `model`"));
