@@ -105,7 +105,7 @@ test-torch: setup ## Tests a whole network against torchvision, losses and gradi
 	SDG_TORCH_PYTHON="$(SDG_TORCH_PYTHON)" $(CARGO) test $(PROFILE) --locked --workspace --test detection -- --ignored golden::
 
 # The libraries for other programs, with what they depend on. Nothing is published; what is packaged is what the tests compile.
-PACKAGED = geometry kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
+PACKAGED = geometry picture kinematics sift shape grasp kernels layers detection demonstration training orientation comparison part-generator
 
 package: ## Packages the libraries that other programs can use, into target/package
 	$(CARGO) package $(foreach crate,$(PACKAGED),-p sdg-$(crate)) --no-verify

@@ -128,10 +128,33 @@ impl Checkpoint {
             }
         };
         if checkpoint.tensors.is_empty() {
-            return Err(WeightsError::damaged("checkpoint", "tensors by name", "none"));
+            return Err(WeightsError::damaged("checkpoint", "tensors by name", checkpoint.found_instead()));
         }
         checkpoint.check_total(source.len())?;
         Ok(checkpoint)
+    }
+
+    /// What a checkpoint without tensors has, and how to get at them.
+    fn found_instead(&self) -> String {
+        const SHOWN: usize = 6;
+        if self.not_tensors.is_empty() {
+            return "none".to_owned();
+        }
+        let named: Vec<String> =
+            self.not_tensors.iter().take(SHOWN).map(|name| format!("`{}`", printable(name))).collect();
+        let more = if self.not_tensors.len() > SHOWN { ", …" } else { "" };
+        // Parameters have a point in their names: torch's tensors in Python's own pickle. Otherwise training keeps the weights, or
+        // their mean over its last steps (`model_ema`), beside other things.
+        let weights = self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first());
+        let loaded = match weights {
+            Some(name) if name.contains('.') => "pickle.load(open(\"FILE\", \"rb\"))".to_owned(),
+            Some(name) => format!("torch.load(\"FILE\", weights_only=False)[\"{}\"]", printable(name)),
+            None => String::new(),
+        };
+        format!(
+            "none, but {}{more}: write the weights alone, in Python: torch.save({loaded}, \"NEW.pth\")",
+            named.join(", ")
+        )
     }
 
     fn from_pickle(format: FileFormat, pickle: &Pickle, storages: Option<&Storages>) -> Result<Self> {

@@ -18,7 +18,8 @@ pub enum WeightsError {
     },
     /// A pickle that asks for a function or class which weights do not need.
     #[error(
-        "refused: the pickle asks for {name} (byte {offset}); weights need only numpy arrays, torch tensors and dicts"
+        "refused: the pickle asks for {name} (byte {offset}); weights need only numpy arrays, torch tensors and dicts: \
+         write them alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"model\"], \"NEW.pth\")"
     )]
     ForbiddenGlobal {
         /// Module and name, as the file spells them.

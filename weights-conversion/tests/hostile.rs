@@ -86,6 +86,19 @@ fn element_types_that_are_no_numbers_are_refused() {
 }
 
 #[test]
+fn what_training_saves_names_the_way_out() {
+    let ema = cat(&[b"\x80\x04}(", &text("epoch"), b"K\x01", &text("model_ema"), b"}u."]);
+    assert_refused(
+        "ema",
+        ema,
+        &["`epoch`, `model_ema`", "torch.save(torch.load(\"FILE\", weights_only=False)[\"model_ema\"]"],
+    );
+    assert_refused("plain", dict_with("backbone.w", b"N"), &["`backbone.w`", "torch.save(pickle.load("]);
+    let namespace = cat(&[b"\x80\x02}", b"cargparse\nNamespace\n", b"."]);
+    assert_refused("namespace", namespace, &["argparse.Namespace", "torch.save(torch.load("]);
+}
+
+#[test]
 fn nesting_and_loops_end() {
     // A hundred thousand lists in each other: nothing here recurses.
     let deep = cat(&[b"\x80\x02", &[b']'; 100_000], &[b'a'; 99_999], b"."]);

@@ -7,11 +7,14 @@ pub fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// Accents that stand behind their letter, as macOS writes umlauts.
+const COMBINING: std::ops::RangeInclusive<char> = '\u{300}'..='\u{36f}';
+
 /// What of a name any file system takes.
 pub fn safe_stem(name: &str) -> String {
     let safe: String = name
         .chars()
-        .map(|c| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' })
+        .map(|c| if c.is_alphanumeric() || COMBINING.contains(&c) || c == '-' || c == '_' { c } else { '_' })
         .take(60)
         .collect();
     if safe.chars().all(|c| c == '_') { "part".to_owned() } else { safe }
@@ -43,6 +46,8 @@ mod tests {
     fn names_from_elsewhere_name_nothing_else() {
         assert_eq!(safe_stem("../../etc/passwd"), "______etc_passwd");
         assert_eq!(safe_stem("Pleuel 3"), "Pleuel_3");
+        assert_eq!(safe_stem("Bügel größer"), "Bügel_größer");
+        assert_eq!(safe_stem("Bu\u{308}gel"), "Bu\u{308}gel");
         assert_eq!(safe_stem("…"), "part");
         assert_eq!(safe_stem(&"a".repeat(300)).len(), 60);
     }

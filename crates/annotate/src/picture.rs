@@ -4,9 +4,8 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::metadata::Orientation;
-use image::{ImageDecoder, ImageFormat, ImageReader, RgbImage};
-use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, decode_image};
+use image::{ImageFormat, RgbImage};
+use sdg_demonstration::{IMAGE_EXTENSIONS, ImageLimits, PictureError, decode_image, is_turned_by_exif};
 
 use crate::error::{Error, Result};
 
@@ -66,7 +65,7 @@ impl Picture {
             _ => None,
         };
         match media_type {
-            Some(media_type) if is_upright(&bytes) => Ok((bytes, media_type)),
+            Some(media_type) if !is_turned_by_exif(&bytes) => Ok((bytes, media_type)),
             _ => Ok((jpeg(&decode(&bytes, &self.name)?), "image/jpeg")),
         }
     }
@@ -124,13 +123,8 @@ fn read(path: &Path) -> Result<Vec<u8>> {
 }
 
 fn decode(bytes: &[u8], name: &str) -> Result<RgbImage> {
-    decode_image(bytes, &ImageLimits::default()).map_err(|source| Error::Demonstration { name: name.into(), source })
-}
-
-fn is_upright(bytes: &[u8]) -> bool {
-    let decoder = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok().and_then(|r| r.into_decoder().ok());
-    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
-    orientation.is_none_or(|orientation| orientation == Orientation::NoTransforms)
+    let failed = |source: PictureError| Error::Demonstration { name: name.into(), source: source.into() };
+    decode_image(bytes, &ImageLimits::default()).map_err(failed)
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@
 //!   flange_from_camera: {translation_m: [0.05, 0.0, 0.06], rotation_xyzw: [0.0, 0.0, 0.0, 1.0]}
 //! ```
 
-use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point2, Quaternion, Translation3, UnitQuaternion};
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera, Workspace};
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +98,18 @@ struct File {
     image_height: u32,
     #[serde(default)]
     camera_name: String,
+    /// Kalibr's and others' name of the projection.
+    #[serde(default)]
+    camera_model: Option<String>,
+    #[serde(default)]
+    lens_model: Option<String>,
+    #[serde(default)]
+    projection_model: Option<String>,
+    /// The mirror of an omnidirectional camera.
+    #[serde(default)]
+    xi: Option<f64>,
+    #[serde(default)]
+    fisheye: Option<bool>,
     camera_matrix: Matrix,
     distortion_model: String,
     distortion_coefficients: Matrix,
@@ -239,7 +251,48 @@ impl CalibratedCamera {
     }
 }
 
+/// Names of what is read, in lines other than `distortion_model`.
+const PINHOLE_NAMES: [&str; 6] = ["pinhole", "perspective", "plumb_bob", "radtan", "brown", "opencv"];
+/// Places along each side of the picture at which the lens is tried.
+const TRIED_A_SIDE: u32 = 16;
+
+/// Refuses what says in another line than `distortion_model` that it is no pinhole camera.
+fn check_model(file: &File) -> Result<(), CameraFileError> {
+    let other = |key, found: &dyn std::fmt::Display| Err(CameraFileError::OtherModel { key, found: found.to_string() });
+    let named = [
+        ("camera_model", &file.camera_model),
+        ("lens_model", &file.lens_model),
+        ("projection_model", &file.projection_model),
+    ];
+    for (key, name) in named {
+        if let Some(name) = name.as_ref().filter(|name| !PINHOLE_NAMES.contains(&name.to_lowercase().as_str())) {
+            return other(key, name);
+        }
+    }
+    match (file.xi, file.fisheye) {
+        (Some(xi), _) if xi != 0.0 => other("xi", &xi),
+        (_, Some(true)) => other("fisheye", &true),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a lens that shows one place at two pixels of the picture, or none at one.
+fn check_does_not_fold(camera: &PinholeCamera) -> Result<(), CameraFileError> {
+    let [width, height] = [camera.width, camera.height].map(f64::from);
+    let border = (0..=TRIED_A_SIDE).map(|step| f64::from(step) / f64::from(TRIED_A_SIDE)).flat_map(|share| {
+        [(share * width, 0.0), (share * width, height), (0.0, share * height), (width, share * height)]
+    });
+    for (x, y) in border {
+        let seen = camera.unproject(&Point2::new(x, y)).map(|point| point.xy());
+        if !seen.is_some_and(|point| camera.lens.jacobian(&point).determinant() > 0.0) {
+            return Err(CameraFileError::Folds { found: camera.lens.to_array().to_vec(), x, y });
+        }
+    }
+    Ok(())
+}
+
 fn intrinsics(file: &File) -> Result<PinholeCamera, CameraFileError> {
+    check_model(file)?;
     let coefficients = &file.distortion_coefficients.data;
     let lens = match (file.distortion_model.as_str(), coefficients.len()) {
         ("plumb_bob", 4 | 5) => {
@@ -249,13 +302,18 @@ fn intrinsics(file: &File) -> Result<PinholeCamera, CameraFileError> {
         }
         (found, coefficients) => return Err(CameraFileError::Lens { found: found.to_owned(), coefficients }),
     };
+    if !coefficients.iter().all(|value| value.is_finite()) {
+        return Err(CameraFileError::Coefficients { found: coefficients.clone() });
+    }
     let (width, height) = (file.image_width, file.image_height);
     let refused = || CameraFileError::Matrix { found: file.camera_matrix.data.clone(), width, height };
     let &[fx, skew, cx, zero, fy, cy, p, q, one] = &file.camera_matrix.data[..] else { return Err(refused()) };
     let is_in_picture = |center: f64, side: u32| (0.0..f64::from(side)).contains(&center);
     let is_one = [skew, zero, p, q] == [0.0; 4] && one == 1.0 && is_in_picture(cx, width) && is_in_picture(cy, height);
     let camera = PinholeCamera { width, height, fx, fy, cx: cx + 0.5, cy: cy + 0.5, lens };
-    camera.checked().ok().filter(|_| is_one).ok_or_else(refused)
+    let camera = camera.checked().ok().filter(|_| is_one).ok_or_else(refused)?;
+    check_does_not_fold(&camera)?;
+    Ok(camera)
 }
 
 impl TablePose {
@@ -410,6 +468,27 @@ table:
         assert!(matches!(read("[1, 2"), Err(CameraFileError::Unreadable { .. })));
         assert!(matches!(with("plumb_bob", "equidistant"), CameraFileError::Lens { coefficients: 5, .. }));
         assert!(matches!(with("0.001014, 0.000505, 0.000000", "0.1"), CameraFileError::Lens { coefficients: 3, .. }));
+        for line in
+            ["camera_model: fisheye", "camera_model: omni", "lens_model: Kannala-Brandt", "xi: 1.2", "fisheye: true"]
+        {
+            let error = with("distortion_model", &format!("{line}\ndistortion_model"));
+            assert!(matches!(error, CameraFileError::OtherModel { .. }), "{line}: {error}");
+        }
+        for line in ["camera_model: pinhole", "camera_model: Plumb_Bob", "fisheye: false", "xi: 0"] {
+            assert!(read(&format!("{line}\n{OF_ROS}")).is_ok(), "{line}");
+        }
+        for number in [".nan", ".inf"] {
+            assert!(matches!(
+                with("0.001014, 0.000505", &format!("{number}, 0.000505")),
+                CameraFileError::Coefficients { .. }
+            ));
+        }
+        // A barrel so strong that the radius shrinks again before the corner; p1 that folds a border.
+        for coefficients in ["[-1.5, 0, 0, 0, 0]", "[0, 0, 2.5, 0, 0]"] {
+            let data = OF_ROS.split("data: ").nth(2).unwrap().lines().next().unwrap();
+            let error = with(data, coefficients);
+            assert!(matches!(error, CameraFileError::Folds { .. }), "{coefficients}: {error}");
+        }
         assert!(matches!(with("438.783367", "-438.8"), CameraFileError::Matrix { .. }));
         assert!(matches!(with("438.783367, 0.000000", "438.783367, 0.5"), CameraFileError::Matrix { .. }));
         assert!(matches!(with("305.593336", "1305.6"), CameraFileError::Matrix { .. }));

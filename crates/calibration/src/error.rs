@@ -18,6 +18,21 @@ pub enum CameraFileError {
         /// How many coefficients it has.
         coefficients: usize,
     },
+    /// Another line of the file that names a lens of another kind than `distortion_model` says.
+    #[error(
+        "expected a pinhole camera with distortion_model plumb_bob, found {key}: {found}; calibrate again with that model (in OpenCV: not as \
+         fisheye)"
+    )]
+    OtherModel { key: &'static str, found: String },
+    /// NaN or an infinity.
+    #[error("expected finite distortion_coefficients, found {found:?}")]
+    Coefficients { found: Vec<f64> },
+    /// A polynomial that turns back within the picture: two places of the world would be one pixel.
+    #[error(
+        "expected distortion_coefficients under which every pixel shows one place, found {found:?}, which fold the picture at ({x:.0}, {y:.0}); \
+         calibrate again with the board held into the corners, too"
+    )]
+    Folds { found: Vec<f64>, x: f64, y: f64 },
     /// A camera matrix that is none.
     #[error(
         "expected a camera matrix [fx, 0, cx, 0, fy, cy, 0, 0, 1] with a positive focal length and its centre in the picture, \

@@ -1,14 +1,9 @@
-//! Bytes of one picture to pixels: JPEG, PNG, PPM; from files WebP, BMP and TIFF, too.
+//! Bytes of one picture to pixels.
 
-use std::io::Cursor;
+use image::RgbImage;
+use sdg_picture::{ImageLimits, PixelFrame, decode_image_in};
 
-use image::{ImageFormat, ImageReader, Limits, RgbImage};
-
-use crate::jpeg::whole_jpeg;
-
-/// More than any camera's: 64 megapixels, 192 MiB.
-pub(crate) const MAX_PIXELS: u64 = 1 << 26;
-/// Pixels in a row, or rows.
+/// Pixels in a row, or rows, of a V4L2 camera.
 pub(crate) const MAX_SIDE: u32 = 1 << 14;
 /// More than a JPEG or PNG of a camera has.
 pub(crate) const MAX_ENCODED_BYTES: usize = 32 << 20;
@@ -16,138 +11,24 @@ pub(crate) const MAX_ENCODED_BYTES: usize = 32 << 20;
 /// A PNG's first bytes.
 pub(crate) const PNG_START: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Decodes one picture, whose kind its first bytes tell.
+/// Decodes one picture, whose kind its first bytes tell, as files are decoded.
 ///
 /// # Errors
 /// In words, what was found instead of a whole picture.
-pub fn decode(bytes: &[u8]) -> Result<RgbImage, String> {
-    match bytes {
-        [0xff, 0xd8, ..] => decode_limited(&whole_jpeg(bytes)?, ImageFormat::Jpeg),
-        _ if bytes.starts_with(&PNG_START) => decode_limited(bytes, ImageFormat::Png),
-        [b'P', b'6', ..] => decode_ppm(bytes),
-        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => decode_limited(bytes, ImageFormat::WebP),
-        [b'I', b'I', 0x2a, 0, ..] | [b'M', b'M', 0, 0x2a, ..] => decode_limited(bytes, ImageFormat::Tiff),
-        [b'B', b'M', ..] => decode_limited(bytes, ImageFormat::Bmp),
-        [] => Err("nothing".to_owned()),
-        _ => Err(format!("{} bytes that are no JPEG, PNG, PPM, WebP, BMP or TIFF", bytes.len())),
-    }
-}
-
-fn decode_limited(bytes: &[u8], format: ImageFormat) -> Result<RgbImage, String> {
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_PIXELS * 8);
-    reader.limits(limits);
-    let picture = reader.decode().map_err(|error| format!("{} bytes that do not decode: {error}", bytes.len()))?;
-    Ok(picture.into_rgb8())
-}
-
-/// The head of a binary PPM.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct PpmHead {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-    /// Where the pixels begin.
-    pub(crate) start: usize,
-}
-
-impl PpmHead {
-    /// A head is shorter than this; comments may stand in it.
-    const MAX_BYTES: usize = 1024;
-
-    /// Reads it; `None` while it has not all arrived.
-    ///
-    /// # Errors
-    /// In words, what is wrong with it.
-    pub(crate) fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
-        let mut numbers = [0_u32; 3];
-        let mut at = 2;
-        for number in &mut numbers {
-            // Blanks and comments before the number.
-            let mut is_comment = false;
-            loop {
-                match bytes.get(at) {
-                    None if at > Self::MAX_BYTES => return Err("a PPM without an end to its head".to_owned()),
-                    None => return Ok(None),
-                    Some(b'\n') => is_comment = false,
-                    Some(_) if is_comment => {}
-                    Some(b'#') => is_comment = true,
-                    Some(blank) if blank.is_ascii_whitespace() => {}
-                    Some(_) => break,
-                }
-                at += 1;
-            }
-            let digits = bytes[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
-            at += digits;
-            match bytes.get(at) {
-                None if digits < 10 => return Ok(None),
-                Some(blank) if digits > 0 && blank.is_ascii_whitespace() => {}
-                _ => return Err("a PPM with something else than numbers in its head".to_owned()),
-            }
-            let text = std::str::from_utf8(&bytes[at - digits..at]).unwrap_or_default();
-            *number = text.parse().map_err(|_| format!("a PPM with the number {text} in its head"))?;
-        }
-        let [width, height, maximum] = numbers;
-        if maximum != 255 {
-            return Err(format!("a PPM with values up to {maximum}; those with 255 are read"));
-        }
-        let is_bounded = width <= MAX_SIDE && height <= MAX_SIDE && u64::from(width) * u64::from(height) <= MAX_PIXELS;
-        if width == 0 || height == 0 || !is_bounded {
-            return Err(format!("a PPM of {width} × {height} pixels"));
-        }
-        Ok(Some(Self { width, height, start: at + 1 }))
-    }
-
-    /// How many bytes head and pixels have together.
-    pub(crate) fn end(self) -> usize {
-        self.start + self.width as usize * self.height as usize * 3
-    }
-}
-
-fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
-    let short = || format!("a PPM that ends after {} bytes", bytes.len());
-    let head = PpmHead::read(bytes)?.ok_or_else(short)?;
-    let pixels = bytes.get(head.start..head.end()).ok_or_else(short)?;
-    RgbImage::from_raw(head.width, head.height, pixels.to_vec()).ok_or_else(short)
+pub fn decode(bytes: &[u8], frame: PixelFrame) -> Result<RgbImage, String> {
+    decode_image_in(bytes, &ImageLimits::default(), frame).map_err(|error| error.to_string())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
+pub(crate) mod tests {
+    use image::codecs::jpeg::JpegEncoder;
+    use image::{Rgb, RgbImage};
 
-    #[test]
-    fn ppm_heads_have_comments_and_bounds() {
-        let picture = decode(b"P6 # two\n# pixels\n2 1\n255\n\x01\x02\x03\x04\x05\x06").unwrap();
-        assert_eq!((picture.dimensions(), picture.as_raw().as_slice()), ((2, 1), [1, 2, 3, 4, 5, 6].as_slice()));
-        for (bytes, expected) in [
-            (b"P6 2 1 255\n\x01\x02\x03".as_slice(), "ends after 14 bytes"),
-            (b"P6 2 1 65535\n", "up to 65535"),
-            (b"P6 0 1 255\n", "0 × 1"),
-            (b"P6 16384 16384 255\n", "16384 × 16384"),
-            (b"P6 99999999999 1 255\n", "99999999999"),
-            (b"P6 -2 1 255\n", "something else"),
-            (b"P6 2", "ends after 4 bytes"),
-        ] {
-            let error = decode(bytes).unwrap_err();
-            assert!(error.contains(expected), "{error}");
-        }
-    }
-
-    #[test]
-    fn pictures_cut_anywhere_are_refused() {
-        let picture = RgbImage::from_fn(31, 17, |x, y| image::Rgb([x as u8, y as u8, 7]));
-        for format in [ImageFormat::Png, ImageFormat::WebP, ImageFormat::Bmp, ImageFormat::Tiff] {
-            let mut bytes = Vec::new();
-            picture.write_to(&mut Cursor::new(&mut bytes), format).unwrap();
-            assert_eq!(decode(&bytes).unwrap(), picture);
-            for length in [0, 1, 8, 20, bytes.len() / 2] {
-                assert!(decode(&bytes[..length]).is_err(), "{format:?}, {length}");
-            }
-        }
-        let jpeg = crate::jpeg::tests::jpeg(31, 17);
-        assert_eq!(decode(&crate::jpeg::tests::without_tables(&jpeg)).unwrap(), decode(&jpeg).unwrap());
-        assert!(decode(&jpeg[..jpeg.len() - 2]).unwrap_err().contains("end marker"));
+    /// A picture of many colours and edges as JPEG.
+    pub(crate) fn jpeg(width: u32, height: u32) -> Vec<u8> {
+        let picture = RgbImage::from_fn(width, height, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8]));
+        let mut bytes = Vec::new();
+        JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(&picture).unwrap();
+        bytes
     }
 }

@@ -8,6 +8,8 @@ use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
+use sdg_picture::PixelFrame;
+
 use crate::address::Playback;
 use crate::decode::{MAX_ENCODED_BYTES, decode};
 use crate::error::CameraError;
@@ -28,6 +30,7 @@ pub(crate) struct Folder {
     played: BTreeSet<OsString>,
     num_played: u64,
     next_at: Instant,
+    frame: PixelFrame,
 }
 
 enum Place {
@@ -66,7 +69,19 @@ impl Folder {
     }
 
     fn at(place: Place, playback: Playback) -> Self {
-        Self { place, playback, played: BTreeSet::new(), num_played: 0, next_at: Instant::now() }
+        Self {
+            place,
+            playback,
+            played: BTreeSet::new(),
+            num_played: 0,
+            next_at: Instant::now(),
+            frame: PixelFrame::Upright,
+        }
+    }
+
+    /// The same with pictures that way up.
+    pub(crate) fn in_frame(self, frame: PixelFrame) -> Self {
+        Self { frame, ..self }
     }
 
     /// The next file; `None` after the last.
@@ -110,12 +125,16 @@ impl Source for Folder {
             }
         };
         self.next_at = Instant::now() + self.playback.interval.unwrap_or_default();
-        let read = read_finished(&path);
+        let read = read_finished(&path, self.frame);
         self.mark_played(&path);
         match read {
             Ok((picture, captured)) => Ok(Some(Taken { picture, captured, num_skipped: 0 })),
             Err(found) => Err(Missing::Torn(format!("{}: {found}", path.display()))),
         }
+    }
+
+    fn is_on_request(&self) -> bool {
+        true
     }
 }
 
@@ -134,7 +153,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<OsString>> {
 }
 
 /// Reads a picture; where it does not decode and still grows, again until it does. With the time of its last change.
-fn read_finished(path: &Path) -> Result<(image::RgbImage, SystemTime), String> {
+fn read_finished(path: &Path, frame: PixelFrame) -> Result<(image::RgbImage, SystemTime), String> {
     let mut unchanged: Option<(u64, Instant)> = None;
     loop {
         let mut bytes = Vec::new();
@@ -142,7 +161,7 @@ fn read_finished(path: &Path) -> Result<(image::RgbImage, SystemTime), String> {
         let changed = file.metadata().and_then(|metadata| metadata.modified());
         let read =
             file.take(MAX_ENCODED_BYTES as u64 * 8 + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-        let found = match decode(&bytes) {
+        let found = match decode(&bytes, frame) {
             Ok(picture) => return Ok((picture, changed.unwrap_or_else(|_| SystemTime::now()))),
             Err(found) => found,
         };

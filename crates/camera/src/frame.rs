@@ -46,11 +46,20 @@ pub trait Camera: Send {
     /// # Errors
     /// What went wrong with this frame or this camera. After an error that [`CameraError::is_passing`] the next call goes on.
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError>;
+
+    /// Whether a picture is only taken or read when it is asked for, so that none is old and none is lost while the last one is worked on.
+    fn is_on_request(&self) -> bool {
+        false
+    }
 }
 
 impl<C: Camera + ?Sized> Camera for Box<C> {
     fn next_frame(&mut self) -> Result<Option<Frame>, CameraError> {
         (**self).next_frame()
+    }
+
+    fn is_on_request(&self) -> bool {
+        (**self).is_on_request()
     }
 }
 

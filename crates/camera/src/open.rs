@@ -45,11 +45,12 @@ pub fn open(address: &Address, options: &OpenOptions) -> Result<Box<dyn Camera>,
 }
 
 fn opener(address: Address, options: OpenOptions) -> Opener {
-    let boxed = |folder: Folder| Box::new(folder) as Box<dyn Source>;
+    let frame = options.frame;
+    let boxed = move |folder: Folder| Box::new(folder.in_frame(frame)) as Box<dyn Source>;
     Box::new(move |deadline| match &address {
         Address::V4l(node) => v4l::open(node, &options),
         Address::Http(url) => http::connect(url, &options, deadline),
-        Address::Command(line) => Ok(Box::new(Program::start(line)?)),
+        Address::Command(line) => Ok(Box::new(Program::start(line, options.frame)?)),
         Address::Folder { path, playback } => Folder::open(path, *playback, &address.to_string()).map(boxed),
         Address::File { path, playback } => Folder::open_file(path, *playback, &address.to_string()).map(boxed),
         Address::Sim(_) | Address::Ros2(_) => Err(CameraError::OpenedElsewhere { address: address.to_string() }),

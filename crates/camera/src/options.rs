@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use sdg_picture::PixelFrame;
+
 /// How a V4L2 camera encodes its frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
@@ -44,6 +46,8 @@ pub struct OpenOptions {
     pub exposure_secs: Option<f64>,
     /// A fixed white balance in kelvin; automatic where `None`.
     pub white_balance_kelvin: Option<u32>,
+    /// Which way up pictures with an Exif orientation are: with a calibration, the sensor's.
+    pub frame: PixelFrame,
     /// Without a frame for so long a camera is [`Fault::Stale`](crate::Fault::Stale).
     pub stall_timeout: Duration,
     /// The same bits in so many frames in a row are [`Fault::Frozen`](crate::Fault::Frozen).
@@ -65,6 +69,7 @@ impl Default for OpenOptions {
             encoding: None,
             exposure_secs: None,
             white_balance_kelvin: None,
+            frame: PixelFrame::Upright,
             stall_timeout: Duration::from_secs(2),
             frozen_frames: 10,
         }

@@ -7,6 +7,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
+use sdg_picture::PixelFrame;
+
 use crate::command_line::CommandLine;
 use crate::decode::decode;
 use crate::error::CameraError;
@@ -30,6 +32,7 @@ pub(crate) struct Program {
     last_line: Arc<Mutex<String>>,
     threads: Vec<JoinHandle<()>>,
     has_delivered: bool,
+    frame: PixelFrame,
 }
 
 impl Program {
@@ -37,7 +40,7 @@ impl Program {
     ///
     /// # Errors
     /// [`CameraError::Open`] for a program that cannot be started.
-    pub(crate) fn start(line: &CommandLine) -> Result<Self, CameraError> {
+    pub(crate) fn start(line: &CommandLine, frame: PixelFrame) -> Result<Self, CameraError> {
         let refused = |why: String| CameraError::Open { address: format!("cmd:{line}"), why };
         let (program, arguments) = line.words().split_first().ok_or_else(|| refused("no program".to_owned()))?;
         let mut command = Command::new(program);
@@ -53,7 +56,7 @@ impl Program {
             let last_line = Arc::clone(&last_line);
             threads.push(std::thread::spawn(move || keep_last_line(stderr, &last_line)));
         }
-        Ok(Self { child, pictures: Some(pictures), last_line, threads, has_delivered: false })
+        Ok(Self { child, pictures: Some(pictures), last_line, threads, has_delivered: false, frame })
     }
 
     /// What the end of the program's output means.
@@ -94,7 +97,7 @@ impl Source for Program {
         };
         match pictures.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
             Ok((captured, Ok(bytes))) => {
-                let picture = decode(&bytes).map_err(Missing::Torn)?;
+                let picture = decode(&bytes, self.frame).map_err(Missing::Torn)?;
                 self.has_delivered = true;
                 Ok(Some(Taken { picture, captured, num_skipped: 0 }))
             }

@@ -145,6 +145,10 @@ impl Camera for Reconnecting {
             Err(Missing::Ended(why)) => Err(CameraError::Ended { camera: self.name.to_string(), why }),
         }
     }
+
+    fn is_on_request(&self) -> bool {
+        self.source.as_ref().is_some_and(|source| source.is_on_request())
+    }
 }
 
 #[cfg(test)]

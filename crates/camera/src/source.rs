@@ -40,6 +40,11 @@ pub(crate) enum Missing {
 pub(crate) trait Source: Send {
     /// Waits for a picture until the deadline; `None` where there will be none.
     fn take(&mut self, deadline: Instant) -> Result<Option<Taken>, Missing>;
+
+    /// As [`Camera::is_on_request`](crate::Camera::is_on_request).
+    fn is_on_request(&self) -> bool {
+        false
+    }
 }
 
 /// An error that carries a fault.

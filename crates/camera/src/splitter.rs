@@ -1,7 +1,8 @@
 //! A stream of bytes to single pictures: JPEG, PNG and PPM one after the other, as programs write them.
 
-use crate::decode::{MAX_ENCODED_BYTES, PNG_START, PpmHead};
-use crate::jpeg::{JpegEnd, JpegScanner};
+use sdg_picture::{JpegEnd, JpegScanner, PpmHead};
+
+use crate::decode::{MAX_ENCODED_BYTES, PNG_START};
 
 /// Bytes that begin no picture are reported after so many, at the latest.
 const MAX_GARBAGE_BYTES: usize = 1 << 20;
@@ -171,7 +172,7 @@ mod tests {
 
     #[test]
     fn pictures_of_three_kinds_come_out_whole_in_any_pieces() {
-        let jpeg = crate::jpeg::tests::jpeg(20, 10);
+        let jpeg = crate::decode::tests::jpeg(20, 10);
         // Pixels that look like beginnings of pictures.
         let ppm = [b"P6\n3 2\n255\n".as_slice(), b"P6P6\xff\xd8\xff\xd9 P6 \x89P6 P6"].concat();
         let stream = [&jpeg, &ppm, &png(), b"\n\n\0\0".as_slice(), &jpeg, &jpeg, &png()].concat();
@@ -184,7 +185,7 @@ mod tests {
 
     #[test]
     fn torn_pictures_and_garbage_are_told_and_passed_over() {
-        let jpeg = crate::jpeg::tests::jpeg(20, 10);
+        let jpeg = crate::decode::tests::jpeg(20, 10);
         let stream = [b"hello P6x ".as_slice(), &jpeg[..400], &jpeg, b"P6 0 0 255\n", &png(), &jpeg[..99]].concat();
         for piece in [1, 64, stream.len()] {
             let (found, rest) = split(&stream, piece);

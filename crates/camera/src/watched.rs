@@ -53,6 +53,10 @@ impl<C: Camera> Camera for Watched<C> {
         }
         Ok(frame)
     }
+
+    fn is_on_request(&self) -> bool {
+        self.camera.is_on_request()
+    }
 }
 
 fn is_black(picture: &RgbImage) -> bool {

@@ -121,7 +121,7 @@ fn garbage_is_told() {
         sleep(Duration::from_millis(100));
     });
     assert!(
-        matches!(&faults[0], Fault::Torn { found } if found.contains("no JPEG, PNG, PPM, WebP, BMP or TIFF")),
+        matches!(&faults[0], Fault::Torn { found } if found.contains("expected a PNG, JPEG, WebP, BMP or TIFF")),
         "{faults:?}"
     );
     // No boundary any more: nothing is kept, and silence is told.

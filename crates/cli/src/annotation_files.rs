@@ -44,6 +44,9 @@ impl AnnotationFile {
     /// # Errors
     /// Whatever [`Annotation::read_with`] refuses.
     pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
+        for foreign in Annotation::passed_over(&self.bytes) {
+            eprintln!("{}: passed over {foreign}", self.path.display());
+        }
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
         Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
             Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),

@@ -4,7 +4,7 @@ use sdg_calibration::Frame;
 use sdg_grasp::DetectionRecord;
 use serde::Serialize;
 
-use crate::picture_detector::Found;
+use crate::picture_detector::{Found, PictureDetector};
 
 /// A detection and, with a camera, its pose.
 #[derive(Debug, Clone, Serialize)]
@@ -28,9 +28,9 @@ struct PoseRecord {
 }
 
 impl FoundRecord {
-    /// The record of what was found by a camera whose positions are in `frame`.
-    pub fn new(found: &Found, frame: Option<Frame>) -> Self {
-        let pose = found.pose.as_ref().zip(frame).map(|(pose, frame)| PoseRecord {
+    /// The record of what a detector found.
+    pub fn new(found: &Found, detector: &PictureDetector) -> Self {
+        let pose = found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| PoseRecord {
             frame,
             p_m: pose.position_m.coords.into(),
             yaw_deg: pose.yaw.degrees(),
@@ -38,6 +38,6 @@ impl FoundRecord {
             sigma_mm: 1e3 * pose.uncertainty.position_m,
             sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
         });
-        Self { detection: DetectionRecord::from(&found.detection), pose }
+        Self { detection: DetectionRecord::new(&found.detection, detector.model().kind()), pose }
     }
 }

@@ -37,6 +37,7 @@ mod found_record;
 mod found_text;
 mod held_back;
 mod interrupt;
+mod json_line;
 pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::Result;
 use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
-use sdg_camera::{Address, CameraError, Fault, OpenOptions, Playback};
+use sdg_camera::{Address, CameraError, Fault, OpenOptions, PixelFrame, Playback};
 
 use crate::camera_files::CameraFile;
 use crate::exit::one_line;
@@ -42,6 +42,7 @@ impl PageCamera {
         let address = paced(address);
         if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
             (options.width, options.height) = (width, height);
+            options.frame = PixelFrame::Sensor;
         }
         let mut camera = live_pictures::open(&address, &options)?;
         let newest = Arc::new(Mutex::new(Newest { calibration, ..Newest::default() }));

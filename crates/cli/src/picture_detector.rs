@@ -6,6 +6,7 @@ use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Point2;
 use sdg_calibration::Frame;
+use sdg_demonstration::PixelFrame;
 use sdg_grasp::{
     Differences, GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose,
     TaughtDemonstration, Verification,
@@ -90,6 +91,14 @@ impl PictureDetector {
         match self {
             Self::AnyCamera(_) => None,
             Self::Calibrated(camera, _) => Some(camera.size_px()),
+        }
+    }
+
+    /// Which way up its pictures are: a calibration knows the sensor's pixels.
+    pub fn pixel_frame(&self) -> PixelFrame {
+        match self {
+            Self::AnyCamera(_) => PixelFrame::Upright,
+            Self::Calibrated(..) => PixelFrame::Sensor,
         }
     }
 

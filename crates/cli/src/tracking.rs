@@ -3,7 +3,10 @@
 //! ```text
 //! frame ─ LiveTracker::frame ─ Tracker: follow ─────────────────────────── TrackedPart…
 //!                                │ search due ─ channel ─ search thread ─ channel ─ taken before the next frame
+//!                                └ the frame does not follow from the one before: searched here, before it is answered
 //! ```
+//! So a frame is answered after one search at most, beside which one more may run on the search thread.
+//!
 //! The duration of a search varies, and what it found is carried forward. So that a test gives the same output on any machine,
 //! [`SearchTime::Frames`] runs each search on the caller's thread and hands its outcome over a fixed number of frames later.
 
@@ -71,7 +74,8 @@ impl LiveTracker {
         Ok(Self { tracker: Tracker::new(detector, config), searches })
     }
 
-    /// Follows all known parts into a frame, and searches frames where that is due. `captured` counts from any moment that is the
+    /// Follows all known parts into a frame; a frame that does not follow from the one before is searched first, others beside this
+    /// thread where that is due. `captured` counts from any moment that is the
     /// same for all frames.
     ///
     /// # Errors
@@ -81,6 +85,9 @@ impl LiveTracker {
             self.tracker.take_outcome(outcome)?;
         }
         let parts = self.tracker.frame(picture, captured);
+        if let Some(search) = self.tracker.search_before_answer() {
+            return Ok(self.tracker.answer(search.run())?);
+        }
         if let Some(search) = self.tracker.search_due() {
             self.searches.start(search)?;
         }

@@ -17,6 +17,7 @@ mod live_pictures;
 mod many_parts;
 mod outputs;
 mod own_part;
+mod picture_kinds;
 mod place;
 mod plan;
 #[path = "../../calibration/tests/rendering/mod.rs"]

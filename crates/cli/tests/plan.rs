@@ -80,7 +80,11 @@ fn what_blocks_is_named() {
     refused(&cell, &["500,0,200"], 1, &["the goal is not free", "inside wall"]);
     refused(&cell, &["1500,0,200"], 1, &["the goal: the pose is out of reach"]);
     refused(&cell, &["500,nan,200"], 2, &["expected finite numbers", "nan"]);
-    refused(&cell, &["500,300,200", "--start", "0,0,0,0,0,0,0"], 1, &["joint 4 must lie in"]);
+    refused(&cell, &["500,300,200", "--start", "0,0,0,0,0,0,0"], 1, &["joint 4 must lie in [-176.00, -4.00] degrees"]);
+    let radians = "0,-0.785,0,-2.356,0,1.571,0.785";
+    refused(&cell, &["500,300,200", "--start", radians], 1, &["--start", "-2.356", "radians given as degrees?"]);
+    refused(&cell, &["500,300,200,3.14,0,1.57"], 2, &["--goal", "radians given as degrees?"]);
+    refused(&cell, &["0.5,0.3,0.2"], 2, &["--goal", "metres given as millimetres?"]);
     refused(&cell, &["500,300,200", "--start", "0,45,0,-90,0,90,0"], 1, &["the start is not free", "wall"]);
     refused(&cell, &["500,300,200", "--held-mm", "0,5"], 2, &["DIAMETER,LENGTH"]);
     refused(&cell, &["500,300,200", "--margin-mm", "0"], 1, &["margin_m must be above 0"]);

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, ImageFacts};
 use crate::draft::{Border, Draft};
+use crate::foreign::is_foreign_annotation;
 use crate::json::{Node, describe, shorten};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
@@ -38,17 +39,24 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
         None => Vec::new(),
     };
 
-    let mut objects = Vec::new();
+    let mut of_image = Vec::new();
     for annotation in root.field("annotations", "the list of annotations")?.items()? {
-        if annotation.field("image_id", "the number of its image")?.value == image_id.value {
-            objects.push(LabelledInstance {
-                optional: is_optional(annotation.optional("attributes")?.as_ref())?,
-                annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
-                place: annotation.place,
-            });
+        if is_same_id(annotation.field("image_id", "the number of its image")?.value, image_id.value) {
+            of_image.push(annotation);
         }
     }
-    Ok(objects)
+    // A mask that is all there is gets its error.
+    if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
+        of_image.retain(|annotation| !is_foreign_annotation(annotation));
+    }
+    let instance = |annotation: Node| {
+        Ok(LabelledInstance {
+            optional: is_optional(annotation.optional("attributes")?.as_ref())?,
+            annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
+            place: annotation.place,
+        })
+    };
+    of_image.into_iter().map(instance).collect()
 }
 
 /// A path's last part, whichever system wrote it.
@@ -89,8 +97,9 @@ fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>>
             });
         };
         let id = chosen.field("id", "the image's number")?.value;
-        if let Some(other) =
-            images.iter().find(|other| other.place != chosen.place && other.value.get("id") == Some(id))
+        if let Some(other) = images
+            .iter()
+            .find(|other| other.place != chosen.place && other.value.get("id").is_some_and(|own| is_same_id(own, id)))
         {
             return Err(Error::Malformed {
                 place: format!("{}.id", chosen.place),
@@ -115,9 +124,9 @@ fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>>
 fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
     let mut draft = Draft { place: node.place.clone(), ..Draft::default() };
     let category_id = node.optional("category_id")?;
-    let category = categories
-        .iter()
-        .find(|category| category_id.as_ref().is_some_and(|id| category.value.get("id") == Some(id.value)));
+    let category = categories.iter().find(|category| {
+        category_id.as_ref().is_some_and(|id| category.value.get("id").is_some_and(|own| is_same_id(own, id.value)))
+    });
     if let Some(name) = category.map(|category| category.optional("name")).transpose()?.flatten() {
         draft.label = Some(name.text()?.to_string());
     }
@@ -158,6 +167,12 @@ fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
         draft.outline = Some((points, polygon.place.clone()));
     }
     Ok(draft)
+}
+
+/// Whether two ids are the same number, which some programs write as 1.0 or as text, or the same text.
+fn is_same_id(one: &Value, other: &Value) -> bool {
+    let number = |id: &Value| id.as_f64().or_else(|| id.as_str()?.trim().parse().ok());
+    one == other || number(one).is_some_and(|one| Some(one) == number(other))
 }
 
 /// Exporters write `[]` for what is not there.
@@ -329,6 +344,47 @@ mod tests {
         let mut value = full();
         change(&mut value);
         read_named(&value, None).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_crowd_beside_the_part_is_passed_over_and_told() {
+        let expected = read_named(&full(), None).unwrap();
+        let image_id = full()["images"][0]["id"].clone();
+        for crowd in [
+            json!({"id": 9, "image_id": image_id, "iscrowd": 1, "segmentation": {"counts": [0, 9], "size": [480, 640]}}),
+            json!({"id": 9, "image_id": image_id, "iscrowd": 0, "segmentation": {"counts": "ab", "size": [480, 640]}, "keypoints": []}),
+        ] {
+            let mut file = full();
+            file["annotations"].as_array_mut().unwrap().push(crowd);
+            assert_eq!(read_named(&file, None).unwrap(), expected);
+            let told = Annotation::passed_over(file.to_string().as_bytes());
+            assert_eq!(told, ["annotations[1]: a crowd or a mask without keypoints"]);
+        }
+    }
+
+    #[test]
+    fn ids_are_compared_as_numbers() {
+        let expected = read_named(&full(), None).unwrap();
+        for other in [json!("1"), json!(1.0)] {
+            for key in ["image_id", "category_id"] {
+                let mut file = full();
+                assert_eq!(file["annotations"][0][key], 1);
+                file["annotations"][0][key] = other.clone();
+                assert_eq!(read_named(&file, None).unwrap(), expected, "{key} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_area_that_is_no_number_is_not_needed() {
+        let text = full().to_string();
+        let area = full()["annotations"][0]["area"].to_string();
+        let expected = read_named(&full(), None).unwrap();
+        for literal in ["NaN", "Infinity", "-Infinity"] {
+            let text = text.replace(&format!("\"area\":{area}"), &format!("\"area\": {literal}"));
+            assert!(text.contains(literal));
+            assert_eq!(Annotation::read(text.as_bytes(), &IMAGE).unwrap(), expected, "{literal}");
+        }
     }
 
     #[test]

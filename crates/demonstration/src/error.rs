@@ -1,5 +1,6 @@
 //! What can be wrong with a photo or its annotation, each with what was expected and what was found.
 
+use sdg_picture::PictureError;
 use thiserror::Error;
 
 /// Result of this crate's functions.
@@ -13,32 +14,9 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the fields are")]
 pub enum Error {
-    /// The bytes are of no format that is read.
-    #[error("not a readable image: expected a {expected} file, found {found}")]
-    NotAnImage {
-        /// The formats that this build reads.
-        expected: String,
-        /// What the bytes look like.
-        found: String,
-    },
-    /// The image starts well and then breaks off or is damaged.
-    #[error("damaged {format} image: {reason}")]
-    DamagedImage { format: &'static str, reason: String },
-    /// Width or height is zero.
-    #[error("empty image: expected at least 1×1 pixels, found {width}×{height}")]
-    EmptyImage { width: u32, height: u32 },
-    /// More pixels than the limit allows; found in the header, before anything was allocated.
-    #[error(
-        "enormous image: expected at most {max_pixels} pixels, found {width}×{height} = {}",
-        u64::from(*.width) * u64::from(*.height)
-    )]
-    EnormousImage {
-        /// Pixels across, by the file's header.
-        width: u32,
-        /// Pixels down, by the file's header.
-        height: u32,
-        max_pixels: u64,
-    },
+    /// The photo itself.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// The annotation is not JSON at all, nor of a format that is something else.
     #[error("annotation is not JSON ({place}): {reason}")]
     NotJson { place: String, reason: String },

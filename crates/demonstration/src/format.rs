@@ -3,7 +3,7 @@
 use crate::json::{self, Node, describe};
 use crate::npy;
 use crate::written::WrittenAnnotation;
-use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, labelme, opendr, yolo_pose};
+use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, foreign, labelme, opendr, yolo_pose};
 
 /// A kind of annotation file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +53,9 @@ impl AnnotationFormat {
         }
         if yolo_pose::looks_like(bytes) {
             return Ok(Self::YoloPose);
+        }
+        if let Some(found) = other_kind(bytes) {
+            return Err(Error::WrongFile { found: found.into() });
         }
         json_format(&json::parse(bytes)?)
     }
@@ -110,7 +113,29 @@ impl AnnotationFormat {
     }
 }
 
+/// What a file is, by its first bytes, that is none of the formats.
+fn other_kind(bytes: &[u8]) -> Option<&'static str> {
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let is_number = |field: &[u8]| std::str::from_utf8(field).is_ok_and(|field| field.trim().parse::<f64>().is_ok());
+    match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16: save it as UTF-8"),
+        _ if text.is_empty() => Some("nothing: the file is empty"),
+        _ if text.starts_with(b"<") => Some("XML: export the marks as COCO or YOLO-pose"),
+        _ if first.contains(&b',') && first.split(|byte| *byte == b',').all(is_number) => {
+            Some("a row of numbers with commas: YOLO-pose has blanks between them")
+        }
+        _ => None,
+    }
+}
+
 impl Annotation {
+    /// What of a COCO or LabelMe file is passed over because it marks no part, in words: circles, lines, masks, points of other
+    /// names, crowds.
+    pub fn passed_over(bytes: &[u8]) -> Vec<String> {
+        foreign::passed_over(bytes)
+    }
+
     /// Reads every object that a file marks on the image; the content says which [`AnnotationFormat`] it is.
     ///
     /// # Errors

@@ -15,7 +15,13 @@ pub(crate) struct Node<'a> {
 pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
     // Windows editors like to put a byte order mark first; the parser does not.
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    serde_json::from_slice(bytes).map_err(|error| {
+    let parsed = serde_json::from_slice(bytes);
+    // Nothing here needs an area.
+    let parsed = parsed.or_else(|error| match without_area_literals(bytes) {
+        Some(patched) => serde_json::from_slice(&patched),
+        None => Err(error),
+    });
+    parsed.map_err(|error| {
         let place = format!("line {}, column {}", error.line(), error.column());
         let line = bytes.split(|&b| b == b'\n').nth(error.line().saturating_sub(1)).unwrap_or(&[]);
         let rest = &line[error.column().saturating_sub(1).min(line.len())..];
@@ -33,6 +39,25 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Value> {
             None => Error::NotJson { place, reason: error.to_string() },
         }
     })
+}
+
+/// The same text of the same length with blanks and a 0 for each area that is Python's NaN or infinity; `None` where there is none.
+fn without_area_literals(bytes: &[u8]) -> Option<Vec<u8>> {
+    const KEY: &[u8] = b"\"area\"";
+    let mut patched: Option<Vec<u8>> = None;
+    let mut at = 0;
+    while let Some(key) = bytes[at..].windows(KEY.len()).position(|window| window == KEY) {
+        at += key + KEY.len();
+        let blanks = bytes[at..].iter().take_while(|byte| byte.is_ascii_whitespace() || **byte == b':').count();
+        let value = at + blanks;
+        let literals: [&[u8]; 3] = [b"NaN", b"Infinity", b"-Infinity"];
+        if let Some(literal) = literals.into_iter().find(|literal| bytes[value..].starts_with(literal)) {
+            let place = &mut patched.get_or_insert_with(|| bytes.to_vec())[value..value + literal.len()];
+            place.fill(b' ');
+            place[0] = b'0';
+        }
+    }
+    patched
 }
 
 impl<'a> Node<'a> {

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, ImageFacts};
 use crate::draft::{Border, Draft};
+use crate::foreign::is_foreign_shape;
 use crate::json::{Node, shorten};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
@@ -17,7 +18,7 @@ pub(crate) fn read(root: &Node, image: &ImageFacts) -> Result<Vec<Annotation>> {
     if instances.is_empty() {
         return Err(Error::NoObject {
             expected: "at least a `rectangle` or a `polygon`".into(),
-            found: "an empty list of shapes".into(),
+            found: "an empty list of shapes, or other things alone".into(),
         });
     }
     Ok(instances.into_iter().map(|instance| instance.annotation).collect())
@@ -28,8 +29,9 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
     if let (Some(width), Some(height)) = (root.optional("imageWidth")?, root.optional("imageHeight")?) {
         image.check_declared(width.pixels()?, height.pixels()?)?;
     }
-    let shapes =
-        root.field("shapes", "the list of shapes")?.items()?.iter().map(Shape::read).collect::<Result<Vec<_>>>()?;
+    let shapes = root.field("shapes", "the list of shapes")?.items()?;
+    let own = shapes.iter().filter(|shape| !is_foreign_shape(shape));
+    let shapes = own.map(Shape::read).collect::<Result<Vec<_>>>()?;
     if shapes.is_empty() {
         return Ok(Vec::new());
     }
@@ -297,6 +299,22 @@ mod tests {
     }
 
     #[test]
+    fn marks_of_other_things_are_passed_over_and_told() {
+        let expected = Annotation::read(full().to_string().as_bytes(), &IMAGE).unwrap();
+        let foreign = [("circle", "hole"), ("linestrip", "cable"), ("mask", "rod"), ("point", "hole")];
+        let mut file = full();
+        for (shape_type, label) in foreign {
+            let shape = json!({"label": label, "points": [[1, 1]], "group_id": 7, "shape_type": shape_type});
+            file["shapes"].as_array_mut().unwrap().insert(0, shape);
+        }
+        let text = file.to_string();
+        assert_eq!(Annotation::read(text.as_bytes(), &IMAGE).unwrap(), expected);
+        let told = Annotation::passed_over(text.as_bytes());
+        assert!(told.len() == 4 && told[0] == "shapes[0]: a point `hole`", "{told:?}");
+        assert!(Annotation::passed_over(full().to_string().as_bytes()).is_empty());
+    }
+
+    #[test]
     fn literals_of_python_are_not_finite() {
         for literal in ["NaN", "Infinity", "-Infinity", "1e999"] {
             let text = serde_json::to_string_pretty(&full()).unwrap().replace("150.5", literal);
@@ -309,7 +327,14 @@ mod tests {
     #[test]
     fn other_files_are_refused() {
         let message = |text: &str| Annotation::read(text.as_bytes(), &IMAGE).unwrap_err().to_string();
-        assert!(message("").contains("is empty"));
+        for empty in ["", " \n"] {
+            assert!(message(empty).contains("found nothing: the file is empty"));
+        }
+        assert!(message("<annotation></annotation>").contains("found XML"));
+        assert!(message("0,0.5,0.46,0.2,0.22,0.52,0.48,2\n").contains("commas: YOLO-pose has blanks"));
+        let utf16 =
+            [b"\xff\xfe".as_slice(), &"{}".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>()].concat();
+        assert!(Annotation::read(&utf16, &IMAGE).unwrap_err().to_string().contains("UTF-16: save it as UTF-8"));
         assert!(message("{\"shapes\": [").contains("not JSON (line 1"));
         assert!(message("[1, 2]").contains("found a list of 2"));
         assert!(message("{\"model\": 3}").contains("an object with `model`"));

@@ -39,10 +39,10 @@ mod annotation;
 mod augmentation;
 mod coco;
 mod data_yaml;
-mod decode;
 mod demonstration;
 mod draft;
 mod error;
+mod foreign;
 mod format;
 mod json;
 mod keypoint_row;
@@ -62,7 +62,6 @@ pub use augmentation::{
     AugmentationConfig, AugmentationStyle, Augmenter, PaperStyle, Sample, SampleObject, SceneStyle, Windows,
 };
 pub use coco::CocoFile;
-pub use decode::{IMAGE_EXTENSIONS, ImageLimits, decode_image};
 pub use demonstration::{Demonstration, NUM_KEYPOINTS};
 pub use error::{Error, Result};
 pub use format::{AnnotationFormat, DeclaredImage};
@@ -70,4 +69,7 @@ pub use label_file::LabelFile;
 pub use labelled_instance::LabelledInstance;
 pub use model_kind::{ModelKind, UnknownModel};
 pub use outline_proposal::{OutlineClick, propose_outline, propose_outline_with};
+pub use sdg_picture::{
+    IMAGE_EXTENSIONS, ImageLimits, PictureError, PixelFrame, decode_image, decode_image_in, is_turned_by_exif,
+};
 pub use written::WrittenAnnotation;

@@ -148,7 +148,8 @@ impl GraspModel {
             .enumerate()
             .map(|(i, marks)| {
                 let png = tensor(&file, &format!("demonstrations.{i}.cutout"), Dtype::U8)?;
-                let cutout = decode_image(png.data(), &ImageLimits::default())?;
+                let cutout =
+                    decode_image(png.data(), &ImageLimits::default()).map_err(sdg_demonstration::Error::from)?;
                 let mut check = CheckConfig::DEFAULT;
                 if let Some([low, high]) = facts.size_tolerance {
                     check.search.scales = low..=high;

@@ -3,15 +3,15 @@
 use serde::Serialize;
 
 use crate::model::GraspDetection;
-use crate::{Contributions, TurnSource};
+use crate::{Contributions, ModelKind, TurnSource};
 
 /// A [`GraspDetection`] under the names that files and programs rely on; pixels and degrees.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DetectionRecord {
     /// Calibrated, in `[0, 1]`: at least 0.5 is accepted.
     pub score: f64,
-    /// The network's own, in `[0, 1]`.
-    pub network_score: f64,
+    /// The network's own, in `[0, 1]`; null where no network was asked (model S).
+    pub network_score: Option<f64>,
     /// How well the demonstration agrees with the image, in `[0, 1]`; null without verification.
     pub agreement: Option<f64>,
     /// Left, top, right, bottom.
@@ -47,13 +47,14 @@ pub struct GraspRecord {
     pub width_px: f64,
 }
 
-impl From<&GraspDetection> for DetectionRecord {
-    fn from(detection: &GraspDetection) -> Self {
+impl DetectionRecord {
+    /// The record of a detection by a model of that kind.
+    pub fn new(detection: &GraspDetection, kind: ModelKind) -> Self {
         let b = detection.bbox;
         let grasp = detection.grasp;
         Self {
             score: detection.score,
-            network_score: detection.network_score,
+            network_score: (kind != ModelKind::S).then_some(detection.network_score),
             agreement: detection.agreement,
             bounds: [b.x1, b.y1, b.x2, b.y2],
             keypoints: detection.keypoints.iter().map(|(point, score)| [point.x, point.y, *score]).collect(),
@@ -87,13 +88,15 @@ mod tests {
             turn_source: TurnSource::Keypoints,
             light: 1.0,
         };
-        let json = serde_json::to_string(&DetectionRecord::from(&detection)).unwrap();
+        let json = serde_json::to_string(&DetectionRecord::new(&detection, ModelKind::C)).unwrap();
         let expected = r#"{"score":0.75,"network_score":0.5,"agreement":null,"box":[1.0,2.0,3.0,4.0],"#.to_owned()
             + r#""keypoints":[[1.5,2.5,0.25]],"grasp":{"x":2.0,"y":3.0,"angle_deg":90.0,"width_px":8.0},"#
             + r#""turn_source":"keypoints"}"#;
         assert_eq!(json, expected);
+        let json = serde_json::to_string(&DetectionRecord::new(&detection, ModelKind::S)).unwrap();
+        assert!(json.contains(r#""network_score":null"#), "{json}");
         let verified = GraspDetection { outline: Some(Polygon::from_box(&bbox)), agreement: Some(0.9), ..detection };
-        let json = serde_json::to_string(&DetectionRecord::from(&verified)).unwrap();
+        let json = serde_json::to_string(&DetectionRecord::new(&verified, ModelKind::C)).unwrap();
         assert!(json.contains(r#""agreement":0.9"#) && json.contains(r#""polygon":[[1.0,2.0],"#), "{json}");
         let evidence = Contributions {
             network: None,
@@ -112,7 +115,7 @@ mod tests {
             mirror: 0.0,
         };
         let refused = GraspDetection { evidence: Some(evidence), score: 0.25, ..verified };
-        let json = serde_json::to_string(&DetectionRecord::from(&refused)).unwrap();
+        let json = serde_json::to_string(&DetectionRecord::new(&refused, ModelKind::C)).unwrap();
         assert!(json.contains(r#""evidence":{"edges":1.5,"surface":0.5,"#), "{json}");
         assert!(json.ends_with(r#""refused":"too little of it is visible"}"#), "{json}");
     }

@@ -19,8 +19,8 @@ pub enum KinematicsError {
     InvalidOption { option: &'static str, expected: &'static str, found: f64 },
     /// A joint configuration is outside the position limits.
     #[error(
-        "{what}: joint {} must lie in [{:.4}, {:.4}] rad, found {:.4}",
-        .violation.joint, .violation.min_rad, .violation.max_rad, .violation.found_rad
+        "{what}: joint {} must lie in [{:.2}, {:.2}] degrees, found {:.2}",
+        .violation.joint, .violation.min_rad.to_degrees(), .violation.max_rad.to_degrees(), .violation.found_rad.to_degrees()
     )]
     JointOutOfRange { what: &'static str, violation: LimitViolation },
     /// No configuration reaches the pose, whatever the joint limits.
@@ -40,9 +40,9 @@ pub enum KinematicsError {
     },
     /// Configurations reach the pose, but each of them breaks a joint limit.
     #[error(
-        "a joint limit forbids the pose: joint {} would have to be at {:.4} rad, outside [{:.4}, {:.4}]; \
+        "a joint limit forbids the pose: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]; \
          within the limits the tcp misses by {:.4} m and {:.2}°",
-        .violation.joint, .violation.found_rad, .violation.min_rad, .violation.max_rad,
+        .violation.joint, .violation.found_rad.to_degrees(), .violation.min_rad.to_degrees(), .violation.max_rad.to_degrees(),
         .nearest.position_residual_m, .nearest.angle_residual_rad.to_degrees()
     )]
     JointLimit {
@@ -53,8 +53,9 @@ pub enum KinematicsError {
     },
     /// A straight path meets a joint limit on its way.
     #[error(
-        "the straight path meets a joint limit {:.1} % along: joint {} would have to be at {:.4} rad, outside [{:.4}, {:.4}]",
-        .at_share * 100.0, .violation.joint, .violation.found_rad, .violation.min_rad, .violation.max_rad
+        "the straight path meets a joint limit {:.1} % along: joint {} would have to be at {:.2} degrees, outside [{:.2}, {:.2}]",
+        .at_share * 100.0, .violation.joint, .violation.found_rad.to_degrees(), .violation.min_rad.to_degrees(),
+        .violation.max_rad.to_degrees()
     )]
     PathJointLimit {
         /// Share of the path done, 0 to 1.

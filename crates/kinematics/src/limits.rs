@@ -85,6 +85,11 @@ impl JointLimits {
         (self.position_min + self.position_max) * 0.5
     }
 
+    /// Whether these angles, which were given in degrees, break the limits, and the same numbers in radians would not.
+    pub fn are_radians_given_as_degrees(&self, q: &JointVector) -> bool {
+        self.worst_violation(q, 0.0).is_some() && self.worst_violation(&q.map(f64::to_degrees), 0.0).is_none()
+    }
+
     pub(crate) fn violation_at(&self, q: &JointVector, joint_idx: usize) -> LimitViolation {
         LimitViolation {
             joint: joint_idx + 1,

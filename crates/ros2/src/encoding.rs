@@ -1,7 +1,7 @@
 //! Pictures in messages: the encodings of sensor_msgs/Image, and CompressedImage.
 
 use image::{ImageFormat, RgbImage};
-use sdg_camera::{decode_picture, yuyv_to_rgb};
+use sdg_camera::{PixelFrame, decode_picture, yuyv_to_rgb};
 
 use crate::error::PictureError;
 use crate::messages::{CompressedImage, Header, Image};
@@ -121,7 +121,8 @@ pub fn read_compressed(message: &CompressedImage) -> Result<RgbImage, PictureErr
         [0xff, 0xd8, ..] | [0x89, b'P', b'N', b'G', ..] => {}
         _ => return Err(refused("jpeg or png", format!("\"{}\" of {} bytes", message.format, message.data.len()))),
     }
-    decode_picture(&message.data).map_err(|found| refused("a whole picture", found))
+    // What camera_info describes are the sensor's pixels.
+    decode_picture(&message.data, PixelFrame::Sensor).map_err(|found| refused("a whole picture", found))
 }
 
 /// A picture as `rgb8`.

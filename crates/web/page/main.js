@@ -334,7 +334,7 @@ function listGrasps(detections) {
       grasp.y.toFixed(1),
       `${grasp.angle_deg.toFixed(1)}°`,
       grasp.width_px.toFixed(1),
-      network.toFixed(2),
+      network === null ? "–" : network.toFixed(2),
       agreement === null ? "–" : agreement.toFixed(2),
     ];
     const row = document.createElement("tr");

@@ -60,7 +60,7 @@ impl Detector {
     ) -> Result<String, WebError> {
         let max_pixels = ImageLimits::default().max_pixels;
         if u64::from(width) * u64::from(height) > max_pixels {
-            return Err(sdg_demonstration::Error::EnormousImage { width, height, max_pixels }.into());
+            return Err(sdg_demonstration::PictureError::EnormousImage { width, height, max_pixels }.into());
         }
         let pixels = || WebError::Pixels { width, height, found: rgba.len() };
         if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) {
@@ -73,7 +73,7 @@ impl Detector {
 
     async fn detect_in(&self, image: &RgbImage, verification: Verification) -> Result<String, WebError> {
         let found = self.model.detect_async(image, verification).await?;
-        let detections = found.iter().map(DetectionRecord::from).collect();
+        let detections = found.iter().map(|one| DetectionRecord::new(one, self.model.kind())).collect();
         Ok(to_json(&ImageRecord { width: image.width(), height: image.height(), detections }))
     }
 }

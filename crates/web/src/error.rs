@@ -10,7 +10,7 @@ pub enum WebError {
     Grasp(#[from] sdg_grasp::GraspError),
     /// An image file that is none, is damaged, or is enormous.
     #[error(transparent)]
-    Image(#[from] sdg_demonstration::Error),
+    Image(#[from] sdg_demonstration::PictureError),
     /// Pixels of another number than the size says.
     #[error("expected {width} × {height} pixels of four bytes, found {found} bytes")]
     Pixels { width: u32, height: u32, found: usize },

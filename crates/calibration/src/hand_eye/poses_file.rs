@@ -50,13 +50,19 @@ const HEADER: &str = "picture,x,y,z,qx,qy,qz,qw";
 /// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for a pose that is none, or in millimetres.
 pub fn read_robot_poses(text: &str) -> Result<Vec<RobotPose>, CalibrationError> {
     let unreadable = |found: String| CalibrationError::PosesUnreadable { found };
-    let entries = if text.trim_start().starts_with("picture,") {
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    let first = text.lines().next().unwrap_or_default();
+    // Spreadsheets of countries with decimal commas put semicolons between the fields.
+    let separator = [',', ';', '\t'].into_iter().find(|separator| {
+        first.split_once(*separator).is_some_and(|(name, _)| name.trim().eq_ignore_ascii_case("picture"))
+    });
+    let entries = if let Some(separator) = separator {
         let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-        let header = lines.next().unwrap_or_default().replace(' ', "");
+        let header = lines.next().unwrap_or_default().replace(' ', "").replace(separator, ",").to_ascii_lowercase();
         if header != HEADER {
             return Err(unreadable(format!("the header {header} instead of {HEADER}")));
         }
-        lines.map(entry_of_line).collect::<Result<_, _>>()?
+        lines.map(|line| entry_of_line(line, separator)).collect::<Result<_, _>>()?
     } else {
         let file: File = serde_saphyr::from_str(text).map_err(|error| {
             let message = error.to_string();
@@ -67,10 +73,10 @@ pub fn read_robot_poses(text: &str) -> Result<Vec<RobotPose>, CalibrationError> 
     entries.into_iter().map(Entry::checked).collect()
 }
 
-fn entry_of_line(line: &str) -> Result<Entry, CalibrationError> {
+fn entry_of_line(line: &str, separator: char) -> Result<Entry, CalibrationError> {
     let unreadable = || CalibrationError::PosesUnreadable { found: format!("the line {line}, expected {HEADER}") };
-    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
-    let numbers: Option<Vec<f64>> = fields.iter().skip(1).map(|field| field.parse().ok()).collect();
+    let fields: Vec<&str> = line.split(separator).map(str::trim).collect();
+    let numbers: Option<Vec<f64>> = fields.iter().skip(1).map(|field| field.replace(',', ".").parse().ok()).collect();
     let numbers = numbers.filter(|numbers| numbers.len() == 7).ok_or_else(unreadable)?;
     let base_from_flange = Pose { translation_m: numbers[..3].to_vec(), rotation_xyzw: numbers[3..].to_vec() };
     Ok(Entry { picture: fields[0].to_owned(), base_from_flange })
@@ -127,6 +133,17 @@ poses:
         assert_eq!(read_robot_poses(json).unwrap(), yaml);
         let csv = "picture,x,y,z,qx,qy,qz,qw\na.png,0.4,0,0.5,1,0,0,0\n";
         assert_eq!(read_robot_poses(csv).unwrap(), yaml);
+        let by_spreadsheets = [
+            format!("\u{feff}{csv}"),
+            csv.replace("picture,x,y,z", "Picture,X,Y,Z"),
+            csv.replace(',', ";"),
+            csv.replace(',', ";").replace("0.", "0,"),
+            csv.replace(',', "\t"),
+        ];
+        for text in by_spreadsheets {
+            assert_eq!(read_robot_poses(&text).unwrap(), yaml, "{text}");
+        }
+        assert_eq!(read_robot_poses(&format!("\u{feff}{YAML}")).unwrap(), yaml);
     }
 
     #[test]

@@ -33,7 +33,8 @@ pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Re
             Ok(Box::new(snapshots::Snapshots::new(url.clone(), answer, options)))
         }
         _ if kind.starts_with("multipart/") => {
-            let source = motion_jpeg::MotionJpeg::new(&answer.content_type, answer.body).map_err(refused)?;
+            let source =
+                motion_jpeg::MotionJpeg::new(&answer.content_type, answer.body, options.frame).map_err(refused)?;
             Ok(Box::new(source))
         }
         _ => Err(refused(format!(

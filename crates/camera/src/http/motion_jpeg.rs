@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
+use sdg_picture::PixelFrame;
+
 use super::body::{Body, Progress};
 use super::multipart::Multipart;
 use crate::decode::decode;
@@ -15,6 +17,7 @@ const MAX_CATCH_UP: Duration = Duration::from_millis(20);
 pub(super) struct MotionJpeg {
     multipart: Multipart,
     body: Body,
+    frame: PixelFrame,
     /// How the connection ended, found while looking for newer pictures.
     end: Option<Result<Progress, String>>,
 }
@@ -22,8 +25,8 @@ pub(super) struct MotionJpeg {
 impl MotionJpeg {
     /// # Errors
     /// In words, a content type without a boundary.
-    pub(super) fn new(content_type: &str, body: Body) -> Result<Self, String> {
-        Ok(Self { multipart: Multipart::new(content_type)?, body, end: None })
+    pub(super) fn new(content_type: &str, body: Body, frame: PixelFrame) -> Result<Self, String> {
+        Ok(Self { multipart: Multipart::new(content_type)?, body, frame, end: None })
     }
 
     /// Goes on to the newest part that has arrived; counts those that it passes over.
@@ -57,7 +60,7 @@ impl Source for MotionJpeg {
             if let Some(part) = self.multipart.next_part().map_err(Missing::Gone)? {
                 let (part, num_skipped) = self.catch_up(part);
                 let captured = SystemTime::now();
-                let picture = decode(&part).map_err(Missing::Torn)?;
+                let picture = decode(&part, self.frame).map_err(Missing::Torn)?;
                 return Ok(Some(Taken { picture, captured, num_skipped }));
             }
             match self.end.take().unwrap_or_else(|| self.body.read(self.multipart.buffer(), Some(deadline))) {

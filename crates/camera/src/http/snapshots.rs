@@ -3,6 +3,8 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
+use sdg_picture::PixelFrame;
+
 use super::body::Progress;
 use super::exchange::{Answer, get};
 use super::url::Url;
@@ -17,12 +19,19 @@ pub(super) struct Snapshots {
     first: Option<Answer>,
     interval: Duration,
     next_at: Instant,
+    frame: PixelFrame,
 }
 
 impl Snapshots {
     pub(super) fn new(url: Url, first: Answer, options: &OpenOptions) -> Self {
         let fps = options.fps.unwrap_or(OpenOptions::DEFAULT_SNAPSHOT_FPS);
-        Self { url, first: Some(first), interval: Duration::from_secs_f64(1.0 / fps), next_at: Instant::now() }
+        Self {
+            url,
+            first: Some(first),
+            interval: Duration::from_secs_f64(1.0 / fps),
+            next_at: Instant::now(),
+            frame: options.frame,
+        }
     }
 }
 
@@ -56,7 +65,11 @@ impl Source for Snapshots {
             }
         }
         let captured = SystemTime::now();
-        let picture = decode(&bytes).map_err(Missing::Torn)?;
+        let picture = decode(&bytes, self.frame).map_err(Missing::Torn)?;
         Ok(Some(Taken { picture, captured, num_skipped: 0 }))
+    }
+
+    fn is_on_request(&self) -> bool {
+        true
     }
 }

@@ -8,6 +8,7 @@ use linuxvideo::controls::Cid;
 use linuxvideo::format::{PixFormat, PixelFormat};
 use linuxvideo::stream::ReadStream;
 use linuxvideo::{Device, Fract};
+use sdg_picture::PixelFrame;
 
 use super::choice::{Choice, choose};
 use super::nodes::{nodes, paths, read};
@@ -181,7 +182,7 @@ impl Source for Stream {
             Ok(match encoding {
                 Encoding::Yuyv => yuyv_to_rgb(&buffer, width, height, stride),
                 Encoding::Rgb24 => rgb24_to_rgb(&buffer, width, height, stride),
-                Encoding::Mjpeg => decode(&buffer),
+                Encoding::Mjpeg => decode(&buffer, PixelFrame::Sensor),
             })
         });
         self.last_read = Instant::now();

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use sdg_camera::{Address, LatestFrame};
+use sdg_camera::{Address, LatestFrame, PixelFrame};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -19,6 +19,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
 use crate::robots::{
     self, Consent, DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
@@ -103,6 +104,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
         RobotChoice::Network(address) => {
             let mut options = args.request.options();
             [options.width, options.height] = prepared.camera.size_px();
+            options.frame = PixelFrame::Sensor;
             let camera = LatestFrame::spawn(live_pictures::open(&args.from, &options)?);
             let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
             arm.check_model(prepared.workcell.robot)?;
@@ -253,7 +255,7 @@ fn dry_run<A: Arm>(
 /// The closing lines, or the one object.
 fn print_report(args: &GraspArgs, prepared: &Prepared, ended: &Ended, secs: f64, robot: &str) -> Result<Outcome> {
     if args.json {
-        println!("{}", to_json(prepared, ended, secs, robot));
+        println!("{}", json_line(&to_json(prepared, ended, secs, robot))?);
     }
     let Ended { grasp, failed, beside, .. } = ended;
     match (failed, &prepared.place) {

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
+use sdg_demonstration::PixelFrame;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
@@ -24,6 +25,7 @@ use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::held_back::HeldBackFigures;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
 use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
@@ -129,8 +131,14 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
+    let mut pixel_frame = PixelFrame::Upright;
+    if args.camera.file.is_some() {
+        demonstrations::check_are_not_turned(&args.demonstrations)?;
+        pixel_frame = PixelFrame::Sensor;
+    }
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
-    options.negatives = args.negatives.iter().map(|path| files::read_image(path)).collect::<Result<_>>()?;
+    options.negatives =
+        args.negatives.iter().map(|path| files::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
     if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;
         for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
@@ -198,7 +206,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             "base_weights": report,
             "report": page.map(|path| path.display().to_string()),
         });
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
         println!("{}", figures.in_words());

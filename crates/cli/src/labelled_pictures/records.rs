@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use sdg_geometry::BoundingBox;
-use sdg_grasp::{DetectionRecord, GraspModel, Verification};
+use sdg_grasp::{DetectionRecord, GraspModel, ModelKind, Verification};
 use serde_json::{Value, json};
 
 use super::picture::LeftOut;
@@ -37,8 +37,12 @@ impl Evaluated<'_> {
 pub fn to_json(evaluated: &Evaluated, report: &Path) -> Value {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
-    let pictures: Vec<Value> =
-        evaluated.tested.iter().zip(&judged).map(|(tested, judged)| picture(tested, judged)).collect();
+    let pictures: Vec<Value> = evaluated
+        .tested
+        .iter()
+        .zip(&judged)
+        .map(|(tested, judged)| picture(tested, judged, evaluated.model.kind()))
+        .collect();
     let tested: Vec<&Tested> = evaluated.tested.iter().collect();
     json!({
         "folder": evaluated.folder.display().to_string(),
@@ -97,7 +101,7 @@ pub fn by_kind_json(tested: &[&Tested], min_score: f64) -> Vec<Value> {
     by_kind(tested, min_score).into_iter().map(of_kind).collect()
 }
 
-fn picture(tested: &Tested, judged: &Judged) -> Value {
+fn picture(tested: &Tested, judged: &Judged, kind: ModelKind) -> Value {
     let instances: Vec<Value> = tested
         .truths
         .iter()
@@ -121,7 +125,7 @@ fn picture(tested: &Tested, judged: &Judged) -> Value {
         .zip(&judged.hits)
         .map(|(detection, hit)| {
             let hit = hit.map(|Hit { instance_idx, error }| json!({"instance": instance_idx, "error": error}));
-            json!({"hit": hit, "detection": DetectionRecord::from(detection)})
+            json!({"hit": hit, "detection": DetectionRecord::new(detection, kind)})
         })
         .collect();
     let parts = judged.parts();

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use nalgebra::Point2;
+use sdg_demonstration::PixelFrame;
 use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry, percentile};
 use sdg_grasp::{GraspDetection, TaughtDemonstration, Verification};
 use serde::Serialize;
@@ -103,6 +104,9 @@ impl Tested {
     /// # Errors
     /// A picture that cannot be read or detected in.
     pub fn detect(picture: LabelledPicture, detector: &PictureDetector, verification: Verification) -> Result<Self> {
+        if detector.pixel_frame() == PixelFrame::Sensor {
+            files::check_is_not_turned(&picture.path)?;
+        }
         let image = files::read_image(&picture.path)?;
         let start = Instant::now();
         let found = detector.detect(&image, verification).with_context(|| picture.path.display().to_string())?;

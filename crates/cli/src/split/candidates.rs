@@ -85,7 +85,7 @@ fn of_picture<'a>(model: ModelKind, run: &'a SetRun, tested: &'a Tested) -> impl
             hit: hit.map(|hit| if tested.truths[hit.instance_idx].optional { Hit::Optional } else { Hit::Part }),
             distance_percent: nearest.map(|error| error.percent),
             turn_deg: nearest.map(|error| error.deg),
-            detection: DetectionRecord::from(detection),
+            detection: DetectionRecord::new(detection, model),
         }
     })
 }

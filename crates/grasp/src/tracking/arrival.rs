@@ -8,85 +8,19 @@
 //! carried forward: frame k ─ k + stride ─ … ─ newest, some steps a call
 //! ```
 
-use std::collections::VecDeque;
-use std::sync::Arc;
-use std::time::Duration;
-
-use image::RgbImage;
-
 use super::detector::PartDetector;
 use super::follow::Effort;
+use super::frames::FrameBuffer;
 use super::track::{PastPose, Standing, Track};
 use crate::model::{Found, Placement};
 use crate::same_part::are_outlines_of_same_part;
 
-/// Longest time from one frame that a detection is carried through to the next: a part at 0.5 m/s moves by 20 pixels of a
-/// millimetre, which a capture reaches. Chosen by that reasoning.
-const MAX_STRIDE: Duration = Duration::from_millis(40);
-/// Frames that are kept for a search that has not ended; of more, every second one is kept. Chosen by hand: 44 MB of 640×480.
-const MAX_BUFFERED: usize = 48;
 /// A pose this far from that of its track is carried forward like one of another part: from the track's own pose a capture does
 /// not reach it. In pixels of the cut-out, and in radians. Chosen by hand.
 const FAR_PX: f64 = 8.0;
 const FAR_RAD: f64 = 0.15;
 /// What such a pose must gain in agreement. Chosen by hand.
 const MIN_GAIN: f64 = 0.02;
-
-/// A frame that may still be needed.
-#[derive(Debug, Clone)]
-pub(super) struct BufferedFrame {
-    pub(super) number: u64,
-    pub(super) picture: Arc<RgbImage>,
-    pub(super) time: Duration,
-}
-
-/// The newest frame, and those since the one that is being searched.
-#[derive(Debug, Clone, Default)]
-pub(super) struct FrameBuffer {
-    frames: VecDeque<BufferedFrame>,
-}
-
-impl FrameBuffer {
-    pub(super) fn push(&mut self, frame: BufferedFrame) {
-        self.frames.push_back(frame);
-        if self.frames.len() > MAX_BUFFERED {
-            let newest = self.frames.len() - 1;
-            let mut idx = 0;
-            self.frames.retain(|_| {
-                idx += 1;
-                idx % 2 == 1 || idx > newest
-            });
-        }
-    }
-
-    /// Drops the frames that are older than `oldest`, but for the newest of all.
-    pub(super) fn forget_before(&mut self, oldest: u64) {
-        while self.frames.len() > 1 && self.frames[0].number < oldest {
-            self.frames.pop_front();
-        }
-    }
-
-    pub(super) fn newest(&self) -> Option<&BufferedFrame> {
-        self.frames.back()
-    }
-
-    pub(super) fn get(&self, number: u64) -> Option<&BufferedFrame> {
-        self.frames.iter().find(|frame| frame.number == number)
-    }
-
-    /// The frame to which something that holds in frame `number` is to be carried next; `None` where that is the newest, which
-    /// every track is followed into.
-    fn next_after(&self, number: u64, time: Duration) -> Option<&BufferedFrame> {
-        let newest = self.newest()?;
-        if newest.time.saturating_sub(time) <= MAX_STRIDE {
-            return None;
-        }
-        let mut later = self.frames.iter().filter(|frame| frame.number > number && frame.number < newest.number);
-        let first = later.next()?;
-        let within = later.take_while(|frame| frame.time.saturating_sub(time) <= MAX_STRIDE).last();
-        Some(within.unwrap_or(first))
-    }
-}
 
 /// Whether a track is near enough to the newest frame to be followed into it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

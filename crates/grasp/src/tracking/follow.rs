@@ -28,6 +28,9 @@ const MIN_LEVEL_SIDE: u32 = 24;
 /// What a close look sees of a part, in lengths of the part: 1.25, and a pixel for interpolation.
 const SEEN_CLOSELY: f64 = 1.28;
 
+/// A part that has not moved agrees as well as before, but for noise. Chosen by hand.
+const STILL_AGREEMENT: f64 = 0.005;
+
 /// A demonstration at the size at which a part is followed.
 #[derive(Debug, Clone)]
 pub(super) struct SizedPart {
@@ -47,9 +50,18 @@ pub(super) enum Effort {
     Captured,
 }
 
+/// Where a search had a part, and how well that agreed then.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StillPose {
+    pub(super) image_from_cutout: PlanarSimilarity,
+    pub(super) agreement: f64,
+}
+
 /// A part in one frame.
 #[derive(Debug, Clone)]
 pub(super) struct Followed {
+    /// Whether it lies where the last search had it.
+    pub(super) is_held: bool,
     /// Where the edges alone have it.
     pub(super) by_edges: PlanarSimilarity,
     /// Where edges and surface together have it: there, or corrected.
@@ -105,7 +117,8 @@ impl SizedPart {
     }
 
     /// Refines the part about `start`; `None` where too little of it lies in the frame. `correction` is where the part was last found
-    /// against where the edges alone had it; it is applied where the frame agrees better with it.
+    /// against where the edges alone had it; it is applied where the frame agrees better with it. Where the frame agrees with `still`
+    /// as well as it did, the part lies there, and nothing is refined.
     ///
     /// # Units and frames
     /// Poses map pixels of the cut-out to the detector's frame of reference.
@@ -116,6 +129,7 @@ impl SizedPart {
         start: &PlanarSimilarity,
         effort: Effort,
         correction: Option<&PlanarSimilarity>,
+        still: Option<&StillPose>,
     ) -> Option<Followed> {
         let demonstration = self.demonstration(detector);
         let reach = effort.reach();
@@ -128,18 +142,29 @@ impl SizedPart {
         // From afar the table's colours are not asked for.
         let picture = Picture { image: &view.image, field: &field, table: &TableColors::default() };
         let comparison = search.comparison(&picture);
-        let start = self.view_from_working(&view, start);
-        let pose = match effort {
-            Effort::Snapped => search.template().snapped(&field, &start, &reach),
-            Effort::Captured => search.template().captured(&field, &start, &reach),
-        };
-        let by_edges = self.image_from_cutout(&view, &pose);
         let both = |pose: &PlanarSimilarity| comparison.agreement(pose).both();
-        let corrected = correction.map(|correction| self.view_from_working(&view, &by_edges.compose(correction)));
-        let pose = corrected.filter(|corrected| both(corrected) > both(&pose)).unwrap_or(pose);
+        let held = still.filter(|still| {
+            both(&self.view_from_working(&view, &still.image_from_cutout)) >= still.agreement - STILL_AGREEMENT
+        });
+        let (by_edges, image_from_cutout) = match held {
+            Some(still) => (still.image_from_cutout, still.image_from_cutout),
+            None => {
+                let start = self.view_from_working(&view, start);
+                let pose = match effort {
+                    Effort::Snapped => search.template().snapped(&field, &start, &reach),
+                    Effort::Captured => search.template().captured(&field, &start, &reach),
+                };
+                let by_edges = self.image_from_cutout(&view, &pose);
+                let corrected = correction.map(|correction| by_edges.compose(correction));
+                let is_better =
+                    |corrected: &PlanarSimilarity| both(&self.view_from_working(&view, corrected)) > both(&pose);
+                (by_edges, corrected.filter(is_better).unwrap_or(by_edges))
+            }
+        };
+        let pose = self.view_from_working(&view, &image_from_cutout);
         let (evidence, agreement) = comparison.evidence_from_afar(&pose);
-        let image_from_cutout = self.image_from_cutout(&view, &pose);
         Some(Followed {
+            is_held: held.is_some(),
             by_edges,
             image_from_cutout,
             agreement,

@@ -3,12 +3,13 @@
 //! ```text
 //! frame n ─┬─ each track: pose carried forward by its velocity ─ window about it ─ edges ─ score ─ followed or lost
 //!          │                                                                                          ↑
-//!          └─ now and then: PartSearch, on another core ─ what frame n showed ─ carried forward ──────┘
-//!                                                         through the frames since, or matched to tracks
+//!          ├─ now and then: PartSearch, on another core ─ what frame n showed ─ carried forward ──────┤
+//!          │                                              through the frames since, or matched to tracks
+//!          └─ does not follow from frame n - 1: PartSearch, before frame n is answered ───────────────┘
 //! ```
 //! **Glossary.** *Frame of reference*: the pixels that a model works in, those of the picture or of its plan view. *Followed*:
 //! refined near the last pose, in a window; nothing outside the window is read. *Captured*: the same with a wider reach, about five
-//! times slower. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the newest.
+//! times slower. *Held*: left where the last search had it, because the part has not moved since. *Carried forward*: a detection in an older frame, followed through the frames since until it is one of the newest.
 //!
 //! A track is scored in every frame by the verdict that scores detections ([`crate::Contributions`]), with one difference: the
 //! comparing network, which takes more time than all else, is asked only when the agreement of edges and surface has fallen since
@@ -18,8 +19,10 @@
 //! where and when it likes, so that the same code runs on two cores, in a browser, and in a test that is the same on any machine.
 
 mod arrival;
+mod continuity;
 mod detector;
 mod follow;
+mod frames;
 #[cfg(all(test, feature = "teach"))]
 mod tests;
 mod track;
@@ -71,7 +74,8 @@ impl TrackedPart {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TrackerConfig {
-    /// Time from the start of one search to that of the next while all known parts are followed; as soon as one is lost, or none is
+    /// Time from the start of one search to that of the next while all known parts are followed, and the longest from one frame to
+    /// the next that follows from it; as soon as one is lost, or none is
     /// known, searches follow each other. Chosen by hand: a new part is found within this and the time of a search.
     pub search_every: Duration,
     /// A track with a lower score is lost. Below 0.5, where detections are accepted: the part was there in the last frame. Chosen by
@@ -81,6 +85,10 @@ pub struct TrackerConfig {
     pub retry_for: Duration,
     /// A part that was lost for longer is forgotten: found later it is another one. Chosen by hand.
     pub forget_after: Duration,
+    /// Frames no further apart than this follow from each other: a thing that moves or covers the part is not told from another picture,
+    /// and the next search finds what is new. Further apart, a part that is lost and a change beside the followed parts are searched
+    /// before the frame is answered. Chosen by hand: just above the period of 30 frames a second. Zero where frames wait.
+    pub moves_within: Duration,
     /// Most parts that are followed at once. Chosen by hand, for time: each takes some milliseconds a frame.
     pub max_parts: usize,
 }
@@ -92,6 +100,7 @@ impl TrackerConfig {
         lose_below: 0.35,
         retry_for: Duration::from_millis(200),
         forget_after: Duration::from_secs(10),
+        moves_within: Duration::from_millis(40),
         max_parts: 16,
     };
 }

@@ -137,6 +137,63 @@ fn a_part_is_carried_to_the_newest_frame_followed_lost_and_found_again() {
     }
 }
 
+/// Feeds pictures; frames that do not follow are searched before they are answered, others never.
+fn run_searching_before_answers(
+    tracker: &mut Tracker,
+    period: Duration,
+    frames: &[Vec<PlanarSimilarity>],
+) -> Vec<(bool, Vec<TrackedPart>)> {
+    frames
+        .iter()
+        .zip(0..)
+        .map(|(poses, number)| {
+            let parts = tracker.frame(Arc::new(picture(poses)), period * number);
+            match tracker.search_before_answer() {
+                Some(search) => (true, tracker.answer(search.run()).unwrap()),
+                None => (false, parts),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_frame_that_does_not_follow_is_answered_by_its_own_search() {
+    let [here, there, elsewhere] = [at(80.0, 90.0, 0.0), at(230.0, 160.0, 90.0), at(240.0, 70.0, 200.0)];
+    let frames = [vec![here], vec![here], vec![there], vec![], vec![elsewhere], vec![here, elsewhere], vec![elsewhere]];
+    // 10 pictures a second: what appears beside the part is another picture.
+    let answers = run_searching_before_answers(&mut tracker(), Duration::from_millis(100), &frames);
+    let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
+    assert_eq!(was_searched, [true, false, true, true, true, true, true]);
+    for (number, ((_, parts), poses)) in answers.iter().zip(&frames).enumerate() {
+        let followed: Vec<_> = parts.iter().filter(|part| part.is_followed()).collect();
+        assert_eq!(followed.len(), poses.len(), "frame {number}");
+        for pose in poses {
+            let expected = line().transformed(pose).center();
+            let off = |part: &&&TrackedPart| (part.detection.grasp.center() - expected).norm();
+            let nearest = followed.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+            assert_at(nearest, pose, &format!("frame {number}"));
+        }
+    }
+    // At 100 frames a second things move.
+    let answers = run_searching_before_answers(&mut tracker(), PERIOD, &frames);
+    let was_searched: Vec<bool> = answers.iter().map(|(was_searched, _)| *was_searched).collect();
+    assert_eq!(was_searched, [true, false, false, false, false, false, false]);
+}
+
+#[test]
+fn a_part_that_lies_still_stays_where_the_search_has_it() {
+    let frames = vec![vec![at(100.3, 90.8, 17.0)]; 12];
+    let mut tracker = tracker();
+    let answers = run_searching_before_answers(&mut tracker, Duration::from_millis(100), &frames);
+    let found = &answers[0].1[0].detection;
+    for (was_searched, parts) in &answers[1..] {
+        assert_eq!((*was_searched, &parts[0].detection), (false, found));
+    }
+    // What moves by a pixel is followed.
+    let moved = tracker.frame(Arc::new(picture(&[at(101.3, 90.8, 17.0)])), Duration::from_millis(1200));
+    assert_at(&moved[0], &at(101.3, 90.8, 17.0), "moved");
+}
+
 #[test]
 fn two_parts_have_two_ids_and_a_lost_one_is_forgotten() {
     let pose = |number: u64| {

@@ -9,10 +9,12 @@ use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_shape::{CloseLook, Evidence};
 
 use super::detector::PartDetector;
-use super::follow::{Effort, Followed, SizedPart};
+use super::follow::{Effort, Followed, SizedPart, StillPose};
+use super::frames::BufferedFrame;
 use crate::facts::TurnSource;
-use crate::model::Placement;
+use crate::model::{Found, GraspDetection, Placement};
 use crate::sighting::Sighting;
+use crate::verdict::Contributions;
 use crate::verification::PlacedDemonstration;
 
 /// Share of a new measurement in the velocity. Chosen by hand: after a sudden turn the start is off by less than three frames'
@@ -47,6 +49,14 @@ struct LastLook {
     /// Agreement of edges and surface then.
     agreement: f64,
     at: Duration,
+}
+
+/// What a search found of a part; holds until the part moves or is covered.
+#[derive(Debug, Clone)]
+struct Still {
+    pose: StillPose,
+    score: f64,
+    evidence: Contributions,
 }
 
 /// Whether a part is seen.
@@ -98,42 +108,64 @@ pub(super) struct Track {
     correction: Option<PlanarSimilarity>,
     /// Where the last search has the part, further off; tried in the next frame.
     alternative: Option<PlanarSimilarity>,
+    /// `None` once it has moved.
+    still: Option<Still>,
     history: VecDeque<PastPose>,
 }
 
 impl Track {
-    /// A track of what a search found in frame `number`; `None` where its demonstration shows nothing to compare at that size.
-    pub(super) fn new(
-        detector: &PartDetector,
-        frame_size: [u32; 2],
-        found: &Placement,
-        number: u64,
-        time: Duration,
-    ) -> Option<Self> {
-        let part = SizedPart::new(detector, found, frame_size)?;
+    /// A track of what a search found in a frame; `None` where its demonstration shows nothing to compare at that size.
+    pub(super) fn new(detector: &PartDetector, frame: &BufferedFrame, found: &Found) -> Option<Self> {
+        let placement = found.placement.as_ref()?;
+        let part = SizedPart::new(detector, placement, detector.frame_size(&frame.picture))?;
         let mut made = Self {
             id: 0,
             standing: Standing::Arriving { replaces: None },
-            first_seen: time,
+            first_seen: frame.time,
             part,
-            by_edges: found.image_from_cutout,
-            time,
-            number,
+            by_edges: placement.image_from_cutout,
+            time: frame.time,
+            number: frame.number,
             velocity_px_per_s: Vector2::zeros(),
             turn_rad_per_s: 0.0,
-            steady_scale: found.image_from_cutout.scale,
+            steady_scale: placement.image_from_cutout.scale,
             steady_agreement: None,
             close: None,
             cutout_from_marks: PlanarSimilarity::IDENTITY,
             network_score: 0.0,
             keypoint_scores: Vec::new(),
-            turn_source: found.turn_source,
+            turn_source: placement.turn_source,
             correction: None,
             alternative: None,
+            still: None,
             history: VecDeque::new(),
         };
-        made.take_over(found, time);
+        made.take_over(placement, frame.time);
+        made.hold(detector, &frame.picture, &found.detection, placement);
         Some(made)
+    }
+
+    /// Takes the place and the score that a search found of it in that picture for those of the frames that follow, until it moves.
+    pub(super) fn hold(
+        &mut self,
+        detector: &PartDetector,
+        picture: &RgbImage,
+        detection: &GraspDetection,
+        placement: &Placement,
+    ) {
+        let pose = StillPose { image_from_cutout: placement.image_from_cutout, agreement: f64::NEG_INFINITY };
+        let seen = self.part.follow(detector, picture, &pose.image_from_cutout, Effort::Snapped, None, Some(&pose));
+        self.still = seen.zip(detection.evidence).filter(|_| detection.is_accepted()).map(|(seen, evidence)| Still {
+            pose: StillPose { agreement: seen.agreement, ..pose },
+            score: detection.score,
+            evidence,
+        });
+    }
+
+    /// The verdict of the last search, where it holds.
+    pub(super) fn held_verdict(&self, followed: &Followed) -> Option<(f64, Contributions)> {
+        let still = self.still.as_ref().filter(|_| followed.is_held)?;
+        Some((still.score, still.evidence))
     }
 
     /// Takes over what only a search measures: the marks' shift, the network's score, the close look.
@@ -193,9 +225,14 @@ impl Track {
         effort: Effort,
     ) -> Option<Followed> {
         let start = self.expected(detector, time);
-        let followed = self.part.follow(detector, picture, &start, effort, self.correction.as_ref())?;
+        let still = self.still.as_ref().map(|still| &still.pose);
+        let followed = self.part.follow(detector, picture, &start, effort, self.correction.as_ref(), still)?;
+        if followed.is_held {
+            return Some(followed);
+        }
+        self.still = None;
         let captured_from = |start: &PlanarSimilarity, followed: Followed, gain: f64| {
-            let captured = self.part.follow(detector, picture, start, Effort::Captured, self.correction.as_ref());
+            let captured = self.part.follow(detector, picture, start, Effort::Captured, self.correction.as_ref(), None);
             captured.filter(|captured| captured.agreement > followed.agreement + gain).unwrap_or(followed)
         };
         let followed = match self.alternative.map(|alternative| start.compose(&alternative)) {
@@ -230,6 +267,14 @@ impl Track {
             self.close = Some(LastLook { look, agreement: followed.agreement, at: time });
         }
         self.close.map(|last| last.look)
+    }
+
+    /// The track that an arriving one corrects.
+    pub(super) fn replaces(&self) -> Option<u64> {
+        match self.standing {
+            Standing::Arriving { replaces } => replaces,
+            _ => None,
+        }
     }
 
     /// ln of its size over the nearest nominal size, without the noise from frame to frame.

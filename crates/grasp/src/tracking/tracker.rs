@@ -4,11 +4,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use image::RgbImage;
+use sdg_geometry::BoundingBox;
 use sdg_shape::CloseLook;
 
-use super::arrival::{BufferedFrame, Carried, FrameBuffer, Match, carry, compare};
+use super::arrival::{Carried, Match, carry, compare};
+use super::continuity::CoarseView;
 use super::detector::{PartDetector, PartSearch, SearchOutcome};
 use super::follow::{Effort, Followed};
+use super::frames::{BufferedFrame, FrameBuffer};
 use super::track::{PastPose, Standing, Track};
 use super::{TrackState, TrackedPart, TrackerConfig};
 use crate::error::Result;
@@ -32,7 +35,10 @@ const MAX_CARRY_STEPS: usize = 3;
 /// let model = GraspModel::from_bytes(&std::fs::read("pendulum.sdg")?, &Device::flex())?;
 /// let mut tracker = Tracker::new(model.into(), TrackerConfig::default());
 /// for (number, picture) in frames.into_iter().enumerate() {
-///     let parts = tracker.frame(Arc::new(picture), Duration::from_millis(10 * number as u64));
+///     let mut parts = tracker.frame(Arc::new(picture), Duration::from_millis(10 * number as u64));
+///     if let Some(search) = tracker.search_before_answer() {
+///         parts = tracker.answer(search.run())?;
+///     }
 ///     for part in parts.iter().filter(|part| part.is_followed()) {
 ///         println!("part {}: ({:.1}, {:.1})", part.id, part.detection.grasp.x, part.detection.grasp.y);
 ///     }
@@ -58,6 +64,19 @@ pub struct Tracker {
     searching: Option<u64>,
     /// When the last search began.
     searched_at: Option<Duration>,
+    /// The newest frame in small; `None` before the first.
+    coarse: Option<CoarseView>,
+    /// How the newest frame does not follow from the one before, until it was searched.
+    gap: Option<Gap>,
+}
+
+/// How a frame does not follow from the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Gap {
+    /// Nothing is known of it: it is the first, or came long after the last.
+    Unrelated,
+    /// Other things are seen, and the parts may be elsewhere.
+    Changed,
 }
 
 /// A track and its last score.
@@ -66,6 +85,9 @@ struct Tracked {
     track: Track,
     part: TrackedPart,
 }
+
+/// What is told of a track.
+type Shown = (GraspDetection, Option<PlanarPose>);
 
 /// A track refined in the newest frame, before it is judged.
 struct Refined {
@@ -86,6 +108,8 @@ impl Tracker {
             arriving: Vec::new(),
             searching: None,
             searched_at: None,
+            coarse: None,
+            gap: None,
         }
     }
 
@@ -99,6 +123,8 @@ impl Tracker {
         }
         let number = self.next_number;
         self.next_number += 1;
+        let before = self.frames.newest().cloned();
+        let boxes_before = self.followed_boxes();
         self.frames.push(BufferedFrame { number, picture: picture.clone(), time: captured });
         self.frames.forget_before(self.oldest_needed());
 
@@ -110,7 +136,104 @@ impl Tracker {
             Standing::Lost(since) => captured.saturating_sub(since) < self.config.forget_after,
             _ => true,
         });
+        self.gap = self.gap_after(before.as_ref(), boxes_before, &picture, captured);
+        self.parts()
+    }
+
+    /// The search that is to be run before the newest frame is answered, because that does not follow from the one before: it is the
+    /// first, a followed part is not where it was, or the picture changed where none is, as far as
+    /// [`TrackerConfig::moves_within`] lets that be told. [`Self::answer`] takes what it finds. A search that is running is given up.
+    pub fn search_before_answer(&mut self) -> Option<PartSearch> {
+        self.gap?;
+        self.search_newest()
+    }
+
+    /// Makes what [`Self::search_before_answer`] found the answer to the newest frame: parts that it did not find are lost.
+    ///
+    /// # Errors
+    /// Those of [`crate::GraspModel::detect`].
+    pub fn answer(&mut self, outcome: SearchOutcome) -> Result<Vec<TrackedPart>> {
+        if self.searching != Some(outcome.number) {
+            return Ok(self.parts());
+        }
+        self.searching = None;
+        self.arriving.clear();
+        let gap = self.gap.take();
+        let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(self.parts()) };
+        let mut found = outcome.found?;
+        found.retain(|found| found.detection.is_accepted());
+        found.truncate(self.config.max_parts);
+        let mut arrived: Vec<_> = found.iter().filter_map(|found| self.arrived(&frame, found)).collect();
+        if gap == Some(Gap::Changed) {
+            let clues: Vec<Clues> = arrived
+                .iter()
+                .map(|(track, Refined { followed, close }, _)| {
+                    self.detector.model().clues(&track.sighting(&self.detector, followed, *close))
+                })
+                .collect();
+            let judged = self.detector.model().judge_in_sequence(&clues, self.log_size());
+            let mut is_accepted = judged.iter().map(|(score, _)| *score >= ACCEPTED);
+            arrived.retain(|_| is_accepted.next() == Some(true));
+        }
+        let is_found = |id: u64| arrived.iter().any(|(track, ..)| track.replaces() == Some(id));
+        for tracked in self.tracks.iter_mut().filter(|tracked| !is_found(tracked.track.id)) {
+            tracked.lose(frame.time);
+        }
+        for (track, refined, shown) in arrived {
+            self.enter(track, &refined.followed, frame.number, frame.time, shown);
+        }
+        Ok(self.parts())
+    }
+
+    /// What a search of the newest frame found as a track there, and what is told of it; `None` where the camera does not show it.
+    fn arrived(&self, frame: &BufferedFrame, found: &Found) -> Option<(Track, Refined, Shown)> {
+        let mut track = Track::new(&self.detector, frame, found)?;
+        if let Some((idx, ..)) = self.matched(found, frame.number) {
+            track = track.replacing(self.tracks[idx].track.id);
+        }
+        let followed = track.refine(&self.detector, &frame.picture, frame.time, Effort::Snapped)?;
+        let close = track.close_look(&self.detector, &frame.picture, frame.time, &followed);
+        let size = self.detector.frame_size(&frame.picture);
+        let shown = shown_within(&self.detector, found.detection.clone(), size)?;
+        Some((track, Refined { followed, close }, shown))
+    }
+
+    /// Parts of one sequence have one size, as those of one picture: a look-alike of another size is no lost part.
+    fn log_size(&self) -> Option<f64> {
+        self.tracks.first().map(|tracked| tracked.track.log_size())
+    }
+
+    fn parts(&self) -> Vec<TrackedPart> {
         self.tracks.iter().map(|tracked| tracked.part.clone()).collect()
+    }
+
+    fn followed_boxes(&self) -> Vec<BoundingBox> {
+        let followed = self.tracks.iter().filter(|tracked| tracked.part.is_followed());
+        followed.map(|tracked| tracked.part.detection.bbox).collect()
+    }
+
+    /// How the newest frame does not follow from the one before, in which parts had those boxes.
+    fn gap_after(
+        &mut self,
+        before: Option<&BufferedFrame>,
+        mut boxes: Vec<BoundingBox>,
+        picture: &RgbImage,
+        captured: Duration,
+    ) -> Option<Gap> {
+        let coarse = CoarseView::new(picture);
+        let coarse_before = self.coarse.replace(coarse.clone());
+        let Some((before, coarse_before)) = before.zip(coarse_before) else { return Some(Gap::Unrelated) };
+        let passed = captured.checked_sub(before.time).filter(|passed| *passed <= self.config.search_every);
+        let Some(passed) = passed else {
+            return (*before.picture != *picture).then_some(Gap::Unrelated);
+        };
+        if passed <= self.config.moves_within {
+            return None;
+        }
+        boxes.extend(self.followed_boxes());
+        let has_changed = self.tracks.iter().any(|tracked| tracked.was_just_lost(captured))
+            || coarse.has_changed_beside(&coarse_before, &boxes);
+        has_changed.then_some(Gap::Changed)
     }
 
     /// The search that is to be run now, on the newest frame; `None` while one is running and while none is due.
@@ -125,6 +248,11 @@ impl Tracker {
         if !(is_due || is_missing && self.arriving.is_empty()) {
             return None;
         }
+        self.search_newest()
+    }
+
+    fn search_newest(&mut self) -> Option<PartSearch> {
+        let newest = self.frames.newest()?;
         self.searching = Some(newest.number);
         self.searched_at = Some(newest.time);
         let (number, picture) = (newest.number, newest.picture.clone());
@@ -142,14 +270,14 @@ impl Tracker {
         }
         self.searching = None;
         let Some(frame) = self.frames.get(outcome.number).cloned() else { return Ok(()) };
-        let frame_size = self.detector.frame_size(&frame.picture);
         for found in outcome.found? {
             let Some(placement) = &found.placement else { continue };
-            let arriving = || Track::new(&self.detector, frame_size, placement, frame.number, frame.time);
+            let arriving = || Track::new(&self.detector, &frame, &found);
             match self.matched(&found, frame.number) {
                 Some((idx, past, Match::Confirms)) => {
                     self.tracks[idx].track.take_over(placement, frame.time);
                     self.tracks[idx].track.correct(&self.detector, &past, placement);
+                    self.tracks[idx].track.hold(&self.detector, &frame.picture, &found.detection, placement);
                 }
                 Some((idx, _, Match::Corrects)) if found.detection.is_accepted() => {
                     let id = self.tracks[idx].track.id;
@@ -179,6 +307,7 @@ impl Tracker {
         self.arriving.clear();
         self.searching = None;
         self.searched_at = None;
+        self.coarse = None;
     }
 
     fn oldest_needed(&self) -> u64 {
@@ -237,17 +366,14 @@ impl Tracker {
             })
             .collect();
         let asked: Vec<Clues> = clues.iter().flatten().copied().collect();
-        // Parts of one sequence have one size, as those of one picture: a look-alike of another size is no lost part.
-        let earlier_log_size = self.tracks.first().map(|tracked| tracked.track.log_size());
-        let mut judged = detector.model().judge_in_sequence(&asked, earlier_log_size).into_iter();
+        let mut judged = detector.model().judge_in_sequence(&asked, self.log_size()).into_iter();
         let mut verdicts = clues.iter().map(|clues| clues.as_ref().and_then(|_| judged.next())).collect::<Vec<_>>();
         let of_newcomers = verdicts.split_off(self.tracks.len());
 
         let output = |track: &Track, refined: &Refined, (score, evidence), size: [u32; 2]| {
             let sighting = track.sighting(&detector, &refined.followed, refined.close);
-            let mut detection = sighting.detection(score, evidence, detector.model().num_keypoints());
-            detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
-            detector.output(detection)
+            let detection = sighting.detection(score, evidence, detector.model().num_keypoints());
+            shown_within(&detector, detection, size)
         };
         let size = self.frames.newest().map_or([0, 0], |newest| detector.frame_size(&newest.picture));
         for ((tracked, refined), verdict) in self.tracks.iter_mut().zip(refined.iter()).zip(verdicts) {
@@ -255,7 +381,8 @@ impl Tracker {
                 Standing::Lost(_) => ACCEPTED,
                 _ => self.config.lose_below,
             };
-            let seen = refined.as_ref().zip(verdict).filter(|(_, (score, _))| *score >= least);
+            let held = refined.as_ref().and_then(|refined| tracked.track.held_verdict(&refined.followed));
+            let seen = refined.as_ref().zip(held.or(verdict)).filter(|(_, (score, _))| *score >= least);
             let shown = seen.and_then(|(refined, verdict)| {
                 output(&tracked.track, refined, verdict, size).map(|shown| (refined, shown))
             });
@@ -274,14 +401,7 @@ impl Tracker {
     }
 
     /// Makes an arrived track one that is followed: the one that it corrects, one that was lost, or a new one.
-    fn enter(
-        &mut self,
-        mut track: Track,
-        followed: &Followed,
-        number: u64,
-        captured: Duration,
-        shown: (GraspDetection, Option<PlanarPose>),
-    ) {
+    fn enter(&mut self, mut track: Track, followed: &Followed, number: u64, captured: Duration, shown: Shown) {
         track.accept(&self.detector, followed, number, captured);
         let lost_nearest = || {
             let apart = |tracked: &Tracked| (tracked.part.detection.grasp.center() - shown.0.grasp.center()).norm();
@@ -294,10 +414,7 @@ impl Tracker {
                 && Some(tracked.track.id) != id
                 && are_of_same_part(&tracked.part.detection, &shown.0)
         };
-        let replaced = match track.standing {
-            Standing::Arriving { replaces } => replaces,
-            _ => None,
-        };
+        let replaced = track.replaces();
         if self.tracks.iter().any(|tracked| is_double(tracked, replaced)) {
             return;
         }
@@ -335,6 +452,12 @@ impl Tracker {
     }
 }
 
+/// A detection of the frame of reference as it is told; `None` where the camera does not show it.
+fn shown_within(detector: &PartDetector, mut detection: GraspDetection, size: [u32; 2]) -> Option<Shown> {
+    detection.bbox = detection.bbox.clip(f64::from(size[0]), f64::from(size[1]));
+    detector.output(detection)
+}
+
 impl Tracked {
     fn follow(
         &mut self,
@@ -342,7 +465,7 @@ impl Tracked {
         followed: &Followed,
         number: u64,
         captured: Duration,
-        (detection, pose): (GraspDetection, Option<PlanarPose>),
+        (detection, pose): Shown,
     ) {
         let was_lost = matches!(self.track.standing, Standing::Lost(_));
         self.track.accept(detector, followed, number, captured);
@@ -360,6 +483,11 @@ impl Tracked {
         self.part.state = TrackState::Lost;
         self.part.age = captured.saturating_sub(self.track.first_seen);
         self.part.unseen_for = captured.saturating_sub(self.track.time);
+    }
+
+    /// Whether it was followed in the frame before.
+    fn was_just_lost(&self, captured: Duration) -> bool {
+        self.track.standing == Standing::Lost(captured)
     }
 
     /// Goes on from where another track has the same part.

@@ -229,7 +229,11 @@ fn look_out(
                 Some(violation) => {
                     let [min, max] = [violation.min_rad, violation.max_rad].map(f64::to_degrees);
                     let expected = format!("joint {} from {min:.1} to {max:.1} degrees", violation.joint);
-                    let found = format!("{:.1}", violation.found_rad.to_degrees());
+                    let hint = match JointLimits::franka().are_radians_given_as_degrees(&q) {
+                        true => ": radians given as degrees?",
+                        false => "",
+                    };
+                    let found = format!("{:.1}{hint}", violation.found_rad.to_degrees());
                     Err(source.expected(joints, "joints_deg", &expected, found))
                 }
             }

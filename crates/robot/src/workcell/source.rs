@@ -7,6 +7,8 @@ use super::error::WorkcellError;
 
 /// Where an arm can be at all, mm.
 pub(super) const MAX_REACH_MM: f64 = 1500.0;
+/// No workspace or table is narrower, mm.
+const MIN_RANGE_MM: f64 = 10.0;
 
 /// So many numbers and no more; serde's own arrays pass over what follows.
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -52,6 +54,10 @@ impl Source<'_> {
 
     pub(super) fn range_m(&self, value: &Spanned<Numbers<2>>, name: &str) -> Result<[f64; 2], WorkcellError> {
         let Numbers([min, max]) = *value.get_ref();
+        if min < max && max - min < MIN_RANGE_MM {
+            let expected = format!("[smallest, largest] in mm, at least {MIN_RANGE_MM} apart");
+            return Err(self.expected(value, name, &expected, format!("[{min}, {max}]: metres given as millimetres?")));
+        }
         if min < max && min >= -MAX_REACH_MM && max <= MAX_REACH_MM {
             return Ok([min * 1e-3, max * 1e-3]);
         }

@@ -57,6 +57,12 @@ fn errors_name_the_line() {
         (14, "\"hand\"", "\"wall\"", "expected \"hand\" or \"base\", found \"wall\""),
         (17, "-12.5", "-12500", "height_mm: expected a number from -1000 to 1000, found -12500"),
         (20, "[200, 800]", "[800, 200]", "x_mm: expected [smallest, largest] in mm"),
+        (
+            20,
+            "[200, 800]",
+            "[0.2, 0.8]",
+            "x_mm: expected [smallest, largest] in mm, at least 10 apart, found [0.2, 0.8]: metres",
+        ),
         (21, "[-450, 450]", "[-450, 450, 3]", "expected 2 numbers, found 3"),
         (22, "z_mm", "zmm", "unknown field `zmm`"),
         (25, "[480, 0, 580]", "[480, 0, 58]", "a height from 150 to 1200 mm above the table, found 58"),

@@ -51,6 +51,10 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
             }
         }
     }
+    if camera.is_some() {
+        let photos = images.iter().map(|(photo, _)| photo).filter(|photo| photo.exists());
+        photos.into_iter().try_for_each(|photo| files::check_is_not_turned(photo))?;
+    }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
     let live = args.from.clone().zip(photo_path).map(open).transpose()?;

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use rayon::prelude::*;
 use sdg_calibration::{Board, CalibratedCamera, Calibration, CalibrationConfig, SeenCorner, calibrate, find_board};
+use sdg_demonstration::PixelFrame;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
@@ -96,7 +97,7 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
 }
 
 fn look<'a>(path: &'a Path, board: &Board) -> Result<Seen<'a>> {
-    let picture = files::read_image(path)?;
+    let picture = files::read_image_in(path, PixelFrame::Sensor)?;
     let corners = find_board(&grey(&picture), board).with_context(|| named(path))?;
     Ok(Seen { path, size: picture.dimensions(), corners })
 }

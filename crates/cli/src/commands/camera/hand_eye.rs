@@ -10,6 +10,7 @@ use sdg_calibration::{
     Board, CalibratedCamera, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose, calibrate_hand_eye, find_board,
     read_robot_poses,
 };
+use sdg_demonstration::PixelFrame;
 use sdg_geometry::upper_median;
 use serde_json::{Value, json};
 
@@ -111,7 +112,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
 
 fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {
     let path = folder.join(&pose.picture);
-    let picture = files::read_image(&path)?;
+    let picture = files::read_image_in(&path, PixelFrame::Sensor)?;
     if let Err(error) = camera.check_picture(picture.dimensions()) {
         bail!("{}: {error}", path.display());
     }

@@ -10,6 +10,7 @@ use sdg_calibration::{
     Board, CalibratedCamera, FocalCost, Frame, SeenCorner, SheetPose, TablePose, find_board, focal_cost,
     focal_from_sheet, homography_rms_px, locate_sheet,
 };
+use sdg_demonstration::PixelFrame;
 use sdg_geometry::{PinholeCamera, PlumbBob};
 use serde_json::{Value, json};
 
@@ -96,7 +97,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
     files::check_extendable(out, args.camera.as_deref())?;
-    let picture = files::read_image(&args.picture)?;
+    let picture = files::read_image_in(&args.picture, PixelFrame::Sensor)?;
     if let Some((camera, _)) = &existing {
         camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
     }

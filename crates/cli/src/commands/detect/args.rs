@@ -61,7 +61,8 @@ pub struct DetectArgs {
     #[arg(required_unless_present = "from", value_name = "IMAGE|DIR|-")]
     pub images: Vec<PathBuf>,
     /// Live pictures instead of images, until Ctrl-C: v4l:, v4l:/dev/video0, v4l:NAME, http://HOST/PATH, 'cmd:PROGRAM ARGUMENTS',
-    /// dir:FOLDER, file:PATH or sim:PART. Parts are followed from frame to frame; --json prints a line for each frame
+    /// dir:FOLDER, file:PATH or sim:PART. Parts are followed from frame to frame, or searched for in each with --every-frame;
+    /// --json prints a line for each frame
     #[arg(long, value_name = "ADDRESS", help_heading = "Live pictures")]
     pub from: Option<Address>,
     /// End after so many frames

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use image::RgbImage;
-use sdg_demonstration::IMAGE_EXTENSIONS;
+use sdg_demonstration::{IMAGE_EXTENSIONS, PixelFrame};
 
 use crate::exit::Usage;
 use crate::files::{self, STANDARD_INPUT, UNREADABLE_EXTENSIONS};
@@ -30,10 +30,10 @@ impl Input {
     }
 
     /// Reads and decodes it.
-    pub fn read(&self) -> Result<RgbImage> {
+    pub fn read(&self, frame: PixelFrame) -> Result<RgbImage> {
         match self {
-            Self::File(path) => files::read_image(path),
-            Self::StandardInput => files::read_standard_input_image(),
+            Self::File(path) => files::read_image_in(path, frame),
+            Self::StandardInput => files::read_standard_input_image(frame),
         }
     }
 

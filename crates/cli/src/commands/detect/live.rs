@@ -20,6 +20,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::found_record::FoundRecord;
 use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::live_pictures;
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
@@ -42,8 +43,8 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
             Some(server)
         }
     };
-    let mut frames = Frames::open(address, args, detector.picture_size())?;
-    let mut finder = FrameDetector::new(args, detector)?;
+    let mut frames = Frames::open(address, args, &detector)?;
+    let mut finder = FrameDetector::new(args, address, frames.wait(), detector)?;
     let interrupt = Interrupt::watch();
     let mut stdout = std::io::stdout().lock();
     let mut found_any = false;
@@ -62,7 +63,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         left -= 1;
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
-        let parts = finder.find(&picture, frame.captured)?;
+        let parts = finder.find(&picture, &frame)?;
         let seconds = began.elapsed().as_secs_f64();
         found_any |= parts.iter().any(|part| part.is_seen(args.min_score));
         write_line(&mut stdout, args, &finder.detector, &frame, picture.dimensions(), seconds, &parts)?;
@@ -76,7 +77,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
     Ok(if found_any { Outcome::Done } else { Outcome::NothingToGrasp })
 }
 
-/// The frames of a camera: of a real one the newest, of stored and rendered pictures each.
+/// The frames of a camera: of a stream the newest, of stored and rendered pictures and of those on request each.
 enum Frames {
     Newest(LatestFrame),
     Each(Box<dyn Camera>),
@@ -92,16 +93,23 @@ enum Next {
 
 impl Frames {
     /// A calibrated camera is asked for the size that it was calibrated with.
-    fn open(address: &Address, args: &DetectArgs, calibrated_size: Option<[u32; 2]>) -> Result<Self> {
+    fn open(address: &Address, args: &DetectArgs, detector: &PictureDetector) -> Result<Self> {
         let mut options = args.request.options();
-        if let Some([width, height]) = calibrated_size {
+        options.frame = detector.pixel_frame();
+        if let Some([width, height]) = detector.picture_size() {
             (options.width, options.height) = (width, height);
         }
         let camera = live_pictures::open(address, &options)?;
         Ok(match address {
-            Address::Folder { .. } | Address::File { .. } | Address::Sim(_) => Self::Each(camera),
+            Address::Sim(_) => Self::Each(camera),
+            _ if camera.is_on_request() => Self::Each(camera),
             _ => Self::Newest(LatestFrame::spawn(camera)),
         })
+    }
+
+    /// Whether none comes before it is asked for.
+    fn wait(&self) -> bool {
+        matches!(self, Self::Each(camera) if camera.is_on_request())
     }
 
     fn next(&mut self) -> Next {
@@ -142,32 +150,50 @@ struct FrameDetector {
     detector: PictureDetector,
     verification: Verification,
     tracker: Option<LiveTracker>,
+    /// The time from one stored picture to the next; `None` where frames have times of their own.
+    interval: Option<Duration>,
     /// What frame times are counted from.
     first: Option<SystemTime>,
 }
 
+/// Between stored pictures that are played without a rate: nothing says that one follows from the other.
+const UNRELATED: Duration = Duration::from_secs(1);
+
 impl FrameDetector {
-    fn new(args: &DetectArgs, detector: PictureDetector) -> Result<Self> {
+    fn new(args: &DetectArgs, address: &Address, frames_wait: bool, detector: PictureDetector) -> Result<Self> {
+        // The time of a file's last change is not that of its picture.
+        let interval = match address {
+            Address::Folder { playback, .. } | Address::File { playback, .. } => {
+                Some(playback.interval.unwrap_or(UNRELATED))
+            }
+            _ => None,
+        };
         let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
         let tracker = match args.every_frame || args.no_verify {
             true => None,
             false => {
                 let mut config = TrackerConfig::DEFAULT;
                 config.max_parts = args.max as usize;
+                if frames_wait {
+                    config.moves_within = Duration::ZERO;
+                }
                 Some(LiveTracker::new(detector.to_part_detector(), config, SearchTime::AsItTakes)?)
             }
         };
-        Ok(Self { detector, verification, tracker, first: None })
+        Ok(Self { detector, verification, tracker, interval, first: None })
     }
 
-    fn find(&mut self, picture: &Arc<RgbImage>, captured: SystemTime) -> Result<Vec<Part>> {
+    fn find(&mut self, picture: &Arc<RgbImage>, frame: &Frame) -> Result<Vec<Part>> {
         self.detector.check_picture(picture)?;
         let Some(tracker) = &mut self.tracker else {
             let found = self.detector.detect(picture, self.verification)?;
             return Ok(found.into_iter().map(|found| Part { found, track: None }).collect());
         };
-        let first = *self.first.get_or_insert(captured);
-        let since = captured.duration_since(first).unwrap_or_default();
+        let first = *self.first.get_or_insert(frame.captured);
+        let since = match self.interval {
+            Some(interval) => interval.mul_f64(frame.number as f64),
+            None => frame.captured.duration_since(first).unwrap_or_default(),
+        };
         let parts = tracker.frame(Arc::clone(picture), since)?;
         let part = |part: sdg_grasp::TrackedPart| Part {
             track: Some((part.id, part.state, part.age)),
@@ -197,7 +223,7 @@ fn write_line(
     let shown = || parts.iter().filter(|part| args.all || part.is_seen(args.min_score));
     if args.json {
         let record = |part: &Part| PartLine {
-            found: FoundRecord::new(&part.found, detector.frame()),
+            found: FoundRecord::new(&part.found, detector),
             track: part.track.map(|(id, ..)| id),
             state: part.track.map(|(_, state, _)| state_name(state)),
             age_s: part.track.map(|(.., age)| age.as_secs_f64()),
@@ -205,6 +231,7 @@ fn write_line(
         let fault = |fault: &sdg_camera::Fault| FaultLine { fault: fault.name(), why: fault.to_string() };
         let line = FrameLine {
             camera: &frame.camera,
+            object: detector.model().object(),
             frame: frame.number,
             captured: frame.captured.duration_since(UNIX_EPOCH).unwrap_or_default().as_secs_f64(),
             width,
@@ -213,7 +240,7 @@ fn write_line(
             faults: frame.faults.iter().map(fault).collect(),
             detections: shown().map(record).collect(),
         };
-        writeln!(out, "{}", serde_json::to_string(&line)?)?;
+        writeln!(out, "{}", json_line(&line)?)?;
     } else {
         for fault in &frame.faults {
             writeln!(out, "frame {}: {fault}", frame.number)?;
@@ -248,6 +275,8 @@ fn write_error(out: &mut impl Write, args: &DetectArgs, address: &Address, error
 #[derive(Serialize)]
 struct FrameLine<'a> {
     camera: &'a str,
+    /// The part that the model looks for.
+    object: &'a str,
     frame: u64,
     /// Seconds since 1970.
     captured: f64,

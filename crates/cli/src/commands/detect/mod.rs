@@ -21,6 +21,7 @@ use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
 use crate::found_text::{DEFAULT_MIN_SCORE, Wording};
+use crate::json_line::json_line;
 use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
@@ -123,7 +124,7 @@ impl<W: Write> Batch<'_, W> {
         let error = one_line(error);
         if self.args.json {
             let line = ErrorLine { image: name.to_owned(), error };
-            writeln!(self.stdout, "{}", serde_json::to_string(&line)?)?;
+            writeln!(self.stdout, "{}", json_line(&line)?)?;
         } else {
             self.stdout.flush()?;
             eprintln!("error: {error}");
@@ -133,7 +134,7 @@ impl<W: Write> Batch<'_, W> {
 
     fn detect(&mut self, input: &Input) -> Result<Seen> {
         let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
-        let image = input.read()?;
+        let image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
         let detections = self.detector.detect(&image, verification).with_context(|| input.name())?;
         let seen = Seen { size: image.dimensions().into(), seconds: start.elapsed().as_secs_f64(), detections };
@@ -182,19 +183,20 @@ impl Seen {
         let listed = self.detections.iter().filter(|found| args.all || wording.is_accepted(&found.detection));
         if args.json {
             let record = |found: &Found| PictureRecord {
-                found: FoundRecord::new(found, detector.frame()),
+                found: FoundRecord::new(found, detector),
                 size: detector.size_of(&found.detection, self.size),
                 advice: found.detection.advice(),
             };
             let line = ImageLine {
                 image: name,
+                object: detector.model().object(),
                 width: self.size[0],
                 height: self.size[1],
                 seconds: self.seconds,
                 num_refused: refused.len(),
                 detections: listed.map(record).collect(),
             };
-            writeln!(out, "{}", serde_json::to_string(&line)?)?;
+            writeln!(out, "{}", json_line(&line)?)?;
             return Ok(());
         }
         if refused.len() == self.detections.len() {
@@ -211,6 +213,8 @@ impl Seen {
 #[derive(Serialize)]
 struct ImageLine<'a> {
     image: &'a str,
+    /// The part that the model looks for.
+    object: &'a str,
     width: u32,
     height: u32,
     seconds: f64,

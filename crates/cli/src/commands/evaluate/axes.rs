@@ -17,6 +17,7 @@ use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::machine::machine;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
@@ -84,7 +85,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
             "tables": tables.display().to_string(),
             "report": report.display().to_string(),
         });
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         print_lines(&summary);
         print_comparisons(&comparisons);

@@ -13,6 +13,7 @@ use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::machine::machine;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
@@ -58,7 +59,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let report = page(&summary, &facts, &command).write(&report_folder)?;
     if args.json {
         let (tables, report) = (tables.display().to_string(), report.display().to_string());
-        println!("{}", json!({ "summary": summary, "tables": tables, "report": report }));
+        println!("{}", json_line(&json!({ "summary": summary, "tables": tables, "report": report }))?);
     } else {
         for row in &summary.sets {
             let of =

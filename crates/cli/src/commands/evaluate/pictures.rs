@@ -10,6 +10,7 @@ use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
+use crate::json_line::json_line;
 use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json};
 use crate::picture_detector::PictureDetector;
 use crate::progress::EvaluationProgress;
@@ -58,7 +59,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let judged = evaluated.judged();
     let totals = Totals::of(&judged);
     if args.json {
-        println!("{}", to_json(&evaluated, &report));
+        println!("{}", json_line(&to_json(&evaluated, &report))?);
     } else {
         print!("{}", summary(&evaluated, &totals));
         println!("report: {}", report.display());

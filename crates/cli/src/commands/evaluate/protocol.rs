@@ -15,6 +15,7 @@ use crate::evaluation::{Evaluation, EvaluationProgress, PartGroup, Settings, Sto
 use crate::exit::Outcome;
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::machine::machine;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
@@ -85,7 +86,7 @@ pub(super) fn write_tables(args: &EvaluateArgs, evaluation: &Evaluation, setting
             "cells": store.path("tables.json").display().to_string(),
             "report": report.display().to_string(),
         });
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         for summary in &summaries {
             let of = if summary.group == PartGroup::HeldOut { " (held-out parts)" } else { "" };

@@ -1,5 +1,6 @@
 //! Numbers on the command line of `sdg plan`.
 
+use std::f64::consts::FRAC_PI_4;
 use std::str::FromStr;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -46,6 +47,12 @@ impl FromStr for GoalPose {
                 return Err(format!("expected X,Y,Z or X,Y,Z,YAW or X,Y,Z,ROLL,PITCH,YAW, found {found} numbers"));
             }
         };
+        if [x, y, z].iter().all(|value| value.abs() < MIN_DISTANCE_MM) {
+            return Err(format!("expected X,Y,Z in mm, found {x},{y},{z}: metres given as millimetres?"));
+        }
+        if are_radians(&[roll, pitch, yaw]) {
+            return Err(format!("expected angles in degrees, found {roll},{pitch},{yaw}: radians given as degrees?"));
+        }
         let turn = UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians());
         Ok(Self(Isometry3::from_parts(Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3), turn)))
     }
@@ -62,6 +69,20 @@ impl FromStr for Held {
             _ => Err(format!("expected DIAMETER,LENGTH in mm, each above 0 and at most 1000, found \"{text}\"")),
         }
     }
+}
+
+/// No tcp comes so near to the middle of the robot's base.
+const MIN_DISTANCE_MM: f64 = 10.0;
+/// How far rounded numbers are from parts of a turn.
+const ROUNDING_RAD: f64 = 0.006;
+
+/// Whether the angles are eighths of a turn in radians, as 3.14 and 0.785: hardly anybody means 3.14 degrees.
+fn are_radians(angles: &[f64]) -> bool {
+    let is_part = |angle: f64| {
+        let eighths = angle.abs() / FRAC_PI_4;
+        eighths < 8.5 && (eighths - eighths.round()).abs() * FRAC_PI_4 < ROUNDING_RAD && angle.fract() != 0.0
+    };
+    angles.iter().any(|angle| *angle != 0.0) && angles.iter().all(|angle| *angle == 0.0 || is_part(*angle))
 }
 
 fn numbers(text: &str) -> Result<Vec<f64>, String> {
@@ -90,6 +111,11 @@ mod tests {
         assert!("500,0".parse::<GoalPose>().unwrap_err().contains("found 2 numbers"));
         assert!("500,x,3".parse::<GoalPose>().unwrap_err().contains("found \"x\""));
         assert!("500,nan,3".parse::<GoalPose>().is_err());
+        for radians in ["500,0,200,3.14159,0,1.5708", "500,0,200,3.14,0,0.785"] {
+            assert!(radians.parse::<GoalPose>().unwrap_err().contains("radians given as degrees?"), "{radians}");
+        }
+        assert!("500,0,200,180,0,3".parse::<GoalPose>().is_ok() && "500,0,200,2.5".parse::<GoalPose>().is_ok());
+        assert!("0.5,0,0.2".parse::<GoalPose>().unwrap_err().contains("metres given as millimetres?"));
     }
 
     #[test]

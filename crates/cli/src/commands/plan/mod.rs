@@ -8,17 +8,18 @@ mod explain;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_kinematics::collision::Capsule;
 use sdg_kinematics::dynamics::ArmDynamics;
 use sdg_kinematics::planning::PlanOptions;
-use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, Panda, Trajectory, ready_pose};
+use sdg_kinematics::{CartesianLimits, HAND_OPENING_MAX_M, JointLimits, Panda, Trajectory, ready_pose};
 use sdg_robot::DEFAULT_SPEED;
 use sdg_robot::workcell::Workcell;
 
 use crate::exit::{Outcome, Usage};
+use crate::json_line::json_line;
 use crate::robots;
 use arguments::{GoalPose, Held, JointsDeg};
 use explain::Explained;
@@ -76,6 +77,14 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         model.hold(&[Capsule::new([0.0; 3], [0.0, 0.0, far], radius_m)]).map_err(|error| Usage(error.to_string()))?;
     }
     let start = args.start.map_or_else(|| workcell.home().unwrap_or_else(ready_pose), |JointsDeg(q)| q);
+    if args.start.is_some() && JointLimits::franka().are_radians_given_as_degrees(&start) {
+        let found = start.map(|angle| angle.to_degrees());
+        let found: Vec<String> = found.iter().map(|angle| format!("{angle:.3}")).collect();
+        bail!(
+            "--start: expected joint angles in degrees, found {}, which the joints reach as radians alone: radians given as degrees?",
+            found.join(",")
+        );
+    }
     let goals = goals(args);
     let mut options = PlanOptions::default();
     (options.seed, options.margin_m) = (args.seed, args.margin_mm * 1e-3);
@@ -93,7 +102,7 @@ pub fn run(args: &PlanArgs) -> Result<Outcome> {
         eprintln!("  sdg grasp would refuse it: {refused}");
     }
     if args.json {
-        println!("{}", explained.json());
+        println!("{}", json_line(&explained.json())?);
     }
     if !args.no_drawing && !motions.is_empty() {
         draw(args, &workcell, &motions)?;

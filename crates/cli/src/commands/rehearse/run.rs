@@ -15,6 +15,7 @@ use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::interrupt::Interrupt;
+use crate::json_line::json_line;
 use crate::own_part::OwnPart;
 use crate::parts::part_named;
 use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
@@ -139,7 +140,7 @@ pub fn finish(page: &RunPage, teach_seconds: Option<f64>, report: &std::path::Pa
         if let Some(seconds) = teach_seconds {
             line["teach_seconds"] = json!(seconds);
         }
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         if let Some(seconds) = teach_seconds {
             println!("taught the {} from one photo in {seconds:.0} s", object.title.to_lowercase());

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use super::arm_args::ArmArgs;
 use crate::exit::Outcome;
+use crate::json_line::json_line;
 
 /// `sdg robot state`
 #[derive(Debug, Args)]
@@ -37,7 +38,7 @@ pub(super) fn run(args: &StateArgs) -> Result<Outcome> {
             "external_torques_nm": state.tau_external_nm.as_slice(),
             "hand": {"opening_m": hand.opening_m, "is_grasping": hand.is_grasping},
         });
-        println!("{line}");
+        println!("{}", json_line(&line)?);
     } else {
         println!("arm    {address}, {}", state.mode.name());
         let joints: Vec<String> = joints_deg.iter().map(|angle| format!("{angle:.2}")).collect();

@@ -2,9 +2,13 @@
 
 use std::borrow::Cow;
 
+use image::ImageFormat;
+
+use crate::error::PictureError;
+
 /// What is known of a JPEG that grows at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum JpegEnd {
+pub enum JpegEnd {
     /// It has so many bytes, its end marker included.
     At(usize),
     /// More bytes are needed.
@@ -15,22 +19,32 @@ pub(crate) enum JpegEnd {
 
 /// Walks over the markers of a JPEG, without decoding it. It goes on where it stopped, so that a growing buffer is read once.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct JpegScanner {
+pub struct JpegScanner {
     position: usize,
     /// Within the entropy-coded data that follows a start of scan.
     is_in_scan: bool,
     first_scan: Option<usize>,
     has_huffman_tables: bool,
+    has_adobe_marker: bool,
+    /// By the frame's header.
+    num_components: Option<u8>,
+    is_progressive: bool,
+    /// Of a progressive picture: bits of the coefficients (0 to 63) that have been sent to their last bit, by component's number.
+    sent: Vec<(u8, u64)>,
 }
 
 const START: u8 = 0xd8;
 const END: u8 = 0xd9;
 const START_OF_SCAN: u8 = 0xda;
 const HUFFMAN_TABLES: u8 = 0xc4;
+const ADOBE: u8 = 0xee;
+/// Frames: baseline and its kin, without the tables (0xc4), the reserved (0xc8) and the arithmetic ones (0xcc).
+const FRAMES: std::ops::RangeInclusive<u8> = 0xc0..=0xcf;
+const PROGRESSIVE: u8 = 0xc2;
 
 impl JpegScanner {
     /// Walks on. `bytes` begin with the start marker, and with what they began with in the call before.
-    pub(crate) fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
+    pub fn advance(&mut self, bytes: &[u8]) -> JpegEnd {
         if self.position == 0 {
             match bytes {
                 [0xff, START, ..] => self.position = 2,
@@ -69,15 +83,23 @@ impl JpegScanner {
                     else {
                         return JpegEnd::NotYet;
                     };
+                    let length = usize::from(u16::from_be_bytes(length));
+                    let segment = bytes.get(self.position + 4..self.position + 2 + length.max(2)).unwrap_or_default();
                     match marker {
                         HUFFMAN_TABLES => self.has_huffman_tables = true,
+                        ADOBE => self.has_adobe_marker |= segment.starts_with(b"Adobe"),
                         START_OF_SCAN => {
                             self.first_scan.get_or_insert(self.position);
                             self.is_in_scan = true;
+                            self.note_sent(segment);
+                        }
+                        0xc8 | 0xcc => {}
+                        _ if FRAMES.contains(&marker) => {
+                            self.num_components = segment.get(5).copied();
+                            self.is_progressive = marker == PROGRESSIVE;
                         }
                         _ => {}
                     }
-                    let length = usize::from(u16::from_be_bytes(length));
                     if length < 2 {
                         return JpegEnd::Broken(self.position + 2);
                     }
@@ -93,26 +115,90 @@ impl JpegScanner {
     }
 }
 
-/// The one JPEG that the bytes begin with, without what follows it, and with Huffman tables.
+impl JpegScanner {
+    /// Notes what a scan's header says that it sends.
+    fn note_sent(&mut self, header: &[u8]) {
+        let Some((&count, rest)) = header.split_first() else { return };
+        let Some((components, [first, last, bits, ..])) = rest.split_at_checked(2 * usize::from(count)) else { return };
+        let is_last_bit = bits & 0x0f == 0;
+        if !is_last_bit || *first > *last || *last > 63 {
+            return;
+        }
+        let coefficients = (u64::MAX >> (63 - last)) & (u64::MAX << first);
+        for component in components.chunks_exact(2) {
+            match self.sent.iter_mut().find(|(number, _)| *number == component[0]) {
+                Some((_, sent)) => *sent |= coefficients,
+                None => self.sent.push((component[0], coefficients)),
+            }
+        }
+    }
+
+    /// Whether the scans that have begun send the whole picture.
+    fn is_fully_sent(&self) -> bool {
+        !self.is_progressive
+            || self.num_components.is_some_and(|count| self.sent.len() == usize::from(count))
+                && self.sent.iter().all(|(_, sent)| *sent == u64::MAX)
+    }
+}
+
+/// The one JPEG that the bytes begin with, without what follows it, and with Huffman tables and an end.
 ///
 /// Motion JPEG (AVI1, USB video class) may leave out the tables of the JPEG standard's annex K, sections K.3.1 and K.3.2; they are
-/// put before the first scan then.
+/// put before the first scan then. Some cameras leave out the end marker: it is added where the data before it are complete.
 ///
 /// # Errors
-/// In words, what is found where there is no whole JPEG.
-pub(crate) fn whole_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, String> {
+/// Data that break off; inks without Adobe's marker, of which nothing says whether they are inverted.
+pub(crate) fn complete_jpeg(bytes: &[u8]) -> Result<Cow<'_, [u8]>, PictureError> {
+    let damaged = |reason: String| PictureError::DamagedImage { format: "JPEG", reason };
     let mut scanner = JpegScanner::default();
-    let end = match scanner.advance(bytes) {
-        JpegEnd::At(end) => end,
-        JpegEnd::NotYet => return Err(format!("a JPEG that ends after {} bytes without its end marker", bytes.len())),
-        JpegEnd::Broken(at) => return Err(format!("a JPEG that breaks off after {at} of {} bytes", bytes.len())),
+    let (jpeg, lacks_end) = match scanner.advance(bytes) {
+        JpegEnd::At(end) => (&bytes[..end], false),
+        JpegEnd::NotYet => (bytes, true),
+        JpegEnd::Broken(at) => return Err(damaged(format!("it breaks off after {at} of {} bytes", bytes.len()))),
     };
-    let jpeg = &bytes[..end];
-    match scanner.first_scan {
-        None => Err(format!("a JPEG of {end} bytes without a picture in it")),
-        Some(_) if scanner.has_huffman_tables => Ok(Cow::Borrowed(jpeg)),
-        Some(scan) => Ok(Cow::Owned([&jpeg[..scan], &STANDARD_HUFFMAN_TABLES, &jpeg[scan..]].concat())),
+    let truncated = || damaged(format!("truncated, it ends after {} bytes without its end marker", bytes.len()));
+    let Some(scan) = scanner.first_scan else {
+        if lacks_end {
+            return Err(truncated());
+        }
+        return Err(damaged(format!("{} bytes without a picture in them", jpeg.len())));
+    };
+    if scanner.num_components == Some(4) && !scanner.has_adobe_marker {
+        return Err(PictureError::UnsupportedKind {
+            format: "JPEG",
+            found: "CMYK inks without Adobe's marker, which says whether they are inverted".to_owned(),
+            remedy: "export it as RGB",
+        });
     }
+    let mut jpeg = Cow::Borrowed(jpeg);
+    if !scanner.has_huffman_tables {
+        jpeg = Cow::Owned([&jpeg[..scan], &STANDARD_HUFFMAN_TABLES, &jpeg[scan..]].concat());
+    }
+    if lacks_end {
+        let ended = [without_fill_bytes(&jpeg), &[0xff, END]].concat();
+        if !scanner.is_fully_sent() || !is_complete(&ended) {
+            return Err(truncated());
+        }
+        jpeg = Cow::Owned(ended);
+    }
+    Ok(jpeg)
+}
+
+/// Without the 0xff that may stand before a marker.
+fn without_fill_bytes(jpeg: &[u8]) -> &[u8] {
+    let end = jpeg.iter().rposition(|byte| *byte != 0xff).map_or(0, |last| last + 1);
+    &jpeg[..end]
+}
+
+/// Whether the data before the end marker hold every block: the decoder fills what is missing, and with what stands there. So it must
+/// give the same picture whatever stands behind complete data.
+fn is_complete(jpeg: &[u8]) -> bool {
+    let decoded = |filler: &[u8]| {
+        let (data, end) = jpeg.split_at(jpeg.len() - 2);
+        image::load_from_memory_with_format(&[data, filler, end].concat(), ImageFormat::Jpeg).ok()
+    };
+    let found = decoded(&[]);
+    found.is_some() && found == decoded(&[0x55; 64]) && found == decoded(&[0xaa; 64])
 }
 
 /// The segment with the four tables of annex K: luminance and chrominance DC, luminance and chrominance AC.
@@ -142,13 +228,13 @@ const STANDARD_HUFFMAN_TABLES: [u8; 420] = [
 ];
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use image::codecs::jpeg::JpegEncoder;
     use image::{Rgb, RgbImage};
 
     /// A picture of many colours and edges as JPEG.
-    pub(crate) fn jpeg(width: u32, height: u32) -> Vec<u8> {
+    fn jpeg(width: u32, height: u32) -> Vec<u8> {
         let picture = RgbImage::from_fn(width, height, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8]));
         let mut bytes = Vec::new();
         JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(&picture).unwrap();
@@ -167,7 +253,7 @@ pub(crate) mod tests {
     }
 
     /// As webcams send it.
-    pub(crate) fn without_tables(jpeg: &[u8]) -> Vec<u8> {
+    fn without_tables(jpeg: &[u8]) -> Vec<u8> {
         let (segments, rest) = segments(jpeg);
         let kept: Vec<u8> = segments.into_iter().filter(|s| s[1] != HUFFMAN_TABLES).flatten().copied().collect();
         [&jpeg[..2], &kept, rest].concat()
@@ -176,7 +262,7 @@ pub(crate) mod tests {
     #[test]
     fn tables_that_were_left_out_are_put_in() {
         let original = jpeg(40, 30);
-        assert!(matches!(whole_jpeg(&original), Ok(Cow::Borrowed(same)) if same == original));
+        assert!(matches!(complete_jpeg(&original), Ok(Cow::Borrowed(same)) if same == original));
         let bare = without_tables(&original);
         assert_eq!(
             bare.len(),
@@ -185,23 +271,50 @@ pub(crate) mod tests {
         );
         let decode = |bytes: &[u8]| image::load_from_memory(bytes).map(|picture| picture.to_rgb8());
         assert!(decode(&bare).is_err(), "the decoder needs the tables");
-        assert_eq!(decode(&whole_jpeg(&bare).unwrap()).unwrap(), decode(&original).unwrap());
+        assert_eq!(decode(&complete_jpeg(&bare).unwrap()).unwrap(), decode(&original).unwrap());
     }
 
     #[test]
     fn what_follows_the_end_is_cut_off_and_what_has_no_end_is_refused() {
         let original = jpeg(40, 30);
         let padded = [original.as_slice(), &[0; 9]].concat();
-        assert_eq!(whole_jpeg(&padded).unwrap(), original);
-        for length in [2, 3, 20, 300, original.len() / 2, original.len() - 1] {
-            let error = whole_jpeg(&original[..length]).unwrap_err();
-            assert!(error.contains(&format!("ends after {length} bytes")), "{error}");
+        assert_eq!(complete_jpeg(&padded).unwrap(), original);
+        for length in [2, 3, 20, 300, original.len() / 2, original.len() - 60] {
+            let error = complete_jpeg(&original[..length]).unwrap_err().to_string();
+            assert!(error.contains(&format!("{length} bytes")), "{error}");
         }
-        assert!(whole_jpeg(&[0xff, START, 0xff, END]).unwrap_err().contains("without a picture"));
-        assert!(whole_jpeg(b"GIF89a").unwrap_err().contains("breaks off"));
+        assert!(complete_jpeg(&[0xff, START, 0xff, END]).unwrap_err().to_string().contains("without a picture"));
+        assert!(complete_jpeg(b"GIF89a").unwrap_err().to_string().contains("breaks off"));
         // The first half, then the next picture.
         let torn = [&original[..700], &original].concat();
-        assert!(whole_jpeg(&torn).unwrap_err().contains("breaks off after 700 of"));
+        assert!(complete_jpeg(&torn).unwrap_err().to_string().contains("breaks off after 700 of"));
+    }
+
+    #[test]
+    fn complete_data_without_an_end_marker_are_read() {
+        let original = jpeg(64, 48);
+        for cut in [1, 2] {
+            assert_eq!(complete_jpeg(&original[..original.len() - cut]).unwrap(), original, "{cut}");
+        }
+        let decode = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().to_rgb8();
+        let whole = decode(&original);
+        // What is cut off the data is either not missed or told.
+        for cut in 3..200 {
+            if let Ok(read) = complete_jpeg(&original[..original.len() - cut]) {
+                assert!(decode(&read) == whole, "{cut} bytes");
+            }
+        }
+        assert!((5..100).all(|cut| complete_jpeg(&original[..original.len() - cut]).is_err()));
+    }
+
+    #[test]
+    fn inks_are_read_with_adobes_marker_alone() {
+        let mut inks = jpeg(16, 16);
+        let frame = inks.windows(2).position(|pair| pair == [0xff, 0xc0]).unwrap();
+        inks[frame + 9] = 4;
+        assert!(complete_jpeg(&inks).unwrap_err().to_string().contains("CMYK"));
+        inks.splice(2..2, *b"\xff\xee\x00\x0eAdobe\0\x64\0\0\0\0\0");
+        assert!(complete_jpeg(&inks).is_ok());
     }
 
     #[test]

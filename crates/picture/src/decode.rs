@@ -1,11 +1,14 @@
-//! A photo from its bytes: PNG, JPEG and (feature `more-image-formats`) WebP, BMP and TIFF by content, checked before memory is
-//! taken, upright.
+//! Formats, limits and frames.
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, Rgb, RgbImage, metadata::Orientation};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage, metadata::Orientation};
 
-use crate::{Error, Result};
+use crate::error::PictureError;
+use crate::{jpeg, ppm, samples, tiff};
+
+type Result<T> = std::result::Result<T, PictureError>;
 
 /// What an image may at most be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,10 +18,20 @@ pub struct ImageLimits {
 }
 
 impl Default for ImageLimits {
-    /// 50 megapixels: every phone's standard mode, and 150 MB once decoded.
+    /// 210 megapixels: phones take photos of 50, 64, 108 and 200. 630 MB once decoded.
     fn default() -> Self {
-        Self { max_pixels: 50_000_000 }
+        Self { max_pixels: 210_000_000 }
     }
+}
+
+/// Which way up the pixels are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PixelFrame {
+    /// As a viewer shows them: turned as the Exif orientation says.
+    #[default]
+    Upright,
+    /// As the sensor delivered them, which is what a calibration knows; phones that look straight down set the orientation by chance.
+    Sensor,
 }
 
 /// How the names of picture files end, whose content [`decode_image`] may read.
@@ -43,62 +56,99 @@ fn readable_formats() -> String {
     }
 }
 
-fn not_an_image(found: impl Into<String>) -> Error {
-    Error::NotAnImage { expected: readable_formats(), found: found.into() }
+fn not_an_image(found: impl Into<String>) -> PictureError {
+    PictureError::NotAnImage { expected: readable_formats(), found: found.into() }
 }
 
-/// Decodes a picture file into upright 8-bit RGB.
+/// Decodes a picture into upright 8-bit RGB, as [`decode_image_in`].
 ///
-/// The content says what it is: PNG or JPEG, and with the feature `more-image-formats` WebP, BMP or TIFF. Grey and deeper
-/// images are converted, transparent pixels laid over white, and the Exif orientation that phones write is applied, so that
-/// the pixels stand as a viewer shows them. Of several pages or frames the first one counts.
+/// # Errors
+/// Those of [`decode_image_in`].
+pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
+    decode_image_in(bytes, limits, PixelFrame::Upright)
+}
+
+/// Decodes a picture into 8-bit RGB.
+///
+/// The content says what it is: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF. Grey and deeper images are
+/// converted, those of 10 and 12 bits in 16 by their own range; transparent pixels are laid over white, unless all are fully
+/// transparent, which is how programs leave an alpha that they do not use. Of a TIFF the page in full size is read.
 ///
 /// # Errors
 /// Bytes of another kind (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
-/// or height, more than `limits.max_pixels`.
-pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
-    if let Some(found) = iso_media(bytes) {
-        return Err(not_an_image(found));
+/// or height, more than `limits.max_pixels`, a TIFF of several full pages, inks of which nothing says how they are stored.
+pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) -> Result<RgbImage> {
+    if bytes.starts_with(b"P6") {
+        let damaged = |found| PictureError::DamagedImage { format: "PPM", reason: format!("found {found}") };
+        return ppm::decode_ppm(bytes).map_err(damaged);
     }
-    let guessed = image::guess_format(bytes).map_err(|_| not_an_image(describe(bytes)))?;
-    let (format, name) = match FORMATS.iter().find(|(format, _)| *format == guessed) {
-        Some(known) if guessed.reading_enabled() => *known,
-        Some((_, name)) => return Err(not_an_image(*name)),
-        None => return Err(not_an_image(format!("{guessed:?}"))),
-    };
-    let damaged = |error: image::ImageError| Error::DamagedImage { format: name, reason: error.to_string() };
+    let (format, name) = format_of(bytes)?;
+    let damaged = |error: image::ImageError| PictureError::DamagedImage { format: name, reason: error.to_string() };
     // Ahead of the decoder, which refuses an empty PNG with less to say.
     if let Some([width, height]) = png_header_size(bytes) {
         check_size(width, height, limits)?;
     }
-    let mut decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(damaged)?;
+    let mut palette = None;
+    let bytes = match format {
+        ImageFormat::Jpeg => jpeg::complete_jpeg(bytes)?,
+        ImageFormat::Tiff => {
+            let page = tiff::full_page(bytes)?;
+            palette = page.palette;
+            page.bytes
+        }
+        _ => Cow::Borrowed(bytes),
+    };
+    let mut decoder = ImageReader::with_format(Cursor::new(&*bytes), format).into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
-    if format == ImageFormat::Jpeg && !jpeg_is_complete(bytes) {
-        // The decoder fills what is missing with grey and calls it a success.
-        return Err(Error::DamagedImage {
-            format: name,
-            reason: "truncated, the end-of-image marker is missing".into(),
-        });
-    }
-
     let mut allocation = Limits::default();
     // 16-bit RGBA is the widest pixel that photos have.
     allocation.max_alloc = Some(limits.max_pixels.saturating_mul(8).saturating_add(1 << 20));
     decoder.set_limits(allocation).map_err(damaged)?;
     // A damaged Exif block is no reason to refuse the picture.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
-    picture.apply_orientation(orientation);
-    Ok(if picture.color().has_alpha() { over_white(&picture) } else { picture.into_rgb8() })
+    let picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    let mut picture = match palette {
+        Some(palette) => palette.applied(&picture).into(),
+        None => picture,
+    };
+    if frame == PixelFrame::Upright {
+        picture.apply_orientation(orientation);
+    }
+    Ok(samples::to_rgb8(picture))
+}
+
+/// Whether the picture has an Exif orientation that turns or mirrors it; not for bytes that are no picture.
+pub fn is_turned_by_exif(bytes: &[u8]) -> bool {
+    let Ok((format, _)) = format_of(bytes) else { return false };
+    let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok();
+    let orientation = decoder.and_then(|mut decoder| decoder.orientation().ok());
+    orientation.is_some_and(|orientation| orientation != Orientation::NoTransforms)
+}
+
+/// The format by content, with its name.
+fn format_of(bytes: &[u8]) -> Result<(ImageFormat, &'static str)> {
+    if let Some(found) = iso_media(bytes) {
+        return Err(not_an_image(found));
+    }
+    let guessed = match image::guess_format(bytes) {
+        Ok(format) => format,
+        Err(_) if tiff::is_big_tiff(bytes) => ImageFormat::Tiff,
+        Err(_) => return Err(not_an_image(describe(bytes))),
+    };
+    match FORMATS.iter().find(|(format, _)| *format == guessed) {
+        Some(known) if guessed.reading_enabled() => Ok(*known),
+        Some((_, name)) => Err(not_an_image(*name)),
+        None => Err(not_an_image(format!("{guessed:?}"))),
+    }
 }
 
 fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
     if width == 0 || height == 0 {
-        return Err(Error::EmptyImage { width, height });
+        return Err(PictureError::EmptyImage { width, height });
     }
     if u64::from(width) * u64::from(height) > limits.max_pixels {
-        return Err(Error::EnormousImage { width, height, max_pixels: limits.max_pixels });
+        return Err(PictureError::EnormousImage { width, height, max_pixels: limits.max_pixels });
     }
     Ok(())
 }
@@ -125,37 +175,6 @@ fn png_header_size(bytes: &[u8]) -> Option<[u32; 2]> {
     Some([number(16)?, number(20)?])
 }
 
-/// Whether the end-of-image marker follows the first scan; thumbnails inside Exif blocks are stepped over.
-fn jpeg_is_complete(bytes: &[u8]) -> bool {
-    const START_OF_SCAN: u8 = 0xda;
-    const END_OF_IMAGE: u8 = 0xd9;
-    let mut at = 2;
-    // Marker segments: 0xff, kind, two bytes of length that count themselves.
-    while let Some(&[first, kind, high, low]) = bytes.get(at..at + 4) {
-        if first != 0xff {
-            return false;
-        }
-        if kind == 0xff {
-            at += 1; // a fill byte
-            continue;
-        }
-        at += 2 + usize::from(u16::from_be_bytes([high, low]));
-        if kind == START_OF_SCAN {
-            // Entropy-coded data writes a literal 0xff as 0xff00, so the pair cannot stand there by chance.
-            return bytes.get(at..).is_some_and(|scan| scan.windows(2).any(|pair| pair == [0xff, END_OF_IMAGE]));
-        }
-    }
-    false
-}
-
-fn over_white(picture: &DynamicImage) -> RgbImage {
-    let rgba = picture.to_rgba8();
-    RgbImage::from_fn(rgba.width(), rgba.height(), |x, y| {
-        let [r, g, b, a] = rgba.get_pixel(x, y).0.map(u32::from);
-        Rgb([r, g, b].map(|value| ((value * a + 255 * (255 - a) + 127) / 255) as u8))
-    })
-}
-
 /// A word or two on bytes that are no image.
 fn describe(bytes: &[u8]) -> String {
     if bytes.is_empty() {
@@ -173,7 +192,7 @@ fn describe(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage};
+    use image::{GrayImage, ImageBuffer, Luma, Rgb, Rgba, RgbaImage};
     use proptest::prelude::*;
 
     fn encode(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
@@ -262,15 +281,15 @@ mod tests {
     #[test]
     fn a_bomb_is_refused_by_its_header() {
         let found = decode(&png_header(60_000, 60_000)).unwrap_err();
-        assert_eq!(found, Error::EnormousImage { width: 60_000, height: 60_000, max_pixels: 50_000_000 });
-        assert!(found.to_string().contains("60000×60000 = 3600000000"), "{found}");
+        assert_eq!(found, PictureError::EnormousImage { width: 60_000, height: 60_000, max_pixels: 210_000_000 });
+        assert!(found.to_string().contains("60000×60000 = 3600 megapixels"), "{found}");
         let small = ImageLimits { max_pixels: 40 * 24 - 1 };
         assert!(decode_image(&encode(&gradient(), ImageFormat::Jpeg), &small).is_err());
     }
 
     #[test]
     fn an_empty_image_is_named() {
-        assert_eq!(decode(&png_header(0, 7)), Err(Error::EmptyImage { width: 0, height: 7 }));
+        assert_eq!(decode(&png_header(0, 7)), Err(PictureError::EmptyImage { width: 0, height: 7 }));
     }
 
     #[test]
@@ -279,7 +298,7 @@ mod tests {
             let bytes = encode(&gradient(), format);
             for keep in [bytes.len() / 4, bytes.len() / 2, bytes.len() * 9 / 10] {
                 let found = decode(&bytes[..keep]);
-                assert!(matches!(found, Err(Error::DamagedImage { .. })), "{format:?}, {keep} bytes: {found:?}");
+                assert!(matches!(found, Err(PictureError::DamagedImage { .. })), "{format:?}, {keep} bytes: {found:?}");
             }
         }
     }

@@ -1,0 +1,85 @@
+//! Whether a frame follows from the one before.
+
+use image::RgbImage;
+use sdg_geometry::BoundingBox;
+
+/// Cells across and down, of which the mean colours are compared.
+const CELLS: [u32; 2] = [32, 24];
+/// Pixels across and down of which a cell's mean is made: more of a large picture would take longer than following a part.
+const MAX_SAMPLES: u32 = 20;
+/// A mean that changes by more, in grey values, shows other things. Chosen by hand: above what noise and lamps do, below what a
+/// part does that covers a tenth of a cell.
+const MAX_CHANGE: f32 = 6.0;
+
+/// The mean colours of a picture's cells.
+#[derive(Debug, Clone)]
+pub(super) struct CoarseView {
+    size: [u32; 2],
+    means: Vec<[f32; 3]>,
+}
+
+impl CoarseView {
+    pub(super) fn new(picture: &RgbImage) -> Self {
+        let size = [picture.width(), picture.height()];
+        let means = (0..CELLS[1]).flat_map(|row| (0..CELLS[0]).map(move |column| [column, row]));
+        Self { size, means: means.map(|cell| mean(picture, cell)).collect() }
+    }
+
+    /// Whether anything changed that does not lie in one of the boxes, or at their border.
+    pub(super) fn has_changed_beside(&self, before: &Self, boxes: &[BoundingBox]) -> bool {
+        let [width, height] = [0, 1].map(|axis| f64::from(self.size[axis]) / f64::from(CELLS[axis]));
+        let is_beside = |idx: usize| {
+            let [column, row] = [idx % CELLS[0] as usize, idx / CELLS[0] as usize].map(|cell| cell as f64);
+            let touches = |part: &BoundingBox| {
+                (part.x1 - width..part.x2 + width).contains(&((column + 0.5) * width))
+                    && (part.y1 - height..part.y2 + height).contains(&((row + 0.5) * height))
+            };
+            !boxes.iter().any(touches)
+        };
+        let has_changed = |(one, other): (&[f32; 3], &[f32; 3])| (0..3).any(|c| (one[c] - other[c]).abs() > MAX_CHANGE);
+        self.means.iter().zip(&before.means).enumerate().any(|(idx, means)| has_changed(means) && is_beside(idx))
+    }
+}
+
+fn mean(picture: &RgbImage, cell: [u32; 2]) -> [f32; 3] {
+    let [from, to] = [0, 1]
+        .map(|end| [0, 1].map(|axis| (cell[axis] + end) * [picture.width(), picture.height()][axis] / CELLS[axis]));
+    let steps = [0, 1].map(|axis| (to[axis] - from[axis]).div_ceil(MAX_SAMPLES).max(1) as usize);
+    let (mut sum, mut count) = ([0_u32; 3], 0_u32);
+    for y in (from[1]..to[1]).step_by(steps[1]) {
+        for x in (from[0]..to[0]).step_by(steps[0]) {
+            let pixel = picture.get_pixel(x, y).0;
+            (0..3).for_each(|c| sum[c] += u32::from(pixel[c]));
+            count += 1;
+        }
+    }
+    sum.map(|sum| sum as f32 / count.max(1) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn noise_is_no_change_and_another_thing_is_one_unless_a_part_lies_there() {
+        let noisy = |seed: u32| {
+            RgbImage::from_fn(640, 480, |x, y| {
+                let noise =
+                    (x.wrapping_mul(31) ^ y.wrapping_mul(17) ^ seed.wrapping_mul(97)).wrapping_mul(2_654_435_761);
+                Rgb([90 + (noise >> 28) as u8; 3])
+            })
+        };
+        let before = CoarseView::new(&noisy(1));
+        assert!(!CoarseView::new(&noisy(2)).has_changed_beside(&before, &[]));
+        let mut other = noisy(2);
+        (100..130).for_each(|y| (200..230).for_each(|x| other.put_pixel(x, y, Rgb([150; 3]))));
+        let after = CoarseView::new(&other);
+        assert!(after.has_changed_beside(&before, &[]));
+        let on = |x1: f64| BoundingBox { x1, y1: 100.0, x2: x1 + 30.0, y2: 130.0 };
+        assert!(!after.has_changed_beside(&before, &[on(200.0)]));
+        assert!(after.has_changed_beside(&before, &[on(300.0)]));
+        // Fewer pixels than cells.
+        assert!(!CoarseView::new(&RgbImage::new(5, 3)).has_changed_beside(&CoarseView::new(&RgbImage::new(5, 3)), &[]));
+    }
+}

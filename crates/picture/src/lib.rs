@@ -1,0 +1,22 @@
+//! A picture from its bytes, for files and live pictures alike.
+//!
+//! ```text
+//! bytes ─ kind by content ─┬─ JPEG: tables put in, end looked for ─┐
+//!                          ├─ TIFF: the page in full size          ├─ image ─ samples to 8 bits ─ alpha over white ─ upright ─ RGB
+//!                          └─ PNG, WebP, BMP; PPM ─────────────────┘                                        [`PixelFrame`]
+//! ```
+//! The size is read before memory is taken. Absent: files, clocks, HEIC and AVIF, raw photos, animations.
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod decode;
+mod error;
+mod jpeg;
+mod ppm;
+mod samples;
+mod tiff;
+
+pub use decode::{IMAGE_EXTENSIONS, ImageLimits, PixelFrame, decode_image, decode_image_in, is_turned_by_exif};
+pub use error::PictureError;
+pub use jpeg::{JpegEnd, JpegScanner};
+pub use ppm::PpmHead;

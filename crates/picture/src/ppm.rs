@@ -1,0 +1,106 @@
+//! Binary PPM, as programs write it to a pipe.
+
+use image::RgbImage;
+
+/// More than any camera's: 64 megapixels, 192 MiB.
+const MAX_PIXELS: u64 = 1 << 26;
+/// Pixels in a row, or rows.
+const MAX_SIDE: u32 = 1 << 14;
+
+/// The head of a binary PPM.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PpmHead {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Where the pixels begin.
+    pub start: usize,
+}
+
+impl PpmHead {
+    /// A head is shorter than this; comments may stand in it.
+    const MAX_BYTES: usize = 1024;
+
+    /// Reads it; `None` while it has not all arrived.
+    ///
+    /// # Errors
+    /// In words, what is wrong with it.
+    pub fn read(bytes: &[u8]) -> Result<Option<Self>, String> {
+        let mut numbers = [0_u32; 3];
+        let mut at = 2;
+        for number in &mut numbers {
+            // Blanks and comments before the number.
+            let mut is_comment = false;
+            loop {
+                match bytes.get(at) {
+                    None if at > Self::MAX_BYTES => return Err("a PPM without an end to its head".to_owned()),
+                    None => return Ok(None),
+                    Some(b'\n') => is_comment = false,
+                    Some(_) if is_comment => {}
+                    Some(b'#') => is_comment = true,
+                    Some(blank) if blank.is_ascii_whitespace() => {}
+                    Some(_) => break,
+                }
+                at += 1;
+            }
+            let digits = bytes[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+            at += digits;
+            match bytes.get(at) {
+                None if digits < 10 => return Ok(None),
+                Some(blank) if digits > 0 && blank.is_ascii_whitespace() => {}
+                _ => return Err("a PPM with something else than numbers in its head".to_owned()),
+            }
+            let text = std::str::from_utf8(&bytes[at - digits..at]).unwrap_or_default();
+            *number = text.parse().map_err(|_| format!("a PPM with the number {text} in its head"))?;
+        }
+        let [width, height, maximum] = numbers;
+        if maximum != 255 {
+            return Err(format!("a PPM with values up to {maximum}; those with 255 are read"));
+        }
+        let is_bounded = width <= MAX_SIDE && height <= MAX_SIDE && u64::from(width) * u64::from(height) <= MAX_PIXELS;
+        if width == 0 || height == 0 || !is_bounded {
+            return Err(format!("a PPM of {width} × {height} pixels"));
+        }
+        Ok(Some(Self { width, height, start: at + 1 }))
+    }
+
+    /// How many bytes head and pixels have together.
+    pub fn end(self) -> usize {
+        self.start + self.width as usize * self.height as usize * 3
+    }
+}
+
+/// The picture that the bytes begin with.
+///
+/// # Errors
+/// In words, what was found instead of a whole picture.
+pub(crate) fn decode_ppm(bytes: &[u8]) -> Result<RgbImage, String> {
+    let short = || format!("a PPM that ends after {} bytes", bytes.len());
+    let head = PpmHead::read(bytes)?.ok_or_else(short)?;
+    let pixels = bytes.get(head.start..head.end()).ok_or_else(short)?;
+    RgbImage::from_raw(head.width, head.height, pixels.to_vec()).ok_or_else(short)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ppm_heads_have_comments_and_bounds() {
+        let picture = decode_ppm(b"P6 # two\n# pixels\n2 1\n255\n\x01\x02\x03\x04\x05\x06").unwrap();
+        assert_eq!((picture.dimensions(), picture.as_raw().as_slice()), ((2, 1), [1, 2, 3, 4, 5, 6].as_slice()));
+        for (bytes, expected) in [
+            (b"P6 2 1 255\n\x01\x02\x03".as_slice(), "ends after 14 bytes"),
+            (b"P6 2 1 65535\n", "up to 65535"),
+            (b"P6 0 1 255\n", "0 × 1"),
+            (b"P6 16384 16384 255\n", "16384 × 16384"),
+            (b"P6 99999999999 1 255\n", "99999999999"),
+            (b"P6 -2 1 255\n", "something else"),
+            (b"P6 2", "ends after 4 bytes"),
+        ] {
+            let error = decode_ppm(bytes).unwrap_err();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+}
