@@ -13,8 +13,9 @@ use self::network::{Answer, CELL, CELLS_SIDE, Features, NUM_CHANNELS, Network, S
 use crate::frame::Frame;
 use crate::likeness::exposed_values;
 
-/// Pixels that the part's longer side has at least in photo and picture: in the pictures that the network was trained on it has 33 to 190.
-const MIN_PX: f64 = 40.0;
+/// Pixels that the part's longer side has at least in photo and picture: a bearing of 50 is taken for another although the training has such
+/// parts, too.
+const MIN_PX: f64 = 75.0;
 /// The part's longer side in what the network sees.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
 
@@ -136,6 +137,6 @@ mod tests {
         let taught = Details::new(&plate(205.0, 1.0), &outline);
         let at =
             |scale: f64| taught.log_odds(&plate(205.0, 1.0), &PlanarSimilarity { scale, ..PlanarSimilarity::IDENTITY });
-        assert!(at(0.2).is_none() && at(0.3).is_some() && at(2.0).is_some());
+        assert!(at(0.4).is_none() && at(0.5).is_some() && at(2.0).is_some());
     }
 }
