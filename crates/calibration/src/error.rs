@@ -118,6 +118,12 @@ pub enum CalibrationError {
          agree with: show more of it, or print it with `sdg camera board`; a checkerboard without dots must be seen whole"
     )]
     BoardUnclear { corners: usize },
+    /// A checkerboard without dots that has other squares, or is not seen whole.
+    #[error(
+        "expected a checkerboard of {columns} x {rows} squares, found one of {found_columns} x {found_rows}: give its squares with --squares, or \
+         show the whole board"
+    )]
+    OtherCheckerboard { columns: u32, rows: u32, found_columns: u32, found_rows: u32 },
     /// The board has more squares than expected.
     #[error(
         "expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}: give its squares with --squares"

@@ -151,6 +151,11 @@ fn a_board_without_dots_is_known_where_it_is_whole() {
     assert!(rms_px(&corners, &board, &WIDE, &pose) < MAX_RMS_PX);
     let (cut, _) = picture([560.0, 240.0]);
     assert!(matches!(find_board(&cut, &board), Err(CalibrationError::BoardUnclear { .. })));
+    let larger = Board::new(10, 7, 0.025).unwrap();
+    assert_eq!(
+        find_board(&whole, &larger),
+        Err(CalibrationError::OtherCheckerboard { columns: 10, rows: 7, found_columns: 9, found_rows: 6 })
+    );
 }
 
 #[test]

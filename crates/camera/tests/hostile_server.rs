@@ -272,11 +272,16 @@ fn a_server_that_went_away_comes_back() {
     assert!(matches!(faults.last(), Some(Fault::Back { away_secs }) if *away_secs > 0.5), "{faults:?}");
 }
 
-#[test]
-fn snapshots_are_fetched_again_and_again_with_the_password() {
+/// A camera of single pictures that asks who asks, and what it was asked with an answer to that.
+fn locked_server(challenges: &'static str) -> (Server, std::sync::Arc<std::sync::Mutex<Vec<String>>>) {
     let asked = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     let log = std::sync::Arc::clone(&asked);
     let server = Server::start_with_requests(move |request, stream| {
+        assert!(request.starts_with("GET /shot.jpg HTTP/1.1\r\n"), "{request}");
+        if !request.contains("Authorization: ") {
+            let head = format!("HTTP/1.1 401 Unauthorized\r\n{challenges}Content-Length: 0\r\n\r\n");
+            return stream.write_all(head.as_bytes()).unwrap();
+        }
         let mut log = log.lock().unwrap();
         log.push(request.to_owned());
         let picture = jpeg(50 + 10 * log.len() as u8);
@@ -285,6 +290,12 @@ fn snapshots_are_fetched_again_and_again_with_the_password() {
         stream.write_all(head.as_bytes()).unwrap();
         stream.write_all(&picture[..cut]).unwrap();
     });
+    (server, asked)
+}
+
+#[test]
+fn snapshots_are_fetched_again_and_again_with_the_password() {
+    let (server, asked) = locked_server("WWW-Authenticate: Basic realm=\"cam\"\r\n");
     let mut camera = open(&format!("http://me:secret@127.0.0.1:{}/shot.jpg", server.port()));
     for expected in [60, 70] {
         let frame = camera.next_frame().unwrap().unwrap();
@@ -294,10 +305,22 @@ fn snapshots_are_fetched_again_and_again_with_the_password() {
     assert!(matches!(camera.next_frame().unwrap_err().fault(), Some(Fault::Torn { .. })));
     assert!(level_of(&camera.next_frame().unwrap().unwrap()).abs_diff(90) < 5);
     for request in asked.lock().unwrap().iter() {
-        assert!(request.starts_with("GET /shot.jpg HTTP/1.1\r\n"), "{request}");
         // Base64 of me:secret.
         assert!(request.contains("Authorization: Basic bWU6c2VjcmV0\r\n"), "{request}");
     }
+}
+
+#[test]
+fn a_camera_with_digest_authentication_is_given_no_password() {
+    let (server, asked) = locked_server(
+        "WWW-Authenticate: Digest realm=\"cam\", nonce=\"0123\", algorithm=MD5\r\nWWW-Authenticate: Basic realm=\"cam\"\r\n",
+    );
+    let mut camera = open(&format!("http://me:secret@127.0.0.1:{}/shot.jpg", server.port()));
+    assert!(level_of(&camera.next_frame().unwrap().unwrap()).abs_diff(60) < 5);
+    let asked = asked.lock().unwrap();
+    // MD5 of "MD5(me:cam:secret):0123:MD5(GET:/shot.jpg)", by Python's hashlib.
+    assert!(asked[0].contains("Authorization: Digest username=\"me\", realm=\"cam\", "), "{}", asked[0]);
+    assert!(asked[0].contains("response=\"6c7e16a34d86f066385e2785cecac31d\""), "{}", asked[0]);
 }
 
 #[test]

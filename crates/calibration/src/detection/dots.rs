@@ -29,7 +29,8 @@ const RING: f64 = 0.32;
 /// Finds the grid's place on the board.
 ///
 /// # Errors
-/// [`CalibrationError::BoardUnclear`] where several fit or none, [`CalibrationError::OtherBoard`] where a larger board fits.
+/// [`CalibrationError::BoardUnclear`] where several fit or none, [`CalibrationError::OtherBoard`] where a larger board fits,
+/// [`CalibrationError::OtherCheckerboard`] where one without dots has other squares.
 pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Result<Placed, CalibrationError> {
     let dots = read(picture, grid);
     if let Some(placed) = place(grid, &dots, [board.columns(), board.rows()]) {
@@ -45,7 +46,27 @@ pub(super) fn identify(picture: &Luminance, grid: &Grid, board: &Board) -> Resul
         });
     }
     let is_plain = dots.values().sum::<f64>() < MAX_PLAIN * 0.5 * dots.len() as f64;
-    plain(grid, board).filter(|_| is_plain).ok_or(CalibrationError::BoardUnclear { corners: grid.len() })
+    match plain(grid, board) {
+        Some(placed) if is_plain => Ok(placed),
+        _ if is_plain => Err(other_checkerboard(grid, board)),
+        _ => Err(CalibrationError::BoardUnclear { corners: grid.len() }),
+    }
+}
+
+/// Why a grid without dots is not the whole board.
+fn other_checkerboard(grid: &Grid, board: &Board) -> CalibrationError {
+    let [columns, rows] = [board.columns(), board.rows()];
+    // The longer side as that of the board.
+    let mut found = grid.extent().map(|corners| corners as u32 + 1);
+    found.sort_unstable();
+    if columns >= rows {
+        found.reverse();
+    }
+    if found == [columns, rows] {
+        return CalibrationError::BoardUnclear { corners: grid.len() };
+    }
+    let [found_columns, found_rows] = found;
+    CalibrationError::OtherCheckerboard { columns, rows, found_columns, found_rows }
 }
 
 fn read(picture: &Luminance, grid: &Grid) -> Dots {

@@ -4,8 +4,7 @@ use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Instant;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
+use http_auth::PasswordClient;
 
 use super::body::{Body, Framing};
 use super::url::Url;
@@ -24,16 +23,23 @@ pub(super) struct Answer {
     pub(super) body: Body,
 }
 
-/// Asks and follows redirects.
+/// Asks, says who asks where that is wanted, and follows redirects.
 ///
 /// # Errors
 /// In words, why there is no answer with a body.
 pub(super) fn get(url: &Url, deadline: Instant) -> Result<Answer, String> {
     let mut url = url.clone();
     for _ in 0..=MAX_REDIRECTS {
-        match get_once(&url, deadline)? {
+        let reply = match get_once(&url, None, deadline)? {
+            Reply::Challenges(challenges) => get_once(&url, Some(&authorization(&url, &challenges)?), deadline)?,
+            reply => reply,
+        };
+        match reply {
             Reply::Answer(answer) => return Ok(answer),
             Reply::Redirect(location) => url = url.redirected(&location)?,
+            Reply::Challenges(_) => {
+                return Err("expected the camera's user and password, found status 401 for those of the address".into());
+            }
         }
     }
     Err(format!("expected pictures, found more than {MAX_REDIRECTS} redirects, the last to {url}"))
@@ -42,13 +48,27 @@ pub(super) fn get(url: &Url, deadline: Instant) -> Result<Answer, String> {
 enum Reply {
     Answer(Answer),
     Redirect(String),
+    /// Status 401: how the camera wants to know who asks.
+    Challenges(Vec<String>),
 }
 
-fn get_once(url: &Url, deadline: Instant) -> Result<Reply, String> {
+/// The value of the header that answers a camera's challenges, digest or basic.
+fn authorization(url: &Url, challenges: &[String]) -> Result<String, String> {
+    let Some((username, password)) = url.credentials() else {
+        return Err(
+            "expected http://USER:PASSWORD@HOST/… with the camera's user and password, found status 401".to_owned()
+        );
+    };
+    let client = challenges.iter().fold(PasswordClient::builder(), |builder, challenge| builder.challenges(challenge));
+    let unknown =
+        |error: String| format!("expected a camera that asks for digest or basic authentication, found {error}");
+    let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };
+    client.build().and_then(|mut client| client.respond(&params)).map_err(unknown)
+}
+
+fn get_once(url: &Url, authorization: Option<&str>, deadline: Instant) -> Result<Reply, String> {
     let mut stream = connect(url, deadline)?;
-    let authorization = url
-        .credentials()
-        .map_or_else(String::new, |credentials| format!("Authorization: Basic {}\r\n", STANDARD.encode(credentials)));
+    let authorization = authorization.map_or_else(String::new, |value| format!("Authorization: {value}\r\n"));
     let request = format!(
         "GET {} HTTP/1.1\r\nHost: {}\r\n{authorization}User-Agent: sdg\r\nAccept: multipart/x-mixed-replace, image/jpeg, \
          image/png\r\nConnection: close\r\n\r\n",
@@ -102,6 +122,7 @@ struct Head {
     content_type: String,
     location: Option<String>,
     length: Option<String>,
+    challenges: Vec<String>,
     is_chunked: bool,
 }
 
@@ -120,6 +141,7 @@ impl Head {
             match header.name.to_ascii_lowercase().as_str() {
                 "content-type" => head.content_type = value,
                 "location" => head.location = Some(value),
+                "www-authenticate" => head.challenges.push(value),
                 "content-length" => head.length = Some(value),
                 "transfer-encoding" => head.is_chunked = value.to_ascii_lowercase().ends_with("chunked"),
                 _ => {}
@@ -137,11 +159,7 @@ impl Head {
                     .map(Reply::Redirect)
                     .ok_or_else(|| "expected a redirect's target, found none".to_owned());
             }
-            401 => {
-                return Err(
-                    "expected http://USER:PASSWORD@HOST/… with the camera's user and password, found status 401".into(),
-                );
-            }
+            401 => return Ok(Reply::Challenges(self.challenges)),
             other => return Err(format!("expected status 200, found {other}")),
         }
         let framing = match self.length {

@@ -41,9 +41,9 @@ impl Url {
         &self.path
     }
 
-    /// `user:password`, for basic authentication.
-    pub(crate) fn credentials(&self) -> Option<String> {
-        self.credentials.as_ref().map(|Credentials { user, password }| format!("{user}:{password}"))
+    /// User and password.
+    pub(crate) fn credentials(&self) -> Option<(&str, &str)> {
+        self.credentials.as_ref().map(|Credentials { user, password }| (user.as_str(), password.as_str()))
     }
 
     /// Where a redirect leads. User and password go along only to the same host and port.
@@ -161,7 +161,7 @@ mod tests {
             (full.host(), full.port(), full.authority(), full.path()),
             ("cam.local", 8080, "cam.local:8080", "/video?x=1")
         );
-        assert_eq!(full.credentials().unwrap(), "me:p@ss:w");
+        assert_eq!(full.credentials(), Some(("me", "p@ss:w")));
         assert_eq!(full.to_string(), "http://me:***@cam.local:8080/video?x=1", "the password stays here");
         assert!(!format!("{full:?}").contains("p@ss"));
         let short = url("http://10.0.0.7");
@@ -193,7 +193,7 @@ mod tests {
         let to = |location: &str| from.redirected(location).unwrap();
         assert_eq!(to("/x").to_string(), "http://me:***@cam:8080/x");
         assert_eq!(to("x?y").to_string(), "http://me:***@cam:8080/a/x?y");
-        assert_eq!(to("http://cam:8080/x").credentials().unwrap(), "me:secret");
+        assert_eq!(to("http://cam:8080/x").credentials(), Some(("me", "secret")));
         assert_eq!(to("http://other:8080/x").credentials(), None);
         assert_eq!(to("//other/x").to_string(), "http://other/x");
         let error = from.redirected("https://cam/x").unwrap_err();

@@ -1,6 +1,8 @@
 //! `sdg annotate`: the annotation page.
 
 #[cfg(feature = "annotate")]
+mod lock;
+#[cfg(feature = "annotate")]
 mod run;
 
 use std::path::PathBuf;

@@ -1,5 +1,6 @@
 //! `sdg annotate`: the annotation page.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -13,6 +14,7 @@ use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
 use super::AnnotateArgs;
+use super::lock::Lock;
 use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage, one_line};
@@ -42,6 +44,11 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     if let Some(out) = &args.out {
         files::check_writable(out)?;
     }
+    let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
+    let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
+    let project_file = project.iter().map(|folder| folder.join("sdg-project.json"));
+    let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
+    let _locks = written.iter().map(|written| Lock::of(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in files::entries(folder)? {
             // What stands beside pictures is no news; a picture that is not read is.
