@@ -45,10 +45,16 @@ pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstrat
         let fits =
             |image: &RgbImage, objects: &[Annotation]| objects.iter().map(|one| contrast(image, one)).sum::<f64>();
         let fit_of_sensor = fits(&sensor, &of_sensor);
-        if fit_of_sensor > MIN_GAIN * objects.as_ref().map_or(0.0, |objects| fits(&image, objects)) {
+        let fit_as_shown = objects.as_ref().map_or(0.0, |objects| fits(&image, objects));
+        if fit_as_shown <= MIN_GAIN * fit_of_sensor {
+            let found = if fit_of_sensor > MIN_GAIN * fit_as_shown {
+                "marks that fit its pixels as they are stored"
+            } else {
+                "marks that fit its pixels as they are stored just as well"
+            };
             bail!(
-                "{}: expected marks on the photo as viewers show it, found marks that fit its pixels as they are stored: an Exif \
-                 orientation turns {}, and the tool that made the marks ignored it; save the photo upright without the tag and mark it anew",
+                "{}: expected marks on the photo as viewers show it, found {found}: an Exif orientation turns {}, which tools of marks may \
+                 ignore; save the photo upright without the tag and mark it anew",
                 annotation_path.display(),
                 image_path.display()
             );
@@ -71,7 +77,7 @@ pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstrat
     Ok(Demonstration { image, annotation: objects.remove(0) })
 }
 
-/// Marks that fit the unturned pixels so much better were made on those. Chosen by hand.
+/// Marks that fit one of the two so much better were made on it. Chosen by hand.
 const MIN_GAIN: f64 = 1.25;
 
 /// How much colours change across the border of the marked region, in grey values: more where the border is the part's.

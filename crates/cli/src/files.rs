@@ -56,6 +56,21 @@ fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
+/// Makes sure that no input of this command is replaced by what it will write, before it writes the first.
+///
+/// # Errors
+/// A path that leads to one.
+pub fn check_are_no_inputs(paths: impl IntoIterator<Item = PathBuf>) -> Result<()> {
+    paths.into_iter().try_for_each(|path| check_is_no_input(&path, None))
+}
+
+/// Keeps [`write`] from replacing a file, or the files of a folder, that others than this module read.
+pub fn keep(path: &Path) {
+    let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let kept = entries.chain([path.to_owned()]).filter_map(|path| path.canonicalize().ok());
+    INPUTS.lock().unwrap_or_else(PoisonError::into_inner).extend(kept);
+}
+
 /// Writes a file whole or not at all, and never over an input of this command.
 ///
 /// # Errors

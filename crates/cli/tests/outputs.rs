@@ -57,3 +57,23 @@ fn drawings_replace_no_picture() {
     stdout(&["detect", "--grasp-model", &model, "--draw", &drawn, &photo]);
     assert!(fs::metadata(folder.path("drawn/photo.png")).is_ok());
 }
+
+#[test]
+fn frames_and_samples_replace_no_picture() {
+    let (folder, photo, marks) = photographed();
+    let from = format!("file:{photo}");
+    refused(&["camera", "grab", "--from", &from, "--out", &photo], "found an input of this command", &[&photo]);
+    let pictures = folder.path("pictures");
+    fs::create_dir(&pictures).unwrap();
+    let first = folder.path("pictures/000000.png");
+    fs::copy(&photo, &first).unwrap();
+    let from = format!("dir:{pictures}");
+    let grab = ["camera", "grab", "--from", &from, "--count", "2", "--out", &pictures];
+    refused(&grab, "found an input of this command", &[&first]);
+    // Before the first sample is written.
+    let list = folder.path("pictures/annotations.json");
+    fs::copy(&marks, &list).unwrap();
+    let demo = format!("{photo}:{list}");
+    let augment = ["augment", "--demo", &demo, "--count", "2", "--out", &pictures];
+    refused(&augment, "found an input of this command", &[&first, &list]);
+}

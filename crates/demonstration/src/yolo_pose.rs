@@ -1,7 +1,7 @@
 //! YOLO-pose labels: a text file an image, a line an object, everything as a share of the image's width and height.
 //!
 //! ```text
-//! class  centre_x centre_y width height  x y v  x y v …      visibilities may be left out: x y  x y …
+//! class  centre_x centre_y width height  x y v  x y v …      without visibilities where data.yaml says so: x y  x y …
 //! ```
 //!
 //! Labels stand in a `data.yaml`, whose `names` the classes count and whose `kpt_shape` says how the line is read.
@@ -57,7 +57,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
         let place = format!("line {number}");
         let read = read_line(line, &place, &data, image)?;
         if data.keypoint_shape.is_none() {
-            check_is_pose(line, &read, &place, beside.is_some(), image)?;
+            check_is_pose(line, &place)?;
         }
         objects.push(read);
     }
@@ -134,44 +134,18 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
     draft.finish(image)
 }
 
-/// Refuses what may be corners of an oriented box or of a segment, which have as many numbers as a box and keypoints without visibilities: all
-/// of it beside a data.yaml without `kpt_shape`, and without one four corners of a rectangle and keypoints outside the box.
-fn check_is_pose(line: &str, read: &Annotation, place: &str, has_data_yaml: bool, image: &ImageFacts) -> Result<()> {
-    /// How far a keypoint may lie outside the box, as a share of its sides.
-    const MARGIN: f64 = 0.1;
-    let numbers: Vec<f64> = line.split_whitespace().skip(1).filter_map(|word| word.parse().ok()).collect();
-    let rest = &numbers[4..];
+/// Refuses what may be corners of an oriented box or of a segment, which have as many numbers as a box and keypoints without visibilities.
+fn check_is_pose(line: &str, place: &str) -> Result<()> {
+    let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let rest = &numbers[BOX_NUMBERS..];
     if rest.is_empty() || keypoint_stride(rest, &DataYaml::default()) == Some(3) {
         return Ok(());
     }
-    let [across, down] = [f64::from(image.width), f64::from(image.height)];
-    let points: Vec<Point2<f64>> =
-        numbers.chunks_exact(2).map(|point| Point2::new(point[0] * across, point[1] * down)).collect();
-    let bbox = read.bbox;
-    let is_outside = |point: &Point2<f64>| {
-        let [dx, dy] = [MARGIN * bbox.width(), MARGIN * bbox.height()];
-        point.x < bbox.x1 - dx || point.x > bbox.x2 + dx || point.y < bbox.y1 - dy || point.y > bbox.y2 + dy
-    };
-    let keypoints = &points[2..];
-    let is_unlabelled = |point: &&Point2<f64>| point.x < 0.0 || point.y < 0.0;
-    let strays = keypoints.iter().filter(|point| !is_unlabelled(point)).any(is_outside);
-    if has_data_yaml || strays || is_rectangle(&points) {
-        return Err(Error::Malformed {
-            place: place.to_owned(),
-            expected: "a box and keypoints, which `kpt_shape` of data.yaml announces".into(),
-            found: format!("{} numbers, which may be an oriented box or a segment", numbers.len() + 1),
-        });
-    }
-    Ok(())
-}
-
-/// Whether four points are the corners of a rectangle, one after the other.
-fn is_rectangle(points: &[Point2<f64>]) -> bool {
-    let [a, b, c, d] = points else { return false };
-    let [one, other] = [(c - a).norm(), (d - b).norm()];
-    let about = |x: f64, y: f64| (x - y).abs() <= 1.0 + 0.02 * one.max(other);
-    let sides = [(b - a).norm(), (c - b).norm(), (d - c).norm(), (a - d).norm()];
-    about(one, other) && about(sides[0], sides[2]) && about(sides[1], sides[3]) && sides[0].min(sides[1]) > 2.0
+    Err(Error::Malformed {
+        place: place.to_owned(),
+        expected: "keypoints with visibilities, or a data.yaml whose `kpt_shape` says that they have none".into(),
+        found: format!("{} numbers, which may be an oriented box or a segment", numbers.len()),
+    })
 }
 
 /// Numbers a keypoint: as data.yaml says, or as the numbers themselves allow.
@@ -248,8 +222,9 @@ mod tests {
         let made = read_text("0 0.5 0.5 0.25 0.5 0.4 0.5 2 0.6 0.5 1\n\n").unwrap();
         assert_eq!(made[0].bbox.to_xywh(), [240.0, 120.0, 160.0, 240.0]);
         assert_eq!(made[0].grasp.unwrap().start, Point2::new(256.0, 240.0));
-        let without_visibility = read_text("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5").unwrap();
-        assert_eq!(without_visibility, made);
+        let announced = Some(&b"kpt_shape: [2, 2]\n"[..]);
+        let without_visibility = Annotation::read_with(b"0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", announced, &IMAGE);
+        assert_eq!(without_visibility.unwrap()[0].grasp, made[0].grasp);
         let unmarked = read_text("0 0.5 0.5 0.25 0.5 0 0 0 0 0 0").unwrap();
         assert_eq!(unmarked[0].grasp, None);
         assert_eq!(read_text("0 0.5 0.5 0.25 0.5").unwrap()[0].grasp, None);
@@ -276,7 +251,8 @@ mod tests {
         let oriented = "0 0.404687 0.35 0.60625 0.35 0.60625 0.579167 0.404687 0.579167";
         refused(oriented, None);
         refused("0 0.596094 0.575 0.460156 0.458333 0.919531 0.360417 0.489063 0.421875", None);
-        // In any picture of a dataset of another task, whatever its numbers are.
+        // Whatever its numbers are.
+        refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", None);
         refused("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", Some(b"names: [rod]\n"));
         let announced = Some(&b"kpt_shape: [2, 2]\nnames: [rod]\n"[..]);
         assert!(Annotation::read_with(b"0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", announced, &IMAGE).is_ok());

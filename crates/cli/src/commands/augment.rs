@@ -63,12 +63,15 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         .transpose()?;
     let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
     files::prepare_folder(&args.out)?;
+    let picture_name = |i: u64| format!("{i:06}.png");
+    let pictures = (0..u64::from(args.count)).map(picture_name);
+    files::check_are_no_inputs(pictures.chain([ANNOTATIONS.to_owned()]).map(|name| args.out.join(name)))?;
 
     let mut coco = CocoFile::new();
     let mut with_part = 0;
     for i in 0..u64::from(args.count) {
         let sample = held_back.as_ref().map_or_else(|| augmenter.sample(i), |held_back| held_back.sample(i));
-        let name = format!("{i:06}.png");
+        let name = picture_name(i);
         let mut png = Cursor::new(Vec::new());
         sample.image.write_to(&mut png, ImageFormat::Png)?;
         files::write(&args.out.join(&name), &png.into_inner())?;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use image::ImageFormat;
-use sdg_camera::{Camera, Frame, LatestFrame};
+use sdg_camera::{Address, Camera, Frame, LatestFrame};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
@@ -53,6 +53,9 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
     } else {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
+    }
+    if let Address::File { path, .. } | Address::Folder { path, .. } = &args.live.from {
+        files::keep(path);
     }
     let interrupt = Interrupt::watch();
     let mut camera = open(&args.live.from, &args.live.options())?;

@@ -63,7 +63,16 @@ pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> R
         left -= 1;
         let began = Instant::now();
         let picture = Arc::new(std::mem::take(&mut frame.picture));
-        let parts = finder.find(&picture, &frame)?;
+        let parts = match finder.find(&picture, &frame) {
+            Ok(parts) => parts,
+            // One picture of a folder says nothing of the others.
+            Err(error) if matches!(address, Address::Folder { .. }) => {
+                let error = error.context(format!("frame {} of {address}", frame.number));
+                write_error(&mut stdout, args, address, &error)?;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
         let seconds = began.elapsed().as_secs_f64();
         found_any |= parts.iter().any(|part| part.is_seen(args.min_score));
         write_line(&mut stdout, args, &finder.detector, &frame, picture.dimensions(), seconds, &parts)?;
