@@ -131,7 +131,8 @@ fn what_is_no_board_is_told_by_what_is_missing() {
 
 /// Too little of it is seen; pieces of a grid may be.
 fn is_missing(found: &Result<Vec<SeenCorner>, CalibrationError>) -> bool {
-    matches!(found, Err(CalibrationError::BoardNotFound { .. } | CalibrationError::BoardUnclear { .. }))
+    use CalibrationError::{BoardNotFound, BoardUnclear, OtherCheckerboard};
+    matches!(found, Err(BoardNotFound { .. } | BoardUnclear { .. } | OtherCheckerboard { .. }))
 }
 
 #[test]
