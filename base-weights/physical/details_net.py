@@ -1,9 +1,9 @@
 """The network of the details, and its export for crates/shape. Usage: details_net.py FILE.pt... OUT.safetensors [--parity]
 
 Writes the weights of train_details.py in half precision, batch norms folded in; of several trainings their mean, which
-works where one began from the other's weights. `--parity` prints the log-odds that the
-test of crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in
-double precision.
+works where one began from the other's weights. `--parity` prints the log-odds that the test of
+crates/shape/src/details/network.rs expects: of two inputs of numbers, with the weights in half and the sums in double
+precision.
 
 Legend: B pairs, N = 128 pixels of the input's side, C = 16 cells a side. The input [B, 8, N, N] is photo RGB, picture
 RGB, in the outline (0 or 1), picture valid (0 or 1). The answer [B] is the log-odds that the picture shows the part;
