@@ -13,9 +13,10 @@ use self::network::{Answer, CELL, CELLS_SIDE, Features, NUM_CHANNELS, Network, S
 use crate::frame::Frame;
 use crate::likeness::exposed_values;
 
-/// Pixels that the part's longer side has at least in photo and picture: a bearing of 50 is taken for another although the training has such
-/// parts, too.
-const MIN_PX: f64 = 75.0;
+/// Pixels that the part's longer side has at least in photo and picture.
+const MIN_PX: f64 = 40.0;
+/// Below, only the features that are there count: a bearing of 50 pixels is taken for another although the training has such parts, too.
+const MIN_PX_AGAINST: f64 = 75.0;
 /// The part's longer side in what the network sees.
 const PART_SIDE: f64 = SIDE as f64 / 1.2;
 
@@ -42,11 +43,16 @@ impl Details {
     /// ln of how much likelier the image shows the part at the pose than a look-alike or anything else, as the network was trained: with three wrong
     /// poses for two right ones. `None` where photo or picture shows the part too small for its details.
     pub fn log_odds(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<f64> {
-        self.compared(image, image_from_cutout).map(|answer| f64::from(answer.log_odds))
+        let log_odds = f64::from(self.compared(image, image_from_cutout)?.log_odds);
+        let is_small = self.longer_side_px(image_from_cutout) < MIN_PX_AGAINST;
+        Some(if is_small { log_odds.max(0.0) } else { log_odds })
     }
 
-    /// Squares of the image, in its pixels, in which it rather differs from the photo; none where [`Self::log_odds`] has no answer.
+    /// Squares of the image, in its pixels, in which it rather differs from the photo; none where nothing counts against the pose.
     pub fn differing(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Vec<Polygon> {
+        if self.longer_side_px(image_from_cutout) < MIN_PX_AGAINST {
+            return Vec::new();
+        }
         let cells = self.compared(image, image_from_cutout).map(|answer| answer.cells).unwrap_or_default();
         let square = |cell: usize| {
             let [x, y] = [cell % CELLS_SIDE, cell / CELLS_SIDE].map(|k| (k * CELL) as f64);
@@ -58,8 +64,13 @@ impl Details {
         cells.into_iter().enumerate().filter_map(differs).collect()
     }
 
+    /// Pixels of the part's longer side, in the photo or in the picture, whichever has fewer.
+    fn longer_side_px(&self, image_from_cutout: &PlanarSimilarity) -> f64 {
+        PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0)
+    }
+
     fn compared(&self, image: &RgbImage, image_from_cutout: &PlanarSimilarity) -> Option<Answer> {
-        if PART_SIDE * self.frame.step() * image_from_cutout.scale.min(1.0) < MIN_PX {
+        if self.longer_side_px(image_from_cutout) < MIN_PX {
             return None;
         }
         let picture = self.frame.sampled(image, image_from_cutout);
@@ -132,11 +143,16 @@ mod tests {
     }
 
     #[test]
-    fn a_part_of_few_pixels_is_not_judged() {
+    fn nothing_speaks_against_a_small_part_and_a_tiny_one_is_not_judged() {
         let outline = Polygon::from_box(&BoundingBox { x1: 80.0, y1: 70.0, x2: 240.0, y2: 170.0 });
         let taught = Details::new(&plate(205.0, 1.0), &outline);
-        let at =
-            |scale: f64| taught.log_odds(&plate(205.0, 1.0), &PlanarSimilarity { scale, ..PlanarSimilarity::IDENTITY });
-        assert!(at(0.4).is_none() && at(0.5).is_some() && at(2.0).is_some());
+        // The same, and a table without it.
+        let at = |scale: f64, picture: &RgbImage| {
+            taught.log_odds(picture, &PlanarSimilarity { scale, ..PlanarSimilarity::IDENTITY })
+        };
+        let (plate, table) = (plate(205.0, 1.0), RgbImage::from_pixel(320, 240, Rgb([180, 170, 160])));
+        assert!(at(0.2, &plate).is_none() && at(2.0, &plate).is_some());
+        assert_eq!(at(0.4, &table), Some(0.0));
+        assert!(at(0.5, &table).unwrap() < 0.0);
     }
 }
