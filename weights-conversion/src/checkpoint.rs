@@ -143,18 +143,19 @@ impl Checkpoint {
         let named: Vec<String> =
             self.not_tensors.iter().take(SHOWN).map(|name| format!("`{}`", printable(name))).collect();
         let more = if self.not_tensors.len() > SHOWN { ", …" } else { "" };
-        // Parameters have a point in their names: torch's tensors in Python's own pickle. Otherwise training keeps the weights, or
-        // their mean over its last steps (`model_ema`), beside other things.
-        let weights = self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first());
-        let loaded = match weights {
-            Some(name) if name.contains('.') => "pickle.load(open(\"FILE\", \"rb\"))".to_owned(),
-            Some(name) => format!("torch.load(\"FILE\", weights_only=False)[\"{}\"]", printable(name)),
-            None => String::new(),
-        };
-        format!(
-            "none, but {}{more}: write the weights alone, in Python: torch.save({loaded}, \"NEW.pth\")",
-            named.join(", ")
-        )
+        let what = format!("none, but {}{more}", named.join(", "));
+        // Parameters have a point in their names, and their numbers stand in torch's zip beside this pickle or, written by Python's
+        // own pickle, nowhere. Otherwise training keeps the weights, or their mean over its last steps (`model_ema`), beside other things.
+        match self.not_tensors.iter().find(|name| name.contains("ema")).or(self.not_tensors.first()) {
+            Some(name) if !name.contains('.') => format!(
+                "{what}: write the weights alone, in Python: torch.save(torch.load(\"FILE\", weights_only=False)[\"{}\"], \"NEW.pth\")",
+                printable(name)
+            ),
+            _ => format!(
+                "{what}: a pickle without the numbers of its tensors: give the whole file that torch.save wrote (a zip, of which this \
+                 is data.pkl), or write the weights anew: torch.save(model.state_dict(), \"NEW.pth\")"
+            ),
+        }
     }
 
     fn from_pickle(format: FileFormat, pickle: &Pickle, storages: Option<&Storages>) -> Result<Self> {

@@ -19,6 +19,9 @@ pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
 /// Larger grasp models than any preset gives.
 const MAX_MODEL_BYTES: u64 = 2 << 30;
 
+/// The bytes that tell a picture's format.
+const MAX_SIGNATURE: u64 = 64;
+
 /// Reads a whole file, unless it is larger than `max_bytes`.
 pub fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     let (file, length) = open(path)?;
@@ -71,10 +74,10 @@ pub fn keep(path: &Path) {
     INPUTS.lock().unwrap_or_else(PoisonError::into_inner).extend(kept);
 }
 
-/// Writes a file whole or not at all, and never over an input of this command.
+/// Writes a file whole or not at all, and never over an input of this command, or over a picture of another format.
 ///
 /// # Errors
-/// A path that leads to an input; what the system says.
+/// A path that leads to such a file; the system's reason.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     extend(path, None, bytes)
 }
@@ -85,7 +88,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// As [`write`].
 pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
     check_is_no_input(path, own)?;
+    check_replaces_no_other_picture(path, bytes)?;
     Ok(write_atomically(path, bytes)?)
+}
+
+/// Makes sure that no photo is replaced by a report, a drawing of lines or a list.
+fn check_replaces_no_other_picture(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut start = Vec::new();
+    let _ = File::open(path).and_then(|file| file.take(MAX_SIGNATURE).read_to_end(&mut start));
+    let format = |bytes| image::guess_format(bytes).ok();
+    if let Some(found) = format(&start).filter(|found| format(bytes) != Some(*found)) {
+        bail!("{}: expected a new name for what is written, found a picture ({found:?})", path.display());
+    }
+    Ok(())
 }
 
 /// The file and its length.
@@ -268,6 +283,18 @@ mod tests {
         extend(&photo, Some(&by_detour), b"photo").unwrap();
         write(&other, b"drawing").unwrap();
         assert_eq!(fs::read(&other).unwrap(), b"drawing");
+    }
+
+    #[test]
+    fn a_picture_is_replaced_by_its_own_format_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("photo.png");
+        RgbImage::new(4, 3).save(&photo).unwrap();
+        let before = fs::read(&photo).unwrap();
+        let error = write(&photo, b"<svg/>").unwrap_err().to_string();
+        assert!(error.contains("found a picture (Png)"), "{error}");
+        assert_eq!(fs::read(&photo).unwrap(), before);
+        write(&photo, &before).unwrap();
     }
 
     #[test]

@@ -41,10 +41,10 @@ impl TaughtCameraArgs {
 pub struct OwnPartArgs {
     /// Instead of --object the part that the model was taught from, with its outline and photo: its height over the table; not
     /// needed for a model taught with --camera
-    #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub height_mm: Option<f64>,
     /// The longer side of its box; not needed for a model taught with --camera
-    #[arg(long, value_name = "MM", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
+    #[arg(long, value_name = "MM", value_parser = size_mm, conflicts_with = "object", help_heading = OWN_PART)]
     pub length_mm: Option<f64>,
     /// What it weighs; without it, what its volume would at 1.5 g/cm3
     #[arg(long, value_name = "G", value_parser = positive, conflicts_with = "object", help_heading = OWN_PART)]
@@ -113,17 +113,40 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// A height over the table. A part higher than half a metre was given in another unit.
-fn height_mm(text: &str) -> Result<f64, String> {
-    const MAX_MM: f64 = 500.0;
-    match text.parse::<f64>() {
-        Ok(height) if (0.0..=MAX_MM).contains(&height) => Ok(height),
-        _ => Err(format!("expected a height of 0 to {MAX_MM} millimetres, found {text}")),
+pub fn height_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "a height", [0.0, 500.0])
+}
+
+/// The size of a part. No part is smaller than a millimetre, or larger than a metre.
+fn size_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "a size", [1.0, 1000.0])
+}
+
+/// A length from `min` to `max`. A tenth of a millimetre is less than anything here is known to: such a number is in metres.
+pub fn millimetres(text: &str, name: &str, [min, max]: [f64; 2]) -> Result<f64, String> {
+    const MIN_MM: f64 = 0.1;
+    let number = text.parse().unwrap_or(f64::NAN);
+    let is_tiny = 0.0 < number && number < MIN_MM.max(min);
+    if (min..=max).contains(&number) && !is_tiny {
+        return Ok(number);
     }
+    let hint = if is_tiny { ": metres given as millimetres?" } else { "" };
+    Err(format!("expected {name} of {min} to {max} millimetres, found {text}{hint}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn metres_are_no_millimetres() {
+        assert_eq!((height_mm("0"), height_mm("0.4"), height_mm("16")), (Ok(0.0), Ok(0.4), Ok(16.0)));
+        let found = [height_mm("0.016"), size_mm("0.12")].map(Result::unwrap_err);
+        assert!(found.iter().all(|error| error.ends_with("metres given as millimetres?")), "{found:?}");
+        for text in ["-1", "501", "nan", "4 cm"] {
+            assert!(height_mm(text).unwrap_err().ends_with(&format!("millimetres, found {text}")), "{text}");
+        }
+    }
 
     #[test]
     fn a_size_tolerance_holds_the_nominal_size() {

@@ -86,8 +86,8 @@ fn what_blocks_is_named() {
     refused(&cell, &["500,300,200,3.14,0,1.57"], 2, &["--goal", "radians given as degrees?"]);
     refused(&cell, &["0.5,0.3,0.2"], 2, &["--goal", "metres given as millimetres?"]);
     refused(&cell, &["500,300,200", "--start", "0,45,0,-90,0,90,0"], 1, &["the start is not free", "wall"]);
-    refused(&cell, &["500,300,200", "--held-mm", "0,5"], 2, &["DIAMETER,LENGTH"]);
-    refused(&cell, &["500,300,200", "--margin-mm", "0"], 1, &["margin_m must be above 0"]);
+    refused(&cell, &["500,300,200", "--held-mm", "0,5"], 2, &["a DIAMETER of 1 to 1000 millimetres"]);
+    refused(&cell, &["500,300,200", "--margin-mm", "0"], 2, &["a distance of 0.1 to 100 millimetres"]);
     let hall = workcell(&folder, "\n[[obstacle]]\nname = \"hall\"\nbox_mm = [4000, 4000, 4000]\nat_mm = [0, 0, 0]\n");
     refused(&hall, &["500,300,200"], 1, &["\"hall\" encloses the robot"]);
     let odd = workcell(&folder, "\n[[obstacle]]\nname = \"odd\"\nbox_mm = [10, 10, 0]\nat_mm = [500, 0, 0]\n");

@@ -1,6 +1,5 @@
 //! A motion of the arm as an animation and a still picture.
 
-use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -54,9 +53,7 @@ impl MotionDrawing {
         crate::files::prepare_folder(folder)?;
         let [gif, still] = ["gif", "png"].map(|ending| folder.join(format!("{}.{ending}", self.name)));
         crate::files::write(&gif, animation.gif())?;
-        let mut png = Vec::new();
-        animation.still().write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png)?;
-        crate::files::write(&still, &png)?;
+        crate::drawings::write(&still, animation.still())?;
         Ok(vec![gif, still])
     }
 }

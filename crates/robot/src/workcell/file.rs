@@ -20,6 +20,8 @@ const FORMAT: i64 = 1;
 const MAX_TABLE_MM: f64 = 1000.0;
 /// No finger is longer than this beyond the tcp, mm.
 const MAX_FINGERTIP_MM: f64 = 100.0;
+/// Shorter finger tips than these, but for none, are lengths in metres.
+const MIN_FINGERTIP_MM: f64 = 0.1;
 /// What the hand holds for long, N.
 const MAX_FORCE_N: f64 = 70.0;
 /// How far a part reaches from its grasp unless told, and at most, mm.
@@ -149,6 +151,17 @@ fn read(text: &str) -> Result<Workcell, WorkcellError> {
     };
     let tool = &file.tool;
     let fingertip_mm = option(&tool.fingertip_beyond_tcp_mm, "fingertip_beyond_tcp_mm", [0.0, MAX_FINGERTIP_MM])?;
+    if let (Some(value), Some(found)) = (&tool.fingertip_beyond_tcp_mm, fingertip_mm)
+        && (f64::MIN_POSITIVE..MIN_FINGERTIP_MM).contains(&found)
+    {
+        let expected = format!("0, or a number from {MIN_FINGERTIP_MM} to {MAX_FINGERTIP_MM}");
+        return Err(source.expected(
+            value,
+            "fingertip_beyond_tcp_mm",
+            &expected,
+            format!("{found}: metres given as millimetres?"),
+        ));
+    }
     let [x, y, z] = [
         source.range_m(&file.workspace.x_mm, "x_mm")?,
         source.range_m(&file.workspace.y_mm, "y_mm")?,

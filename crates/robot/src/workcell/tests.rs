@@ -52,6 +52,7 @@ fn errors_name_the_line() {
         (4, "\"panda\"", "\"ur5\"", "expected \"panda\" or \"fr3\", found \"ur5\""),
         (5, "172.16.0.2", "http://robot", "expected HOST or HOST:PORT"),
         (8, "= 9", "= 900", "fingertip_beyond_tcp_mm: expected a number from 0 to 100, found 900"),
+        (8, "= 9", "= 0.009", "found 0.009: metres given as millimetres?"),
         (9, "30.0", "nan", "grasp_force_n: expected a number from 1 to 70, found NaN"),
         (10, "kg = 0.2", "kg = \"heavy\"", "expected f64"),
         (14, "\"hand\"", "\"wall\"", "expected \"hand\" or \"base\", found \"wall\""),

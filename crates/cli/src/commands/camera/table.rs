@@ -18,6 +18,7 @@ use super::board_in_use::{BoardInUse, grey, named, pose_json};
 use crate::camera_files;
 use crate::exit::{Outcome, Usage};
 use crate::files;
+use crate::shared_args::height_mm;
 
 /// `sdg camera table`
 #[derive(Debug, Args)]
@@ -61,10 +62,10 @@ pub struct TableArgs {
     )]
     table_height_mm: f64,
     /// How high the sheet lies above the table, on a plate
-    #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM")]
+    #[arg(long, default_value_t = 0.0, hide_default_value = true, value_name = "MM", value_parser = height_mm)]
     sheet_thickness_mm: f64,
     /// Height of a part's marks, at which the error from a wrong focal length is reported
-    #[arg(long, default_value_t = 30.0, value_name = "MM")]
+    #[arg(long, default_value_t = 30.0, value_name = "MM", value_parser = height_mm)]
     mark_height_mm: f64,
     /// Focal length in pixels of a camera without file
     #[arg(long, value_name = "PX", conflicts_with = "camera")]

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use image::{ImageFormat, RgbImage};
+use image::RgbImage;
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use serde::Serialize;
 
@@ -17,6 +17,7 @@ pub use args::DetectArgs;
 use inputs::{Input, Inputs};
 
 use crate::commands::devices;
+use crate::drawings;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
@@ -141,9 +142,7 @@ impl<W: Write> Batch<'_, W> {
         if let Some(folder) = &self.args.draw {
             let wording = seen.wording(self.detector, self.args.min_score);
             let drawn = drawn(image, &seen.detections, &wording);
-            let mut png = std::io::Cursor::new(Vec::new());
-            drawn.write_to(&mut png, ImageFormat::Png)?;
-            files::write(&folder.join(input.drawn_name(&mut self.drawn)), &png.into_inner())?;
+            drawings::write(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
         }
         Ok(seen)
     }

@@ -4,7 +4,9 @@ use std::f64::consts::FRAC_PI_4;
 use std::str::FromStr;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use sdg_kinematics::{JointVector, NUM_JOINTS};
+use sdg_kinematics::{HAND_OPENING_MAX_M, JointVector, NUM_JOINTS};
+
+use crate::shared_args::millimetres;
 
 /// `--start`: joint angles, given in degrees.
 #[derive(Debug, Clone, Copy)]
@@ -19,6 +21,16 @@ pub struct GoalPose(pub Isometry3<f64>);
 pub struct Held {
     pub diameter_m: f64,
     pub length_m: f64,
+}
+
+/// `--opening-mm`.
+pub fn opening_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "an opening", [0.0, HAND_OPENING_MAX_M * 1e3])
+}
+
+/// `--margin-mm`. Nothing in a cell keeps a tenth of a metre from everything.
+pub fn margin_mm(text: &str) -> Result<f64, String> {
+    millimetres(text, "a distance", [0.1, 100.0])
 }
 
 impl FromStr for JointsDeg {
@@ -50,8 +62,9 @@ impl FromStr for GoalPose {
         if [x, y, z].iter().all(|value| value.abs() < MIN_DISTANCE_MM) {
             return Err(format!("expected X,Y,Z in mm, found {x},{y},{z}: metres given as millimetres?"));
         }
-        if are_radians(&[roll, pitch, yaw]) {
-            return Err(format!("expected angles in degrees, found {roll},{pitch},{yaw}: radians given as degrees?"));
+        let given = &numbers[3..];
+        if are_radians(given) {
+            return Err(format!("expected angles in degrees, found {given:?}: radians given as degrees?"));
         }
         let turn = UnitQuaternion::from_euler_angles(roll.to_radians(), pitch.to_radians(), yaw.to_radians());
         Ok(Self(Isometry3::from_parts(Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3), turn)))
@@ -62,12 +75,11 @@ impl FromStr for Held {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match numbers(text)?[..] {
-            [diameter, length] if diameter > 0.0 && length > 0.0 && diameter <= 1000.0 && length <= 1000.0 => {
-                Ok(Self { diameter_m: diameter * 1e-3, length_m: length * 1e-3 })
-            }
-            _ => Err(format!("expected DIAMETER,LENGTH in mm, each above 0 and at most 1000, found \"{text}\"")),
-        }
+        let [diameter, length] = text.split(',').collect::<Vec<_>>()[..] else {
+            return Err(format!("expected DIAMETER,LENGTH in mm, found \"{text}\""));
+        };
+        let size_m = |text: &str, name| Ok::<_, String>(1e-3 * millimetres(text.trim(), name, [1.0, 1000.0])?);
+        Ok(Self { diameter_m: size_m(diameter, "a DIAMETER")?, length_m: size_m(length, "a LENGTH")? })
     }
 }
 
@@ -111,7 +123,7 @@ mod tests {
         assert!("500,0".parse::<GoalPose>().unwrap_err().contains("found 2 numbers"));
         assert!("500,x,3".parse::<GoalPose>().unwrap_err().contains("found \"x\""));
         assert!("500,nan,3".parse::<GoalPose>().is_err());
-        for radians in ["500,0,200,3.14159,0,1.5708", "500,0,200,3.14,0,0.785"] {
+        for radians in ["500,0,200,3.14159,0,1.5708", "500,0,200,3.14,0,0.785", "500,0,200,1.5708"] {
             assert!(radians.parse::<GoalPose>().unwrap_err().contains("radians given as degrees?"), "{radians}");
         }
         assert!("500,0,200,180,0,3".parse::<GoalPose>().is_ok() && "500,0,200,2.5".parse::<GoalPose>().is_ok());
@@ -123,7 +135,10 @@ mod tests {
         let JointsDeg(q) = "0,-45,0,-135,0,90,45".parse().unwrap();
         assert!((q - sdg_kinematics::ready_pose()).amax() < 1e-12);
         assert!("0,-45".parse::<JointsDeg>().unwrap_err().contains("found 2"));
-        assert!("30,0".parse::<Held>().is_err());
+        assert!("30,0".parse::<Held>().is_err() && "30".parse::<Held>().is_err());
+        assert!("0.03,0.1".parse::<Held>().unwrap_err().contains("metres given as millimetres?"));
+        assert!(margin_mm("0.003").unwrap_err().contains("metres given as millimetres?") && margin_mm("3") == Ok(3.0));
+        assert!(opening_mm("0.08").unwrap_err().contains("metres given as millimetres?") && opening_mm("81").is_err());
         assert!((("30,100".parse::<Held>().unwrap()).diameter_m - 0.03).abs() < 1e-12);
     }
 }

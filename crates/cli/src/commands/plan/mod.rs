@@ -44,10 +44,10 @@ pub struct PlanArgs {
     #[arg(long, value_name = "SIZE")]
     pub held_mm: Option<Held>,
     /// How far the fingers are open
-    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3)]
+    #[arg(long, value_name = "MM", default_value_t = HAND_OPENING_MAX_M * 1e3, value_parser = arguments::opening_mm)]
     pub opening_mm: f64,
     /// Distance to keep from everything
-    #[arg(long, value_name = "MM", default_value_t = 3.0)]
+    #[arg(long, value_name = "MM", default_value_t = 3.0, value_parser = arguments::margin_mm)]
     pub margin_mm: f64,
     /// Share of the joints' velocity limits, above 0 and at most 0.6
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SPEED)]

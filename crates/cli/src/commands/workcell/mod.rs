@@ -3,12 +3,12 @@
 mod map;
 mod reach;
 
-use std::io::Cursor;
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
+use crate::drawings;
 use crate::exit::Outcome;
 use crate::files;
 use crate::robots;
@@ -57,10 +57,7 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
     for line in reach.lines(&workcell) {
         eprintln!("{line}");
     }
-    let picture = map.draw(&workcell, &reach);
-    let mut png = Vec::new();
-    picture.write_to(&mut Cursor::new(&mut png), image::ImageFormat::Png)?;
-    files::write(&args.out, &png)?;
+    drawings::write(&args.out, &map.draw(&workcell, &reach))?;
     eprintln!("{}", args.out.display());
     Ok(Outcome::Done)
 }
