@@ -120,7 +120,7 @@ pub struct ScoreConfig {
     pub likeness: Term,
     /// Of [`sdg_shape::CloseLook::details`], against a pose. From the tuned side of a split (docs/decisions/026-details.md), as the next.
     pub details: Term,
-    /// Of the same, for a pose. Between the two the network is not sure, and its level differs from part to part: nothing counts.
+    /// Of the same, for a pose. Between the two the network tells little: nothing counts.
     pub details_for: Term,
     /// Of [`sdg_shape::CloseLook::bare`].
     pub table: Term,
