@@ -4,12 +4,13 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
+use sdg_cell::{LiveTracker, Perception, SearchTime};
 use sdg_cli::shipped;
-use sdg_cli::tracking::{LiveTracker, SearchTime};
+
 use sdg_demonstration::Demonstration;
 use sdg_grasp::{
-    CameraOverTable, Device, GraspModel, ModelKind, PartDetector, PlanDetector, TeachOptions, TrackState, TrackedPart,
-    TrackerConfig, seen_from_above, teach,
+    CameraOverTable, Device, GraspModel, ModelKind, TeachOptions, TrackState, TrackedPart, TrackerConfig,
+    seen_from_above, teach,
 };
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::demonstration_view;
@@ -40,11 +41,12 @@ struct Sequence {
     frames: Vec<(Vec<MovingTruth>, Vec<TrackedPart>)>,
 }
 
-fn tracked(address: &str, detector: impl FnOnce(&TableCamera, &ObjectSpec) -> PartDetector) -> Sequence {
+fn tracked(address: &str, perception: impl FnOnce(&TableCamera, &ObjectSpec) -> Perception) -> Sequence {
     let mut camera = TableCamera::new(&address.parse().unwrap()).unwrap();
     let part = ObjectSpec::by_name(&camera.config().part).unwrap();
-    let detector = detector(&camera, &part);
-    let mut tracker = LiveTracker::new(detector, TrackerConfig::default(), SearchTime::Frames(SEARCH_FRAMES)).unwrap();
+    let perception = perception(&camera, &part);
+    let mut tracker =
+        LiveTracker::new(&perception, TrackerConfig::default(), SearchTime::Frames(SEARCH_FRAMES)).unwrap();
     let mut frames = Vec::new();
     while let Some(view) = camera.next_view().unwrap() {
         let parts = tracker.frame(Arc::new(view.picture), view.time).unwrap();
@@ -54,15 +56,15 @@ fn tracked(address: &str, detector: impl FnOnce(&TableCamera, &ObjectSpec) -> Pa
 }
 
 /// Without a calibrated camera.
-fn by_picture(_: &TableCamera, part: &ObjectSpec) -> PartDetector {
+fn by_picture(_: &TableCamera, part: &ObjectSpec) -> Perception {
     let mut options = TeachOptions::new(1);
     options.kind = ModelKind::S;
     options.symmetry = part.symmetry;
-    taught(shipped::demonstration(&part.name).unwrap(), &options).into()
+    Perception::of_any_camera(taught(shipped::demonstration(&part.name).unwrap(), &options))
 }
 
 /// With one: in the plan view of the marks' plane, and in metres.
-fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> PartDetector {
+fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> Perception {
     let over_table = |camera| CameraOverTable { camera, table_height_m: 0.0, workspace: None };
     let shown = demonstration_view(part).unwrap();
     let mark_height_m = part.marks_in_base(&shown.truth.base_from_object)[0].z;
@@ -75,7 +77,7 @@ fn by_plan_view(camera: &TableCamera, part: &ObjectSpec) -> PartDetector {
     options.symmetry = part.symmetry;
     options.lengths = lengths;
     let model = taught(seen.into_iter().next().unwrap(), &options);
-    PlanDetector::new(model, &over_table(camera.posed_camera())).unwrap().into()
+    Perception::over_table(model, &over_table(camera.posed_camera())).unwrap()
 }
 
 impl Sequence {
@@ -158,7 +160,7 @@ impl Sequence {
     }
 }
 
-type MakeDetector = fn(&TableCamera, &ObjectSpec) -> PartDetector;
+type MakeDetector = fn(&TableCamera, &ObjectSpec) -> Perception;
 
 /// Four seconds at 50 mm/s and 30°/s with changes of direction; for half a second the part is off the table, and then elsewhere.
 fn assert_tracked(part: &str, seed: u64, beside: &str, detector: MakeDetector) -> Sequence {

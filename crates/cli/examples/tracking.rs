@@ -10,8 +10,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
+use sdg_cell::{LiveTracker, Perception, SearchTime};
 use sdg_cli::shipped;
-use sdg_cli::tracking::{LiveTracker, SearchTime};
+
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     Device, GraspDetection, GraspModel, ModelKind, TeachOptions, TrackedPart, TrackerConfig, Verification, teach,
@@ -96,7 +97,8 @@ fn detect(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry) -> 
 }
 
 fn track(model: &GraspModel, shown: &[Shown], symmetry: RotationalSymmetry, is_paced: bool) -> Result<()> {
-    let mut tracker = LiveTracker::new(model.clone().into(), TrackerConfig::default(), SearchTime::AsItTakes)?;
+    let mut tracker =
+        LiveTracker::new(&Perception::of_any_camera(model.clone()), TrackerConfig::default(), SearchTime::AsItTakes)?;
     let (mut walls, mut all) = (Vec::new(), Vec::new());
     let (mut start, mut cpu_before) = (Instant::now(), process_time()?);
     for (idx, frame) in shown.iter().enumerate() {

@@ -4,10 +4,12 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_calibration::{CalibratedCamera, Frame};
+use sdg_calibration::CalibratedCamera;
+use sdg_cell::{Perception, PlacedCamera};
 use sdg_demonstration::Demonstration;
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{CameraOverTable, Lengths, pictures_from_above, seen_from_above};
+use sdg_grasp::{CameraOverTable, GraspModel, Lengths, pictures_from_above, seen_from_above};
+use sdg_robot::workcell::Workcell;
 
 use crate::files;
 
@@ -18,8 +20,6 @@ const MAX_BYTES: u64 = 1 << 20;
 #[derive(Debug, Clone)]
 pub struct CameraFile {
     camera: CalibratedCamera,
-    /// What the camera's world is.
-    pub frame: Frame,
     /// Where the camera is.
     pub over_table: CameraOverTable,
 }
@@ -41,7 +41,15 @@ impl CameraFile {
         let (camera, _) = read(path)?;
         let (posed, table) = camera.posed().with_context(|| path.display().to_string())?;
         let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
-        Ok(Self { frame: table.frame, over_table, camera })
+        Ok(Self { over_table, camera })
+    }
+
+    /// A model that looks through it.
+    ///
+    /// # Errors
+    /// A model that was taught without a camera; a camera that does not see the plane of the marks.
+    pub fn perception(&self, model: GraspModel) -> Result<Perception> {
+        Ok(Perception::calibrated(model, &self.camera)?)
     }
 
     /// Width and height of its pictures.
@@ -79,6 +87,25 @@ impl CameraFile {
         pictures.iter().try_for_each(|picture| self.check_picture(picture))?;
         Ok(pictures_from_above(pictures, &self.over_table, lengths)?)
     }
+}
+
+/// Puts the model of a file behind the camera of a file, if one is given.
+///
+/// # Errors
+/// A camera file that cannot be used; a model that was taught without a camera, with its file's name.
+pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
+    match camera {
+        None => Ok(Perception::of_any_camera(model)),
+        Some(path) => CameraFile::read(path)?.perception(model).with_context(|| model_file.display().to_string()),
+    }
+}
+
+/// The camera of a file where the workcell mounts it.
+///
+/// # Errors
+/// A file without the pose that the mounting needs.
+pub fn placed(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> Result<PlacedCamera> {
+    PlacedCamera::new(camera, workcell.mounting, workcell.table_height_m).with_context(|| path.display().to_string())
 }
 
 /// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.

@@ -4,6 +4,10 @@ use std::fmt;
 use std::io;
 use std::process::ExitCode;
 
+use sdg_cell::CellError;
+use sdg_grasp::GraspError;
+use sdg_robot::RobotError;
+
 /// What every help text and manual page ends with.
 pub const EXIT_CODES: &str = "Exit codes:\n  \
     0  done\n  \
@@ -89,7 +93,33 @@ pub fn one_line(error: &anyhow::Error) -> String {
             line = format!("{line}: {text}");
         }
     }
-    line
+    match error.chain().find_map(remedy) {
+        Some(remedy) => format!("{line}; {remedy}"),
+        None => line,
+    }
+}
+
+/// The option that helps with an error of a library, which knows no options.
+fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
+    let of_model = |error: &GraspError| match error {
+        GraspError::NoLengths => Some("teach it again with --camera and --mark-height-mm".to_owned()),
+        GraspError::BackendNotBuilt { asked, .. } => Some(format!("build sdg-cli with --features {asked}")),
+        _ => None,
+    };
+    if let Some(error) = cause.downcast_ref() {
+        return of_model(error);
+    }
+    match cause.downcast_ref() {
+        Some(CellError::Grasp(error)) => of_model(error),
+        Some(CellError::NotOnHand) => Some("sdg camera hand-eye --mount hand measures it".to_owned()),
+        Some(CellError::NotInBase) => {
+            Some("sdg camera hand-eye --mount base or sdg camera table --sheet-in-base-mm measures it".to_owned())
+        }
+        _ => match cause.downcast_ref() {
+            Some(RobotError::NoRealTime { .. }) => Some("--no-realtime goes without".to_owned()),
+            _ => None,
+        },
+    }
 }
 
 #[cfg(test)]

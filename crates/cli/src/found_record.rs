@@ -1,10 +1,9 @@
 //! A detection in JSON, as `sdg detect` prints it.
 
 use sdg_calibration::Frame;
+use sdg_cell::{Found, Perception};
 use sdg_grasp::DetectionRecord;
 use serde::Serialize;
-
-use crate::picture_detector::{Found, PictureDetector};
 
 /// A detection and, with a camera, its pose.
 #[derive(Debug, Clone, Serialize)]
@@ -29,7 +28,7 @@ struct PoseRecord {
 
 impl FoundRecord {
     /// The record of what a detector found.
-    pub fn new(found: &Found, detector: &PictureDetector) -> Self {
+    pub fn new(found: &Found, detector: &Perception) -> Self {
         let pose = found.pose.as_ref().zip(detector.frame()).map(|(pose, frame)| PoseRecord {
             frame,
             p_m: pose.position_m.coords.into(),

@@ -1,9 +1,8 @@
 //! A detection as a line of text, and why it is refused.
 
 use sdg_calibration::Frame;
-use sdg_grasp::GraspDetection;
-
-use crate::picture_detector::{Found, PictureDetector};
+use sdg_cell::{Found, Perception};
+use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 
 /// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
 pub const DEFAULT_MIN_SCORE: f64 = 0.5;
@@ -12,11 +11,24 @@ pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
 const SAME_SIZE: f64 = 0.03;
 
+/// What would help where a refused detection is the part after all.
+pub fn advice_in_words(advice: Advice) -> &'static str {
+    match advice {
+        Advice::CheckSize => {
+            "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm"
+        }
+        Advice::DarkerPhoto => "if it is the part, a second --demo in darker light would help",
+        Advice::BrighterPhoto => "if it is the part, a second --demo in brighter light would help",
+        Advice::Uncover => "if it is the part, uncover it, or add a --demo taken from this side",
+        _ => "if it is the part, a second --demo taken from this side would help",
+    }
+}
+
 /// What the words about the detections in a picture depend on.
 #[derive(Debug, Clone, Copy)]
 pub struct Wording<'a> {
     /// What found them.
-    pub detector: &'a PictureDetector,
+    pub detector: &'a Perception,
     /// Width and height of the picture.
     pub picture_size: [u32; 2],
     /// The score from which they are accepted.
@@ -88,7 +100,7 @@ impl Wording<'_> {
         Some(format!(
             "{}{}",
             self.reasons(detection, 2),
-            advice.map(|advice| format!("; {advice}")).unwrap_or_default()
+            advice.map(|advice| format!("; {}", advice_in_words(advice))).unwrap_or_default()
         ))
     }
 
@@ -96,9 +108,9 @@ impl Wording<'_> {
     pub fn reasons(&self, detection: &GraspDetection, most: usize) -> String {
         let Some(evidence) = &detection.evidence else { return "the network is not sure".to_owned() };
         let size = self.detector.size_of(detection, self.picture_size).filter(|size| (size - 1.0).abs() >= SAME_SIZE);
-        let in_words = |(name, words): (&str, &str)| match (name, size) {
-            ("size", Some(size)) => format!("its size is {size:.2} of the photo's"),
-            _ => words.to_owned(),
+        let in_words = |kind: EvidenceKind| match (kind, size) {
+            (EvidenceKind::Size, Some(size)) => format!("its size is {size:.2} of the photo's"),
+            _ => kind.objection().to_owned(),
         };
         let reasons: Vec<String> = evidence
             .objections(&self.detector.model().demonstrations()[0].check().score)
@@ -133,7 +145,10 @@ impl Wording<'_> {
 
     /// Where the picture has another number of pixels than the photo: that the part may have a size that is not looked for.
     fn of_other_size(&self) -> Option<String> {
-        let PictureDetector::AnyCamera(model) = self.detector else { return None };
+        if self.detector.place().is_some() {
+            return None;
+        }
+        let model = self.detector.model();
         let [width, height] = self.picture_size;
         let photo = model.demonstrations().iter().find_map(|demonstration| demonstration.marks.photo_size)?;
         (photo != [width, height] && photo != [height, width]).then(|| {

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
+use sdg_cell::Perception;
 use sdg_demonstration::{
     AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
 };
@@ -12,7 +13,6 @@ use sdg_grasp::{GraspDetection, GraspModel, Verification};
 use serde_json::{Value, json};
 
 use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
-use crate::picture_detector::PictureDetector;
 use crate::statistics::{Share, wilson_interval};
 
 /// Where held-back samples begin: far beyond those that teaching validates and calibrates with.
@@ -100,7 +100,7 @@ impl HeldBackFigures {
         let (alone, others_in_photo) = without_others(model, demonstrations)?;
         let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
         let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
-        let detector = PictureDetector::AnyCamera(Box::new(model.clone()));
+        let detector = Perception::of_any_camera(model.clone());
         let judged = (0..COUNT).into_par_iter().map(|number| {
             let sample = samples.sample(number);
             let detections = model.detect(&sample.image, Verification::ByShape)?;

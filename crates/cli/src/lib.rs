@@ -51,7 +51,6 @@ mod page_camera;
 mod page_teacher;
 #[cfg(feature = "simulation")]
 mod parts;
-pub mod picture_detector;
 mod pictures;
 mod progress;
 #[cfg(feature = "simulation")]
@@ -66,9 +65,9 @@ mod shared_args;
 pub mod shipped;
 pub mod split;
 mod statistics;
+mod taught_file;
 mod teaching_page;
 mod teaching_progress;
-pub mod tracking;
 #[cfg(feature = "simulation")]
 pub mod trial;
 

@@ -11,14 +11,15 @@ use sdg_annotate::{
     TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_calibration::Frame;
+use sdg_cell::{Found, Perception};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification, teach};
+use sdg_grasp::{Advice, GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification};
 
 use crate::camera_files::CameraFile;
 use crate::found_text::{DEFAULT_MIN_SCORE, MIN_ADVISED_SCORE, Wording};
 use crate::held_back::HeldBackFigures;
-use crate::picture_detector::{Found, PictureDetector};
 use crate::statistics::{Share, wilson_interval};
+use crate::taught_file::TaughtFile;
 
 /// Teaches with one preset.
 pub struct PageTeacher {
@@ -54,11 +55,9 @@ impl GraspTeacher for PageTeacher {
             options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
             options.lengths = Some(lengths);
         }
-        let model = teach(&demonstrations, &options, &mut |event| observe(step(event)))?.model;
-        // What is written, and not what is in memory, is what will be used.
-        let bytes = model.to_bytes()?;
-        let model = GraspModel::from_bytes(&bytes, &options.device)?;
-        let figures = HeldBackFigures::of(&model, &demonstrations, request.seed)?;
+        let file = TaughtFile::teach(&demonstrations, &options, &mut |event| observe(step(event)))?;
+        let figures = file.figures(&demonstrations, request.seed)?;
+        let TaughtFile { model, bytes, .. } = file;
         let summary = summary(&model, page_figures(&figures), start.elapsed().as_secs_f64());
         Ok(Box::new(PageModel { detector: Mutex::new(self.detector(model)?), summary, bytes }))
     }
@@ -71,10 +70,10 @@ impl GraspTeacher for PageTeacher {
 }
 
 impl PageTeacher {
-    fn detector(&self, model: GraspModel) -> anyhow::Result<PictureDetector> {
+    fn detector(&self, model: GraspModel) -> anyhow::Result<Perception> {
         match &self.camera {
-            None => Ok(PictureDetector::AnyCamera(Box::new(model))),
-            Some((camera, _)) => PictureDetector::calibrated(model, camera.clone()),
+            None => Ok(Perception::of_any_camera(model)),
+            Some((camera, _)) => camera.perception(model),
         }
     }
 }
@@ -122,7 +121,7 @@ fn step(event: &TeachingEvent) -> TeachingStep {
 
 /// One look at a time: each uses every core.
 struct PageModel {
-    detector: Mutex<PictureDetector>,
+    detector: Mutex<Perception>,
     summary: TaughtSummary,
     /// Its file.
     bytes: Vec<u8>,
@@ -167,22 +166,20 @@ impl TaughtModel for PageModel {
     }
 }
 
-/// Options of `sdg teach` in the page's words.
-const PAGE_REMEDIES: [(&str, &str); 2] = [
-    (
-        "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm",
-        "if it is the part, learn from it: it is taught at this size, too",
-    ),
-    ("--demo", "demonstration"),
-];
-
 /// What would help, for a person who has buttons instead of options.
-fn remedy(advice: &str) -> String {
-    PAGE_REMEDIES.iter().fold(advice.to_owned(), |text, (option, words)| text.replace(option, words))
+fn remedy(advice: Advice) -> String {
+    let words = match advice {
+        Advice::CheckSize => "if it is the part, learn from it: it is taught at this size, too",
+        Advice::DarkerPhoto => "if it is the part, a second demonstration in darker light would help",
+        Advice::BrighterPhoto => "if it is the part, a second demonstration in brighter light would help",
+        Advice::Uncover => "if it is the part, uncover it, or add a demonstration taken from this side",
+        _ => "if it is the part, a second demonstration taken from this side would help",
+    };
+    words.to_owned()
 }
 
 /// The marked line is as long, against the part, as the first demonstration's: detections tell its middle only.
-fn found_grasp(detector: &PictureDetector, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
+fn found_grasp(detector: &Perception, found: &Found, wording: &Wording<'_>) -> FoundGrasp {
     let taught = &detector.model().demonstrations()[0].marks;
     let detection = &found.detection;
     let scale = if taught.width_px > 0.0 { detection.grasp.width / taught.width_px } else { 1.0 };
@@ -218,14 +215,6 @@ mod tests {
     use super::*;
     use sdg_annotate::{Session, SessionOptions};
     use std::sync::Arc;
-
-    #[test]
-    fn remedies_name_no_options_of_the_command_line() {
-        let size = remedy(PAGE_REMEDIES[0].0);
-        let side = remedy("if it is the part, uncover it, or add a --demo taken from this side");
-        assert!(!size.contains("--") && size.contains("learn from it"), "{size}");
-        assert_eq!(side, "if it is the part, uncover it, or add a demonstration taken from this side");
-    }
 
     #[test]
     fn the_page_shows_the_opening_that_is_taught_where_a_file_states_none() {

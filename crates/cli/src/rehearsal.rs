@@ -6,8 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Isometry3;
+use sdg_cell::{CellError, Found, Perception as ModelPerception};
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{CameraOverTable, GraspDetection, GraspError, GraspModel, GraspPose, PlanDetector, Verification};
+use sdg_grasp::{CameraOverTable, GraspModel, GraspPose, Verification};
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, GraspTarget, Place, PlaceGoal, PlacingConfig};
@@ -184,8 +185,12 @@ impl Rehearsal<'_> {
             obstacles,
             ..WorkcellConfig::new(scene)
         })?;
-        let mut perception =
-            ModelPerception { rehearsal: self, assumed: self.assumed(number), detector: None, last: None };
+        let mut perception = RehearsedPerception {
+            rehearsal: self,
+            assumed: self.assumed(number),
+            perception: ModelPerception::of_any_camera(self.model.clone()),
+            last: None,
+        };
         let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
         let started = Instant::now();
         let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
@@ -274,37 +279,30 @@ fn attempt_seed(seed: u64, number: usize) -> u64 {
 }
 
 /// The model as the workcell's perception.
-struct ModelPerception<'a> {
+struct RehearsedPerception<'a> {
     rehearsal: &'a Rehearsal<'a>,
     assumed: ObjectSpec,
-    /// With a calibrated camera: ready since the first picture.
-    detector: Option<PlanDetector>,
+    perception: ModelPerception,
     last: Option<RgbImage>,
 }
 
-impl ModelPerception<'_> {
-    /// What the model finds, in pixels of the picture.
-    fn detect(&mut self, view: &CameraView) -> std::result::Result<Vec<GraspDetection>, GraspError> {
-        let Rehearsal { model, verification, camera, .. } = self.rehearsal;
-        if camera.is_none() {
-            return model.detect(&view.image, *verification);
+impl RehearsedPerception<'_> {
+    /// The model's detections in a view; behind the paper's camera in the picture itself.
+    fn detect(&mut self, view: &CameraView) -> std::result::Result<Vec<Found>, CellError> {
+        if self.rehearsal.camera.is_some() {
+            let place = CameraOverTable { camera: view.camera, table_height_m: 0.0, workspace: None };
+            self.perception.move_to(&place)?;
         }
-        let over_table = CameraOverTable { camera: view.camera, table_height_m: 0.0, workspace: None };
-        let detector = match self.detector.take() {
-            Some(detector) => detector.moved_to(&over_table)?,
-            None => PlanDetector::new((*model).clone(), &over_table)?,
-        };
-        let found = self.detector.insert(detector).detect(&view.image, *verification)?;
-        Ok(found.into_iter().map(|found| found.detection).collect())
+        self.perception.detect(&view.image, self.rehearsal.verification)
     }
 }
 
-impl Perception for ModelPerception<'_> {
+impl Perception for RehearsedPerception<'_> {
     fn perceive(
         &mut self,
         view: &CameraView,
     ) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>> {
-        let detections = self.detect(view)?;
+        let detections: Vec<_> = self.detect(view)?.into_iter().map(|found| found.detection).collect();
         self.last = Some(crate::pictures::with_detections(&view.image, &detections));
         let Some(best) = detections.into_iter().next() else { return Ok(None) };
         let target = |pose: GraspPose| GraspTarget {

@@ -82,8 +82,8 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
             detector = Some(PlanDetector::new(model, &over_table(shown.camera))?);
         }
         let sample = scenes.sample(0);
-        let Some(looking) = detector.take() else { continue };
-        let looking = looking.moved_to(&over_table(sample.camera))?;
+        let Some(looking) = &mut detector else { continue };
+        looking.move_to(&over_table(sample.camera))?;
         for found in looking.detect(&sample.image, Verification::ByShape)? {
             if !found.detection.is_accepted() {
                 continue;
@@ -110,7 +110,6 @@ fn rows(part_seed: u64, is_held_out: bool, size: [u32; 2]) -> Result<Vec<Row>> {
                 circumstances: found.pose.circumstances,
             });
         }
-        detector = Some(looking);
     }
     Ok(rows)
 }

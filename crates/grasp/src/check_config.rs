@@ -9,6 +9,7 @@ use std::ops::RangeInclusive;
 use sdg_shape::SearchConfig;
 
 use crate::error::{GraspError, Result};
+use crate::evidence_kind::EvidenceKind;
 
 /// How a demonstration is compared with an image, searched for in it, and accepted or refused.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,6 +144,26 @@ impl ScoreConfig {
         Self { is_size_known: true, size: KNOWN_SIZE, ..self }
     }
 
+    /// The most that a kind of evidence adds for a part.
+    pub(crate) fn most_of(&self, kind: EvidenceKind) -> f64 {
+        match kind {
+            EvidenceKind::Network => self.network.most(),
+            EvidenceKind::Edges => self.edges.most(),
+            EvidenceKind::Surface => self.surface.most(),
+            EvidenceKind::Hue => self.hue.most(),
+            EvidenceKind::Visible => self.visible.most(),
+            EvidenceKind::Size => self.size.most(),
+            EvidenceKind::Outside => self.outside.most(),
+            EvidenceKind::Resemblance => self.resemblance.most(),
+            EvidenceKind::Likeness => self.likeness.most(),
+            EvidenceKind::Details => self.details.most() + self.details_for.most(),
+            EvidenceKind::Table => self.table.most(),
+            EvidenceKind::Rim => self.rim.most(),
+            EvidenceKind::Added => self.added.most(),
+            EvidenceKind::Mirror => self.mirror.most(),
+        }
+    }
+
     /// Every term of the score, by name.
     pub fn terms(&self) -> [(&'static str, Term); 15] {
         [
@@ -168,6 +189,19 @@ impl ScoreConfig {
 impl Default for ScoreConfig {
     fn default() -> Self {
         Self::DEFAULT
+    }
+}
+
+impl Term {
+    /// The log-odds of a value: its distance from the neutral one, within the range, times the weight.
+    pub(crate) fn log_odds(&self, value: f64) -> f64 {
+        let [low, high] = self.range;
+        self.weight * (value.clamp(low, high) - self.neutral)
+    }
+
+    /// The most of any value.
+    fn most(&self) -> f64 {
+        self.range.map(|value| self.log_odds(value)).into_iter().fold(f64::MIN, f64::max)
     }
 }
 

@@ -24,7 +24,7 @@ pub enum GraspError {
     },
     /// A device that was not compiled in.
     #[error(
-        "expected a device out of {}, which this build has; found \"{asked}\": build sdg-cli with --features {asked}",
+        "expected a device out of {}, which this build has; found \"{asked}\"",
         .built.join(", ")
     )]
     BackendNotBuilt { asked: &'static str, built: Vec<&'static str> },
@@ -64,9 +64,7 @@ pub enum GraspError {
     #[error(transparent)]
     PlanView(#[from] sdg_geometry::PlanViewError),
     /// A model that knows no lengths.
-    #[error(
-        "expected a model taught with a camera, found one without: teach it again with --camera and --mark-height-mm"
-    )]
+    #[error("expected a model taught with a camera, found one without")]
     NoLengths,
     /// A part that the gripper cannot take.
     #[error(

@@ -61,6 +61,7 @@ mod colors;
 mod decimal;
 mod device;
 mod error;
+mod evidence_kind;
 mod explanation;
 mod facts;
 #[cfg(feature = "teach")]
@@ -95,6 +96,7 @@ pub use calibration::Calibration;
 pub use check_config::{CheckConfig, ScoreConfig, Term};
 pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
+pub use evidence_kind::{Advice, EvidenceKind};
 pub use facts::{ModelKind, NegativeFacts, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};

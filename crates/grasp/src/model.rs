@@ -19,6 +19,7 @@ use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
 use crate::colors::Colors;
 use crate::error::{GraspError, Result};
+use crate::evidence_kind::{Advice, EvidenceKind};
 use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::models::{Network, PoseCandidate, Proposals};
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
@@ -87,13 +88,12 @@ impl GraspDetection {
         if self.is_accepted() {
             return None;
         }
-        let objection =
-            self.evidence.as_ref().map_or(Some("the network is not sure"), Contributions::strongest_objection);
-        Some(objection.unwrap_or("all evidence together is too weak"))
+        let Some(evidence) = &self.evidence else { return Some("the network is not sure") };
+        Some(evidence.strongest_objection().map_or("all evidence together is too weak", EvidenceKind::objection))
     }
 
     /// The further demonstration, or the setting, that would help where this is the part and was refused.
-    pub fn advice(&self) -> Option<&'static str> {
+    pub fn advice(&self) -> Option<Advice> {
         let evidence = self.evidence.as_ref().filter(|_| !self.is_accepted())?;
         evidence.advice(self.light)
     }

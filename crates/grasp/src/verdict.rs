@@ -17,6 +17,7 @@ use sdg_shape::{CloseLook, Evidence, RivalFit};
 use serde::Serialize;
 
 use crate::check_config::{ScoreConfig, Term};
+use crate::evidence_kind::{Advice, EvidenceKind};
 
 /// What each kind of evidence adds to a detection's log-odds: above 0 it speaks for the part, below 0 against it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -54,100 +55,66 @@ pub struct Contributions {
 }
 
 impl Contributions {
-    /// Name and log-odds of each, in the order of the fields.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        let network = self.network.map(|network| ("network", network));
+    /// The log-odds of each kind, in the order of the fields.
+    pub fn by_kind(&self) -> impl Iterator<Item = (EvidenceKind, f64)> {
+        let network = self.network.map(|network| (EvidenceKind::Network, network));
         network.into_iter().chain([
-            ("edges", self.edges),
-            ("surface", self.surface),
-            ("hue", self.hue),
-            ("visible", self.visible),
-            ("size", self.size),
-            ("outside", self.outside),
-            ("resemblance", self.resemblance),
-            ("likeness", self.likeness),
-            ("details", self.details),
-            ("table", self.table),
-            ("rim", self.rim),
-            ("added", self.added),
-            ("mirror", self.mirror),
+            (EvidenceKind::Edges, self.edges),
+            (EvidenceKind::Surface, self.surface),
+            (EvidenceKind::Hue, self.hue),
+            (EvidenceKind::Visible, self.visible),
+            (EvidenceKind::Size, self.size),
+            (EvidenceKind::Outside, self.outside),
+            (EvidenceKind::Resemblance, self.resemblance),
+            (EvidenceKind::Likeness, self.likeness),
+            (EvidenceKind::Details, self.details),
+            (EvidenceKind::Table, self.table),
+            (EvidenceKind::Rim, self.rim),
+            (EvidenceKind::Added, self.added),
+            (EvidenceKind::Mirror, self.mirror),
         ])
     }
 
-    /// What speaks most against the part, or least for it.
-    fn weakest(&self) -> Option<(&'static str, f64)> {
-        self.named().min_by(|a, b| a.1.total_cmp(&b.1))
+    /// The evidence that speaks most against the part, or least for it.
+    fn weakest(&self) -> Option<(EvidenceKind, f64)> {
+        self.by_kind().min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// What speaks against the part, name and words: first the strongest objection, then whatever says clearly less for the part
+    /// The evidence that speaks most against the part; `None` where none does.
+    pub fn strongest_objection(&self) -> Option<EvidenceKind> {
+        let (kind, log_odds) = self.weakest()?;
+        (log_odds < 0.0).then_some(kind)
+    }
+
+    /// The evidence that speaks against the part: first the strongest objection, then each that says clearly less for the part
     /// than it could by `config`, the greatest loss first.
-    pub fn objections(&self, config: &ScoreConfig) -> Vec<(&'static str, &'static str)> {
+    pub fn objections(&self, config: &ScoreConfig) -> Vec<EvidenceKind> {
         /// Less than this is lost in clear views, too. Chosen by hand.
         const MIN_LOSS: f64 = 0.5;
-        let best = |name: &str| {
-            let term = config.terms().into_iter().find(|(known, _)| *known == name).map(|(_, term)| term)?;
-            Some(term.range.map(|value| term.log_odds(value)).into_iter().fold(f64::MIN, f64::max))
-        };
-        let strongest = self.weakest().filter(|(_, log_odds)| *log_odds < 0.0).map(|(name, _)| name);
-        let mut lost: Vec<(&'static str, f64)> = self
-            .named()
-            .filter(|(name, _)| Some(*name) != strongest)
-            // These say nothing of where the part and the picture differ, unless they speak against the part.
-            .filter(|(name, log_odds)| {
-                !["network", "resemblance", "likeness", "details"].contains(name) || *log_odds < 0.0
-            })
-            .filter_map(|(name, log_odds)| Some((name, best(name)? - log_odds)))
+        let strongest = self.strongest_objection();
+        let mut lost: Vec<(EvidenceKind, f64)> = self
+            .by_kind()
+            .filter(|(kind, log_odds)| Some(*kind) != strongest && (kind.is_local() || *log_odds < 0.0))
+            .map(|(kind, log_odds)| (kind, config.most_of(kind) - log_odds))
             .filter(|(_, loss)| *loss >= MIN_LOSS)
             .collect();
         lost.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let names = strongest.into_iter().chain(lost.into_iter().map(|(name, _)| name));
-        names.map(|name| (name, Self::objection(name))).collect()
+        strongest.into_iter().chain(lost.into_iter().map(|(kind, _)| kind)).collect()
     }
 
-    /// What speaks most against the part, in words; `None` where nothing does.
-    pub fn strongest_objection(&self) -> Option<&'static str> {
-        let (name, log_odds) = self.weakest()?;
-        (log_odds < 0.0).then(|| Self::objection(name))
-    }
-
-    fn objection(name: &str) -> &'static str {
-        match name {
-            "network" => "the network does not see the part there",
-            "edges" => "too few of the part's edges are there",
-            "surface" => "the surface looks different: another side, print, gloss or light",
-            "hue" => "it has another colour: another part, or other light",
-            "visible" => "too little of it is visible",
-            "size" => "it has another size",
-            "likeness" => "photo and picture, laid over each other, do not show the same part",
-            "details" => "a feature or print of the part is not there, or is elsewhere",
-            "outside" => "too much of it lies outside the picture",
-            "table" => "bare table is seen where the part should be",
-            "rim" => "a part of its outline is not there",
-            "added" => "there is more inside its outline than in the photo",
-            "mirror" => "the mirror image fits better",
-            _ => "other things look much like this part",
-        }
-    }
-}
-
-impl Contributions {
     /// The further demonstration, or the setting, that would help where this is the part after all; `light` is its
     /// brightness over that of the demonstration. `None` where no photo would.
-    pub(crate) fn advice(&self, light: f64) -> Option<&'static str> {
+    pub(crate) fn advice(&self, light: f64) -> Option<Advice> {
         // Beyond these the light is another one. Chosen by hand, not measured.
         const DARKER: f64 = 0.6;
         const BRIGHTER: f64 = 1.6;
-        let (worst, log_odds) = self.weakest()?;
-        match worst {
-            _ if log_odds >= 0.0 => None,
-            "size" => Some(
-                "if its size is right, widen --size-tolerance, or with --camera check its file and --mark-height-mm",
-            ),
-            "outside" | "network" | "resemblance" => None,
-            _ if light < DARKER => Some("if it is the part, a second --demo in darker light would help"),
-            _ if light > BRIGHTER => Some("if it is the part, a second --demo in brighter light would help"),
-            "visible" => Some("if it is the part, uncover it, or add a --demo taken from this side"),
-            _ => Some("if it is the part, a second --demo taken from this side would help"),
+        match self.strongest_objection()? {
+            EvidenceKind::Size => Some(Advice::CheckSize),
+            EvidenceKind::Outside | EvidenceKind::Network | EvidenceKind::Resemblance => None,
+            _ if light < DARKER => Some(Advice::DarkerPhoto),
+            _ if light > BRIGHTER => Some(Advice::BrighterPhoto),
+            EvidenceKind::Visible => Some(Advice::Uncover),
+            _ => Some(Advice::OtherSide),
         }
     }
 }
@@ -222,7 +189,7 @@ fn judge(clues: &Clues, reference_log_size: Option<f64>, config: &ScoreConfig) -
         added: closely(&config.added, &|close| close.added),
         mirror: closely(&config.mirror, &|close| close.mirrored.map_or(0.0, rivals_gain)),
     };
-    let log_odds = config.bias + contributions.named().map(|(_, log_odds)| log_odds).sum::<f64>();
+    let log_odds = config.bias + contributions.by_kind().map(|(_, log_odds)| log_odds).sum::<f64>();
     (1.0 / (1.0 + (-log_odds).exp()), contributions)
 }
 
@@ -233,13 +200,6 @@ pub(crate) fn rivals_gain(rival: RivalFit) -> f64 {
     const FITS: [f64; 2] = [0.5, 0.7];
     let explains = ((rival.fit - FITS[0]) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
     if rival.share < MIN_RIVALS_SHARE { 0.0 } else { -rival.margin * explains }
-}
-
-impl Term {
-    /// What a value adds: its distance from the neutral one, within the range, times the weight.
-    fn log_odds(&self, value: f64) -> f64 {
-        self.weight * (value.clamp(self.range[0], self.range[1]) - self.neutral)
-    }
 }
 
 #[cfg(test)]
@@ -330,32 +290,35 @@ pub(crate) mod tests {
 
     #[test]
     fn the_photo_that_would_help_depends_on_the_objection_and_the_light() {
-        let of =
-            |clues: Clues, light: f64| judge(&clues, None, &ScoreConfig::DEFAULT).1.advice(light).unwrap_or("none");
+        let of = |clues: Clues, light: f64| judge(&clues, None, &ScoreConfig::DEFAULT).1.advice(light);
         let plain = Clues { evidence: Evidence { surface: Some(0.0), edges: 0.5, ..clear().evidence }, ..clear() };
-        assert!(of(plain, 1.0).contains("from this side"));
-        assert!(of(plain, 0.4).contains("darker") && of(plain, 2.0).contains("brighter"));
+        assert_eq!(of(plain, 1.0), Some(Advice::OtherSide));
+        assert_eq!([of(plain, 0.4), of(plain, 2.0)], [Some(Advice::DarkerPhoto), Some(Advice::BrighterPhoto)]);
         let covered = Clues { evidence: Evidence { visible: 0.2, ..clear().evidence }, ..clear() };
-        assert!(of(covered, 1.0).contains("uncover it"));
+        assert_eq!(of(covered, 1.0), Some(Advice::Uncover));
         let cut = Clues { evidence: Evidence { outside: 0.4, ..clear().evidence }, ..clear() };
-        assert_eq!(of(cut, 1.0), "none");
+        assert_eq!(of(cut, 1.0), None);
     }
 
     #[test]
-    fn the_strongest_objection_is_said_in_words() {
+    fn the_strongest_objection_comes_first() {
         let hidden = Clues { evidence: Evidence { visible: 0.2, ..clear().evidence }, ..clear() };
         let (_, contributions) = judge(&hidden, None, &ScoreConfig::DEFAULT);
-        assert_eq!(contributions.strongest_objection(), Some("too little of it is visible"));
+        assert_eq!(contributions.strongest_objection(), Some(EvidenceKind::Visible));
         let covered =
             Clues { evidence: Evidence { close: Some(look(-1.5)), edges: 0.6, ..hidden.evidence }, ..clear() };
         let config = ScoreConfig::DEFAULT;
-        let names = |clues: &Clues| -> Vec<_> {
-            judge(clues, None, &config).1.objections(&config).into_iter().map(|(name, _)| name).collect()
-        };
-        assert_eq!(names(&hidden)[0], "visible");
+        let objections = |clues: &Clues| judge(clues, None, &config).1.objections(&config);
+        assert_eq!(objections(&hidden)[0], EvidenceKind::Visible);
         // The strongest objection first; what only says less for the part than it could comes after it.
-        let of_covered = names(&covered);
-        assert!(of_covered.contains(&"visible") && of_covered.contains(&"edges"), "{of_covered:?}");
-        assert_eq!(names(&Clues { evidence: Evidence { edges: 0.79, ..clear().evidence }, ..clear() }).first(), None);
+        let of_covered = objections(&covered);
+        assert!(
+            of_covered.contains(&EvidenceKind::Visible) && of_covered.contains(&EvidenceKind::Edges),
+            "{of_covered:?}"
+        );
+        assert_eq!(
+            objections(&Clues { evidence: Evidence { edges: 0.79, ..clear().evidence }, ..clear() }).first(),
+            None
+        );
     }
 }

@@ -57,6 +57,12 @@ pub enum RobotError {
     /// A setting outside its range, or one that the arm cannot do.
     #[error("{what}: expected {expected}, found {found}")]
     Configuration { what: String, expected: String, found: String },
+    /// The system refuses real-time scheduling.
+    #[error(
+        "real-time scheduling of the control loop: expected a kernel and a user that may use SCHED_FIFO (a line \"@realtime - \
+         rtprio 99\" in /etc/security/limits.conf, and the user in that group), found {found}"
+    )]
+    NoRealTime { found: String },
     /// What lies below reports something else.
     #[error(transparent)]
     Device(Box<dyn Error + Send + Sync>),
@@ -74,6 +80,7 @@ impl RobotError {
                 | Self::Unreachable { .. }
                 | Self::Perception(_)
                 | Self::Configuration { .. }
+                | Self::NoRealTime { .. }
         )
     }
 }

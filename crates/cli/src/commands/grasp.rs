@@ -6,6 +6,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
+use sdg_cell::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -21,10 +22,7 @@ use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
-use crate::robots::{
-    self, Consent, DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, RobotChoice, SeenOutline, confirm,
-    run_sequence, write_states,
-};
+use crate::robots::{self, Consent, DryRun, Ended, RobotChoice, confirm, run_sequence, write_states};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg grasp`
@@ -129,8 +127,7 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         Usage(format!("expected --camera FILE, or a file under [camera] in {}", args.workcell.display()))
     })?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
-    let camera = PlacedCamera::new(&calibrated, workcell.mounting, workcell.table_height_m)
-        .with_context(|| camera_path.display().to_string())?;
+    let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
     let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
@@ -140,7 +137,7 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
         soft_approach: args.soft.then(TouchDown::default),
-        part: robots::part_shape(&model),
+        part: part_shape(&model),
         ..workcell.grasp_config()
     };
     let symmetry = model.facts().symmetry;
@@ -164,10 +161,9 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
         );
     };
     let scene = robots::simulated_scene(text)?;
-    let (intrinsics, place) = prepared.camera.simulated();
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
-        wrist_camera: Some(intrinsics),
-        camera_place: Some(place),
+        wrist_camera: Some(prepared.camera.intrinsics),
+        camera_place: Some(robots::camera_place(&prepared.camera)),
         obstacles: prepared.workcell.obstacles.clone(),
         ..WorkcellConfig::new(scene)
     })?;
@@ -203,7 +199,7 @@ fn attempt<A: CompliantArm, P: Pictures<A>>(
     }
     if args.dry_run {
         let target = finder.find(arm)?.filter(|target| target.score >= sdg_robot::SURE);
-        dry_run(args, prepared, arm, limits.clone(), target, finder.seen.as_ref())?;
+        dry_run(args, prepared, arm, limits.clone(), target, finder.seen())?;
     }
     if args.dry_run || address.is_some() {
         let question = match address {

@@ -10,9 +10,7 @@ use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{
-    CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
-};
+use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -23,10 +21,10 @@ use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
 use crate::files;
-use crate::held_back::HeldBackFigures;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
+use crate::taught_file::TaughtFile;
 use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
 
@@ -158,20 +156,18 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let report = read_base_weights(args, &mut options)?;
 
     let mut progress = TeachingProgress::new(Interrupt::watch());
-    let taught = teach(&demonstrations, &options, &mut |event| progress.show(event));
+    let taught = TaughtFile::teach(&demonstrations, &options, &mut |event| progress.show(event));
     progress.finish();
-    let taught = taught.map_err(|error| match error {
+    let file = taught.map_err(|error| match error {
         GraspError::NeedsBaseWeights { preset } if preset == Preset::Edge.name() => {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
         GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
         error => anyhow::Error::from(error),
     })?;
-    let bytes = taught.model.to_bytes()?;
-    files::write(&args.out, &bytes)?;
-    // What was written, and no network apart from it, is what will be used.
-    let written = GraspModel::from_bytes(&bytes, &options.device)?;
-    let figures = HeldBackFigures::of(&written, &demonstrations, args.seed)?;
+    files::write(&args.out, &file.bytes)?;
+    let figures = file.figures(&demonstrations, args.seed)?;
+    let TaughtFile { taught, bytes, .. } = file;
     let page = match &args.report {
         Some(folder) => {
             let command = command(args);

@@ -5,17 +5,17 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use image::RgbImage;
-use sdg_grasp::{GraspModel, TeachOptions, TeachingEvent, teach};
+use sdg_grasp::{TeachOptions, TeachingEvent};
 use serde_json::{Value, json};
 
 use super::teach::{TeachArgs, options, read_base_weights, symmetry};
 use crate::exit::{Outcome, Usage, one_line};
-use crate::held_back::HeldBackFigures;
 use crate::interrupt::Interrupt;
 use crate::many_parts::{
     CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page,
 };
 use crate::progress::EvaluationProgress;
+use crate::taught_file::TaughtFile;
 
 /// Teaches what is not taught yet; then, unless single parts were asked for, runs each model on every photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
@@ -107,11 +107,9 @@ fn teach_part(
         let mut observe = |_: &TeachingEvent| {
             if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let taught = teach(&demonstrations, &options, &mut observe)?;
-        let bytes = taught.model.to_bytes()?;
-        let written = GraspModel::from_bytes(&bytes, &options.device)?;
-        let figures = HeldBackFigures::of(&written, &demonstrations, options.seed)?;
-        Ok((bytes, PartOutcome::taught(taught.model.facts().seconds, &figures)))
+        let file = TaughtFile::teach(&demonstrations, &options, &mut observe)?;
+        let figures = file.figures(&demonstrations, options.seed)?;
+        Ok((file.bytes, PartOutcome::taught(file.model.facts().seconds, &figures)))
     };
     let ended = attempt();
     if interrupt.is_requested() {

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use nalgebra::Point2;
+use sdg_cell::Perception;
 use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
 use sdg_grasp::GraspModel;
 
@@ -17,7 +18,6 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::exit::one_line;
 use crate::files::{self, UNREADABLE_EXTENSIONS};
-use crate::picture_detector::PictureDetector;
 
 /// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
@@ -42,7 +42,7 @@ impl LabelledFolder {
     /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
     /// marks of a picture of another size or outside the picture, two files that label one picture, an instance
     /// without a grasp that is not optional, and several labels out of which none is chosen.
-    pub fn read(folder: &Path, detector: &PictureDetector, label: Option<&str>) -> Result<Self> {
+    pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
         let mut left_out = Vec::new();
         let mut others = 0;
         let read = if folder.join(TRUTH_FILE).exists() {
@@ -75,7 +75,7 @@ impl LabelledFolder {
     }
 }
 
-fn read_labels(folder: &Path, detector: &PictureDetector, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
+fn read_labels(folder: &Path, detector: &Perception, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
     let assigned = assign(folder, left_out)?;
     let read = assigned.pictures.iter().map(|(picture, labels)| {
         let (path, file) = &assigned.label_files[*labels];
@@ -181,7 +181,7 @@ struct ReadPicture {
     taught: Vec<Point2<f64>>,
 }
 
-fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &PictureDetector) -> Result<ReadPicture> {
+fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Perception) -> Result<ReadPicture> {
     let image = files::read_image(path)?;
     let (width, height) = image.dimensions();
     let name = file_name(path);

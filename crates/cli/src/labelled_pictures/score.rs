@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use nalgebra::Point2;
+use sdg_cell::Perception;
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::{Angle, BoundingBox, PlanarGrasp, RotationalSymmetry, percentile};
 use sdg_grasp::{GraspDetection, TaughtDemonstration, Verification};
@@ -13,7 +14,6 @@ use serde::Serialize;
 
 use super::picture::{Instance, LabelledPicture};
 use crate::files;
-use crate::picture_detector::PictureDetector;
 use crate::statistics::Share;
 
 /// A hit lies at most so far from the instance's marks, in diagonals of the instance.
@@ -53,7 +53,7 @@ pub struct TrueGrasp {
 impl Truth {
     /// An instance. Unless its labels say them, its size is read off the length of its marks, the mean over several demonstrations,
     /// and its symmetry is the model's.
-    pub fn new(instance: &Instance, detector: &PictureDetector) -> Self {
+    pub fn new(instance: &Instance, detector: &Perception) -> Self {
         let demonstrations = detector.model().demonstrations();
         let diagonal_per_length = |demonstration: &TaughtDemonstration| {
             let marks = &demonstration.marks;
@@ -103,7 +103,7 @@ impl Tested {
     ///
     /// # Errors
     /// A picture that cannot be read or detected in.
-    pub fn detect(picture: LabelledPicture, detector: &PictureDetector, verification: Verification) -> Result<Self> {
+    pub fn detect(picture: LabelledPicture, detector: &Perception, verification: Verification) -> Result<Self> {
         if detector.pixel_frame() == PixelFrame::Sensor {
             files::check_is_not_turned(&picture.path)?;
         }

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use nalgebra::{Point2, Vector2};
+use sdg_cell::Perception;
 use sdg_demonstration::IMAGE_EXTENSIONS;
 use sdg_geometry::{Angle, BoundingBox, GraspLine, RotationalSymmetry};
 use serde::Deserialize;
@@ -14,7 +15,6 @@ use serde_json::Value;
 use super::picture::{Extent, Instance, LabelledPicture, LeftOut, file_name};
 use super::taught::taught_grasps;
 use crate::files;
-use crate::picture_detector::PictureDetector;
 
 /// The file's name in a folder of pictures.
 pub const TRUTH_FILE: &str = "truth.json";
@@ -135,7 +135,7 @@ impl RawInstance {
 /// Those of [`TruthEntry::read_all`]; pictures that cannot be read.
 pub(super) fn read_truth(
     folder: &Path,
-    detector: &PictureDetector,
+    detector: &Perception,
     left_out: &mut Vec<LeftOut>,
 ) -> Result<Vec<(LabelledPicture, Vec<Point2<f64>>)>> {
     let entries = TruthEntry::read_all(folder)?;

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow};
 use nalgebra::Isometry3;
+use sdg_cell::SeenOutline;
 use sdg_kinematics::collision::Obstacle;
 use sdg_robot::{
     ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedAction,
     PlannedArm, Robot, SafetyLimits, Watch,
 };
 
-use super::finder::SeenOutline;
 use super::sequence_run::{Ended, run_sequence};
 
 /// A grasp that is planned and not carried out.

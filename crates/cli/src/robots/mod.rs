@@ -2,8 +2,6 @@
 
 mod confirm;
 mod dry_run;
-mod finder;
-mod model_shape;
 #[cfg(feature = "simulation")]
 mod motion_drawing;
 mod sequence_run;
@@ -23,16 +21,10 @@ use crate::interrupt::Interrupt;
 pub(crate) use confirm::{Consent, confirm};
 pub(crate) use dry_run::DryRun;
 #[cfg(feature = "simulation")]
-pub(crate) use finder::SimulatedPictures;
-#[cfg(feature = "ros2")]
-pub(crate) use finder::TakenPicture;
-pub(crate) use finder::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline};
-pub(crate) use model_shape::part_shape;
-#[cfg(feature = "simulation")]
 pub(crate) use motion_drawing::MotionDrawing;
 pub(crate) use sequence_run::{Ended, run_sequence};
 #[cfg(feature = "simulation")]
-pub(crate) use simulated_scene::simulated_scene;
+pub(crate) use simulated_scene::{SimulatedPictures, camera_place, simulated_scene};
 pub(crate) use states_file::write_states;
 pub(crate) use workcell_file::read_workcell;
 

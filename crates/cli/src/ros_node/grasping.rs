@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result};
+use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
@@ -19,7 +20,7 @@ use crate::camera_files;
 use crate::commands::ros2::args::Ros2Args;
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;
-use crate::robots::{self, ModelFinder, Pictures, PlacedCamera, TakenPicture};
+use crate::robots;
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -48,8 +49,7 @@ impl GraspSettings {
             .or(camera_of_workcell)
             .ok_or_else(|| Usage("--allow-motion: expected --camera FILE".to_owned()))?;
         let (calibrated, _) = camera_files::read(&camera_path)?;
-        let camera = PlacedCamera::new(&calibrated, workcell.mounting, workcell.table_height_m)
-            .with_context(|| camera_path.display().to_string())?;
+        let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
         let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
         Ok(Self { workcell, camera, speed: args.arm.speed, base_frame })
     }
@@ -123,7 +123,12 @@ impl Grasping {
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }
-        let config = GraspConfig { pace, max_detection_age_secs: 1.0, ..self.settings.workcell.grasp_config() };
+        let config = GraspConfig {
+            pace,
+            max_detection_age_secs: 1.0,
+            part: part_shape(model),
+            ..self.settings.workcell.grasp_config()
+        };
         let mut arm = self.arm.take().context("the arm is lost")?;
         let (settings, interrupt) = (Arc::clone(&self.settings), self.interrupt.clone());
         let mut finder = ModelFinder::new(model.clone(), settings.camera, self.pictures.clone());

@@ -6,17 +6,19 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use image::RgbImage;
 use nalgebra::Point2;
-use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspModel, PlanDetector, Verification};
+use sdg_cell::{Found, Perception};
+use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspModel, Verification};
 use sdg_ros2::found::FoundPart;
 use sdg_ros2::messages::Header;
 
 use super::pictures::Picture;
 use crate::files;
 
-/// A grasp model, and the camera behind which it was last used.
+/// A grasp model, and the camera behind which it looks.
 pub(super) struct Searcher {
+    /// As it was read, for the grasps of an arm.
     model: Option<GraspModel>,
-    placed: Option<PlanDetector>,
+    perception: Option<Perception>,
     min_score: f64,
 }
 
@@ -34,7 +36,8 @@ pub(super) struct Searched {
 
 impl Searcher {
     pub(super) fn new(model: Option<GraspModel>, min_score: f64) -> Self {
-        Self { model, placed: None, min_score }
+        let perception = model.clone().map(Perception::of_any_camera);
+        Self { model, perception, min_score }
     }
 
     /// Uses another model from now on.
@@ -42,8 +45,7 @@ impl Searcher {
     /// # Errors
     /// A file that is no model.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
-        self.model = Some(files::read_model(path, device)?);
-        self.placed = None;
+        *self = Self::new(Some(files::read_model(path, device)?), self.min_score);
         Ok(())
     }
 
@@ -51,57 +53,38 @@ impl Searcher {
         self.model.as_ref()
     }
 
-    /// Searches a picture; `over_table` is where its camera was.
+    /// Searches a picture; `place` is where its camera was, which a node knows of each picture or of none.
     ///
     /// # Errors
     /// No model, one without lengths behind a calibrated camera, a picture of another size than the camera's.
-    pub(super) fn search(&mut self, picture: &Picture, over_table: Option<&CameraOverTable>) -> Result<Searched> {
-        let model = self.model.as_ref().context("no grasp model yet: --grasp-model, or the service teach")?;
+    pub(super) fn search(&mut self, picture: &Picture, place: Option<&CameraOverTable>) -> Result<Searched> {
+        const NO_MODEL: &str = "no grasp model yet: --grasp-model, or the service teach";
+        let perception = self.perception.as_mut().context(NO_MODEL)?;
         let started = Instant::now();
-        let part = |detection: &GraspDetection, grasp| FoundPart {
-            name: model.object().to_owned(),
+        if let Some(place) = place {
+            perception.move_to(place)?;
+        }
+        let name = perception.model().object();
+        let part = |Found { detection, pose }: &Found| FoundPart {
+            name: name.to_owned(),
             score: detection.score,
             corners: [
                 Point2::new(detection.bbox.x1, detection.bbox.y1),
                 Point2::new(detection.bbox.x2, detection.bbox.y2),
             ],
-            grasp,
+            grasp: pose.zip(place).map(|(pose, place)| {
+                (place.camera.world_from_camera.inverse() * pose.frame_from_tcp(), pose.opening_m)
+            }),
         };
-        let (found, detections) = match over_table {
-            None => {
-                let detections = model.detect(&picture.picture, Verification::ByShape)?;
-                (detections.iter().map(|detection| part(detection, None)).collect(), detections)
-            }
-            Some(over_table) => {
-                let camera = &over_table.camera;
-                let (expected, found) =
-                    ((camera.intrinsics.width, camera.intrinsics.height), picture.picture.dimensions());
-                if expected != found {
-                    let ((w, h), (width, height)) = (expected, found);
-                    anyhow::bail!("expected pictures of {w} × {h} pixels, as the camera has, found {width} × {height}");
-                }
-                let detector = match self.placed.take() {
-                    Some(detector) => detector.moved_to(over_table)?,
-                    None => PlanDetector::new(model.clone(), over_table)?,
-                };
-                let placed = self.placed.insert(detector).detect(&picture.picture, Verification::ByShape)?;
-                let camera_from_world = camera.world_from_camera.inverse();
-                let found: Vec<FoundPart> = placed
-                    .iter()
-                    .map(|one| {
-                        let camera_from_tcp = camera_from_world * one.pose.frame_from_tcp();
-                        part(&one.detection, Some((camera_from_tcp, one.pose.opening_m)))
-                    })
-                    .collect();
-                (found, placed.into_iter().map(|one| one.detection).collect())
-            }
-        };
+        let seen = perception.detect(&picture.picture, Verification::ByShape)?;
+        let found: Vec<_> = seen.iter().map(part).collect();
+        let detections = seen.into_iter().map(|found| found.detection);
         let is_kept = |score: f64| score >= self.min_score;
         Ok(Searched {
             header: picture.header.clone(),
             arrived: picture.arrived,
             found: found.into_iter().filter(|part| is_kept(part.score)).collect(),
-            detections: detections.into_iter().filter(|detection| is_kept(detection.score)).collect(),
+            detections: detections.filter(|detection| is_kept(detection.score)).collect(),
             picture: std::sync::Arc::clone(&picture.picture),
             search_secs: started.elapsed().as_secs_f64(),
         })

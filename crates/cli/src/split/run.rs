@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use sdg_cell::Perception;
 use sdg_demonstration::Demonstration;
 use sdg_geometry::{PlanarGrasp, PlanarSimilarity};
 use sdg_grasp::fitting::{FitInstance, FitPart, FitPicture};
-use sdg_grasp::{GraspModel, ModelKind, TeachOptions, Verification, teach};
+use sdg_grasp::{ModelKind, TeachOptions, Verification};
 
 use super::counts::Counts;
 use super::file::SplitSet;
@@ -15,7 +16,7 @@ use crate::annotation_files::beside_photo;
 use crate::demonstrations;
 use crate::files;
 use crate::labelled_pictures::{Instance, LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
-use crate::picture_detector::PictureDetector;
+use crate::taught_file::TaughtFile;
 
 /// A set whose files were found.
 pub struct ReadySet {
@@ -108,14 +109,14 @@ impl ReadySet {
         options.kind = model;
         options.symmetry = self.set.symmetry;
         let demonstrations = std::slice::from_ref(&self.demonstration);
-        let taught = teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).with_context(named)?;
-        // The file's weights are rounded: what `sdg detect` would read.
-        let written = GraspModel::from_bytes(&taught.model.to_bytes()?, &options.device)?;
-        let detector = PictureDetector::AnyCamera(Box::new(written));
+        let taught =
+            TaughtFile::teach(demonstrations, &options, &mut |_| ControlFlow::Continue(())).with_context(named)?;
+        let teach_secs = taught.model.facts().seconds;
+        let detector = Perception::of_any_camera(taught.model);
         let labelled = LabelledFolder::read(&self.folder, &detector, None)?;
         let detect = |picture| Tested::detect(picture, &detector, Verification::ByShape);
         let tested = labelled.pictures.into_iter().map(detect).collect::<Result<_>>()?;
-        Ok(SetRun { set: self.set.clone(), seed, teach_secs: taught.model.facts().seconds, tested })
+        Ok(SetRun { set: self.set.clone(), seed, teach_secs, tested })
     }
 }
 

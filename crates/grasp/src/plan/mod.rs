@@ -94,14 +94,15 @@ impl PlanDetector {
         Ok(Self { model: model.of_known_size()?, over_table: *over_table, lengths, view, map })
     }
 
-    /// The same model behind another camera, or the same camera in another place.
+    /// Goes on behind another camera, or the same camera in another place.
     ///
     /// # Errors
-    /// A camera that does not see the plane.
-    pub fn moved_to(self, over_table: &CameraOverTable) -> Result<Self> {
-        let view = plan_view(over_table, &self.lengths)?;
-        let map = PlanMap::new(&over_table.camera, &view);
-        Ok(Self { over_table: *over_table, view, map, ..self })
+    /// A camera that does not see the plane; nothing is changed then.
+    pub fn move_to(&mut self, over_table: &CameraOverTable) -> Result<()> {
+        self.view = plan_view(over_table, &self.lengths)?;
+        self.map = PlanMap::new(&over_table.camera, &self.view);
+        self.over_table = *over_table;
+        Ok(())
     }
 
     /// The model, for plan views of known size.

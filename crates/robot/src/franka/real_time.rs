@@ -41,13 +41,7 @@ pub(super) fn enter() -> Result<()> {
 }
 
 fn refused(found: impl std::fmt::Display) -> RobotError {
-    RobotError::Configuration {
-        what: "real-time scheduling of the control loop".to_owned(),
-        expected: "a kernel and a user that may use SCHED_FIFO (a line \"@realtime - rtprio 99\" in \
-                   /etc/security/limits.conf, and the user in that group), or --no-realtime"
-            .to_owned(),
-        found: found.to_string(),
-    }
+    RobotError::NoRealTime { found: found.to_string() }
 }
 
 #[cfg(test)]
@@ -60,7 +54,7 @@ mod tests {
             Ok(()) => {}
             Err(error) => {
                 let line = error.to_string();
-                assert!(line.contains("SCHED_FIFO") && line.contains("--no-realtime"), "{line}");
+                assert!(line.contains("SCHED_FIFO") && line.contains("rtprio"), "{line}");
             }
         }
         // This thread is scheduled as before.

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use anyhow::Result;
 use image::RgbImage;
 use sdg_camera::{Address, Camera, CameraError, Frame, LatestFrame, MjpegServer};
+use sdg_cell::{Found, LiveTracker, Perception, SearchTime};
 use sdg_grasp::{TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
@@ -22,15 +23,13 @@ use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
-use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
-use crate::tracking::{LiveTracker, SearchTime};
 
 /// How long the newest frame is waited for before Ctrl-C is looked at again.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Reads frames until the camera ends, `--frames` are read or Ctrl-C is pressed.
-pub fn run(args: &DetectArgs, address: &Address, detector: PictureDetector) -> Result<Outcome> {
+pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result<Outcome> {
     let server = match &args.draw {
         None => None,
         Some(port) => {
@@ -102,7 +101,7 @@ enum Next {
 
 impl Frames {
     /// A calibrated camera is asked for the size that it was calibrated with.
-    fn open(address: &Address, args: &DetectArgs, detector: &PictureDetector) -> Result<Self> {
+    fn open(address: &Address, args: &DetectArgs, detector: &Perception) -> Result<Self> {
         let mut options = args.request.options();
         options.frame = detector.pixel_frame();
         if let Some([width, height]) = detector.picture_size() {
@@ -156,7 +155,7 @@ impl Part {
 
 /// Parts of a frame, with or without those of the frames before.
 struct FrameDetector {
-    detector: PictureDetector,
+    detector: Perception,
     verification: Verification,
     tracker: Option<LiveTracker>,
     /// The time from one stored picture to the next; `None` where frames have times of their own.
@@ -169,7 +168,7 @@ struct FrameDetector {
 const UNRELATED: Duration = Duration::from_secs(1);
 
 impl FrameDetector {
-    fn new(args: &DetectArgs, address: &Address, frames_wait: bool, detector: PictureDetector) -> Result<Self> {
+    fn new(args: &DetectArgs, address: &Address, frames_wait: bool, detector: Perception) -> Result<Self> {
         // The time of a file's last change is not that of its picture.
         let interval = match address {
             Address::Folder { playback, .. } | Address::File { playback, .. } => {
@@ -186,7 +185,7 @@ impl FrameDetector {
                 if frames_wait {
                     config.moves_within = Duration::ZERO;
                 }
-                Some(LiveTracker::new(detector.to_part_detector(), config, SearchTime::AsItTakes)?)
+                Some(LiveTracker::new(&detector, config, SearchTime::AsItTakes)?)
             }
         };
         Ok(Self { detector, verification, tracker, interval, first: None })
@@ -223,7 +222,7 @@ fn state_name(state: TrackState) -> &'static str {
 fn write_line(
     out: &mut impl Write,
     args: &DetectArgs,
-    detector: &PictureDetector,
+    detector: &Perception,
     frame: &Frame,
     (width, height): (u32, u32),
     seconds: f64,

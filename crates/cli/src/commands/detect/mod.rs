@@ -10,20 +10,21 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
+use sdg_cell::{Found, Perception};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
 use serde::Serialize;
 
 pub use args::DetectArgs;
 use inputs::{Input, Inputs};
 
+use crate::camera_files;
 use crate::commands::devices;
 use crate::drawings;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
-use crate::found_text::{DEFAULT_MIN_SCORE, Wording};
+use crate::found_text::{DEFAULT_MIN_SCORE, Wording, advice_in_words};
 use crate::json_line::json_line;
-use crate::picture_detector::{Found, PictureDetector};
 use crate::pictures;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
@@ -54,7 +55,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if args.max as usize != CheckConfig::DEFAULT_MAX_DETECTIONS {
         model = model.with_max_detections(args.max as usize)?;
     }
-    let detector = PictureDetector::new(model, &args.grasp_model, args.camera.as_deref())?;
+    let detector = camera_files::perception(model, &args.grasp_model, args.camera.as_deref())?;
     if let Some(address) = &args.from {
         return live::run(args, address, detector);
     }
@@ -95,7 +96,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
 /// Pictures one after the other, each with its line.
 struct Batch<'a, W> {
     args: &'a DetectArgs,
-    detector: &'a PictureDetector,
+    detector: &'a Perception,
     stdout: W,
     /// Names of the pictures that were drawn.
     drawn: BTreeSet<String>,
@@ -171,11 +172,11 @@ impl Seen {
         self.detections.iter().filter(move |found| found.detection.score >= min_score)
     }
 
-    fn wording<'a>(&self, detector: &'a PictureDetector, min_score: f64) -> Wording<'a> {
+    fn wording<'a>(&self, detector: &'a Perception, min_score: f64) -> Wording<'a> {
         Wording { detector, picture_size: self.size, min_score }
     }
 
-    fn write(&self, out: &mut impl Write, args: &DetectArgs, detector: &PictureDetector, name: &str) -> Result<()> {
+    fn write(&self, out: &mut impl Write, args: &DetectArgs, detector: &Perception, name: &str) -> Result<()> {
         let wording = self.wording(detector, args.min_score);
         let refused: Vec<&GraspDetection> =
             self.detections.iter().map(|found| &found.detection).filter(|found| !wording.is_accepted(found)).collect();
@@ -184,7 +185,7 @@ impl Seen {
             let record = |found: &Found| PictureRecord {
                 found: FoundRecord::new(found, detector),
                 size: detector.size_of(&found.detection, self.size),
-                advice: found.detection.advice(),
+                advice: found.detection.advice().map(advice_in_words),
             };
             let line = ImageLine {
                 image: name,

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use crate::camera_files;
 use anyhow::Result;
 use sdg_grasp::Verification;
 
@@ -12,7 +13,6 @@ use crate::exit::{Outcome, Usage};
 use crate::files;
 use crate::json_line::json_line;
 use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json};
-use crate::picture_detector::PictureDetector;
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
 
@@ -27,7 +27,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
         );
     };
     let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
-    let detector = PictureDetector::new(model, model_file, args.camera.as_deref())?;
+    let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));

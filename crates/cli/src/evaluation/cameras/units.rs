@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use sdg_grasp::{CameraOverTable, ModelKind, PlanDetection, PlanDetector, Preset, Verification};
+use sdg_cell::{Found, Perception};
+use sdg_grasp::{CameraOverTable, ModelKind, Preset, Verification};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::ObjectSpec;
 use serde::{Deserialize, Serialize};
@@ -132,7 +133,7 @@ impl CamerasEvaluation<'_> {
             return Ok(Some(NO_MODEL.to_owned()));
         };
         let started = Instant::now();
-        let mut detector: Option<PlanDetector> = None;
+        let mut perception = Perception::of_any_camera(model);
         let mut pictures = Vec::new();
         for number in 0..u64::from(self.views) {
             if is_interrupted() {
@@ -140,13 +141,9 @@ impl CamerasEvaluation<'_> {
             }
             let shown = set.draw(object, number, u64::from(self.views), self.store.settings().seed)?;
             let camera = CameraOverTable { camera: shown.view.camera, table_height_m: 0.0, workspace: None };
-            let looking = match detector.take() {
-                Some(detector) => detector.moved_to(&camera)?,
-                None => PlanDetector::new(model.clone(), &camera)?,
-            };
-            let found = looking.detect(&shown.view.image, Verification::ByShape)?;
+            perception.move_to(&camera)?;
+            let found = perception.detect(&shown.view.image, Verification::ByShape)?;
             pictures.push(judged(object, number, &shown, &found));
-            detector = Some(looking);
         }
         let record = CameraRecord { pictures, seconds: started.elapsed().as_secs_f64() };
         self.store.write_made_with(&file(cell, set), &self.settings(), &record)?;
@@ -157,27 +154,31 @@ impl CamerasEvaluation<'_> {
 }
 
 /// Accepted detections beside the truth.
-fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[PlanDetection]) -> CameraPicture {
+fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[Found]) -> CameraPicture {
     let num_counted = if shown.instances.len() <= 1 { 1 } else { usize::MAX };
-    let accepted: Vec<&PlanDetection> =
-        found.iter().take_while(|found| found.detection.is_accepted()).take(num_counted).collect();
+    let accepted: Vec<_> = found
+        .iter()
+        .take_while(|found| found.detection.is_accepted())
+        .take(num_counted)
+        .filter_map(|found| Some((found.detection.score, found.pose?)))
+        .collect();
     let errors: Vec<Vec<Option<DetectionError>>> = accepted
         .iter()
-        .map(|found| {
-            let base_from_tcp = found.pose.frame_from_tcp();
+        .map(|(_, pose)| {
+            let base_from_tcp = pose.frame_from_tcp();
             shown.instances.iter().map(|instance| Some(grasp_error(object, instance, &base_from_tcp))).collect()
         })
         .collect();
     let matched = match_one_to_one(&errors, &vec![true; accepted.len()]);
-    let answers = accepted.iter().zip(&errors).zip(matched).map(|((found, errors), instance)| {
+    let answers = accepted.iter().zip(&errors).zip(matched).map(|(((score, pose), errors), instance)| {
         let nearest = || errors.iter().flatten().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm)).copied();
         let error = instance.map_or_else(nearest, |instance| errors[instance]);
         MetricAnswer {
-            score: found.detection.score,
+            score: *score,
             error_mm: error.map(|error| error.distance_mm),
             error_deg: error.map(|error| error.angle_deg),
-            sigma_mm: 1e3 * found.pose.uncertainty.position_m,
-            sigma_deg: found.pose.uncertainty.yaw_rad.to_degrees(),
+            sigma_mm: 1e3 * pose.uncertainty.position_m,
+            sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
             found: instance,
         }
     });

@@ -15,9 +15,13 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_grasp::{PartDetector, PartSearch, SearchOutcome, TrackedPart, Tracker, TrackerConfig};
+use sdg_grasp::{PartSearch, SearchOutcome, TrackedPart, Tracker, TrackerConfig};
+
+use crate::error::{CellError, Result};
+use crate::perception::Perception;
+
+const ENDED: CellError = CellError::SearchThread("ended");
 
 /// Where searches run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +57,7 @@ impl LiveTracker {
     ///
     /// # Errors
     /// A thread that the system refuses.
-    pub fn new(detector: PartDetector, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
+    pub fn new(perception: &Perception, config: TrackerConfig, search_time: SearchTime) -> Result<Self> {
         let searches = match search_time {
             SearchTime::AsItTakes => {
                 let (due, searches) = channel::<PartSearch>();
@@ -66,12 +70,12 @@ impl LiveTracker {
                     }
                 };
                 let thread = thread::Builder::new().name("search".to_owned()).spawn(work);
-                let thread = thread.context("a thread for searches does not start")?;
+                let thread = thread.map_err(|_| CellError::SearchThread("does not start"))?;
                 Searches::Threaded { due: Some(due), done, thread: Some(thread) }
             }
             SearchTime::Frames(frames) => Searches::Delayed { frames: frames.max(1), outcome: None },
         };
-        Ok(Self { tracker: Tracker::new(detector, config), searches })
+        Ok(Self { tracker: Tracker::new(perception.to_part_detector(), config), searches })
     }
 
     /// Follows all known parts into a frame; a frame that does not follow from the one before is searched first, others beside this
@@ -102,7 +106,7 @@ impl Searches {
             Self::Threaded { done, .. } => match done.try_recv() {
                 Ok(outcome) => Ok(Some(outcome)),
                 Err(TryRecvError::Empty) => Ok(None),
-                Err(TryRecvError::Disconnected) => bail!("the search thread ended"),
+                Err(TryRecvError::Disconnected) => Err(ENDED),
             },
             Self::Delayed { outcome, .. } => {
                 if let Some((_, frames)) = outcome {
@@ -118,7 +122,7 @@ impl Searches {
             Self::Threaded { due, .. } => {
                 let sent = due.as_ref().map(|due| due.send(search));
                 if !matches!(sent, Some(Ok(()))) {
-                    bail!("the search thread ended");
+                    return Err(ENDED);
                 }
             }
             Self::Delayed { frames, outcome } => *outcome = Some((search.run(), *frames)),

@@ -5,7 +5,7 @@ use sdg_grasp::GraspModel;
 use sdg_robot::PartShape;
 
 /// Where the model knows lengths and its first demonstration has an outline; else its width between the fingers is found by the camera.
-pub(crate) fn part_shape(model: &GraspModel) -> Option<PartShape> {
+pub fn part_shape(model: &GraspModel) -> Option<PartShape> {
     let lengths = model.facts().lengths?;
     let marks = &model.demonstrations().first()?.marks;
     let outline = marks.outline.as_ref()?;

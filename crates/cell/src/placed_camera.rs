@@ -1,0 +1,74 @@
+//! A calibrated camera on or beside an arm.
+
+use nalgebra::Isometry3;
+use sdg_calibration::{CalibratedCamera, Frame};
+use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_grasp::CameraOverTable;
+use sdg_kinematics::Panda;
+use sdg_robot::CameraMount;
+use sdg_robot::workcell::Mounting;
+
+use crate::error::{CellError, Result};
+
+/// A calibrated camera and where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlacedCamera {
+    /// The lens and the size of its pictures.
+    pub intrinsics: PinholeCamera,
+    /// Where it is fixed.
+    pub pose: CameraPose,
+    /// The table's z in the robot's base, in metres.
+    pub table_height_m: f64,
+}
+
+/// Where a camera is fixed; lengths in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraPose {
+    /// `flange_from_camera`.
+    OnFlange(Isometry3<f64>),
+    /// `base_from_camera`.
+    InBase(Isometry3<f64>),
+}
+
+impl PlacedCamera {
+    /// The camera of a file, mounted as a workcell says.
+    ///
+    /// # Errors
+    /// [`CellError::NotOnHand`] and [`CellError::NotInBase`] for a file without the pose that the mounting needs.
+    pub fn new(camera: &CalibratedCamera, mounting: Mounting, table_height_m: f64) -> Result<Self> {
+        let pose = match (mounting, camera.flange_from_camera, &camera.table) {
+            (Mounting::Hand, Some(flange_from_camera), _) => CameraPose::OnFlange(flange_from_camera),
+            (Mounting::Hand, None, _) => return Err(CellError::NotOnHand),
+            (Mounting::Base, _, Some(table)) if table.frame == Frame::Base => {
+                CameraPose::InBase(table.frame_from_camera)
+            }
+            (Mounting::Base, ..) => return Err(CellError::NotInBase),
+        };
+        Ok(Self { intrinsics: camera.intrinsics, pose, table_height_m })
+    }
+
+    /// Width and height of its pictures.
+    pub fn size_px(&self) -> [u32; 2] {
+        [self.intrinsics.width, self.intrinsics.height]
+    }
+
+    /// The camera's mount, as the grasp sequence takes it.
+    pub fn mount(&self) -> CameraMount {
+        match self.pose {
+            CameraPose::OnFlange(flange_from_camera) => {
+                CameraMount::Hand { tcp_from_camera: Panda::new().flange_from_tcp().inverse() * flange_from_camera }
+            }
+            CameraPose::InBase(_) => CameraMount::Base,
+        }
+    }
+
+    /// The camera over the table, in the robot's base, while the flange is at `base_from_flange`.
+    pub fn over_table(&self, base_from_flange: &Isometry3<f64>) -> CameraOverTable {
+        let world_from_camera = match self.pose {
+            CameraPose::OnFlange(flange_from_camera) => base_from_flange * flange_from_camera,
+            CameraPose::InBase(base_from_camera) => base_from_camera,
+        };
+        let camera = PosedCamera { intrinsics: self.intrinsics, world_from_camera };
+        CameraOverTable { camera, table_height_m: self.table_height_m, workspace: None }
+    }
+}

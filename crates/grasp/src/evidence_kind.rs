@@ -1,0 +1,97 @@
+//! The kinds of evidence by name, and the advice that follows from them.
+
+/// A kind of evidence of [`crate::Contributions`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EvidenceKind {
+    /// The network's score.
+    Network,
+    /// Agreement of edges.
+    Edges,
+    /// Correlation of the surface.
+    Surface,
+    /// Distance in hue.
+    Hue,
+    /// The visible share.
+    Visible,
+    /// Distance in size.
+    Size,
+    /// The share outside the picture.
+    Outside,
+    /// Resemblance of other things.
+    Resemblance,
+    /// The network that knows parts from background.
+    Likeness,
+    /// The network that knows parts from their look-alikes.
+    Details,
+    /// Table where the part should be.
+    Table,
+    /// Outline without edge.
+    Rim,
+    /// Edges that the photo does not have.
+    Added,
+    /// A better fit of the mirror image.
+    Mirror,
+}
+
+impl EvidenceKind {
+    /// Its name, as in `evidence` of JSON lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Network => "network",
+            Self::Edges => "edges",
+            Self::Surface => "surface",
+            Self::Hue => "hue",
+            Self::Visible => "visible",
+            Self::Size => "size",
+            Self::Outside => "outside",
+            Self::Resemblance => "resemblance",
+            Self::Likeness => "likeness",
+            Self::Details => "details",
+            Self::Table => "table",
+            Self::Rim => "rim",
+            Self::Added => "added",
+            Self::Mirror => "mirror",
+        }
+    }
+
+    /// The reason in words where it speaks against a detection.
+    pub fn objection(self) -> &'static str {
+        match self {
+            Self::Network => "the network does not see the part there",
+            Self::Edges => "too few of the part's edges are there",
+            Self::Surface => "the surface looks different: another side, print, gloss or light",
+            Self::Hue => "it has another colour: another part, or other light",
+            Self::Visible => "too little of it is visible",
+            Self::Size => "it has another size",
+            Self::Outside => "too much of it lies outside the picture",
+            Self::Resemblance => "other things look much like this part",
+            Self::Likeness => "photo and picture, laid over each other, do not show the same part",
+            Self::Details => "a feature or print of the part is not there, or is elsewhere",
+            Self::Table => "bare table is seen where the part should be",
+            Self::Rim => "a part of its outline is not there",
+            Self::Added => "there is more inside its outline than in the photo",
+            Self::Mirror => "the mirror image fits better",
+        }
+    }
+
+    /// Whether it says where part and picture differ also where it speaks for the part less than it could.
+    pub(crate) fn is_local(self) -> bool {
+        !matches!(self, Self::Network | Self::Resemblance | Self::Likeness | Self::Details)
+    }
+}
+
+/// What would help where a refused detection is the part after all; the words are the caller's, who has options or buttons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Advice {
+    /// A wider tolerance of size, or with a calibrated camera a look at its file and the height of the marks.
+    CheckSize,
+    /// A further photo in darker light.
+    DarkerPhoto,
+    /// A further photo in brighter light.
+    BrighterPhoto,
+    /// Uncover the part, or a further photo from this side.
+    Uncover,
+    /// A further photo from this side.
+    OtherSide,
+}
