@@ -83,12 +83,6 @@ impl Calibration {
         Some(Self { threshold: decimal(probability(threshold)), slope: decimal(slope) })
     }
 
-    /// Of a file of version 1 or 2, whose slope is per unit of the raw score: the same at the threshold.
-    pub(crate) fn of_older_file(self) -> Self {
-        let threshold = self.threshold.clamp(MIN_PROBABILITY, 1.0 - MIN_PROBABILITY);
-        Self { threshold, slope: decimal(self.slope * threshold * (1.0 - threshold)) }
-    }
-
     /// The calibrated score, in (0, 1).
     pub fn apply(&self, raw: f64) -> f64 {
         probability(self.slope * (log_odds(raw) - log_odds(self.threshold)))
@@ -108,21 +102,6 @@ mod tests {
         assert!((calibration.apply(0.83) - 0.5).abs() < 1e-12);
         let scores: Vec<f64> = (0..=10).map(|i| calibration.apply(f64::from(i) / 10.0)).collect();
         assert!(scores.windows(2).all(|pair| pair[0] < pair[1]), "{scores:?}");
-    }
-
-    #[test]
-    fn an_older_files_scores_are_accepted_as_they_were() {
-        let older = Calibration { threshold: 0.78, slope: 25.0 };
-        let read = older.of_older_file();
-        for raw in [0.2, 0.77, 0.79, 0.95] {
-            let was = 1.0 / (1.0 + (-older.slope * (raw - older.threshold)).exp());
-            assert_eq!(read.apply(raw) >= 0.5, was >= 0.5, "{raw}");
-        }
-        // Next to the threshold they are the same.
-        let was = 1.0 / (1.0 + (-older.slope * 0.01_f64).exp());
-        assert!((read.apply(0.79) - was).abs() < 2e-3);
-        let neutral = Calibration { threshold: 0.5, slope: 4.0 }.of_older_file();
-        assert_eq!(neutral, Calibration::NEUTRAL);
     }
 
     /// Scores of these log-odds.

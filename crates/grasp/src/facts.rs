@@ -41,10 +41,10 @@ impl TurnSource {
 pub struct TeachingFacts {
     /// Decides every random choice.
     pub seed: u64,
-    /// Which turns of the part cannot be told from none, as was told at teaching; files of older versions do not tell.
+    /// Which turns of the part cannot be told from none, as was told at teaching.
     #[serde(default, skip_serializing_if = "is_without_symmetry")]
     pub symmetry: RotationalSymmetry,
-    /// Smallest and largest size over the nominal one at which the part is looked for; files of older versions do not tell.
+    /// Smallest and largest size over the nominal one at which the part is looked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_tolerance: Option<[f64; 2]>,
     /// What it knows of lengths; `None` for a model taught without a camera.

@@ -195,24 +195,6 @@ impl GraspModel {
         Ok(Self { demonstrations, ..self })
     }
 
-    /// What the file lacks because an older version wrote it, and what is done instead; empty for today's.
-    pub fn lacks(&self) -> Vec<&'static str> {
-        let mut lacks = Vec::new();
-        if self.facts.size_tolerance.is_none() {
-            lacks.push("it was taught before sizes were free: the part is looked for within the default tolerance");
-        }
-        if self.calibrations.resemblance.is_none() {
-            lacks.push("how much other things resemble the part is taken from its old threshold; teach again for a better score");
-        }
-        if self.network.is_some() && self.calibrations.evidence.is_none() {
-            lacks.push("how far its network can be trusted was not measured: the network proposes and counts for nothing; teach again");
-        }
-        if self.demonstrations.iter().any(|demonstration| demonstration.marks.photo_size.is_none()) {
-            lacks.push("the photo's size is not known: pictures with another number of pixels are taken as crops");
-        }
-        lacks
-    }
-
     /// Finds the part in an image, best score first. Detections below 0.5 are listed too, for callers that show
     /// what was refused and why: [`GraspDetection::is_accepted`] tells.
     ///
@@ -296,7 +278,7 @@ impl GraspModel {
     pub(crate) fn clues(&self, sighting: &Sighting<'_>) -> Clues {
         let PlacedDemonstration { evidence, log_size, .. } = sighting.placed;
         let network = self.calibrations.log_likelihood_ratio(sighting.network_score);
-        Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance() }
+        Clues { evidence, log_size, network, resemblance: self.calibrations.resemblance }
     }
 
     /// The scores of all places in one picture of a sequence in which parts had that size before, as [`Clues::log_size`].

@@ -28,7 +28,6 @@ use sdg_orientation::OrientationConfig;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use crate::calibrations::Calibrations;
 use crate::check_config::CheckConfig;
 use crate::error::{GraspError, Result};
 use crate::facts::{ModelKind, TeachingFacts};
@@ -41,9 +40,6 @@ use crate::taught_marks::TaughtMarks;
 
 /// The version written here. Any change that an older reader would misread raises it.
 pub const FORMAT_VERSION: u32 = 3;
-/// The oldest version that is read. Version 1 had a threshold of the agreement instead of one score from all evidence,
-/// version 2 no comparison network, and both a slope of the calibration per unit of the score, not of its log-odds.
-const OLDEST_VERSION: u32 = 1;
 
 /// More demonstrations than anybody takes; bounds the work on a forged file.
 const MAX_DEMONSTRATIONS: usize = 1000;
@@ -161,11 +157,9 @@ impl GraspModel {
             })
             .collect::<Result<Vec<_>>>()?;
 
-        let calibrations: Calibrations = metadata.json("calibration")?;
-        let is_older = metadata.text("format_version")? != FORMAT_VERSION.to_string();
         Ok(Self {
             preset: metadata.text("preset")?.to_owned(),
-            calibrations: if is_older { calibrations.of_older_file() } else { calibrations },
+            calibrations: metadata.json("calibration")?,
             facts,
             network: read_network(kind, &metadata, &file, &demonstrations, device)?,
             demonstrations,
@@ -282,7 +276,7 @@ fn read_metadata(bytes: &[u8]) -> Result<Metadata> {
     let Some(version) = metadata.get("format_version").filter(|_| metadata.contains_key("model")) else {
         return Err(GraspError::NotAModel { found: "a safetensors file without a grasp model's metadata".to_owned() });
     };
-    if !(OLDEST_VERSION..=FORMAT_VERSION).any(|known| *version == known.to_string()) {
+    if *version != FORMAT_VERSION.to_string() {
         return Err(GraspError::OtherVersion { expected: FORMAT_VERSION, found: version.clone() });
     }
     let expected = 8 + header_length + header.data_len();
@@ -334,6 +328,7 @@ pub fn summarize(bytes: &[u8]) -> Result<ModelSummary> {
 mod tests {
     use super::*;
     use crate::calibration::Calibration;
+    use crate::calibrations::Calibrations;
     use image::{Rgb, RgbImage};
     use nalgebra::Point2;
     use sdg_detection::presets::edge_of;
@@ -371,7 +366,7 @@ mod tests {
             preset: "edge".to_owned(),
             network,
             demonstrations,
-            calibrations: Calibrations::new(Calibration::NEUTRAL, None, 0.3),
+            calibrations: Calibrations { network: Calibration::NEUTRAL, evidence: None, resemblance: 0.3 },
             facts: TeachingFacts {
                 seed: 3,
                 symmetry: RotationalSymmetry::None,
@@ -425,43 +420,14 @@ mod tests {
     #[test]
     fn other_versions_are_told_apart_from_damage() {
         let bytes = untaught(ModelKind::C).to_bytes().unwrap();
-        let newer = with_metadata(&bytes, r#""format_version":"3""#, r#""format_version":"7""#);
-        let refused = GraspModel::from_bytes(&newer, &Device::flex()).unwrap_err();
-        assert!(
-            matches!(&refused, GraspError::OtherVersion { expected: FORMAT_VERSION, found } if found == "7"),
-            "{refused}"
-        );
-    }
-
-    #[test]
-    fn a_file_of_version_1_is_read_and_says_what_it_lacks() {
-        let today = untaught(ModelKind::S).to_bytes().unwrap();
-        assert!(GraspModel::from_bytes(&today, &Device::flex()).unwrap().lacks().len() == 1, "the photo's size alone");
-        // The same as version 1 wrote it: a threshold instead of the resemblance, no tolerance.
-        let mut old = untaught(ModelKind::S);
-        old.facts.size_tolerance = None;
-        old.calibrations = serde_json::from_str(
-            r#"{"network":{"threshold":0.5,"slope":4.0},"agreement":{"threshold":0.56,"slope":25.0}}"#,
-        )
-        .unwrap();
-        let bytes = with_metadata(&old.to_bytes().unwrap(), r#""format_version":"3""#, r#""format_version":"1""#);
-        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
-        assert!((read.calibrations.resemblance() - 0.36).abs() < 1e-12);
-        assert_eq!(read.size_tolerance(), CheckConfig::DEFAULT_SIZE_TOLERANCE);
-        assert_eq!(read.lacks().len(), 3, "{:?}", read.lacks());
-    }
-
-    #[test]
-    fn a_file_of_version_2_is_read_without_a_comparison_network() {
-        let mut older = untaught(ModelKind::C);
-        older.network.as_mut().unwrap().comparison = None;
-        let today = older.to_bytes().unwrap();
-        // The same as version 2 wrote it: a slope of 4 per unit of the score is one of 1 per unit of its log-odds.
-        older.calibrations.network.slope = 4.0;
-        let bytes = with_metadata(&older.to_bytes().unwrap(), r#""format_version":"3""#, r#""format_version":"2""#);
-        let read = GraspModel::from_bytes(&bytes, &Device::flex()).unwrap();
-        assert!(read.network.as_ref().unwrap().comparison.is_none());
-        assert_eq!(read.to_bytes().unwrap(), today);
+        for other in ["2", "7"] {
+            let file = with_metadata(&bytes, r#""format_version":"3""#, &format!(r#""format_version":"{other}""#));
+            let refused = GraspModel::from_bytes(&file, &Device::flex()).unwrap_err();
+            assert!(
+                matches!(&refused, GraspError::OtherVersion { expected: FORMAT_VERSION, found } if found == other),
+                "{refused}"
+            );
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ pub struct TaughtMarks {
     pub outline: Option<Polygon>,
     /// The part's width between the jaws: as marked, or measured across the outline.
     pub width_px: f64,
-    /// Width and height of the photo that the cut-out is from; files of older versions do not tell.
+    /// Width and height of the photo that the cut-out is from; `None` where it was resized since.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
 }

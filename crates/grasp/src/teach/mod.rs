@@ -171,7 +171,7 @@ fn without_network(demonstrations: &[Demonstration], options: &TeachOptions, sta
         preset: options.preset.name().to_owned(),
         network: None,
         demonstrations,
-        calibrations: Calibrations::new(Calibration::NEUTRAL, None, resemblance),
+        calibrations: Calibrations { network: Calibration::NEUTRAL, evidence: None, resemblance },
         facts: TeachingFacts {
             seed: options.seed,
             symmetry: options.symmetry,
@@ -316,7 +316,11 @@ pub(crate) fn teach_network(
         preset: options.preset.name().to_owned(),
         network: Some(network),
         demonstrations: taught,
-        calibrations: Calibrations::new(calibrated.network, Some(evidence), others.resemblance()),
+        calibrations: Calibrations {
+            network: calibrated.network,
+            evidence: Some(evidence),
+            resemblance: others.resemblance(),
+        },
         facts,
     };
     Ok(Taught { model, history: Some(history) })

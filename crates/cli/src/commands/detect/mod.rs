@@ -46,9 +46,6 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         .into());
     }
     let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
-    for lack in model.lacks() {
-        eprintln!("{}: {lack}", args.grasp_model.display());
-    }
     if let Some(tolerance) = args.size_tolerance {
         model = model.with_size_tolerance(tolerance.range())?;
     }
