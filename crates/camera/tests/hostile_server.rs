@@ -2,6 +2,8 @@
 
 use std::io::Write;
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -272,13 +274,15 @@ fn a_server_that_went_away_comes_back() {
     assert!(matches!(faults.last(), Some(Fault::Back { away_secs }) if *away_secs > 0.5), "{faults:?}");
 }
 
-/// A camera of single pictures that asks who asks, and what it was asked with an answer to that.
-fn locked_server(challenges: &'static str) -> (Server, std::sync::Arc<std::sync::Mutex<Vec<String>>>) {
-    let asked = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
-    let log = std::sync::Arc::clone(&asked);
+/// A camera of single pictures that asks who asks; the requests with an answer to that, and how many had none.
+fn locked_server(challenges: &'static str) -> (Server, Arc<Mutex<Vec<String>>>, Arc<AtomicUsize>) {
+    let asked = Arc::new(Mutex::new(Vec::new()));
+    let refused = Arc::new(AtomicUsize::new(0));
+    let (log, num_refused) = (Arc::clone(&asked), Arc::clone(&refused));
     let server = Server::start_with_requests(move |request, stream| {
         assert!(request.starts_with("GET /shot.jpg HTTP/1.1\r\n"), "{request}");
         if !request.contains("Authorization: ") {
+            num_refused.fetch_add(1, Ordering::SeqCst);
             let head = format!("HTTP/1.1 401 Unauthorized\r\n{challenges}Content-Length: 0\r\n\r\n");
             return stream.write_all(head.as_bytes()).unwrap();
         }
@@ -290,12 +294,12 @@ fn locked_server(challenges: &'static str) -> (Server, std::sync::Arc<std::sync:
         stream.write_all(head.as_bytes()).unwrap();
         stream.write_all(&picture[..cut]).unwrap();
     });
-    (server, asked)
+    (server, asked, refused)
 }
 
 #[test]
 fn snapshots_are_fetched_again_and_again_with_the_password() {
-    let (server, asked) = locked_server("WWW-Authenticate: Basic realm=\"cam\"\r\n");
+    let (server, asked, refused) = locked_server("WWW-Authenticate: Basic realm=\"cam\"\r\n");
     let mut camera = open(&format!("http://me:secret@127.0.0.1:{}/shot.jpg", server.port()));
     for expected in [60, 70] {
         let frame = camera.next_frame().unwrap().unwrap();
@@ -308,11 +312,13 @@ fn snapshots_are_fetched_again_and_again_with_the_password() {
         // Base64 of me:secret.
         assert!(request.contains("Authorization: Basic bWU6c2VjcmV0\r\n"), "{request}");
     }
+    // Once who asks is known, it is said with each request.
+    assert_eq!(refused.load(Ordering::SeqCst), 1);
 }
 
 #[test]
 fn a_camera_with_digest_authentication_is_given_no_password() {
-    let (server, asked) = locked_server(
+    let (server, asked, _) = locked_server(
         "WWW-Authenticate: Digest realm=\"cam\", nonce=\"0123\", algorithm=MD5\r\nWWW-Authenticate: Basic realm=\"cam\"\r\n",
     );
     let mut camera = open(&format!("http://me:secret@127.0.0.1:{}/shot.jpg", server.port()));

@@ -23,15 +23,24 @@ pub(super) struct Answer {
     pub(super) body: Body,
 }
 
+/// The answer to a server's challenge, kept from picture to picture: each is then asked for once.
+#[derive(Default)]
+pub(super) struct Login(Option<PasswordClient>);
+
 /// Asks, says who asks where that is wanted, and follows redirects.
 ///
 /// # Errors
 /// In words, why there is no answer with a body.
-pub(super) fn get(url: &Url, deadline: Instant) -> Result<Answer, String> {
+pub(super) fn get(url: &Url, login: &mut Login, deadline: Instant) -> Result<Answer, String> {
     let mut url = url.clone();
     for _ in 0..=MAX_REDIRECTS {
-        let reply = match get_once(&url, None, deadline)? {
-            Reply::Challenges(challenges) => get_once(&url, Some(&authorization(&url, &challenges)?), deadline)?,
+        let known = login.authorization(&url).unwrap_or_default();
+        let reply = match get_once(&url, known.as_deref(), deadline)? {
+            // Also where what was answered before is stale.
+            Reply::Challenges(challenges) => {
+                login.challenged(&url, &challenges)?;
+                get_once(&url, login.authorization(&url)?.as_deref(), deadline)?
+            }
             reply => reply,
         };
         match reply {
@@ -52,18 +61,30 @@ enum Reply {
     Challenges(Vec<String>),
 }
 
-/// The value of the header that answers a camera's challenges, digest or basic.
-fn authorization(url: &Url, challenges: &[String]) -> Result<String, String> {
-    let Some((username, password)) = url.credentials() else {
-        return Err(
-            "expected http://USER:PASSWORD@HOST/… with the camera's user and password, found status 401".to_owned()
-        );
-    };
-    let client = challenges.iter().fold(PasswordClient::builder(), |builder, challenge| builder.challenges(challenge));
-    let unknown =
-        |error: String| format!("expected a camera that asks for digest or basic authentication, found {error}");
-    let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };
-    client.build().and_then(|mut client| client.respond(&params)).map_err(unknown)
+impl Login {
+    /// Takes a server's challenges, digest or basic.
+    fn challenged(&mut self, url: &Url, challenges: &[String]) -> Result<(), String> {
+        if url.credentials().is_none() {
+            return Err(
+                "expected http://USER:PASSWORD@HOST/… with the camera's user and password, found status 401".to_owned()
+            );
+        }
+        let builder =
+            challenges.iter().fold(PasswordClient::builder(), |builder, challenge| builder.challenges(challenge));
+        self.0 = Some(builder.build().map_err(unknown)?);
+        Ok(())
+    }
+
+    /// The value of the header that says who asks; `None` where no server has asked for it.
+    fn authorization(&mut self, url: &Url) -> Result<Option<String>, String> {
+        let (Some(client), Some((username, password))) = (&mut self.0, url.credentials()) else { return Ok(None) };
+        let params = http_auth::PasswordParams { username, password, uri: url.path(), method: "GET", body: Some(&[]) };
+        client.respond(&params).map(Some).map_err(unknown)
+    }
+}
+
+fn unknown(error: String) -> String {
+    format!("expected a camera that asks for digest or basic authentication, found {error}")
 }
 
 fn get_once(url: &Url, authorization: Option<&str>, deadline: Instant) -> Result<Reply, String> {

@@ -5,7 +5,7 @@
 //!                                                                      └─ one picture ── Snapshots  (a connection each)
 //! ```
 //! A small client of its own: cameras need no more of HTTP, and everything that a server can send is bounded in memory and
-//! in time. Absent: TLS, compression, cookies, proxies, digest authentication, keep-alive between snapshots.
+//! in time. Absent: TLS, compression, cookies, proxies, keep-alive between snapshots.
 
 mod body;
 mod exchange;
@@ -26,11 +26,12 @@ pub use url::Url;
 /// Asks the server and finds out by its answer which of the two it is.
 pub(crate) fn connect(url: &Url, options: &OpenOptions, deadline: Instant) -> Result<Box<dyn Source>, CameraError> {
     let refused = |why: String| CameraError::Open { address: url.to_string(), why };
-    let answer = exchange::get(url, deadline).map_err(refused)?;
+    let mut login = exchange::Login::default();
+    let answer = exchange::get(url, &mut login, deadline).map_err(refused)?;
     let kind = answer.content_type.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
     match kind.as_str() {
         "image/jpeg" | "image/jpg" | "image/png" => {
-            Ok(Box::new(snapshots::Snapshots::new(url.clone(), answer, options)))
+            Ok(Box::new(snapshots::Snapshots::new(url.clone(), login, answer, options)))
         }
         _ if kind.starts_with("multipart/") => {
             let source =

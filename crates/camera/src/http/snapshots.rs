@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 use sdg_picture::PixelFrame;
 
 use super::body::Progress;
-use super::exchange::{Answer, get};
+use super::exchange::{Answer, Login, get};
 use super::url::Url;
 use crate::decode::{MAX_ENCODED_BYTES, decode};
 use crate::options::OpenOptions;
@@ -15,6 +15,7 @@ use crate::source::{Missing, Source, Taken};
 /// A server of single pictures.
 pub(super) struct Snapshots {
     url: Url,
+    login: Login,
     /// The answer that showed that these are single pictures.
     first: Option<Answer>,
     interval: Duration,
@@ -23,10 +24,11 @@ pub(super) struct Snapshots {
 }
 
 impl Snapshots {
-    pub(super) fn new(url: Url, first: Answer, options: &OpenOptions) -> Self {
+    pub(super) fn new(url: Url, login: Login, first: Answer, options: &OpenOptions) -> Self {
         let fps = options.fps.unwrap_or(OpenOptions::DEFAULT_SNAPSHOT_FPS);
         Self {
             url,
+            login,
             first: Some(first),
             interval: Duration::from_secs_f64(1.0 / fps),
             next_at: Instant::now(),
@@ -44,7 +46,7 @@ impl Source for Snapshots {
         self.next_at = Instant::now() + self.interval;
         let mut answer = match self.first.take() {
             Some(answer) => answer,
-            None => get(&self.url, deadline).map_err(Missing::Gone)?,
+            None => get(&self.url, &mut self.login, deadline).map_err(Missing::Gone)?,
         };
         if !answer.content_type.trim_start().to_ascii_lowercase().starts_with("image/") {
             return Err(Missing::Gone(format!("expected a picture, found {}", answer.content_type)));
