@@ -85,6 +85,10 @@ pub struct ModelFinder<P> {
     camera: PlacedCamera,
     perception: Perception,
     taken: Option<Instant>,
+    /// Whether detections are checked against the demonstration.
+    verification: Verification,
+    /// The last picture, and its detections, best first.
+    last: Option<(RgbImage, Vec<Found>)>,
     /// The best part of the last picture.
     seen: Option<SeenOutline>,
     /// The other sure parts of the last picture.
@@ -97,7 +101,27 @@ impl<P> ModelFinder<P> {
     /// Looks for the model's part through the camera.
     pub fn new(model: GraspModel, camera: PlacedCamera, pictures: P) -> Self {
         let perception = Perception::of_any_camera(model);
-        Self { pictures, camera, perception, taken: None, seen: None, others: Vec::new(), places: Vec::new() }
+        Self {
+            pictures,
+            camera,
+            perception,
+            taken: None,
+            verification: Verification::ByShape,
+            last: None,
+            seen: None,
+            others: Vec::new(),
+            places: Vec::new(),
+        }
+    }
+
+    /// The same, with detections checked or not.
+    pub fn with_verification(self, verification: Verification) -> Self {
+        Self { verification, ..self }
+    }
+
+    /// The last picture, and its detections, best first.
+    pub fn last(&self) -> Option<(&RgbImage, &[Found])> {
+        self.last.as_ref().map(|(picture, found)| (picture, found.as_slice()))
     }
 
     /// Where the best part of the last picture lies.
@@ -115,9 +139,11 @@ impl<P> ModelFinder<P> {
         self.taken = taken;
         let place = self.camera.over_table(&Panda::new().base_from_flange(&state.q));
         self.perception.move_to(&place)?;
-        let found = self.perception.detect(&picture, Verification::ByShape)?;
+        let found = self.perception.detect(&picture, self.verification)?;
         self.seen = found.first().and_then(|best| self.outline_of(best, &place));
-        Ok(found.iter().filter_map(target).collect())
+        let targets = found.iter().filter_map(target).collect();
+        self.last = Some((picture, found));
+        Ok(targets)
     }
 
     fn outline_of(&self, found: &Found, place: &CameraOverTable) -> Option<SeenOutline> {

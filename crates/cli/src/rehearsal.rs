@@ -1,26 +1,30 @@
 //! Grasp attempts with a model in the simulated workcell, and their outcomes.
+//!
+//! The arm gets its grasps as a real one does ([`ModelFinder`]): from the picture, the camera's place on the flange, and the lengths that
+//! the model knows. Nothing is taken from the truth but what a cell's owner knows: the intrinsics, the hand-eye calibration, the table's
+//! height, and the heights of marks and grasp.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use image::RgbImage;
-use nalgebra::Isometry3;
-use sdg_cell::{CellError, Found, Perception as ModelPerception};
-use sdg_geometry::PinholeCamera;
-use sdg_grasp::{CameraOverTable, GraspModel, GraspPose, Verification};
+use nalgebra::{Isometry3, Point2};
+use sdg_cell::{CameraPose, ModelFinder, PlacedCamera};
+use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
-use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, GraspTarget, Place, PlaceGoal, PlacingConfig};
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Place, PlaceGoal, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::scene::{SceneVariation, VariationConfig, base_from_look_camera};
 use sdg_simulation::{
-    AttemptConfig, AttemptErrors, AttemptReport, CameraView, Perception, RecordConfig, SimulationError, Workcell,
-    WorkcellConfig, part_shape,
+    AttemptConfig, AttemptErrors, AttemptReport, RecordConfig, SimulationError, Workcell, WorkcellConfig, part_shape,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::against_truth::{grasp_error, grasp_pose};
+use crate::against_truth::grasp_error;
+use crate::robots::SimulatedPictures;
 
 /// What to rehearse.
 pub struct Rehearsal<'a> {
@@ -35,7 +39,7 @@ pub struct Rehearsal<'a> {
     pub verification: Verification,
     /// What the robot is told wrong, or has wrong.
     pub errors: RehearsalErrors,
-    /// The wrist camera, where it is not the paper's; the model then looks in the plan view.
+    /// The wrist camera, where it is not the paper's.
     pub camera: Option<PinholeCamera>,
     /// Where parts are put down: the attempts take its cells in turn. The table is then empty but for the part.
     pub place: Option<RehearsedPlace>,
@@ -185,15 +189,16 @@ impl Rehearsal<'_> {
             obstacles,
             ..WorkcellConfig::new(scene)
         })?;
-        let mut perception = RehearsedPerception {
-            rehearsal: self,
-            assumed: self.assumed(number),
-            perception: ModelPerception::of_any_camera(self.model.clone()),
-            last: None,
+        let camera = PlacedCamera {
+            intrinsics: self.camera.unwrap_or(PinholeCamera::WRIST),
+            pose: CameraPose::OnFlange(workcell.told_flange_from_camera()),
+            table_height_m: 0.0,
         };
+        let mut finder =
+            ModelFinder::new(self.told_model(number)?, camera, SimulatedPictures).with_verification(self.verification);
         let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
         let started = Instant::now();
-        let (attempt, looks, frames) = match workcell.run_attempt(&mut perception, &config, seed) {
+        let (attempt, looks, frames) = match workcell.run_attempt(&mut finder, &config, seed) {
             Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
             Err(SimulationError::Perception(why)) => {
                 let duration_secs = started.elapsed().as_secs_f64();
@@ -202,7 +207,11 @@ impl Rehearsal<'_> {
             }
             Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
         };
-        Ok(RehearsedAttempt { attempt, looks, frames, view: perception.last })
+        let view = finder.last().map(|(picture, found)| {
+            let detections: Vec<_> = found.iter().map(|found| found.detection.clone()).collect();
+            crate::pictures::with_detections(picture, &detections)
+        });
+        Ok(RehearsedAttempt { attempt, looks, frames, view })
     }
 
     /// Where an attempt puts the part down, and how.
@@ -213,12 +222,30 @@ impl Rehearsal<'_> {
         Ok(Some((goal, PlacingConfig { symmetry: self.object.symmetry, ..PlacingConfig::default() })))
     }
 
-    /// The part as the robot takes it to be in an attempt, with the error of its height.
-    fn assumed(&self, number: usize) -> ObjectSpec {
+    /// The model as the robot is told its lengths in an attempt, with the error of the marks' height.
+    ///
+    /// # Errors
+    /// Lengths that no part has.
+    fn told_model(&self, number: usize) -> Result<GraspModel> {
         let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
-        let mut assumed = self.object.clone();
-        assumed.mark_height_m += sign * self.errors.mark_height_m;
-        assumed
+        let known = self.model.facts().lengths;
+        let lengths = known.map_or_else(|| self.lengths_of_demonstration(), Ok)?;
+        let mark_height_m = lengths.mark_height_m + sign * self.errors.mark_height_m;
+        if known == Some(Lengths { mark_height_m, ..lengths }) {
+            return Ok(self.model.clone());
+        }
+        Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
+    }
+
+    /// The lengths of a model that was taught from a shipped demonstration in its pixels: of the camera that took it, which looked straight
+    /// down, so that a pixel covers as much of the marks' plane everywhere.
+    fn lengths_of_demonstration(&self) -> Result<Lengths> {
+        let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
+        let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;
+        let middle = Point2::new(f64::from(camera.intrinsics.width), f64::from(camera.intrinsics.height)) / 2.0;
+        let metres_per_pixel =
+            camera.metres_per_pixel(&middle, mark_height_m).context("the marks lie above the camera")?;
+        Ok(Lengths { pixels_per_m: 1.0 / metres_per_pixel, mark_height_m, grasp_height_m, slant: [0.0; 2] })
     }
 
     fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
@@ -276,47 +303,6 @@ fn looks_of(report: &AttemptReport) -> Looks {
 /// A seed of its own for every attempt of every rehearsal.
 fn attempt_seed(seed: u64, number: usize) -> u64 {
     seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
-}
-
-/// The model as the workcell's perception.
-struct RehearsedPerception<'a> {
-    rehearsal: &'a Rehearsal<'a>,
-    assumed: ObjectSpec,
-    perception: ModelPerception,
-    last: Option<RgbImage>,
-}
-
-impl RehearsedPerception<'_> {
-    /// The model's detections in a view; behind the paper's camera in the picture itself.
-    fn detect(&mut self, view: &CameraView) -> std::result::Result<Vec<Found>, CellError> {
-        if self.rehearsal.camera.is_some() {
-            let place = CameraOverTable { camera: view.camera, table_height_m: 0.0, workspace: None };
-            self.perception.move_to(&place)?;
-        }
-        self.perception.detect(&view.image, self.rehearsal.verification)
-    }
-}
-
-impl Perception for RehearsedPerception<'_> {
-    fn perceive(
-        &mut self,
-        view: &CameraView,
-    ) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>> {
-        let detections: Vec<_> = self.detect(view)?.into_iter().map(|found| found.detection).collect();
-        self.last = Some(crate::pictures::with_detections(&view.image, &detections));
-        let Some(best) = detections.into_iter().next() else { return Ok(None) };
-        let target = |pose: GraspPose| GraspTarget {
-            base_from_tcp: pose.base_from_tcp,
-            jaw_width_m: pose.jaw_width_m,
-            score: best.score,
-        };
-        match grasp_pose(&self.assumed, &view.camera, &best.grasp) {
-            Ok(pose) => Ok(Some(target(pose))),
-            // What is nothing in all likelihood needs no pose.
-            Err(_) if !best.is_accepted() => Ok(None),
-            Err(error) => Err(error.into()),
-        }
-    }
 }
 
 #[cfg(test)]

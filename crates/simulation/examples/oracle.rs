@@ -41,9 +41,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{name} seed {seed}: {step}: {why}");
         }
         if let (true, Some(folder)) = (seed == first_seed, &folder) {
-            for (index, view) in report.views.iter().enumerate() {
-                view.image.save(folder.join(format!("view_{index}.png")))?;
-            }
             for (index, frame) in report.frames.iter().enumerate() {
                 frame.save(folder.join(format!("frame_{index:03}.png")))?;
             }

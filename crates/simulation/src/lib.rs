@@ -1,7 +1,7 @@
 //! A Franka Panda with a wrist camera at a table, in MuJoCo: pictures, motion, and grasp attempts.
 //!
 //! ```text
-//! objects ─┐                      ┌─> Renderer ─> CameraView ─> Perception ─> GraspTarget ─┐
+//! objects ─┐                      ┌─> Renderer ─> CameraView ─> PartFinder ─> GraspTarget ─┐
 //! scene   ─┴─> Workcell (MJCF) ─> Model, Data                                              │
 //!                                 └<── controller, gripper <── Arm <── sdg_robot::grasp <──┘
 //! ```
@@ -48,7 +48,6 @@ pub mod objects;
 mod obstacles;
 mod oracle;
 mod panda;
-mod perception;
 mod planning_problem;
 mod record;
 mod reference;
@@ -76,7 +75,6 @@ pub use oracle::{marked_grasp, part_shape};
 pub use panda::{
     ArmVector, FINGER_TRAVEL_M, FINGERTIP_BEYOND_TCP_M, NUM_ARM_JOINTS, PANDA_FILE, PandaIds, panda_asset,
 };
-pub use perception::Perception;
 pub use planning_problem::PlanningProblem;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};

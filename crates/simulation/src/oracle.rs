@@ -1,7 +1,7 @@
 //! Perception that gives the part's true pose, to measure the robot without a model.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use sdg_robot::{GraspTarget, PartShape};
+use sdg_robot::{GraspTarget, PartFinder, PartShape};
 
 use crate::attempt::{AttemptConfig, AttemptReport};
 use crate::error::Result;
@@ -33,6 +33,16 @@ pub fn part_shape(spec: &ObjectSpec) -> Result<PartShape> {
     Ok(PartShape::new(outline, spec.jaw_width_m, top_m, spec.grasp_height_m)?)
 }
 
+/// Knows where the part is.
+struct Oracle;
+
+impl PartFinder<Workcell> for Oracle {
+    fn find(&mut self, cell: &mut Workcell) -> sdg_robot::Result<Option<GraspTarget>> {
+        let spec = cell.config().scene.object.as_ref().map(|object| &object.spec);
+        Ok(spec.zip(cell.base_from_object()).map(|(spec, pose)| marked_grasp(spec, &pose)))
+    }
+}
+
 impl Workcell {
     /// Tries once with the part's true pose instead of a picture's: the upper bound of what any
     /// perception can reach.
@@ -40,11 +50,6 @@ impl Workcell {
     /// # Errors
     /// Errors of the simulation.
     pub fn run_oracle_attempt(&mut self, config: &AttemptConfig, seed: u64) -> Result<AttemptReport> {
-        let spec = self.config().scene.object.as_ref().map(|object| object.spec.clone());
-        self.run_attempt_with(
-            &mut |cell, _| Ok(spec.as_ref().zip(cell.base_from_object()).map(|(spec, pose)| marked_grasp(spec, &pose))),
-            config,
-            seed,
-        )
+        self.run_attempt(&mut Oracle, config, seed)
     }
 }

@@ -5,19 +5,18 @@ mod report;
 
 use std::time::Instant;
 
+use nalgebra::Isometry3;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use sdg_kinematics::{CartesianLimits, JointVector, Trajectory, ready_pose};
 use sdg_robot::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget, LookOut, PartFinder,
-    PlaceGoal, PlaceOutcome, PlaceReport, PlacingConfig, Robot, RobotError, SafetyLimits, Watch,
+    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, GraspStep, LookOut, PartFinder, PlaceGoal,
+    PlaceOutcome, PlaceReport, PlacingConfig, Robot, SafetyLimits, Watch,
 };
 
-use crate::camera::CameraView;
 use crate::error::{Result, SimulationError};
 use crate::objects::GraspError;
 use crate::panda::FINGERTIP_BEYOND_TCP_M;
-use crate::perception::Perception;
 use crate::record::RecordConfig;
 use crate::workcell::Workcell;
 use judge::Judge;
@@ -63,26 +62,22 @@ impl Workcell {
         CameraMount::Hand { tcp_from_camera: self.tcp_from_camera() }
     }
 
+    /// `flange_from_camera` of the wrist camera as the robot is told it: with the error of its hand-eye calibration.
+    pub fn told_flange_from_camera(&self) -> Isometry3<f64> {
+        let camera_from_assumed = self.config().errors.camera_from_assumed.unwrap_or_else(Isometry3::identity);
+        self.panda.flange_from_tcp() * self.tcp_from_camera() * camera_from_assumed
+    }
+
     /// Tries to grasp the part once, from a start configuration drawn from `seed`.
     ///
-    /// Everything is put back to the start first, so that the same seed and perception give the same
+    /// Everything is put back to the start first, so that the same seed and finder give the same
     /// attempt.
     ///
     /// # Errors
     /// Errors of the simulation or of perception itself, and whatever stops the arm; a grasp that fails is a report.
     pub fn run_attempt(
         &mut self,
-        perception: &mut dyn Perception,
-        config: &AttemptConfig,
-        seed: u64,
-    ) -> Result<AttemptReport> {
-        self.run_attempt_with(&mut |_, view| perception.perceive(view), config, seed)
-    }
-
-    /// As [`Workcell::run_attempt`], for a perception that may look behind the curtain.
-    pub(crate) fn run_attempt_with(
-        &mut self,
-        perceive: &mut PerceiveFn<'_>,
+        finder: &mut dyn PartFinder<Self>,
         config: &AttemptConfig,
         seed: u64,
     ) -> Result<AttemptReport> {
@@ -92,23 +87,22 @@ impl Workcell {
             self.start_recording(record)?;
         }
         let base_from_object = self.base_from_object();
-        let mut finder = ViewFinder { perceive, views: Vec::new(), perception_secs: 0.0 };
         let mut judge = Judge::new(config.success_height_m);
         let mount = self.wrist_mount();
         let mut robot = Robot::new(self, Self::safety_limits(), Watch::default());
         let ended = match &config.placing {
-            None => sdg_robot::grasp(&mut robot, &mut finder, &mut judge, mount, &config.grasp),
+            None => sdg_robot::grasp(&mut robot, finder, &mut judge, mount, &config.grasp),
             Some((goal, placing)) => {
-                sdg_robot::grasp_and_place(&mut robot, &mut finder, &mut judge, mount, &config.grasp, goal, placing)
-                    .map(|PlaceReport { grasp, outcome, .. }| match outcome {
+                sdg_robot::grasp_and_place(&mut robot, finder, &mut judge, mount, &config.grasp, goal, placing).map(
+                    |PlaceReport { grasp, outcome, .. }| match outcome {
                         PlaceOutcome::Placed => grasp,
                         PlaceOutcome::Failed { step, why } => {
                             GraspReport { outcome: GraspOutcome::Failed { step, why }, ..grasp }
                         }
-                    })
+                    },
+                )
             }
         };
-        let ViewFinder { views, perception_secs, .. } = finder;
         let frames = self.stop_recording();
         let GraspReport { mut outcome, targets, looks, hand_verdicts, .. } = ended.map_err(SimulationError::from)?;
         let placed = config.placing.as_ref().zip(self.true_place_error(config));
@@ -125,7 +119,6 @@ impl Workcell {
             outcome,
             seed,
             base_from_object,
-            views,
             targets,
             looks,
             place_error: placed.map(|(_, error)| error),
@@ -134,7 +127,6 @@ impl Workcell {
             object_height_m: self.object_height_m(),
             simulated_secs: self.data.time_secs(),
             wall_secs: started.elapsed().as_secs_f64(),
-            perception_secs,
             frames,
         })
     }
@@ -175,30 +167,5 @@ impl Workcell {
             }
         }
         Ok(ready_pose())
-    }
-}
-
-/// Perception that may also look at the physics.
-pub(crate) type PerceiveFn<'a> = dyn FnMut(&Workcell, &CameraView) -> std::result::Result<Option<GraspTarget>, Box<dyn std::error::Error + Send + Sync>>
-    + 'a;
-
-/// Perception behind the wrist camera.
-struct ViewFinder<'a, 'p> {
-    perceive: &'a mut PerceiveFn<'p>,
-    views: Vec<CameraView>,
-    perception_secs: f64,
-}
-
-impl PartFinder<Workcell> for ViewFinder<'_, '_> {
-    fn find(&mut self, cell: &mut Workcell) -> sdg_robot::Result<Option<GraspTarget>> {
-        let mut view = cell.wrist_view()?;
-        if let Some(camera_from_assumed) = cell.config().errors.camera_from_assumed {
-            view.camera.world_from_camera *= camera_from_assumed;
-        }
-        let started = Instant::now();
-        let found = (self.perceive)(cell, &view).map_err(|error| RobotError::Perception(error.to_string()))?;
-        self.perception_secs += started.elapsed().as_secs_f64();
-        self.views.push(view);
-        Ok(found)
     }
 }

@@ -4,7 +4,6 @@ use image::RgbImage;
 use nalgebra::Isometry3;
 use sdg_robot::{GraspOutcome, GraspStep, GraspTarget};
 
-use crate::camera::CameraView;
 use crate::objects::GraspError;
 
 /// All that happened in an attempt.
@@ -16,9 +15,7 @@ pub struct AttemptReport {
     pub seed: u64,
     /// Where the part lay at the start, in the base frame.
     pub base_from_object: Option<Isometry3<f64>>,
-    /// What the wrist camera saw, look by look: from afar until the part was found, then from above it.
-    pub views: Vec<CameraView>,
-    /// The target that perception gave for each of the views, where its score was high enough.
+    /// The target that perception gave at each look, where its score was high enough: from afar until the part was found, then from above it.
     pub targets: Vec<Option<GraspTarget>>,
     /// How many looks there were from afar, and how many from above what they found: one each where the part was found
     /// at the first look.
@@ -35,8 +32,6 @@ pub struct AttemptReport {
     pub simulated_secs: f64,
     /// Time that it took, in seconds, perception included.
     pub wall_secs: f64,
-    /// Part of that time spent in perception, in seconds.
-    pub perception_secs: f64,
     /// Pictures from outside, if recorded.
     pub frames: Vec<RgbImage>,
 }
