@@ -8,7 +8,7 @@ use nalgebra::Point2;
 use sdg_calibration::Frame;
 use sdg_demonstration::PixelFrame;
 use sdg_grasp::{
-    Differences, GraspDetection, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose,
+    Differences, GraspDetection, GraspError, GraspModel, PartDetector, PlanDetection, PlanDetector, PlanarPose,
     TaughtDemonstration, Verification,
 };
 
@@ -36,13 +36,19 @@ impl PictureDetector {
     /// Puts the model of a file behind the camera of a file, if one is given.
     ///
     /// # Errors
-    /// A camera file that cannot be used; a model that was taught without a camera, with its file's name.
+    /// A camera file that cannot be used, or that does not see the plane of the marks, with its name; a model that was taught without a
+    /// camera, with its file's name.
     pub fn new(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Self> {
         match camera {
             None => Ok(Self::AnyCamera(Box::new(model))),
             Some(path) => {
                 let camera = CameraFile::read(path)?;
-                Self::calibrated(model, camera).with_context(|| model_file.display().to_string())
+                Self::calibrated(model, camera).map_err(|error| {
+                    // A plane that is not seen is the camera's fault.
+                    let is_of_camera = matches!(error.downcast_ref::<GraspError>(), Some(GraspError::PlanView(_)));
+                    let file = if is_of_camera { path } else { model_file };
+                    error.context(file.display().to_string())
+                })
             }
         }
     }

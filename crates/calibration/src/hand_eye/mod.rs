@@ -11,6 +11,7 @@
 //! ```text
 //! boards' poses ─ A_ij X = X B_ij in closed form ─ reprojection over all pictures minimised in X and Y   closed_form.rs, bundle.rs
 //!               ─ robot poses that are off: their errors estimated with X and Y ─ one left out at a time
+//! poses that contradict the pictures ─ readings of all, a few that are wrong, the board's size        diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
 //! A robot's pose is off by far more than a pixel: 0.05 degrees at 0.5 m are 0.4 mm. Where reprojection says so, each pose gets six
 //! corrections of its own, whose squares are weighed against the pixels'.
