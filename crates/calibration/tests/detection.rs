@@ -19,8 +19,8 @@ const WIDE: PinholeCamera = PinholeCamera {
 /// Bound on the RMS error of corners in ordinary pictures, twice the 0.03 px that the crate documents.
 const MAX_RMS_PX: f64 = 0.06;
 
-/// Pictures of each texture. With dots alone a board is found in 27 of these 250.
-const NUM_TEXTURES: u64 = 50;
+/// Pictures of each texture. With dots alone a board is found in 18 of these 160.
+const NUM_TEXTURES: u64 = 32;
 
 fn board() -> Board {
     Board::new(9, 6, 0.025).unwrap()

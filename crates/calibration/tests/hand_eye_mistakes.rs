@@ -1,6 +1,6 @@
 //! Robot poses and boards that are not what they were told to be: which mistake is named.
 
-use crate::hand_eye::{CAMERA, EXACT_ROBOT, NOISY_ROBOT, NUM_POSES, board, views};
+use crate::hand_eye::{CAMERA, EXACT_ROBOT, NOISY_ROBOT, NUM_POSES, Noise, board, views};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use sdg_calibration::{Board, CalibrationError, HandEye, HandEyeView, Mount, calibrate_hand_eye};
 
@@ -73,6 +73,12 @@ fn a_board_of_the_told_size_is_not_blamed_where_pictures_are_few() {
             let num = 4 + seed as usize % 4;
             assert!(solve(mount, &views[..num]).is_ok(), "{mount:?}, {num} pictures, {seed}");
         }
+    }
+    // A robot whose errors have another ratio than is assumed.
+    let turned_only = Noise { corner_px: 0.3, robot_m: 0.0, robot_deg: 0.1 };
+    for seed in 0..30 {
+        let views = views(Mount::Hand, 7000 + seed, &turned_only);
+        assert!(solve(Mount::Hand, &views[..6]).is_ok(), "{seed}");
     }
     // A third of a percent is what a ruler is read to.
     assert!(solve_told(Mount::Hand, &views(Mount::Hand, 3, &EXACT_ROBOT), 1.002).is_ok());

@@ -34,10 +34,10 @@ const ALIKE_PX: f64 = 0.02;
 const MIN_SCALE_ERROR: f64 = 0.003;
 /// Standard errors by which the board's size is off at least.
 const MIN_SCALE_SIGMAS: f64 = 5.0;
-/// Equations that are left where the standard error is hardly known itself: its square counts by so many over those left more.
+/// Equations left of which fewer make the standard error itself uncertain: of four pictures 11 are left, and it counts three times.
 const FEW_EQUATIONS: f64 = 30.0;
-/// The board's size explains the robot's errors where at most this share of them is left: half of the squares.
-const MAX_ROBOT_SHARE: f64 = 0.7;
+/// The board's size explains the robot's errors where at most this share of them is left: a quarter of the squares are the size's.
+const MAX_ROBOT_SHARE: f64 = 0.85;
 /// A turn by which the robot's and the board's turns between two pictures may differ, radians: 3 degrees, twice [`MAX_ROBOT_SCALE`].
 const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
@@ -150,7 +150,8 @@ fn is_little(evidence: &Evidence, rms_px: f64) -> bool {
 /// The board's size where it is another than told, and explains the robot's errors.
 fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&Solved>) -> Option<Explanation> {
     // The squares fall by the share of the robot's errors that the size explains: a cheap look before the whole minimum.
-    let promises = |solved: &Solved| solved.gain_of_free_scale() > (1.0 - MAX_ROBOT_SHARE) * solved.freedom * 0.5;
+    let promises =
+        |solved: &Solved| solved.gain_of_free_scale() > 0.5 * (1.0 - MAX_ROBOT_SHARE.powi(2)) * solved.freedom;
     if !solved.is_none_or(promises) {
         return None;
     }
@@ -159,8 +160,10 @@ fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&So
     let off = (scale - 1.0).abs();
     let noise = solved.map_or(f64::INFINITY, Solved::robot_noise);
     let rms_px = free.minimum.at.rms_px();
-    let explains = free.robot_noise() < (MAX_ROBOT_SHARE * noise).min(MAX_ROBOT_SCALE) && is_little(evidence, rms_px);
-    let min_sigmas = MIN_SCALE_SIGMAS * (1.0 + FEW_EQUATIONS / free.freedom).sqrt();
+    // A robot's noise may leave more than a reading may: where it is accepted with the board as told, it is here.
+    let is_accepted = noise <= MAX_ROBOT_SCALE || is_little(evidence, rms_px);
+    let explains = free.robot_noise() < (MAX_ROBOT_SHARE * noise).min(MAX_ROBOT_SCALE) && is_accepted;
+    let min_sigmas = MIN_SCALE_SIGMAS * (1.0 + (FEW_EQUATIONS / free.freedom).powi(2)).sqrt();
     (explains && scale > 0.0 && off > MIN_SCALE_ERROR && off > min_sigmas * sigma)
         .then_some(Explanation { rms_px, kind: Kind::BoardScale([scale, sigma]) })
 }

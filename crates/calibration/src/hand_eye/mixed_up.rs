@@ -19,6 +19,9 @@ pub(super) enum MixedUp {
 const MAX_SHARE: f64 = 0.5;
 /// Another choice that leaves less than so many times as much is as good: it is not known which pose is wrong.
 const MIN_AMBIGUITY: f64 = 2.0;
+/// Pictures of which one may be named, and two: of fewer the others agree by chance where the robot is merely off.
+const MIN_FOR_ONE: usize = MIN_POSES + 2;
+const MIN_FOR_TWO: usize = MIN_POSES + 4;
 /// Of more pictures not every two are looked at, but the worst one with each other.
 const MAX_ALL_PAIRS: usize = 30;
 
@@ -47,12 +50,14 @@ pub(super) fn plausible(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Vec<Mi
         .filter(|pair| num <= MAX_ALL_PAIRS || worst.is_some_and(|worst| pair.contains(&worst)))
         .collect();
     let mut found = Vec::new();
-    if num > MIN_POSES {
+    if num >= MIN_FOR_ONE {
         found.extend(clearest(singles, given).map(|k| MixedUp::Wrong(vec![k])));
+    }
+    if num > MIN_POSES {
         let exchanged = pairs.iter().map(|pair| (with_exchanged(*pair), *pair)).collect();
         found.extend(clearest(exchanged, given).map(MixedUp::Exchanged));
     }
-    if num > MIN_POSES + 1 {
+    if num >= MIN_FOR_TWO {
         let two = pairs.iter().map(|pair| (without(pair), *pair)).collect();
         found.extend(clearest(two, given).map(|pair| MixedUp::Wrong(pair.to_vec())));
     }
