@@ -73,6 +73,9 @@ pub struct TablePose {
 
 /// Metres over the table. Chosen by hand: no grasp was ever taught from farther, and a height in millimetres lies beyond.
 const HEIGHTS_M: [f64; 2] = [0.05, 20.0];
+/// How far camera and workspace may be from the frame's origin along the table, metres: no arm stands in a larger hall, and places in
+/// millimetres lie beyond.
+const MAX_ASIDE_M: f64 = 50.0;
 /// How far a quaternion may be from length 1: files round.
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 
@@ -319,10 +322,16 @@ fn intrinsics(file: &File) -> Result<PinholeCamera, CameraFileError> {
 impl TablePose {
     fn read(file: Table) -> Result<Self, CameraFileError> {
         let frame_from_camera = read_pose(&file.frame_from_camera, "table.frame_from_camera")?;
-        let z = frame_from_camera.translation.z;
+        let [x, y, z]: [f64; 3] = frame_from_camera.translation.vector.into();
+        let is_far = |values: &[f64]| values.iter().any(|value| value.abs() > MAX_ASIDE_M);
+        if is_far(&[x, y]) {
+            let expected = "within 50 m of the frame's origin (millimetres given as metres?)";
+            let name = "table.frame_from_camera.translation_m";
+            return Err(pose_error(name, expected, &file.frame_from_camera.translation_m));
+        }
         let height = z - file.height_m;
         if !(HEIGHTS_M[0]..=HEIGHTS_M[1]).contains(&height) {
-            let hint = if height > HEIGHTS_M[1] { ": millimetres given as metres?" } else { "" };
+            let hint = if height.abs() > HEIGHTS_M[1] { ": millimetres given as metres?" } else { "" };
             return Err(CameraFileError::Height { height, hint });
         }
         let workspace = file.workspace_m.map(|Ranges { x, y }| Workspace { x_m: x, y_m: y });
@@ -330,6 +339,12 @@ impl TablePose {
             && !(x[0] < x[1] && y[0] < y[1])
         {
             return Err(CameraFileError::Workspace { x, y });
+        }
+        if let Some(Workspace { x_m: [a, b], y_m: [c, d] }) = workspace
+            && is_far(&[a, b, c, d])
+        {
+            let expected = "within 50 m of the frame's origin (millimetres given as metres?)";
+            return Err(pose_error("table.workspace_m", expected, &[a, b, c, d]));
         }
         Ok(Self { frame: file.frame, height_m: file.height_m, frame_from_camera, workspace })
     }
@@ -498,6 +513,10 @@ table:
         let metres = with("0.58]", "580]").to_string();
         assert!(metres.contains("579.99 m: millimetres given as metres?"), "{metres}");
         assert!(matches!(with("0.58]", "-0.58]"), CameraFileError::Height { hint: "", .. }));
+        for (from, to) in [("[0.5, 0, 0.58]", "[500, 0, 0.58]"), ("{x: [0.3, 0.7]", "{x: [300, 700]")] {
+            let text = with(from, to).to_string();
+            assert!(text.contains("millimetres given as metres?"), "{text}");
+        }
         assert!(matches!(
             read(&format!(
                 "{OF_ROS}hand_eye:\n  flange_from_camera: {{translation_m: [50, 0, 60], rotation_xyzw: [0, 0, 0, 1]}}\n"

@@ -188,4 +188,56 @@ pub enum CalibrationError {
         found: String,
         hint: String,
     },
+    /// One or two robot poses that do not belong to their pictures, among others that agree.
+    #[error(
+        "expected robot poses and pictures that agree, found {found}: {}", wrong_poses(.names, *.are_exchanged, *.left_px)
+    )]
+    WrongPoses {
+        /// How far all are apart.
+        found: String,
+        /// Places of the pictures among those given, from 0.
+        pictures: Vec<usize>,
+        /// What the pictures are called, in the same order: by their numbers from 1 before [`Self::with_picture_names`].
+        names: Vec<String>,
+        /// Whether each of two has the pose of the other.
+        are_exchanged: bool,
+        /// Reprojection without them, or with both exchanged.
+        left_px: f64,
+    },
+    /// A board of another size than was told.
+    #[error(
+        "expected a board of the size that was told, found squares of {:.2} ± {:.2} mm instead of {:.2} mm: by the robot's metres the board seems \
+         {:.1} % of that size, which leaves {left_px:.2} px; measure the 100 mm line below the board, or its squares, and tell what they measure",
+        1000.0 * .told_m * .scale, 1000.0 * .told_m * .sigma, 1000.0 * .told_m, 100.0 * .scale
+    )]
+    OtherBoardScale {
+        /// A square's side as told, metres.
+        told_m: f64,
+        /// The size as a multiple of that told, and its standard error.
+        scale: f64,
+        sigma: f64,
+        left_px: f64,
+    },
+}
+
+impl CalibrationError {
+    /// The same with the names of the pictures, which the caller knows, instead of their numbers.
+    #[must_use]
+    pub fn with_picture_names(mut self, name: impl Fn(usize) -> String) -> Self {
+        if let Self::WrongPoses { pictures, names, .. } = &mut self {
+            *names = pictures.iter().map(|picture| name(*picture)).collect();
+        }
+        self
+    }
+}
+
+fn wrong_poses(names: &[String], are_exchanged: bool, left_px: f64) -> String {
+    let joined = names.join(" and ");
+    if are_exchanged {
+        return format!("the poses of {joined} seem to be exchanged; each with the other's leaves {left_px:.2} px");
+    }
+    let (poses, seem, them) = if names.len() == 1 { ("pose", "seems", "it") } else { ("poses", "seem", "them") };
+    format!(
+        "the {poses} of {joined} {seem} to be wrong: without {them} the others leave {left_px:.2} px; correct {them} or leave {them} out"
+    )
 }

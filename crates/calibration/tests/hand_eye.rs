@@ -12,7 +12,7 @@ use sdg_geometry::{PinholeCamera, PlumbBob};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-const CAMERA: PinholeCamera = PinholeCamera {
+pub const CAMERA: PinholeCamera = PinholeCamera {
     width: 640,
     height: 480,
     fx: 600.0,
@@ -28,10 +28,10 @@ const MAX_ERROR_DEG: f64 = 0.1;
 const CORNER_SIGMA_PX: f64 = 0.3;
 const ROBOT_SIGMA_M: f64 = 0.0001;
 const ROBOT_SIGMA_DEG: f64 = 0.05;
-const NUM_POSES: usize = 15;
+pub const NUM_POSES: usize = 15;
 const NUM_TRIALS: u64 = 100;
 
-fn board() -> Board {
+pub fn board() -> Board {
     Board::new(9, 6, 0.025).unwrap()
 }
 
@@ -57,16 +57,16 @@ fn board_truth(mount: Mount) -> Isometry3<f64> {
     }
 }
 
-struct Noise {
-    corner_px: f64,
-    robot_m: f64,
-    robot_deg: f64,
+pub struct Noise {
+    pub corner_px: f64,
+    pub robot_m: f64,
+    pub robot_deg: f64,
 }
 
-const EXACT_ROBOT: Noise = Noise { corner_px: CORNER_SIGMA_PX, robot_m: 0.0, robot_deg: 0.0 };
-const NOISY_ROBOT: Noise = Noise { corner_px: CORNER_SIGMA_PX, robot_m: ROBOT_SIGMA_M, robot_deg: ROBOT_SIGMA_DEG };
+pub const EXACT_ROBOT: Noise = Noise { corner_px: CORNER_SIGMA_PX, robot_m: 0.0, robot_deg: 0.0 };
+pub const NOISY_ROBOT: Noise = Noise { corner_px: CORNER_SIGMA_PX, robot_m: ROBOT_SIGMA_M, robot_deg: ROBOT_SIGMA_DEG };
 
-fn views(mount: Mount, seed: u64, noise: &Noise) -> Vec<HandEyeView> {
+pub fn views(mount: Mount, seed: u64, noise: &Noise) -> Vec<HandEyeView> {
     let mut random = Random(seed);
     (0..NUM_POSES).map(|_| view(mount, &mut random, noise, 0.3)).collect()
 }
@@ -105,7 +105,7 @@ fn solve(mount: Mount, views: &[HandEyeView]) -> Result<HandEye, CalibrationErro
 }
 
 /// Millimetres and degrees.
-fn errors(found: &Isometry3<f64>, mount: Mount) -> [f64; 2] {
+pub fn errors(found: &Isometry3<f64>, mount: Mount) -> [f64; 2] {
     let truth = truth(mount);
     let off = 1000.0 * (found.translation.vector - truth.translation.vector).norm();
     [off, found.rotation.angle_to(&truth.rotation).to_degrees()]

@@ -3,6 +3,8 @@
 
 mod detection;
 mod hand_eye;
+mod hand_eye_mistakes;
 mod intrinsics;
 mod rendering;
 mod table;
+mod textures;

@@ -5,10 +5,10 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
 use sdg_calibration::CalibratedCamera;
-use sdg_cell::{Perception, PlacedCamera};
+use sdg_cell::{CellError, Perception, PlacedCamera};
 use sdg_demonstration::Demonstration;
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{CameraOverTable, GraspModel, Lengths, pictures_from_above, seen_from_above};
+use sdg_grasp::{CameraOverTable, GraspError, GraspModel, Lengths, pictures_from_above, seen_from_above};
 use sdg_robot::workcell::Workcell;
 
 use crate::files;
@@ -92,12 +92,16 @@ impl CameraFile {
 /// Puts the model of a file behind the camera of a file, if one is given.
 ///
 /// # Errors
-/// A camera file that cannot be used; a model that was taught without a camera, with its file's name.
+/// A camera file that cannot be used, or that does not see the plane of the marks, with its name; a model that was taught without a
+/// camera, with its file's name.
 pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
-    match camera {
-        None => Ok(Perception::of_any_camera(model)),
-        Some(path) => CameraFile::read(path)?.perception(model).with_context(|| model_file.display().to_string()),
-    }
+    let Some(path) = camera else { return Ok(Perception::of_any_camera(model)) };
+    CameraFile::read(path)?.perception(model).map_err(|error| {
+        // A plane that is not seen is the camera's fault.
+        let is_of_camera = matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::PlanView(_))));
+        let file = if is_of_camera { path } else { model_file };
+        error.context(file.display().to_string())
+    })
 }
 
 /// The camera of a file where the workcell mounts it.

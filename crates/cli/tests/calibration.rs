@@ -254,6 +254,16 @@ fn a_camera_on_the_hand_is_found_and_written() {
     assert!(told.contains("flange_from_camera: (") && told.contains("one picture left out"), "{told}");
     assert_refused(&[&common[..], &["--mount", "base"]].concat(), 1, &["--mount to be the other one"]);
 
+    let of_hand = |poses: &str, measured: &str, parts: &[&str]| {
+        let arguments = ["camera", "hand-eye", "--camera", &known, "--poses", poses, "--mount", "hand"];
+        assert_refused(&[&arguments[..], &["--measured-mm", measured]].concat(), 1, parts);
+    };
+    of_hand(&poses, "97", &["% of that size", "--measured-mm; by the robot's metres about"]);
+    let text = fs::read_to_string(&poses).unwrap();
+    of_hand(&files.text("missing.yaml", &text.replace(" 3.png", " away.png")), "100", &["away.png", "no such file"]);
+    let swapped = text.replace(" 3.png", " x.png").replace(" 5.png", " 3.png").replace(" x.png", " 5.png");
+    of_hand(&files.text("swapped.yaml", &swapped), "100", &["5.png", "3.png", "seem to be exchanged"]);
+
     let (millimetres, _) = hand_eye(&files, &camera, 1000.0);
     let arguments = ["camera", "hand-eye", "--camera", &known, "--poses", &millimetres, "--mount", "hand"];
     assert_refused(&arguments, 1, &["0.png", "millimetres given as metres?"]);

@@ -3,10 +3,12 @@
 //! ```text
 //! picture ─ halved until no board is missed ─ saddle points ─ grid grown from neighbour to neighbour   saddle.rs, grid.rs
 //!         ─ dots read, place and turn on the board ─ corners refined at full resolution                dots.rs, refine.rs
+//!         ─ refused where corners are no plane's or squares not even                                   acceptance.rs
 //! ```
 //! A grid is grown by what its last steps were, so distortion and perspective need not be known. Pixels have the first pixel's centre at
 //! (0.5, 0.5).
 
+mod acceptance;
 mod dots;
 mod grid;
 mod luminance;
@@ -58,7 +60,9 @@ pub fn find_board(picture: &GrayImage, board: &Board) -> Result<Vec<SeenCorner>,
             match dots::identify(&level, &grid, board) {
                 Ok(placed) => {
                     let corners = refine::refine(&full, &grid.scaled(scale), &placed);
-                    if corners.len() > found.len() {
+                    if !acceptance::is_board(&full, &corners) {
+                        refusal = refusal.or(Some(CalibrationError::BoardUnclear { corners: grid.len() }));
+                    } else if corners.len() > found.len() {
                         found = corners;
                     }
                 }

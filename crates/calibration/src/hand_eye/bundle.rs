@@ -1,4 +1,4 @@
-//! Reprojection over all pictures as a function of `X` and `Y`, and of what each robot pose is off by.
+//! Reprojection over all pictures as a function of `X`, `Y` and the board's scale, and of what each robot pose is off by.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, SMatrix, SVector, Vector6};
 use sdg_geometry::PinholeCamera;
@@ -7,6 +7,11 @@ use super::view::{HandEyeView, Mount};
 use crate::board::Board;
 use crate::least_squares::{Block, Problem};
 use crate::projection::{by_twist, motion, off, project};
+
+/// The twelve small motions of `X` and `Y`, and the board's scale.
+pub(super) const NUM_SHARED: usize = 13;
+/// The board's scale among them.
+pub(super) const SCALE: usize = 12;
 
 #[derive(Debug, Clone)]
 pub(super) struct Bundle<'a> {
@@ -18,6 +23,9 @@ pub(super) struct Bundle<'a> {
     motions: Vec<Isometry3<f64>>,
     pub(super) x: Isometry3<f64>,
     pub(super) y: Isometry3<f64>,
+    /// The board's size as a multiple of the size that was told; `Y` is followed by the scaled board.
+    pub(super) board_scale: f64,
+    is_scale_free: bool,
     /// What each pose is off by: a small motion in the flange's frame.
     errors: Vec<Isometry3<f64>>,
     /// Metres and radians of robot error that weigh as much as a pixel; `None` where poses are exact.
@@ -29,12 +37,29 @@ impl<'a> Bundle<'a> {
         camera: PinholeCamera,
         board: Board,
         mount: Mount,
-        views: &'a [HandEyeView],
+        views: Vec<&'a HandEyeView>,
         motions: Vec<Isometry3<f64>>,
         [x, y]: [Isometry3<f64>; 2],
     ) -> Self {
         let errors = vec![Isometry3::identity(); views.len()];
-        Self { camera, board, mount, views: views.iter().collect(), motions, x, y, errors, robot_sigma: None }
+        Self {
+            camera,
+            board,
+            mount,
+            views,
+            motions,
+            x,
+            y,
+            board_scale: 1.0,
+            is_scale_free: false,
+            errors,
+            robot_sigma: None,
+        }
+    }
+
+    /// The same with the board's scale as a parameter, which is held otherwise.
+    pub(super) fn with_free_scale(&self, board_scale: f64) -> Self {
+        Self { board_scale, is_scale_free: true, ..self.clone() }
     }
 
     /// The same with robot errors of so many metres and radians for a pixel.
@@ -69,14 +94,14 @@ impl<'a> Bundle<'a> {
     fn square(&self, view: usize) -> f64 {
         let camera_from_board = self.x.inverse() * self.motions[view] * self.y;
         let squares = self.views[view].corners.iter().map(|seen| {
-            let p = camera_from_board * self.board.corner(seen.corner);
+            let p = camera_from_board * (self.board.corner(seen.corner) * self.board_scale);
             project(&self.camera, &p)
                 .map_or(f64::INFINITY, |projected| off(&projected.pixel, &seen.pixel).norm_squared())
         });
         squares.sum()
     }
 
-    fn block(&self, view: usize) -> Option<Block<12>> {
+    fn block(&self, view: usize) -> Option<Block<NUM_SHARED>> {
         let mut block = Block::empty();
         let camera_from_x = self.x.inverse();
         let (motion, error) = (&self.motions[view], &self.errors[view]);
@@ -89,14 +114,16 @@ impl<'a> Bundle<'a> {
         let turn = |isometry: &Isometry3<f64>| -> Matrix3<f64> { isometry.rotation.to_rotation_matrix().into_inner() };
         let (turn_of_y, turn_of_flange) = (turn(&(camera_from_y * self.y)), turn(&camera_from_flange));
         for seen in &self.views[view].corners {
-            let b = self.board.corner(seen.corner);
+            let told = self.board.corner(seen.corner);
+            let b = told * self.board_scale;
             let in_flange = error * (flange_from_y * (self.y * b));
             let p = camera_from_flange * in_flange;
             let projected = project(&self.camera, &p)?;
-            let mut by_shared = SMatrix::<f64, 2, 12>::zeros();
+            let mut by_shared = SMatrix::<f64, 2, NUM_SHARED>::zeros();
             // X and Y are followed by their small motions: X⁻¹ is preceded by the inverse.
             by_shared.fixed_view_mut::<2, 6>(0, 0).copy_from(&-(projected.by_point * by_twist(&p)));
             by_shared.fixed_view_mut::<2, 6>(0, 6).copy_from(&(projected.by_point * turn_of_y * by_twist(&b)));
+            by_shared.fixed_view_mut::<2, 1>(0, SCALE).copy_from(&(projected.by_point * turn_of_y * told.coords));
             let by_own = match self.robot_sigma {
                 Some(_) => projected.by_point * turn_of_flange * by_twist(&in_flange),
                 None => SMatrix::zeros(),
@@ -119,14 +146,21 @@ impl<'a> Bundle<'a> {
     }
 }
 
-impl Problem<12> for Bundle<'_> {
-    fn blocks(&self) -> Option<Vec<Block<12>>> {
+impl Problem<NUM_SHARED> for Bundle<'_> {
+    fn blocks(&self) -> Option<Vec<Block<NUM_SHARED>>> {
         (0..self.views.len()).map(|view| self.block(view)).collect()
     }
 
-    fn stepped(&self, shared: &SVector<f64, 12>, own: &[Vector6<f64>]) -> Self {
+    fn stepped(&self, shared: &SVector<f64, NUM_SHARED>, own: &[Vector6<f64>]) -> Self {
         let twist = |from: usize| motion(&shared.fixed_rows::<6>(from).into_owned());
         let errors = self.errors.iter().zip(own).map(|(error, step)| motion(step) * error).collect();
-        Self { x: self.x * twist(0), y: self.y * twist(6), errors, ..self.clone() }
+        let board_scale = self.board_scale + shared[SCALE];
+        Self { x: self.x * twist(0), y: self.y * twist(6), board_scale, errors, ..self.clone() }
+    }
+
+    fn fixed(&self) -> [bool; NUM_SHARED] {
+        let mut fixed = [false; NUM_SHARED];
+        fixed[SCALE] = !self.is_scale_free;
+        fixed
     }
 }

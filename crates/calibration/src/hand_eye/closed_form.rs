@@ -17,37 +17,102 @@ const MAX_ANGLE: f64 = 2.9;
 /// The least root mean square turn about the second axis, in degrees: at 4 degrees, noise of 0.1 degrees is a fortieth.
 const MIN_SECOND_TURN_DEG: f64 = 4.0;
 
+/// The lever at which a turn counts as much as a shift, metres: about how far boards are from flanges.
+const LEVER_M: f64 = 0.3;
+
+/// Whether the board's size is that which was told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum BoardSize {
+    Told,
+    /// A multiple of it that is found.
+    Free,
+}
+
+/// What the equations give.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Closed {
+    pub(super) x: Isometry3<f64>,
+    pub(super) y: Isometry3<f64>,
+    pub(super) board_scale: f64,
+    /// What the equations of motions between pictures leave: root mean square, radians, shifts over [`LEVER_M`].
+    pub(super) left_rad: f64,
+}
+
+/// A motion of the flange from one picture to another, and the board's.
+type Pair = (Isometry3<f64>, Isometry3<f64>);
+
 /// `X` and `Y` from motions and the board's poses; `None` where they leave it open.
-pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Option<(Isometry3<f64>, Isometry3<f64>)> {
-    let pairs: Vec<_> = (0..motions.len())
-        .flat_map(|i| (0..i).map(move |j| (i, j)))
-        .map(|(i, j)| (motions[i] * motions[j].inverse(), boards[i] * boards[j].inverse()))
-        .filter(|(a, b)| a.rotation.angle() < MAX_ANGLE && b.rotation.angle() < MAX_ANGLE)
-        .collect();
+pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size: BoardSize) -> Option<Closed> {
+    let pairs = pairs(motions, boards, usize::MAX);
+    let rotation = turn_between(&pairs)?;
+    let mut matrix = DMatrix::zeros(3 * pairs.len(), 4);
+    let mut side = DVector::zeros(3 * pairs.len());
+    for (k, (a, b)) in pairs.iter().enumerate() {
+        let turned = a.rotation.to_rotation_matrix().into_inner() - Matrix3::identity();
+        let of_board = rotation * b.translation.vector;
+        matrix.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(&turned);
+        // The board's scale multiplies its shifts.
+        let told = match size {
+            BoardSize::Told => of_board,
+            BoardSize::Free => {
+                matrix.fixed_view_mut::<3, 1>(3 * k, 3).copy_from(&-of_board);
+                Vector3::zeros()
+            }
+        };
+        side.fixed_rows_mut::<3>(3 * k).copy_from(&(told - a.translation.vector));
+    }
+    // The normal equations: of hundreds of pairs the singular values take longer than all the rest.
+    let mut normal = (matrix.transpose() * &matrix).fixed_view::<4, 4>(0, 0).into_owned();
+    if size == BoardSize::Told {
+        normal[(3, 3)] = 1.0;
+    }
+    let found = normal.cholesky()?.solve(&(matrix.transpose() * &side).fixed_rows::<4>(0).into_owned());
+    let shifts_left =
+        (&matrix * DVector::from_column_slice(found.as_slice()) - side).norm_squared() / (LEVER_M * LEVER_M);
+    let left = (shifts_left + squares_of_turns(&rotation, &pairs)) / pairs.len() as f64;
+    let board_scale = if size == BoardSize::Free { found[3] } else { 1.0 };
+    let x = Isometry3::from_parts(found.fixed_rows::<3>(0).into_owned().into(), rotation);
+    let board = boards.first()?;
+    let scaled = Isometry3::from_parts((board.translation.vector * board_scale).into(), board.rotation);
+    // Any picture's Y is near enough to start from.
+    let y = motions.first()?.inverse() * x * scaled;
+    Some(Closed { x, y, board_scale, left_rad: left.sqrt() })
+}
+
+/// What the turns between pictures taken near each other leave, root mean square, radians.
+pub(super) fn turns_left(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> f64 {
+    let pairs = pairs(motions, boards, NEAR);
+    let left = turn_between(&pairs).map(|rotation| squares_of_turns(&rotation, &pairs) / pairs.len() as f64);
+    left.filter(|left| left.is_finite()).map_or(f64::INFINITY, f64::sqrt)
+}
+
+/// Pictures with which each is compared where thousands of readings are: the two before it.
+const NEAR: usize = 2;
+
+/// All pairs of pictures that are at most so many apart.
+fn pairs(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], apart: usize) -> Vec<Pair> {
+    let indices = (0..motions.len()).flat_map(|i| (i.saturating_sub(apart)..i).map(move |j| (i, j)));
+    let pairs = indices.map(|(i, j)| (motions[i] * motions[j].inverse(), boards[i] * boards[j].inverse()));
+    pairs.filter(|(a, b)| a.rotation.angle() < MAX_ANGLE && b.rotation.angle() < MAX_ANGLE).collect()
+}
+
+/// `R_X`.
+fn turn_between(pairs: &[Pair]) -> Option<UnitQuaternion<f64>> {
     let products: Matrix3<f64> =
         pairs.iter().map(|(a, b)| a.rotation.scaled_axis() * b.rotation.scaled_axis().transpose()).sum();
     let svd = products.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
     let sign = (u * v_t).determinant().signum();
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    let mut matrix = DMatrix::zeros(3 * pairs.len(), 3);
-    let mut side = DVector::zeros(3 * pairs.len());
-    for (k, (a, b)) in pairs.iter().enumerate() {
-        let turned = a.rotation.to_rotation_matrix().into_inner() - Matrix3::identity();
-        matrix.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(&turned);
-        side.fixed_rows_mut::<3>(3 * k).copy_from(&(rotation * b.translation.vector - a.translation.vector));
-    }
-    let translation = matrix.svd(true, true).solve(&side, 1e-9).ok()?;
-    let x = Isometry3::from_parts(Vector3::new(translation[0], translation[1], translation[2]).into(), rotation);
-    // Any picture's Y is near enough to start from.
-    let y = motions.first()?.inverse() * x * boards.first()?;
-    Some((x, y))
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation)))
+}
+
+fn squares_of_turns(rotation: &UnitQuaternion<f64>, pairs: &[Pair]) -> f64 {
+    pairs.iter().map(|(a, b)| (a.rotation.scaled_axis() - rotation * b.rotation.scaled_axis()).norm_squared()).sum()
 }
 
 /// Whether the robot's poses turn about two axes.
-pub(super) fn check_turns(mount: Mount, robot: &[Isometry3<f64>]) -> Result<(), CalibrationError> {
-    let motions: Vec<_> = robot.iter().map(|pose| mount.motion(pose)).collect();
+pub(super) fn check_turns(mount: Mount, motions: &[Isometry3<f64>]) -> Result<(), CalibrationError> {
     let mut scatter = Matrix3::zeros();
     let mut count = 0.0;
     for (i, a) in motions.iter().enumerate() {

@@ -1,70 +1,231 @@
 //! Robot poses that contradict the pictures: which mistake explains it.
+//!
+//! ```text
+//! robot errors small, board's size as told ─ no question
+//!   ├─ board's size a parameter: falls the robot's error by much, and is the size another? ─ OtherBoardScale
+//!   └─ robot errors suspect ─ other readings of all poses    readings.rs, euler.rs ─ HandEyeDisagrees
+//!                           ─ a few poses wrong, exchanged   mixed_up.rs           ─ WrongPoses
+//! ```
+//! Of several explanations the one counts that leaves the least; of those that leave as much, the simplest.
 
-use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
-use sdg_geometry::PinholeCamera;
+use nalgebra::Isometry3;
 
-use super::solve::{MAX_ROBOT_SCALE, SUSPECT_ROBOT_SCALE, Solved};
-use super::view::{HandEyeView, Mount};
-use crate::board::Board;
+use super::closed_form::{self, BoardSize};
+use super::mixed_up::{self, MixedUp};
+use super::readings;
+use super::solve::{Evidence, MAX_ROBOT_SCALE, SUSPECT_ROBOT_SCALE, Solved};
 use crate::error::CalibrationError;
-use crate::pose::BoardPose;
 
-/// What a robot's pose may mean instead.
-type Reading = fn(&Isometry3<f64>) -> Isometry3<f64>;
-
-/// Another reading explains what is seen where it leaves at most this share of the reprojection.
+/// Another reading explains the pictures where it leaves at most this share of the reprojection.
 const MAX_SHARE: f64 = 0.3;
+/// A few poses explain the pictures where the others leave at most this share: three quarters of the squares are theirs.
+const MAX_SHARE_OF_FEW: f64 = 0.5;
+/// The most that an explanation leaves beyond the corners' own errors, in radians of the picture: 5 px at a focal length of 700 px. A robot
+/// that is off by 0.5 mm and 0.25 degrees leaves as much.
+const MAX_LEFT_RAD: f64 = 0.007;
+/// What the closed form leaves at most before the minimum is looked for, which takes long where there is none: robot errors that leave
+/// [`MAX_LEFT_RAD`] leave a fifth of it between two pictures.
+const MAX_CLOSED_RAD: f64 = 0.1;
+/// By how much what two explanations leave may differ where they count as alike.
+const ALIKE: f64 = 1.2;
+/// A difference that no corner shows, in pixels.
+const ALIKE_PX: f64 = 0.02;
+/// A board's size that is off by less is left alone: on a line of 100 mm it is what a ruler is read to.
+const MIN_SCALE_ERROR: f64 = 0.003;
+/// Standard errors by which the board's size is off at least.
+const MIN_SCALE_SIGMAS: f64 = 5.0;
+/// Equations left of which fewer make the standard error itself uncertain: of four pictures 11 are left, and it counts three times.
+const FEW_EQUATIONS: f64 = 30.0;
+/// The board's size explains the robot's errors where at most this share of them is left: a quarter of the squares are the size's.
+const MAX_ROBOT_SHARE: f64 = 0.85;
+/// A turn by which the robot's and the board's turns between two pictures may differ, radians: 3 degrees, twice [`MAX_ROBOT_SCALE`].
+const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
-/// What was found, unless poses and pictures contradict each other or another reading of the poses fits far better.
-pub(super) fn checked<'a>(
-    solved: Result<Solved<'a>, CalibrationError>,
-    camera: &PinholeCamera,
-    board: &Board,
-    mount: Mount,
-    views: &[HandEyeView],
-    poses: &[BoardPose],
-) -> Result<Solved<'a>, CalibrationError> {
-    let scale = solved.as_ref().map_or(f64::INFINITY, |solved| solved.robot_scale.unwrap_or_default());
-    let solved = match solved {
-        Ok(solved) if scale < SUSPECT_ROBOT_SCALE => return Ok(solved),
-        solved => solved.ok(),
-    };
-    let rms_px = solved.as_ref().map_or(f64::INFINITY, |solved| solved.minimum.at.rms_px());
-    // A camera on the hand with poses inverted is a camera beside the robot: both have one equation.
-    let readings: [(&str, Reading); 4] = [
-        ("rotation_xyzw seems to hold w first", w_first),
-        ("the poses seem to be flange_from_base, or --mount to be the other one", Isometry3::inverse),
-        ("rotation_xyzw seems to hold w first, and --mount to be the other one", |pose| w_first(pose).inverse()),
-        ("the translations seem to be in millimetres", |pose| {
-            Isometry3::from_parts((pose.translation.vector / 1000.0).into(), pose.rotation)
-        }),
-    ];
-    let tried = readings.iter().filter_map(|(name, reading)| {
-        let robot: Vec<_> = views.iter().map(|view| reading(&view.base_from_flange)).collect();
-        let other = Solved::of(camera, board, mount, views, &robot, poses).ok()?;
-        Some((*name, other.minimum.at.rms_px()))
-    });
-    let best = tried.filter(|(_, rms)| *rms < MAX_SHARE * rms_px).min_by(|a, b| a.1.total_cmp(&b.1));
-    let hint = match best {
-        Some((name, rms)) => format!(": {name}, which leaves {rms:.2} px"),
-        None if scale > MAX_ROBOT_SCALE => {
-            ": check that each picture stands with its own pose, that the robot stood still, and that neither board nor camera was moved"
-                .to_owned()
-        }
-        None => return solved.ok_or(CalibrationError::NoPose),
-    };
-    let found = match solved.filter(|_| rms_px.is_finite()) {
-        Some(solved) => {
-            format!("{rms_px:.1} px between them where the board alone leaves {:.2} px", solved.board_rms_px)
-        }
-        None => "no place of the camera that explains both".to_owned(),
-    };
-    Err(CalibrationError::HandEyeDisagrees { found, hint })
+/// An explanation, and what it leaves.
+struct Explanation {
+    rms_px: f64,
+    kind: Kind,
 }
 
-/// The pose whose quaternion was written w, x, y, z and read x, y, z, w.
-fn w_first(pose: &Isometry3<f64>) -> Isometry3<f64> {
-    let read = pose.rotation.coords;
-    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(read[0], read[1], read[2], read[3]));
-    Isometry3::from_parts(pose.translation, rotation)
+enum Kind {
+    /// All poses are to be read otherwise.
+    Reading(String),
+    MixedUp(MixedUp),
+    /// The board's size as a multiple of that told, and its standard error.
+    BoardScale([f64; 2]),
+}
+
+/// What is found, unless poses and pictures contradict each other or another explanation fits far better.
+///
+/// # Errors
+/// As [`super::calibrate_hand_eye`].
+pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> Result<Solved<'a>, CalibrationError> {
+    let boards = evidence.boards();
+    let turns = closed_form::check_turns(evidence.mount, &evidence.motions(robot));
+    // Where the board turns about one axis, too, the poses are right and do not suffice.
+    if turns.is_err() && closed_form::check_turns(evidence.mount, &boards).is_err() {
+        turns.clone()?;
+    }
+    let solved = turns.clone().and_then(|()| Solved::of(evidence, robot, BoardSize::Told));
+    let noise = solved.as_ref().map_or(f64::INFINITY, Solved::robot_noise);
+    if noise == 0.0 {
+        return solved;
+    }
+    let rms_px = solved.as_ref().map_or(f64::INFINITY, |solved| solved.minimum.at.rms_px());
+    let mut explanations = Vec::new();
+    if noise >= SUSPECT_ROBOT_SCALE {
+        explanations = suspected(evidence, robot, rms_px);
+    }
+    explanations.extend(other_scale(evidence, robot, solved.as_ref().ok()));
+    let best = simplest(explanations);
+    let board_rms_px = evidence_rms_px(evidence);
+    let found = if rms_px.is_finite() {
+        format!("{rms_px:.1} px between them where the board alone leaves {board_rms_px:.2} px")
+    } else {
+        "no place of the camera that explains both".to_owned()
+    };
+    match best {
+        Some(Explanation { rms_px: left, kind }) => Err(refusal(kind, left, found, evidence)),
+        None if noise > MAX_ROBOT_SCALE => {
+            turns?;
+            let hint = match turns_that_differ(evidence, robot) {
+                Some(differ) => format!(": {differ}"),
+                None => ": check that each picture stands with its own pose, that the robot stood still, and that neither board nor \
+                         camera was moved"
+                    .to_owned(),
+            };
+            Err(CalibrationError::HandEyeDisagrees { found, hint })
+        }
+        None => solved,
+    }
+}
+
+/// Readings of all poses and choices of a few, each where it leaves no more than corners and a robot may.
+fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<Explanation> {
+    let readings = readings::plausible(evidence.mount, robot, &evidence.boards());
+    let readings = readings.into_iter().filter_map(|reading| {
+        let rms_px = left_px(evidence, &reading.robot)?;
+        Some(Explanation { rms_px, kind: Kind::Reading(reading.name) })
+    });
+    let mixed_up = mixed_up::plausible(evidence, robot).into_iter().filter_map(|mixed_up| {
+        let rms_px = match &mixed_up {
+            MixedUp::Wrong(out) => {
+                let kept: Vec<usize> = (0..robot.len()).filter(|k| !out.contains(k)).collect();
+                let of_kept: Vec<_> = kept.iter().map(|k| robot[*k]).collect();
+                left_px(&evidence.of(&kept), &of_kept)
+            }
+            MixedUp::Exchanged([a, b]) => {
+                let mut exchanged = robot.to_vec();
+                exchanged.swap(*a, *b);
+                left_px(evidence, &exchanged)
+            }
+        };
+        Some(Explanation { rms_px: rms_px?, kind: Kind::MixedUp(mixed_up) })
+    });
+    let explains = |explanation: &Explanation| {
+        let share = if matches!(explanation.kind, Kind::MixedUp(_)) { MAX_SHARE_OF_FEW } else { MAX_SHARE };
+        explanation.rms_px < share * rms_px
+    };
+    readings.chain(mixed_up).filter(explains).collect()
+}
+
+/// Reprojection with other robot poses; `None` where it is more than corners and a robot may leave.
+fn left_px(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<f64> {
+    let motions = evidence.motions(robot);
+    closed_form::check_turns(evidence.mount, &motions).ok()?;
+    let closed = closed_form::solve(&motions, &evidence.boards(), BoardSize::Told)?;
+    if closed.left_rad > MAX_CLOSED_RAD {
+        return None;
+    }
+    let solved = Solved::of(evidence, robot, BoardSize::Told).ok()?;
+    let rms_px = solved.minimum.at.rms_px();
+    is_little(evidence, rms_px).then_some(rms_px)
+}
+
+fn is_little(evidence: &Evidence, rms_px: f64) -> bool {
+    let most = evidence_rms_px(evidence) + MAX_LEFT_RAD * 0.5 * (evidence.camera.fx + evidence.camera.fy);
+    rms_px <= most
+}
+
+/// The board's size where it is another than told, and explains the robot's errors.
+fn other_scale(evidence: &Evidence, robot: &[Isometry3<f64>], solved: Option<&Solved>) -> Option<Explanation> {
+    // The squares fall by the share of the robot's errors that the size explains: a cheap look before the whole minimum.
+    let promises =
+        |solved: &Solved| solved.gain_of_free_scale() > 0.5 * (1.0 - MAX_ROBOT_SHARE.powi(2)) * solved.freedom;
+    if !solved.is_none_or(promises) {
+        return None;
+    }
+    let free = Solved::of(evidence, robot, BoardSize::Free).ok()?;
+    let [scale, sigma] = free.board_scale()?;
+    let off = (scale - 1.0).abs();
+    let noise = solved.map_or(f64::INFINITY, Solved::robot_noise);
+    let rms_px = free.minimum.at.rms_px();
+    // A robot's noise may leave more than a reading may: where it is accepted with the board as told, it is here.
+    let is_accepted = noise <= MAX_ROBOT_SCALE || is_little(evidence, rms_px);
+    let explains = free.robot_noise() < (MAX_ROBOT_SHARE * noise).min(MAX_ROBOT_SCALE) && is_accepted;
+    let min_sigmas = MIN_SCALE_SIGMAS * (1.0 + (FEW_EQUATIONS / free.freedom).powi(2)).sqrt();
+    (explains && scale > 0.0 && off > MIN_SCALE_ERROR && off > min_sigmas * sigma)
+        .then_some(Explanation { rms_px, kind: Kind::BoardScale([scale, sigma]) })
+}
+
+/// The first of those that leave as little as any; they stand from the simplest on.
+fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
+    // Without both of two exchanged pictures the others agree, too.
+    let exchanged = explanations.iter().find_map(|explanation| match explanation.kind {
+        Kind::MixedUp(MixedUp::Exchanged(two)) => Some(MixedUp::Wrong(two.to_vec())),
+        _ => None,
+    });
+    if let Some(without_both) = exchanged {
+        explanations
+            .retain(|explanation| !matches!(&explanation.kind, Kind::MixedUp(mixed_up) if *mixed_up == without_both));
+    }
+    let least = explanations.iter().map(|explanation| explanation.rms_px).fold(f64::INFINITY, f64::min);
+    explanations.into_iter().find(|explanation| explanation.rms_px <= ALIKE * least + ALIKE_PX)
+}
+
+fn refusal(kind: Kind, left_px: f64, found: String, evidence: &Evidence) -> CalibrationError {
+    match kind {
+        Kind::Reading(name) => {
+            CalibrationError::HandEyeDisagrees { found, hint: format!(": {name}, which leaves {left_px:.2} px") }
+        }
+        Kind::MixedUp(MixedUp::Wrong(pictures)) => {
+            CalibrationError::WrongPoses { found, are_exchanged: false, left_px, names: numbered(&pictures), pictures }
+        }
+        Kind::MixedUp(MixedUp::Exchanged(two)) => {
+            let pictures = two.to_vec();
+            CalibrationError::WrongPoses { found, are_exchanged: true, left_px, names: numbered(&pictures), pictures }
+        }
+        Kind::BoardScale([scale, sigma]) => {
+            CalibrationError::OtherBoardScale { told_m: evidence.board.square_m(), scale, sigma, left_px }
+        }
+    }
+}
+
+fn numbered(pictures: &[usize]) -> Vec<String> {
+    pictures.iter().map(|k| format!("picture {}", k + 1)).collect()
+}
+
+/// Root of the mean squared distance of corners where each picture has a pose of its own.
+fn evidence_rms_px(evidence: &Evidence) -> f64 {
+    let pictures = || evidence.poses.iter().zip(&evidence.views).map(|(pose, view)| (pose.rms_px, view.corners.len()));
+    let squares: f64 = pictures().map(|(rms, num)| rms * rms * num as f64).sum();
+    let num: usize = pictures().map(|(_, num)| num).sum();
+    (squares / num as f64).sqrt()
+}
+
+/// What to say where the robot turns by other angles than the board: no mistake in translations explains it.
+fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<String> {
+    let boards = evidence.boards();
+    let turn = |poses: &[Isometry3<f64>], k: usize| poses[k].rotation.angle_to(&poses[k - 1].rotation);
+    let mut turns: Vec<[f64; 2]> = (1..robot.len()).map(|k| [turn(robot, k), turn(&boards, k)]).collect();
+    turns.sort_by(|a, b| (a[0] - a[1]).abs().total_cmp(&(b[0] - b[1]).abs()));
+    let [robot_turn, board_turn] = *turns.get(turns.len() / 2)?;
+    ((robot_turn - board_turn).abs() > MAX_TURN_DIFFERENCE_RAD).then(|| {
+        format!(
+            "between pictures the flange turns by other angles than the board (typically by {:.0} degrees where the board turns by {:.0}): \
+             check that each picture stands with its own pose, and how the rotations were made (order of Euler angles, degrees or radians)",
+            robot_turn.to_degrees(),
+            board_turn.to_degrees()
+        )
+    })
 }

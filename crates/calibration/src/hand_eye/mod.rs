@@ -11,6 +11,7 @@
 //! ```text
 //! boards' poses ─ A_ij X = X B_ij in closed form ─ reprojection over all pictures minimised in X and Y   closed_form.rs, bundle.rs
 //!               ─ robot poses that are off: their errors estimated with X and Y ─ one left out at a time
+//! poses that contradict the pictures ─ readings of all, a few that are wrong, the board's size        diagnosis.rs, readings.rs, mixed_up.rs
 //! ```
 //! A robot's pose is off by far more than a pixel: 0.05 degrees at 0.5 m are 0.4 mm. Where reprojection says so, each pose gets six
 //! corrections of its own, whose squares are weighed against the pixels'.
@@ -18,7 +19,10 @@
 mod bundle;
 mod closed_form;
 mod diagnosis;
+mod euler;
+mod mixed_up;
 mod poses_file;
+mod readings;
 mod solve;
 mod view;
 
@@ -26,7 +30,7 @@ use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 
 pub use self::poses_file::{RobotPose, read_robot_poses};
-use self::solve::{ROBOT_SIGMA, Solved};
+use self::solve::{Evidence, ROBOT_SIGMA};
 pub use self::view::{HandEyeView, Mount};
 use crate::board::Board;
 use crate::error::CalibrationError;
@@ -64,7 +68,7 @@ pub const MIN_POSES: usize = 4;
 ///
 /// # Errors
 /// [`CalibrationError::TooFewPictures`], [`CalibrationError::TurnsAlike`], [`CalibrationError::HandEyeDisagrees`],
-/// [`CalibrationError::NoPose`].
+/// [`CalibrationError::WrongPoses`], [`CalibrationError::OtherBoardScale`], [`CalibrationError::NoPose`].
 pub fn calibrate_hand_eye(
     camera: &PinholeCamera,
     board: &Board,
@@ -77,9 +81,8 @@ pub fn calibrate_hand_eye(
     let poses: Option<Vec<BoardPose>> = views.iter().map(|view| board_pose(camera, board, &view.corners)).collect();
     let poses = poses.ok_or(CalibrationError::NoPose)?;
     let robot: Vec<_> = views.iter().map(|view| view.base_from_flange).collect();
-    closed_form::check_turns(mount, &robot)?;
-    let solved = Solved::of(camera, board, mount, views, &robot, &poses);
-    let solved = diagnosis::checked(solved, camera, board, mount, views, &poses)?;
+    let evidence = Evidence { camera, board, mount, views: views.iter().collect(), poses: poses.iter().collect() };
+    let solved = diagnosis::checked(&evidence, &robot)?;
     let (found, without) = (&solved.minimum.at, solved.without_each());
     let covariance = solved.minimum.information.try_inverse().ok_or(CalibrationError::NoPose)? * solved.variance();
     let sigma = |from: usize| (from..from + 3).map(|k| covariance[(k, k)].max(0.0)).sum::<f64>().sqrt();

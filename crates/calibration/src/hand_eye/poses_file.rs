@@ -5,7 +5,8 @@
 //!   - picture: 00.png
 //!     base_from_flange: {translation_m: [0.4, 0.0, 0.5], rotation_xyzw: [1.0, 0.0, 0.0, 0.0]}
 //! ```
-//! JSON has the same names. CSV has the header `picture,x,y,z,qx,qy,qz,qw`, lengths in metres.
+//! JSON has the same names. CSV has the header `picture,x,y,z,qx,qy,qz,qw`, lengths in metres; semicolons, tabs or blanks may stand between
+//! the fields, numbers may have decimal commas, and lines that start with `#` are comments.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -44,42 +45,93 @@ const MAX_REACH_M: f64 = 5.0;
 const MAX_QUATERNION_ERROR: f64 = 1e-3;
 const HEADER: &str = "picture,x,y,z,qx,qy,qz,qw";
 
-/// Reads robot poses.
+/// How a file is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Json,
+    Yaml,
+}
+
+impl Format {
+    /// From the first bytes where they leave no doubt, else from the ending of the file's name.
+    fn of(name: &str, text: &str) -> Self {
+        let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
+        let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).unwrap_or_default();
+        let starts_with_picture = first.get(..7).is_some_and(|word| word.eq_ignore_ascii_case("picture"));
+        let is_header = starts_with_picture && first[7..].starts_with([',', ';', '\t', ' ']);
+        match ending.as_str() {
+            _ if is_header => Self::Csv,
+            _ if first.trim_start().starts_with('{') => Self::Json,
+            "csv" | "tsv" => Self::Csv,
+            "json" => Self::Json,
+            _ => Self::Yaml,
+        }
+    }
+}
+
+/// Whether a line of CSV has a row: neither empty nor a comment.
+fn is_row(line: &str) -> bool {
+    !line.trim().is_empty() && !line.trim_start().starts_with('#')
+}
+
+/// Reads robot poses from the text of a file with this name.
 ///
 /// # Errors
 /// [`CalibrationError::PosesUnreadable`]; [`CalibrationError::RobotPose`] for a pose that is none, or in millimetres.
-pub fn read_robot_poses(text: &str) -> Result<Vec<RobotPose>, CalibrationError> {
-    let unreadable = |found: String| CalibrationError::PosesUnreadable { found };
+pub fn read_robot_poses(name: &str, text: &str) -> Result<Vec<RobotPose>, CalibrationError> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    let first = text.lines().next().unwrap_or_default();
-    // Spreadsheets of countries with decimal commas put semicolons between the fields.
-    let separator = [',', ';', '\t'].into_iter().find(|separator| {
-        first.split_once(*separator).is_some_and(|(name, _)| name.trim().eq_ignore_ascii_case("picture"))
-    });
-    let entries = if let Some(separator) = separator {
-        let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-        let header = lines.next().unwrap_or_default().replace(' ', "").replace(separator, ",").to_ascii_lowercase();
-        if header != HEADER {
-            return Err(unreadable(format!("the header {header} instead of {HEADER}")));
+    let entries = match Format::of(name, text) {
+        Format::Csv => read_csv(text)?,
+        Format::Json => {
+            let file: Result<File, _> = serde_json::from_str(text);
+            file.map_err(|error| unreadable(format!("as JSON, {error}")))?.poses
         }
-        lines.map(|line| entry_of_line(line, separator)).collect::<Result<_, _>>()?
-    } else {
-        let file: File = serde_saphyr::from_str(text).map_err(|error| {
-            let message = error.to_string();
-            unreadable(message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned())
-        })?;
-        file.poses
+        Format::Yaml => {
+            let file: Result<File, _> = serde_saphyr::from_str(text);
+            let said = |error: serde_saphyr::Error| {
+                let message = error.to_string();
+                let first = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
+                unreadable(format!("as YAML, {first}"))
+            };
+            file.map_err(said)?.poses
+        }
     };
     entries.into_iter().map(Entry::checked).collect()
 }
 
-fn entry_of_line(line: &str, separator: char) -> Result<Entry, CalibrationError> {
-    let unreadable = || CalibrationError::PosesUnreadable { found: format!("the line {line}, expected {HEADER}") };
-    let fields: Vec<&str> = line.split(separator).map(str::trim).collect();
-    let numbers: Option<Vec<f64>> = fields.iter().skip(1).map(|field| field.replace(',', ".").parse().ok()).collect();
-    let numbers = numbers.filter(|numbers| numbers.len() == 7).ok_or_else(unreadable)?;
+fn unreadable(found: String) -> CalibrationError {
+    CalibrationError::PosesUnreadable { found }
+}
+
+fn read_csv(text: &str) -> Result<Vec<Entry>, CalibrationError> {
+    let mut rows = text.lines().map(str::trim).filter(|line| is_row(line));
+    let header = rows.next().unwrap_or_default();
+    // Spreadsheets of countries with decimal commas put semicolons between the fields.
+    let separator = [';', '\t', ','].into_iter().find(|separator| header.contains(*separator)).unwrap_or(' ');
+    if !fields(header, separator).join(",").eq_ignore_ascii_case(HEADER) {
+        return Err(unreadable(format!("as CSV, the header {header:?} instead of {HEADER}")));
+    }
+    rows.map(|row| entry_of_row(row, separator)).collect()
+}
+
+fn fields(row: &str, separator: char) -> Vec<&str> {
+    if separator == ' ' { row.split_whitespace().collect() } else { row.split(separator).map(str::trim).collect() }
+}
+
+fn entry_of_row(row: &str, separator: char) -> Result<Entry, CalibrationError> {
+    let num_fields = HEADER.split(',').count();
+    let mut fields = fields(row, separator);
+    if fields.len() != num_fields {
+        // Decimal commas beside commas between the fields: blanks tell them apart.
+        fields = row.split_whitespace().map(|field| field.trim_end_matches(separator)).collect();
+    }
+    let expected = || unreadable(format!("as CSV, the line {row:?}, expected {HEADER}"));
+    let [picture, numbers @ ..] = &fields[..] else { return Err(expected()) };
+    let numbers: Option<Vec<f64>> = numbers.iter().map(|field| field.replace(',', ".").parse().ok()).collect();
+    let numbers = numbers.filter(|numbers| numbers.len() + 1 == num_fields).ok_or_else(expected)?;
     let base_from_flange = Pose { translation_m: numbers[..3].to_vec(), rotation_xyzw: numbers[3..].to_vec() };
-    Ok(Entry { picture: fields[0].to_owned(), base_from_flange })
+    Ok(Entry { picture: (*picture).to_owned(), base_from_flange })
 }
 
 impl Entry {
@@ -127,34 +179,53 @@ poses:
 
     #[test]
     fn yaml_json_and_csv_say_the_same() {
-        let yaml = read_robot_poses(YAML).unwrap();
+        let yaml = read_robot_poses("poses.yaml", YAML).unwrap();
         let json = r#"{"poses": [{"picture": "a.png", "base_from_flange":
             {"translation_m": [0.4, 0.0, 0.5], "rotation_xyzw": [1.0, 0.0, 0.0, 0.0]}}]}"#;
-        assert_eq!(read_robot_poses(json).unwrap(), yaml);
+        assert_eq!(read_robot_poses("poses.json", json).unwrap(), yaml);
         let csv = "picture,x,y,z,qx,qy,qz,qw\na.png,0.4,0,0.5,1,0,0,0\n";
-        assert_eq!(read_robot_poses(csv).unwrap(), yaml);
+        assert_eq!(read_robot_poses("poses.csv", csv).unwrap(), yaml);
         let by_spreadsheets = [
             format!("\u{feff}{csv}"),
             csv.replace("picture,x,y,z", "Picture,X,Y,Z"),
             csv.replace(',', ";"),
             csv.replace(',', ";").replace("0.", "0,"),
             csv.replace(',', "\t"),
+            csv.replace(',', " "),
+            csv.replace(',', " ").replace("0.", "0,"),
+            csv.replace("a.png,0.4,0,0.5,", "a.png, 0,4, 0, 0,5, ").replace("1,0,0,0", "1, 0, 0, 0"),
+            format!("# of the arm on the left\n\n{csv}# the end\n"),
         ];
         for text in by_spreadsheets {
-            assert_eq!(read_robot_poses(&text).unwrap(), yaml, "{text}");
+            assert_eq!(read_robot_poses("poses", &text).unwrap(), yaml, "{text}");
         }
-        assert_eq!(read_robot_poses(&format!("\u{feff}{YAML}")).unwrap(), yaml);
+        assert_eq!(read_robot_poses("poses.yml", &format!("\u{feff}{YAML}")).unwrap(), yaml);
     }
 
     #[test]
     fn nonsense_is_refused() {
-        let error = |from: &str, to: &str| read_robot_poses(&YAML.replace(from, to)).unwrap_err().to_string();
+        let error =
+            |from: &str, to: &str| read_robot_poses("poses.yaml", &YAML.replace(from, to)).unwrap_err().to_string();
         assert!(error("[0.4, 0, 0.5]", "[400, 0, 500]").contains("millimetres given as metres?"));
         assert!(error("[0.4, 0, 0.5]", "[0.4, 0]").contains("three numbers"));
         assert!(error("[0.4, 0, 0.5]", "[.nan, 0, 0]").contains("a.png"));
         assert!(error("[1, 0, 0, 0]", "[1, 1, 0, 0]").contains("length 1"));
         assert!(error("poses", "pose").contains("docs/calibration.md"));
-        assert!(read_robot_poses("picture,x\n").is_err());
-        assert!(read_robot_poses("picture,x,y,z,qx,qy,qz,qw\na.png,1,2\n").is_err());
+        assert!(read_robot_poses("poses.txt", "picture,x\n").is_err());
+        assert!(read_robot_poses("poses.txt", "picture,x,y,z,qx,qy,qz,qw\na.png,1,2\n").is_err());
+    }
+
+    #[test]
+    fn the_reader_of_the_files_format_says_what_is_wrong() {
+        let found = |name: &str, text: &str| read_robot_poses(name, text).unwrap_err().to_string();
+        let csv = found("poses.csv", "# comment\nname,x,y\na.png,1,2\n");
+        assert!(csv.contains("as CSV, the header \"name,x,y\" instead of picture,x,y,z"), "{csv}");
+        let row = found("poses.csv", "picture,x,y,z,qx,qy,qz,qw\na.png,1,2\n");
+        assert!(row.contains("as CSV, the line \"a.png,1,2\""), "{row}");
+        for name in ["poses.json", "poses.txt"] {
+            let json = found(name, "{\"poses\": [}");
+            assert!(json.contains("as JSON") && json.contains("line 1 column 12"), "{json}");
+        }
+        assert!(found("poses.yaml", "poses: 3\n").contains("as YAML"));
     }
 }

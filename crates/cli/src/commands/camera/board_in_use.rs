@@ -33,6 +33,11 @@ pub struct BoardInUse {
 }
 
 impl BoardInUse {
+    /// The printed 100 mm line by a ruler, in millimetres.
+    pub fn measured_mm(&self) -> f64 {
+        self.measured_mm
+    }
+
     /// The board as it was printed.
     pub fn read(&self) -> Result<Board> {
         let drawn = match &self.board {

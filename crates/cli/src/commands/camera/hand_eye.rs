@@ -3,12 +3,12 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use sdg_calibration::{
-    Board, CalibratedCamera, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose, calibrate_hand_eye, find_board,
-    read_robot_poses,
+    Board, CalibratedCamera, CalibrationError, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose,
+    calibrate_hand_eye, find_board, read_robot_poses,
 };
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::upper_median;
@@ -71,11 +71,13 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let mount = Mount::from(args.mount);
     let (camera, existing) = camera_files::read(&args.camera)?;
     let bytes = files::read(&args.poses, MAX_BYTES)?;
-    let poses = read_robot_poses(&String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
+    let poses =
+        read_robot_poses(&named(&args.poses), &String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
     if let Some(out) = &args.out {
         files::check_extendable(out, Some(&args.camera))?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
+    check_pictures_exist(&poses, folder)?;
     let looked: Vec<(&RobotPose, Result<HandEyeView>)> =
         poses.par_iter().map(|pose| (pose, look(pose, folder, &camera, &board))).collect();
     let (mut lines, mut seen, mut views) = (Vec::new(), Vec::new(), Vec::new());
@@ -92,7 +94,8 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
             }
         }
     }
-    let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)?;
+    let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)
+        .map_err(|error| explained(error.with_picture_names(|k| seen[k].picture.clone()), args))?;
     if let Some(out) = &args.out {
         let camera = placed(args, camera, &found, mount);
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
@@ -108,6 +111,25 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     }
     report(args, mount, &found, &seen, lines)?;
     Ok(Outcome::Done)
+}
+
+/// A pose whose picture is missing is a mistake in the file of poses, not a picture without the board.
+fn check_pictures_exist(poses: &[RobotPose], folder: &Path) -> Result<()> {
+    match poses.iter().map(|pose| folder.join(&pose.picture)).find(|picture| !picture.exists()) {
+        Some(missing) => bail!("{}: expected the picture of a robot pose, found no such file", missing.display()),
+        None => Ok(()),
+    }
+}
+
+/// The error with the option that corrects it.
+fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
+    match error {
+        CalibrationError::OtherBoardScale { scale, .. } => {
+            let measured_mm = scale * args.board.measured_mm();
+            anyhow!("{error} (--measured-mm; by the robot's metres about {measured_mm:.1})")
+        }
+        error => error.into(),
+    }
 }
 
 fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {

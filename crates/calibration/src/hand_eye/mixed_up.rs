@@ -1,0 +1,85 @@
+//! Which few robot poses do not belong to their pictures: one or two that are wrong, or two that are exchanged.
+
+use nalgebra::Isometry3;
+
+use super::MIN_POSES;
+use super::closed_form::{self, BoardSize};
+use super::solve::Evidence;
+
+/// What is wrong with the poses of a few pictures.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum MixedUp {
+    /// These are wrong.
+    Wrong(Vec<usize>),
+    /// These two are exchanged.
+    Exchanged([usize; 2]),
+}
+
+/// The poses that stay leave at most this share of what all leave in closed form.
+const MAX_SHARE: f64 = 0.5;
+/// Another choice that leaves less than so many times as much is as good: it is not known which pose is wrong.
+const MIN_AMBIGUITY: f64 = 2.0;
+/// Pictures of which one may be named, and two: of fewer the others agree by chance where the robot is merely off.
+const MIN_FOR_ONE: usize = MIN_POSES + 2;
+const MIN_FOR_TWO: usize = MIN_POSES + 4;
+/// Of more pictures not every two are looked at, but the worst one with each other.
+const MAX_ALL_PAIRS: usize = 30;
+
+/// The most plausible choice of each kind, the simplest kind first.
+pub(super) fn plausible(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Vec<MixedUp> {
+    let (motions, boards) = (evidence.motions(robot), evidence.boards());
+    let left = |motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]| {
+        closed_form::solve(motions, boards, BoardSize::Told).map_or(f64::INFINITY, |closed| closed.left_rad)
+    };
+    let num = motions.len();
+    let given = left(&motions, &boards);
+    let without = |out: &[usize]| {
+        let kept =
+            |all: &[Isometry3<f64>]| -> Vec<_> { (0..num).filter(|k| !out.contains(k)).map(|k| all[k]).collect() };
+        left(&kept(&motions), &kept(&boards))
+    };
+    let with_exchanged = |[a, b]: [usize; 2]| {
+        let mut motions = motions.clone();
+        motions.swap(a, b);
+        left(&motions, &boards)
+    };
+    let singles: Vec<_> = (0..num).map(|k| (without(&[k]), k)).collect();
+    let worst = singles.iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k)| *k);
+    let pairs: Vec<[usize; 2]> = (0..num)
+        .flat_map(|b| (0..b).map(move |a| [a, b]))
+        .filter(|pair| num <= MAX_ALL_PAIRS || worst.is_some_and(|worst| pair.contains(&worst)))
+        .collect();
+    let mut found = Vec::new();
+    if num >= MIN_FOR_ONE {
+        found.extend(clearest(singles, given).map(|k| MixedUp::Wrong(vec![k])));
+    }
+    if num > MIN_POSES {
+        let exchanged = pairs.iter().map(|pair| (with_exchanged(*pair), *pair)).collect();
+        found.extend(clearest(exchanged, given).map(MixedUp::Exchanged));
+    }
+    if num >= MIN_FOR_TWO {
+        let two = pairs.iter().map(|pair| (without(pair), *pair)).collect();
+        found.extend(clearest(two, given).map(|pair| MixedUp::Wrong(pair.to_vec())));
+    }
+    found
+}
+
+/// The choice that leaves clearly less than all others, and than what is given.
+fn clearest<T>(mut choices: Vec<(f64, T)>, given: f64) -> Option<T> {
+    choices.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let second = choices.get(1).map_or(f64::INFINITY, |(left, _)| *left);
+    let (left, choice) = choices.into_iter().next()?;
+    (left < MAX_SHARE * given && MIN_AMBIGUITY * left < second).then_some(choice)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_choice_is_clear_where_no_other_is_as_good() {
+        assert_eq!(clearest(vec![(0.5, 'a'), (0.01, 'b'), (0.4, 'c')], 0.6), Some('b'));
+        assert_eq!(clearest(vec![(0.5, 'a'), (0.01, 'b'), (0.015, 'c')], 0.6), None);
+        assert_eq!(clearest(vec![(0.5, 'a')], 0.6), None);
+    }
+}

@@ -1,0 +1,109 @@
+//! Robot poses read otherwise than they were given: mistakes that are often made.
+
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion};
+
+use super::closed_form;
+use super::euler::Recomposition;
+use super::view::Mount;
+
+/// Robot poses as they may have been meant.
+pub(super) struct Reading {
+    /// What seems to be the case, as part of a sentence.
+    pub(super) name: String,
+    /// `base_from_flange` of each picture.
+    pub(super) robot: Vec<Isometry3<f64>>,
+}
+
+/// A reading of one pose.
+type OfPose = fn(&Isometry3<f64>) -> Isometry3<f64>;
+
+/// Mistakes other than Euler angles, the simplest first. A camera on the hand with poses inverted is a camera beside the robot: both have
+/// one equation.
+const READINGS: [(&str, OfPose); 8] = [
+    ("rotation_xyzw seems to hold w first", w_first),
+    ("the poses seem to be flange_from_base, or --mount to be the other one", Isometry3::inverse),
+    ("the rotations seem to be transposed (flange_from_base beside translations in the base)", transposed),
+    ("the translations seem to be in millimetres", |pose| {
+        Isometry3::from_parts((pose.translation.vector / 1000.0).into(), pose.rotation)
+    }),
+    ("the translations seem to be those of flange_from_base beside rotations of base_from_flange", |pose| {
+        Isometry3::from_parts((-(pose.rotation * pose.translation.vector)).into(), pose.rotation)
+    }),
+    ("rotation_xyzw seems to hold w first, and --mount to be the other one", |pose| w_first(pose).inverse()),
+    ("rotation_xyzw seems to hold w first, and the rotations to be transposed", |pose| transposed(&w_first(pose))),
+    ("the rotations seem to be transposed, and --mount to be the other one", |pose| transposed(pose).inverse()),
+];
+
+/// Rotations that another reading explains leave at most this share of what those given leave in closed form.
+const MAX_TURNS_SHARE: f64 = 0.5;
+/// Readings of Euler angles that leave the least in closed form, and are looked at further.
+const NUM_EULER: usize = 3;
+/// By how much what they leave may differ where they count as alike.
+const ALIKE: f64 = 1.1;
+/// Below it all digits are rounding, radians.
+const ROUNDING_RAD: f64 = 1e-5;
+/// Rotations all smaller than this may be radians that were taken for degrees: half a turn about each axis is 3.14 "degrees".
+const MAX_TINY_RAD: f64 = 0.1;
+
+/// All readings whose rotations fit those of the boards, the simplest first.
+pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> Vec<Reading> {
+    let left = |robot: &[Isometry3<f64>]| {
+        let motions: Vec<_> = robot.iter().map(|pose| mount.motion(pose)).collect();
+        closed_form::turns_left(&motions, boards)
+    };
+    let given = left(robot);
+    let mut readings: Vec<Reading> = READINGS
+        .iter()
+        .map(|(name, of_pose)| Reading { name: (*name).to_owned(), robot: robot.iter().map(of_pose).collect() })
+        // Those of translations leave the rotations as they are.
+        .filter(|reading| left(&reading.robot) <= given)
+        .collect();
+    let is_tiny = robot.iter().all(|pose| pose.rotation.angle() < MAX_TINY_RAD);
+    let units: &[f64] = if is_tiny { &[1_f64.to_degrees(), 1.0] } else { &[1.0] };
+    let rotations: Vec<_> = robot.iter().map(|pose| pose.rotation).collect();
+    let turns = |k: usize, j: usize| boards[k].rotation.angle_to(&boards[j].rotation);
+    let recomposed = |way: &Recomposition, first: usize| -> Vec<Isometry3<f64>> {
+        let meant = way.apply(&rotations, first, &turns);
+        robot.iter().zip(meant).map(|(pose, rotation)| Isometry3::from_parts(pose.translation, rotation)).collect()
+    };
+    let mut ways: Vec<(f64, Recomposition, usize)> = units
+        .iter()
+        .flat_map(|unit| Recomposition::all(*unit))
+        .flat_map(|way| [(way, 0), (way, 1)])
+        .map(|(way, first)| (left(&recomposed(&way, first)), way, first))
+        .filter(|(left, ..)| *left < MAX_TURNS_SHARE * given)
+        .collect();
+    let least = ways.iter().map(|(left, ..)| *left).fold(f64::INFINITY, f64::min);
+    // Of those alike the likelier ones stand first.
+    ways.retain(|(left, ..)| *left <= ALIKE * least + ROUNDING_RAD);
+    let likeliest = ways.iter().take(NUM_EULER);
+    readings.extend(likeliest.map(|(_, way, first)| Reading { name: name(way), robot: recomposed(way, *first) }));
+    readings
+}
+
+fn name(way: &Recomposition) -> String {
+    let unit = if way.unit > 1.0 { ", and their radians taken for degrees" } else { "" };
+    if way.composed == way.meant {
+        return format!(
+            "the rotations seem to be composed of radians that were taken for degrees ({})",
+            way.meant.formula()
+        );
+    }
+    format!(
+        "the rotations seem to be composed as {} of angles that mean {}{unit}",
+        way.composed.formula(),
+        way.meant.formula()
+    )
+}
+
+/// The pose whose quaternion was written w, x, y, z and read x, y, z, w.
+fn w_first(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    let read = pose.rotation.coords;
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(read[0], read[1], read[2], read[3]));
+    Isometry3::from_parts(pose.translation, rotation)
+}
+
+/// The pose whose rotation alone was inverted.
+fn transposed(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(pose.translation, pose.rotation.inverse())
+}
