@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
-use sdg_demonstration::PixelFrame;
+use sdg_demonstration::{Demonstration, PixelFrame};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions, teach,
@@ -165,7 +165,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
         GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
-        error => anyhow::Error::from(error),
+        error => anyhow::Error::from(error).context(args.demonstrations.join(", ")),
     })?;
     let bytes = taught.model.to_bytes()?;
     files::write(&args.out, &bytes)?;
@@ -191,6 +191,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let failure = figures.failure();
     if let Some(failure) = &failure {
         eprintln!("warning: {failure}");
+    }
+    for told in openings_by_the_box(&taught.model, &demonstrations) {
+        eprintln!("{told}");
     }
     if args.json {
         let line = json!({
@@ -319,6 +322,21 @@ fn too_wide(model: &GraspModel) -> Option<String> {
             1e3 * HAND_OPENING_MAX_M
         )
     })
+}
+
+/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
+fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
+    let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
+        let annotation = &demonstration.annotation;
+        (annotation.outline.is_none() && annotation.jaw_width.is_none()).then(|| {
+            format!(
+                "the opening of the jaws, {:.0} px, is taken from the box of \"{}\", which may be wider than the part: draw its \
+                 outline, or mark the jaws (`sdg annotate`)",
+                taught.marks.width_px, annotation.label
+            )
+        })
+    });
+    told.collect()
 }
 
 /// How the network's teaching went, for people; nothing for a model without.
