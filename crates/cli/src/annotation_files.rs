@@ -3,12 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use image::RgbImage;
 use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
 
 use crate::files;
+use crate::marks_check::MarkedPhoto;
 
 /// What a YOLO dataset calls the file of its labels.
 pub const DATA_YAML: &str = "data.yaml";
+/// What else people call it; looked for after the former in each folder.
+const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
 /// How many folders above a label file its data.yaml may stand: labels/train/a.txt.
 const FOLDERS_UP: usize = 3;
 
@@ -44,14 +48,32 @@ impl AnnotationFile {
     /// # Errors
     /// Whatever [`Annotation::read_with`] refuses.
     pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
-        for foreign in Annotation::passed_over(&self.bytes) {
-            eprintln!("{}: passed over {foreign}", self.path.display());
-        }
         let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
         Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
             Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),
             None => self.path.display().to_string(),
         })
+    }
+
+    /// What is marked on a photo, read upright, with a word on marks of other things; checked against its pixels.
+    ///
+    /// # Errors
+    /// Those of [`Self::objects`] and of [`MarkedPhoto::checked`].
+    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
+        let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
+        let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
+        let objects = marked.checked(|facts| self.objects(facts))?;
+        objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
+        // After all that may fail, which is told in one line.
+        self.tell_passed_over();
+        Ok(objects)
+    }
+
+    /// Says what of the file marks no part.
+    pub fn tell_passed_over(&self) {
+        for foreign in Annotation::passed_over(&self.bytes) {
+            eprintln!("{}: passed over {foreign}", self.path.display());
+        }
     }
 
     /// The content of the file itself.
@@ -106,7 +128,9 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
             Some(path.with_file_name(other)).filter(|other| other.exists())
         }
         AnnotationFormat::YoloPose => {
-            path.ancestors().skip(1).take(FOLDERS_UP).map(|folder| folder.join(DATA_YAML)).find(|file| file.exists())
+            let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
+            let folders = path.ancestors().skip(1).take(FOLDERS_UP);
+            folders.flat_map(|folder| names().map(|name| folder.join(name))).find(|file| file.exists())
         }
         _ => None,
     }

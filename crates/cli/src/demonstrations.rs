@@ -3,9 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use image::RgbImage;
-use nalgebra::{Point2, Vector2};
-use sdg_demonstration::{Annotation, Demonstration, ImageFacts};
+use sdg_demonstration::Demonstration;
 
 use crate::annotation_files::{AnnotationFile, beside_photo};
 use crate::exit::Usage;
@@ -35,36 +33,14 @@ fn read(argument: &str) -> Result<Demonstration> {
 /// Files that cannot be read; other than one marked object.
 pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
     let image = files::read_image(image_path)?;
-    let path = std::path::absolute(image_path).unwrap_or_else(|_| image_path.to_owned());
-    let facts =
-        |image: &RgbImage| ImageFacts { width: image.width(), height: image.height(), file_name: path.to_str() };
     let file = AnnotationFile::read(annotation_path)?;
-    let objects = file.objects(&facts(&image));
-    if let Some(sensor) = files::read_sensor_pixels_if_turned(image_path)? {
-        let of_sensor = file.objects(&facts(&sensor)).unwrap_or_default();
-        let fits =
-            |image: &RgbImage, objects: &[Annotation]| objects.iter().map(|one| contrast(image, one)).sum::<f64>();
-        let fit_of_sensor = fits(&sensor, &of_sensor);
-        let fit_as_shown = objects.as_ref().map_or(0.0, |objects| fits(&image, objects));
-        if fit_as_shown <= MIN_GAIN * fit_of_sensor {
-            let found = if fit_of_sensor > MIN_GAIN * fit_as_shown {
-                "marks that fit its pixels as they are stored"
-            } else {
-                "marks that fit its pixels as they are stored just as well"
-            };
-            bail!(
-                "{}: expected marks on the photo as viewers show it, found {found}: an Exif orientation turns {}, which tools of marks may \
-                 ignore; save the photo upright without the tag and mark it anew",
-                annotation_path.display(),
-                image_path.display()
-            );
+    let mut objects = file.objects_on(image_path, &image)?;
+    // Boxes of other things, which another tool or another person marked as well.
+    if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
+        for other in objects.extract_if(.., |object| object.grasp.is_none()) {
+            eprintln!("{}: passed over `{}`, which has no grasp", annotation_path.display(), other.label);
         }
-        eprintln!(
-            "{}: turned as its Exif orientation says; the marks are read on the turned photo",
-            image_path.display()
-        );
     }
-    let mut objects = objects?;
     if objects.len() != 1 {
         let labels: Vec<&str> = objects.iter().map(|object| object.label.as_str()).collect();
         bail!(
@@ -75,33 +51,6 @@ pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstrat
         );
     }
     Ok(Demonstration { image, annotation: objects.remove(0) })
-}
-
-/// Marks that fit one of the two so much better were made on it. Chosen by hand.
-const MIN_GAIN: f64 = 1.25;
-
-/// How much colours change across the border of the marked region, in grey values: more where the border is the part's.
-fn contrast(image: &RgbImage, marked: &Annotation) -> f64 {
-    let region = marked.region();
-    let corners = &region.vertices;
-    let reach = 0.01 * (marked.bbox.width() + marked.bbox.height());
-    let color = |at: Point2<f64>| {
-        let inside = |value: f64, end: u32| (value.max(0.0) as u32).min(end - 1);
-        image.get_pixel(inside(at.x, image.width()), inside(at.y, image.height())).0.map(f64::from)
-    };
-    let (mut sum, mut count) = (0.0, 0.0_f64);
-    for (start, end) in corners.iter().zip(corners.iter().cycle().skip(1)) {
-        let side = end - start;
-        let across = Vector2::new(-side.y, side.x).try_normalize(f64::EPSILON).unwrap_or_default() * reach.max(2.0);
-        let num_steps = side.norm().ceil() as u32;
-        for step in 0..num_steps {
-            let at = start + side * (f64::from(step) / f64::from(num_steps));
-            let (one, other) = (color(at + across), color(at - across));
-            sum += (0..3).map(|channel| (one[channel] - other[channel]).abs()).sum::<f64>() / 3.0;
-            count += 1.0;
-        }
-    }
-    sum / count.max(1.0)
 }
 
 /// The two files of an argument; a photo alone has its marks beside it.

@@ -43,6 +43,7 @@ pub mod labelled_pictures;
 pub mod live_pictures;
 mod machine;
 mod many_parts;
+mod marks_check;
 #[cfg(feature = "simulation")]
 mod own_part;
 #[cfg(feature = "annotate")]

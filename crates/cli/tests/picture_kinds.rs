@@ -26,14 +26,14 @@ fn taught(folder: &Folder) -> String {
     model
 }
 
-fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+pub(crate) fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, format).unwrap();
     bytes.into_inner()
 }
 
 /// A JPEG with an Exif orientation.
-fn with_orientation(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
+pub(crate) fn with_orientation(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
     let mut jpeg = Vec::new();
     let encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut jpeg, 95);
     picture.to_rgb8().write_with_encoder(encoder).unwrap();
@@ -46,7 +46,7 @@ fn with_orientation(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
 }
 
 /// The pixels that an orientation shows as the picture: the inverse of what it says.
-fn stored_for(picture: &RgbImage, orientation: u8) -> DynamicImage {
+pub(crate) fn stored_for(picture: &RgbImage, orientation: u8) -> DynamicImage {
     let picture = DynamicImage::from(picture.clone());
     match orientation {
         2 => picture.fliph(),

@@ -7,9 +7,10 @@ use nalgebra::Point2;
 use serde_json::{Value, json};
 
 use crate::annotation::{Annotation, ImageFacts};
+use crate::coco_image::{choose_image, is_same_id};
 use crate::draft::{Border, Draft};
 use crate::foreign::is_foreign_annotation;
-use crate::json::{Node, describe, shorten};
+use crate::json::{Node, describe};
 use crate::labelled_instance::{LabelledInstance, is_optional};
 use crate::{Error, Result};
 
@@ -49,84 +50,57 @@ pub(crate) fn read_instances(root: &Node, image: &ImageFacts, border: Border) ->
     if of_image.iter().any(|annotation| !is_foreign_annotation(annotation)) {
         of_image.retain(|annotation| !is_foreign_annotation(annotation));
     }
+    // Beside one with a grasp, keypoints of a category that names other ones mark something else.
+    let has_grasp = |annotation: &Node| {
+        let category = category_of(annotation, &categories).ok().flatten();
+        category.is_some_and(|category| is_of_grasps(category)) && has_keypoints(annotation)
+    };
+    let needs_grasp_names = !of_image.iter().any(has_grasp);
     let instance = |annotation: Node| {
         Ok(LabelledInstance {
             optional: is_optional(annotation.optional("attributes")?.as_ref())?,
-            annotation: read_object(&annotation, &categories)?.finish_at(image, border)?,
+            annotation: read_object(&annotation, &categories, needs_grasp_names)?.finish_at(image, border)?,
             place: annotation.place,
         })
     };
     of_image.into_iter().map(instance).collect()
 }
 
-/// A path's last part, whichever system wrote it.
-pub(crate) fn base_name(path: &str) -> &str {
-    path.rsplit(['/', '\\']).next().unwrap_or(path)
+/// The category of an annotation, if the file has it.
+///
+/// # Errors
+/// Two categories of one id that name other keypoints, so that which is the grasp's start is not known.
+fn category_of<'a, 'b>(annotation: &Node, categories: &'b [Node<'a>]) -> Result<Option<&'b Node<'a>>> {
+    let Some(id) = annotation.optional("category_id")? else { return Ok(None) };
+    let mut of_id =
+        categories.iter().filter(|category| category.value.get("id").is_some_and(|own| is_same_id(own, id.value)));
+    let Some(first) = of_id.next() else { return Ok(None) };
+    let keypoints = |category: &Node| category.value.get("keypoints").cloned();
+    match of_id.find(|other| keypoints(other) != keypoints(first)) {
+        Some(other) => Err(Error::Malformed {
+            place: format!("{}.id", other.place),
+            expected: "a number of its own".into(),
+            found: format!("{}, as {} has, with other keypoints", id.value, first.place),
+        }),
+        None => Ok(Some(first)),
+    }
 }
 
-/// How many parts of two paths are the same, from the last one on, whichever system wrote them.
-fn common_parts(one: &str, other: &str) -> usize {
-    let parts = |path: &'_ str| -> Vec<String> {
-        path.rsplit(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").map(str::to_owned).collect()
-    };
-    parts(one).iter().zip(&parts(other)).take_while(|(a, b)| a == b).count()
+/// Whether a category names both ends of a grasp.
+fn is_of_grasps(category: &Node) -> bool {
+    let names = category.value.get("keypoints").and_then(Value::as_array);
+    names.is_some_and(|names| ["grasp_start", "grasp_end"].iter().all(|end| names.iter().any(|name| name == end)))
 }
 
-/// The image of that name, of several the one whose folders fit best; the only image whatever its name, since people rename files.
-fn choose_image<'a>(images: &[Node<'a>], image: &ImageFacts) -> Result<Node<'a>> {
-    if let [only] = images {
-        return Ok(only.clone());
-    }
-    let mut names = Vec::new();
-    let mut fitting: Vec<(usize, &Node<'a>, &str)> = Vec::new();
-    for node in images {
-        let name = node.field("file_name", "the image's name")?.text()?;
-        if let Some(wanted) = image.file_name.filter(|wanted| base_name(wanted) == base_name(name)) {
-            fitting.push((common_parts(wanted, name), node, name));
-        }
-        names.push(shorten(base_name(name)));
-    }
-    if let Some(most) = fitting.iter().map(|(parts, ..)| *parts).max() {
-        fitting.retain(|(parts, ..)| *parts == most);
-        let [(_, chosen, _)] = fitting[..] else {
-            let several: Vec<String> =
-                fitting.iter().map(|(_, node, name)| format!("{} `{}`", node.place, shorten(name))).collect();
-            return Err(Error::ImageNotFound {
-                expected: "one image of that name and folder".into(),
-                found: several.join(" and "),
-            });
-        };
-        let id = chosen.field("id", "the image's number")?.value;
-        if let Some(other) = images
-            .iter()
-            .find(|other| other.place != chosen.place && other.value.get("id").is_some_and(|own| is_same_id(own, id)))
-        {
-            return Err(Error::Malformed {
-                place: format!("{}.id", chosen.place),
-                expected: "a number of its own".into(),
-                found: format!("{id}, as {} has", other.place),
-            });
-        }
-        return Ok(chosen.clone());
-    }
-    const SHOWN: usize = 6;
-    let count = names.len();
-    names.truncate(SHOWN);
-    Err(Error::ImageNotFound {
-        expected: match image.file_name {
-            Some(name) => format!("an image named `{}`", base_name(name)),
-            None => "a single image, or the name of one".into(),
-        },
-        found: if count == 0 { "no image".into() } else { format!("{count} images: {}", names.join(", ")) },
-    })
+/// Whether an annotation has a keypoint that is labelled: exporters write zeros for those that are not.
+fn has_keypoints(annotation: &Node) -> bool {
+    let keypoints = annotation.value.get("keypoints").and_then(Value::as_array);
+    keypoints.is_some_and(|all| all.iter().any(|value| value.as_f64() != Some(0.0)))
 }
 
-fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
+fn read_object(node: &Node, categories: &[Node], needs_grasp_names: bool) -> Result<Draft> {
     let mut draft = Draft { place: node.place.clone(), ..Draft::default() };
-    let category_id = node.optional("category_id")?;
-    let category = categories.iter().find(|category| {
-        category_id.as_ref().is_some_and(|id| category.value.get("id").is_some_and(|own| is_same_id(own, id.value)))
-    });
+    let category = category_of(node, categories)?;
     if let Some(name) = category.map(|category| category.optional("name")).transpose()?.flatten() {
         draft.label = Some(name.text()?.to_string());
     }
@@ -143,7 +117,10 @@ fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
         }
         draft.corners = Some((vec![Point2::new(x, y), Point2::new(x + width, y + height)], bbox.place));
     }
-    if let Some(keypoints) = node.optional("keypoints")?.filter(not_empty_list) {
+    let is_of_something_else = !needs_grasp_names && !category.is_some_and(is_of_grasps);
+    if let Some(keypoints) = node.optional("keypoints")?.filter(not_empty_list)
+        && !is_of_something_else
+    {
         read_keypoints(&keypoints, category, &mut draft)?;
     }
     if let Some(attributes) = node.optional("attributes")?.filter(|attributes| attributes.value.is_object())
@@ -167,12 +144,6 @@ fn read_object(node: &Node, categories: &[Node]) -> Result<Draft> {
         draft.outline = Some((points, polygon.place.clone()));
     }
     Ok(draft)
-}
-
-/// Whether two ids are the same number, which some programs write as 1.0 or as text, or the same text.
-fn is_same_id(one: &Value, other: &Value) -> bool {
-    let number = |id: &Value| id.as_f64().or_else(|| id.as_str()?.trim().parse().ok());
-    one == other || number(one).is_some_and(|one| Some(one) == number(other))
 }
 
 /// Exporters write `[]` for what is not there.
@@ -363,6 +334,37 @@ mod tests {
     }
 
     #[test]
+    fn a_category_without_a_grasp_blocks_none_with_it() {
+        let expected = read_named(&full(), None).unwrap();
+        let other = |keypoints: Value, names: Value| {
+            let mut file = full();
+            file["categories"].as_array_mut().unwrap().push(json!({"id": 2, "name": "hole", "keypoints": names}));
+            file["annotations"].as_array_mut().unwrap().insert(
+                0,
+                json!({
+                "id": 9, "image_id": 1, "category_id": 2, "bbox": [10, 10, 30, 30], "keypoints": keypoints}),
+            );
+            file
+        };
+        for (keypoints, names) in
+            [(json!([20, 20, 2]), Value::Null), (json!([0, 0, 0]), Value::Null), (json!([20, 20, 2]), json!(["rim"]))]
+        {
+            let mut file = other(keypoints, names);
+            let read = read_named(&file, None).unwrap();
+            assert_eq!((read[0].label.as_str(), read[0].grasp, &read[1]), ("hole", None, &expected[0]));
+            // Alone it may be the grasp by other names.
+            file["annotations"].as_array_mut().unwrap().pop();
+            let alone = read_named(&file, None);
+            assert!(alone.is_err(), "{alone:?}");
+        }
+        let mut twice = full();
+        let swapped = json!({"id": 1, "name": "pendulum", "keypoints": ["grasp_end", "grasp_start"]});
+        twice["categories"].as_array_mut().unwrap().push(swapped);
+        let found = read_named(&twice, None).unwrap_err().to_string();
+        assert!(found.contains("categories[1].id") && found.contains("categories[0]"), "{found}");
+    }
+
+    #[test]
     fn ids_are_compared_as_numbers() {
         let expected = read_named(&full(), None).unwrap();
         for other in [json!("1"), json!(1.0)] {
@@ -396,43 +398,6 @@ mod tests {
         assert_eq!(annotation["segmentation"], json!([[110.0, 90.0, 290.0, 95.5, 200.0, 250.0]]));
         assert_eq!(annotation["attributes"], json!({"jaw_width": 42.5, "grasp_offset": [0.0, -0.125]}));
         assert_eq!(value["categories"][0]["keypoints"], json!(["grasp_start", "grasp_end"]));
-    }
-
-    #[test]
-    fn one_of_several_images_is_chosen_by_name() {
-        let mut file = CocoFile::new();
-        let other = Annotation { label: "rod".into(), grasp: None, jaw_width: None, outline: None, ..pendulum() };
-        file.push_image("a.png", 640, 480, &[pendulum()]);
-        file.push_image("b.png", 640, 480, std::slice::from_ref(&other));
-        let value: Value = serde_json::from_str(&file.to_json()).unwrap();
-        assert_eq!(read_named(&value, Some("folder/b.png")).unwrap(), [other]);
-        let found = read_named(&value, Some("c.png")).unwrap_err().to_string();
-        assert!(found.contains("an image named `c.png`") && found.contains("2 images: a.png, b.png"), "{found}");
-        assert!(read_named(&value, None).unwrap_err().to_string().contains("a single image"));
-        assert!(read_named(&full(), Some("renamed.png")).is_ok(), "the only image needs no name");
-    }
-
-    #[test]
-    fn of_images_of_one_name_the_folders_choose_or_both_are_named() {
-        let other = Annotation { label: "rod".into(), grasp: None, jaw_width: None, outline: None, ..pendulum() };
-        let of = |names: [&str; 2]| {
-            let mut file = CocoFile::new();
-            file.push_image(names[0], 640, 480, &[pendulum()]);
-            file.push_image(names[1], 640, 480, std::slice::from_ref(&other));
-            serde_json::from_str::<Value>(&file.to_json()).unwrap()
-        };
-        let value = of(["cam_a/image.jpg", "cam_b/image.jpg"]);
-        assert_eq!(read_named(&value, Some("/data/cam_b/image.jpg")).unwrap(), std::slice::from_ref(&other));
-        assert_eq!(read_named(&value, Some("C:\\data\\cam_b\\image.jpg")).unwrap(), std::slice::from_ref(&other));
-        assert_ne!(read_named(&value, Some("./cam_a/image.jpg")).unwrap(), std::slice::from_ref(&other));
-        for (value, wanted) in [(&value, "image.jpg"), (&of(["image.jpg", "image.jpg"]), "cam_b/image.jpg")] {
-            let found = read_named(value, Some(wanted)).unwrap_err().to_string();
-            assert!(found.contains("images[0]") && found.contains("images[1]"), "{found}");
-        }
-        let mut twice = of(["other.jpg", "image.jpg"]);
-        twice["images"][1]["id"] = json!(1);
-        let found = read_named(&twice, Some("image.jpg")).unwrap_err().to_string();
-        assert!(found.contains("images[1].id: expected a number of its own"), "{found}");
     }
 
     #[test]

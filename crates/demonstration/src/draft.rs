@@ -36,8 +36,9 @@ pub(crate) enum Border {
 }
 
 impl Draft {
-    /// Cuts, if need be, what reaches beyond the picture, then [`Self::finish`]. A grasp is never cut: it must lie inside.
+    /// For files with places in pixels: cuts, if need be, what reaches beyond the picture, then [`Self::finish`]. A grasp is never cut: it must lie inside.
     pub fn finish_at(mut self, image: &ImageFacts, border: Border) -> Result<Annotation> {
+        self.check_is_in_pixels(image)?;
         if border == Border::MustNotCut {
             return self.finish(image);
         }
@@ -56,6 +57,30 @@ impl Draft {
             }
         }
         self.finish(image)
+    }
+
+    /// Makes sure that no mark is given in shares of the image, which would be a place of a pixel in its corner.
+    pub fn check_is_in_pixels(&self, image: &ImageFacts) -> Result<()> {
+        let line: Vec<Point2<f64>> = self.grasp_start.iter().chain(&self.grasp_end).map(|(point, _)| *point).collect();
+        let line_place = self.grasp_start.as_ref().map(|(_, place)| place.clone()).unwrap_or_default();
+        let marks = [self.corners.clone(), self.outline.clone(), Some((line, line_place))];
+        for (points, place) in marks.into_iter().flatten() {
+            let is_share = |value: f64| (0.0..=1.0).contains(&value);
+            let has_shares = points.len() > 1 && points.iter().all(|point| is_share(point.x) && is_share(point.y));
+            // Points of one place are a click that was made twice.
+            if has_shares && points[0] != points[1] {
+                let [first, last] = [points[0], points[points.len() - 1]];
+                return Err(Error::Malformed {
+                    place,
+                    expected: format!("pixels of the image of {}×{}", image.width, image.height),
+                    found: format!(
+                        "({}, {}) to ({}, {}), which seem to be in shares of its width and height",
+                        first.x, first.y, last.x, last.y
+                    ),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Checks everything and makes the annotation.
@@ -183,6 +208,21 @@ mod tests {
     fn a_missing_box_is_taken_from_the_outline() {
         let made = draft(&[(10.0, 20.0), (50.0, 25.0), (30.0, 70.0)]).finish(&IMAGE).unwrap();
         assert_eq!(made.bbox, BoundingBox { x1: 10.0, y1: 20.0, x2: 50.0, y2: 70.0 });
+    }
+
+    #[test]
+    fn shares_of_the_image_are_told() {
+        let outline = draft(&[(0.1, 0.2), (0.5, 0.25), (0.3, 0.7)]);
+        let grasp = Draft {
+            grasp_start: Some((Point2::new(0.2, 0.3), "there".into())),
+            grasp_end: Some((Point2::new(0.4, 0.3), "there".into())),
+            ..draft(&[(10.0, 20.0), (50.0, 25.0), (30.0, 70.0)])
+        };
+        for (shares, place) in [(outline, "here"), (grasp, "there")] {
+            let told = shares.check_is_in_pixels(&IMAGE).unwrap_err().to_string();
+            assert!(told.contains(place) && told.contains("shares of its width and height"), "{told}");
+        }
+        draft(&[(0.0, 0.0), (1.0, 3.0), (3.0, 1.0)]).check_is_in_pixels(&IMAGE).unwrap();
     }
 
     #[test]

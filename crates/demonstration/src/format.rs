@@ -1,7 +1,9 @@
 //! The files that hold annotations: which of them one is, and what a file holds besides.
 
+use crate::file_name::without_escapes;
 use crate::json::{self, Node, describe};
 use crate::npy;
+use crate::other_kind::{other_json, other_kind};
 use crate::written::WrittenAnnotation;
 use crate::{Annotation, CocoFile, Error, ImageFacts, Result, coco, foreign, labelme, opendr, yolo_pose};
 
@@ -55,7 +57,7 @@ impl AnnotationFormat {
             return Ok(Self::YoloPose);
         }
         if let Some(found) = other_kind(bytes) {
-            return Err(Error::WrongFile { found: found.into() });
+            return Err(Error::WrongFile { found });
         }
         json_format(&json::parse(bytes)?)
     }
@@ -84,6 +86,19 @@ impl AnnotationFormat {
         Ok(declared.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
     }
 
+    /// The one picture that a file says it is of, and the field that says so; its name may be a path or a web address.
+    pub fn named_picture(bytes: &[u8]) -> Option<(&'static str, String)> {
+        let value = json::parse(bytes).ok()?;
+        let (field, name) = match json_format(&value).ok()? {
+            Self::LabelMe => ("imagePath", value.get("imagePath")),
+            _ => match value.get("images")?.as_array()?.as_slice() {
+                [only] => ("images[0].file_name", only.get("file_name")),
+                _ => return None,
+            },
+        };
+        Some((field, without_escapes(name?.as_str()?)))
+    }
+
     /// Writes what is marked on one image. What is read back is the same but for what `left_out` says.
     ///
     /// # Errors
@@ -110,22 +125,6 @@ impl AnnotationFormat {
             Self::LabelMe => labelme::read(&Node::root(&json::parse(bytes)?), image),
             Self::Coco => coco::read(&Node::root(&json::parse(bytes)?), image),
         }
-    }
-}
-
-/// What a file is, by its first bytes, that is none of the formats.
-fn other_kind(bytes: &[u8]) -> Option<&'static str> {
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let is_number = |field: &[u8]| std::str::from_utf8(field).is_ok_and(|field| field.trim().parse::<f64>().is_ok());
-    match bytes {
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => Some("text in UTF-16: save it as UTF-8"),
-        _ if text.is_empty() => Some("nothing: the file is empty"),
-        _ if text.starts_with(b"<") => Some("XML: export the marks as COCO or YOLO-pose"),
-        _ if first.contains(&b',') && first.split(|byte| *byte == b',').all(is_number) => {
-            Some("a row of numbers with commas: YOLO-pose has blanks between them")
-        }
-        _ => None,
     }
 }
 
@@ -164,7 +163,7 @@ pub(crate) fn json_format(value: &serde_json::Value) -> Result<AnnotationFormat>
     } else if is_list("images") && is_list("annotations") {
         Ok(AnnotationFormat::Coco)
     } else {
-        Err(Error::WrongFile { found: describe(value) })
+        Err(Error::WrongFile { found: other_json(value).map_or_else(|| describe(value), str::to_owned) })
     }
 }
 
@@ -200,6 +199,17 @@ mod tests {
         assert_eq!(AnnotationFormat::declared_images(b"0 0.5 0.5 0.5 0.5"), Ok(vec![]));
         let spoilt = br#"{"shapes": [], "imageWidth": -3, "imageHeight": 480}"#;
         assert!(AnnotationFormat::declared_images(spoilt).unwrap_err().to_string().contains("imageWidth"));
+    }
+
+    #[test]
+    fn the_picture_that_is_named() {
+        let named = |bytes: &[u8]| AnnotationFormat::named_picture(bytes);
+        let labelme = br#"{"shapes": [], "imagePath": "C:\\a%20b.png"}"#;
+        assert_eq!(named(labelme), Some(("imagePath", "C:\\a b.png".into())));
+        let coco = br#"{"images": [{"id": 1, "file_name": "x/a.png"}], "annotations": []}"#;
+        assert_eq!(named(coco), Some(("images[0].file_name", "x/a.png".into())));
+        assert_eq!(named(br#"{"images": [{"file_name": "a"}, {"file_name": "b"}], "annotations": []}"#), None);
+        assert_eq!(named(b"0 0.5 0.5 0.5 0.5"), None);
     }
 
     proptest! {

@@ -6,6 +6,7 @@
 use serde_json::Value;
 
 use crate::draft::Border;
+use crate::file_name::base_name;
 use crate::format::json_format;
 use crate::json::{self, Node, shorten};
 use crate::labelled_instance::LabelledInstance;
@@ -50,7 +51,7 @@ impl LabelFile {
     /// A name that is no text; COCO without the list of images, an image without a name, or two of one name.
     pub fn picture_names(&self) -> Result<Vec<String>> {
         let root = Node::root(&self.value);
-        let name = |node: &Node| node.text().map(|text| coco::base_name(text).to_owned());
+        let name = |node: &Node| node.text().map(|text| base_name(text).to_owned());
         if self.format == AnnotationFormat::LabelMe {
             return root.optional("imagePath")?.iter().map(name).collect();
         }

@@ -38,10 +38,12 @@
 mod annotation;
 mod augmentation;
 mod coco;
+mod coco_image;
 mod data_yaml;
 mod demonstration;
 mod draft;
 mod error;
+mod file_name;
 mod foreign;
 mod format;
 mod json;
@@ -52,8 +54,10 @@ mod labelme;
 mod model_kind;
 mod npy;
 mod opendr;
+mod other_kind;
 mod outline_proposal;
 pub mod random;
+mod reading;
 mod written;
 mod yolo_pose;
 
@@ -69,6 +73,7 @@ pub use label_file::LabelFile;
 pub use labelled_instance::LabelledInstance;
 pub use model_kind::{ModelKind, UnknownModel};
 pub use outline_proposal::{OutlineClick, propose_outline, propose_outline_with};
+pub use reading::{MarksReading, marks_fit, other_reading};
 pub use sdg_picture::{
     IMAGE_EXTENSIONS, ImageLimits, PictureError, PixelFrame, decode_image, decode_image_in, is_turned_by_exif,
 };

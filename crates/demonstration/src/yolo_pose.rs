@@ -8,7 +8,7 @@
 //!
 //! # Source
 //! The dataset format of Ultralytics' pose models, and what its loader accepts: a byte order mark, blank lines,
-//! coordinates up to a hundredth outside.
+//! coordinates up to a hundredth outside. Lines that begin with `#`, as people add them, are passed over.
 
 use std::fmt::Write;
 
@@ -22,15 +22,23 @@ use crate::{Annotation, Error, ImageFacts, Result};
 
 /// Numbers of a line before its keypoints.
 const BOX_NUMBERS: usize = 5;
+/// Larger numbers of a box are no shares that were rounded or reach over the image's edge.
+const MAX_SHARE: f64 = 1.5;
 /// More objects than a person marks on a photo; bounds what a hostile file costs.
 const MAX_OBJECTS: usize = 10_000;
 
 /// Whether the first line with anything on it is a row of numbers.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
     let Ok(text) = std::str::from_utf8(without_mark(bytes)) else { return false };
-    let first = text.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let first = text.lines().find(|line| is_row(line)).unwrap_or_default();
     let mut words = first.split_whitespace();
     words.clone().count() > 1 && words.all(|word| word.parse::<f64>().is_ok())
+}
+
+/// Whether a line is neither blank nor a comment.
+fn is_row(line: &str) -> bool {
+    let line = line.trim();
+    !line.is_empty() && !line.starts_with('#')
 }
 
 fn without_mark(bytes: &[u8]) -> &[u8] {
@@ -46,7 +54,7 @@ pub(crate) fn read(bytes: &[u8], beside: Option<&[u8]>, image: &ImageFacts) -> R
         found: format!("other bytes after {}", error.valid_up_to()),
     })?;
     let mut objects = Vec::new();
-    for (line, number) in text.lines().zip(1..).filter(|(line, _)| !line.trim().is_empty()) {
+    for (line, number) in text.lines().zip(1..).filter(|(line, _)| is_row(line)) {
         if objects.len() == MAX_OBJECTS {
             return Err(Error::Malformed {
                 place: format!("line {number}"),
@@ -108,6 +116,12 @@ fn read_line(line: &str, place: &str, data: &DataYaml, image: &ImageFacts) -> Re
             expected: "a positive width and height".into(),
             found: format!("{width}×{height}"),
         });
+    }
+    if let Some(found) = [x, y, width, height].into_iter().find(|share| *share > MAX_SHARE) {
+        return Err(malformed(
+            "a box in shares of the image's width and height, from 0 to 1",
+            format!("{found}, which seems to be in pixels or percent"),
+        ));
     }
     let corner = |side: f64| Point2::new((x + side * width) * across, (y + side * height) * down);
     let mut draft = Draft {
@@ -225,6 +239,8 @@ mod tests {
         let announced = Some(&b"kpt_shape: [2, 2]\n"[..]);
         let without_visibility = Annotation::read_with(b"0 0.5 0.5 0.25 0.5 0.4 0.5 0.6 0.5", announced, &IMAGE);
         assert_eq!(without_visibility.unwrap()[0].grasp, made[0].grasp);
+        let commented = read_text("# class x y w h\n0 0.5 0.5 0.25 0.5 0.4 0.5 2 0.6 0.5 1\n  # end\n").unwrap();
+        assert_eq!(commented, made);
         let unmarked = read_text("0 0.5 0.5 0.25 0.5 0 0 0 0 0 0").unwrap();
         assert_eq!(unmarked[0].grasp, None);
         assert_eq!(read_text("0 0.5 0.5 0.25 0.5").unwrap()[0].grasp, None);
@@ -276,6 +292,11 @@ mod tests {
             ("0 0.5 half 0.25 0.5", "found `half` as number 3"),
             ("0.5 0.5 0.5 0.25 0.5", "a class counted from 0, found 0.5"),
             ("0 0.5 0.5 0 0.5", "a positive width and height, found 0×0.5"),
+            (
+                "0 320 240 160 240",
+                "line 2: expected a box in shares of the image's width and height, from 0 to 1, found 320",
+            ),
+            ("0 50 50 0.25 0.5", "found 50, which seems to be in pixels or percent"),
             ("0 0.9 0.5 0.5 0.5", "line 2, box: expected a place inside"),
             ("0 0.5 0.5 0.25 0.5 0.4 0.5 0.6", "line 2: expected keypoints of x, y"),
             ("0 0.5 0.5 0.25 0.5 0.4 0.5 2 0 0 0", "`grasp_start` without `grasp_end`"),

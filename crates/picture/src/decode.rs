@@ -6,7 +6,7 @@ use std::io::Cursor;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage, metadata::Orientation};
 
 use crate::error::PictureError;
-use crate::{jpeg, ppm, samples, tiff};
+use crate::{jpeg, jpeg_gap, ppm, samples, tiff};
 
 type Result<T> = std::result::Result<T, PictureError>;
 
@@ -72,7 +72,7 @@ pub fn decode_image(bytes: &[u8], limits: &ImageLimits) -> Result<RgbImage> {
 ///
 /// The content says what it is: PNG, JPEG or PPM, and with the feature `more-formats` WebP, BMP or TIFF. Grey and deeper images are
 /// converted, those of 10 and 12 bits in 16 by their own range; transparent pixels are laid over white, unless all are fully
-/// transparent, which is how programs leave an alpha that they do not use. Of a TIFF the page in full size is read.
+/// transparent, which is how programs leave an alpha that they do not use. Floats of 0 to 255 are read like integers. Of a TIFF the page in full size is read.
 ///
 /// # Errors
 /// Bytes of another kind (for HEIC photos with the phone's setting that avoids them), a truncated or damaged file, zero width
@@ -90,7 +90,11 @@ pub fn decode_image_in(bytes: &[u8], limits: &ImageLimits, frame: PixelFrame) ->
     }
     let mut palette = None;
     let bytes = match format {
-        ImageFormat::Jpeg => jpeg::complete_jpeg(bytes)?,
+        ImageFormat::Jpeg => {
+            let jpeg = jpeg::complete_jpeg(bytes)?;
+            jpeg_gap::check_has_no_gap(&jpeg)?;
+            jpeg
+        }
         ImageFormat::Tiff => {
             let page = tiff::full_page(bytes)?;
             palette = page.palette;

@@ -12,6 +12,7 @@
 mod decode;
 mod error;
 mod jpeg;
+mod jpeg_gap;
 mod ppm;
 mod samples;
 mod tiff;

@@ -4,6 +4,10 @@ use image::{DynamicImage, ImageBuffer, Pixel, Rgb, RgbImage};
 
 /// Bits that cameras have, of the 16 that they are stored in.
 const CAMERA_BITS: [u32; 3] = [8, 10, 12];
+/// Floats are 1 at their brightest by custom. Up to this they are a little overexposed, above it integers that were stored as floats.
+const MAX_OVEREXPOSED: f32 = 2.0;
+/// An alpha that nowhere reaches this would leave a white picture: it was a mask of 0 and 1, or a share that was cut to an integer.
+const MIN_SEEN_ALPHA: u8 = 8;
 
 /// Converts the samples, and lays transparent pixels over white.
 pub(crate) fn to_rgb8(picture: DynamicImage) -> RgbImage {
@@ -19,6 +23,8 @@ fn in_full_range(mut picture: DynamicImage) -> DynamicImage {
         DynamicImage::ImageLumaA16(samples) => stretch(samples, 1),
         DynamicImage::ImageRgb16(samples) => stretch(samples, 3),
         DynamicImage::ImageRgba16(samples) => stretch(samples, 3),
+        DynamicImage::ImageRgb32F(samples) => to_shares(samples),
+        DynamicImage::ImageRgba32F(samples) => to_shares(samples),
         _ => {}
     }
     picture
@@ -40,10 +46,21 @@ fn stretch<P: Pixel<Subpixel = u16>>(picture: &mut ImageBuffer<P, Vec<u16>>, num
     }
 }
 
+/// Divides floats that are integers of 8, 10, 12 or 16 bits by the largest of that kind. An alpha was stored like the colours.
+fn to_shares<P: Pixel<Subpixel = f32>>(picture: &mut ImageBuffer<P, Vec<f32>>) {
+    let largest = picture.iter().copied().filter(|sample| sample.is_finite()).fold(0.0, f32::max);
+    if largest <= MAX_OVEREXPOSED {
+        return;
+    }
+    let full = CAMERA_BITS.into_iter().map(|bits| ((1_u32 << bits) - 1) as f32).find(|full| largest <= *full);
+    let full = full.unwrap_or(largest.max(f32::from(u16::MAX)));
+    picture.iter_mut().for_each(|sample| *sample /= full);
+}
+
 fn over_white(picture: &DynamicImage) -> RgbImage {
     let rgba = picture.to_rgba8();
     // Simulators, ROS and Windows leave an alpha of 0 that nobody set.
-    if rgba.pixels().all(|pixel| pixel[3] == 0) {
+    if rgba.pixels().all(|pixel| pixel[3] < MIN_SEEN_ALPHA) {
         return picture.to_rgb8();
     }
     RgbImage::from_fn(rgba.width(), rgba.height(), |x, y| {
@@ -73,10 +90,27 @@ mod tests {
     }
 
     #[test]
+    fn floats_that_are_integers_are_as_bright_as_eight_bits() {
+        for largest in [1.0_f32, 255.0, 1023.0, 4095.0, 65535.0] {
+            let samples = ImageBuffer::<Rgb<f32>, _>::from_fn(256, 1, |x, _| Rgb([x as f32 * largest / 255.0; 3]));
+            let read = to_rgb8(samples.into());
+            assert!((0..256).all(|x| read.get_pixel(x, 0)[0].abs_diff(x as u8) <= 1), "to {largest}");
+        }
+        // A highlight above white is cut off and darkens nothing.
+        let bright = ImageBuffer::<Rgb<f32>, _>::from_fn(2, 1, |x, _| Rgb([if x == 0 { 1.5 } else { 0.5 }; 3]));
+        let read = to_rgb8(bright.into());
+        assert_eq!([read.get_pixel(0, 0).0, read.get_pixel(1, 0).0], [[255; 3], [128; 3]]);
+    }
+
+    #[test]
     fn an_alpha_that_nobody_set_is_passed_over() {
         let pixel = |alpha: u8| Rgba([10, 20, 30, alpha]);
         let mut picture = image::RgbaImage::from_pixel(4, 3, pixel(0));
         assert_eq!(to_rgb8(picture.clone().into()).get_pixel(1, 1).0, [10, 20, 30]);
+        // A mask of 0 and 1, or an opacity of 1.0 that became an integer.
+        picture.pixels_mut().enumerate().for_each(|(idx, pixel)| pixel[3] = (idx % 2) as u8);
+        assert_eq!(to_rgb8(picture.clone().into()).get_pixel(1, 1).0, [10, 20, 30]);
+        let mut picture = image::RgbaImage::from_pixel(4, 3, pixel(0));
         picture.put_pixel(0, 0, pixel(255));
         let cut_out = to_rgb8(picture.into());
         assert_eq!([cut_out.get_pixel(0, 0).0, cut_out.get_pixel(1, 1).0], [[10, 20, 30], [255; 3]]);

@@ -27,7 +27,7 @@ pub enum ShapeError {
     },
     /// The part shows too few edges to be recognised by.
     #[error(
-        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness"
+        "expected at least {expected} edge points inside the outline, found {found}: the part hardly differs from what surrounds it; photograph it on a plain background of another brightness, or mark it where it is"
     )]
     TooFewEdges { expected: usize, found: usize },
     /// A file of weights does not hold those of the network that compares photo and picture.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
-use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
+use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts, WrittenAnnotation};
 use serde_json::json;
 
 use crate::annotation_files::{AnnotationFile, DATA_YAML};
@@ -62,13 +62,8 @@ fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     }
     files::check_writable(&args.output)?;
     let input = AnnotationFile::read(&args.input)?;
-    let (width, height, file_name) = image_of(args, &input)?;
+    let (width, height, file_name, objects) = read_marks(args, &input)?;
     let image = ImageFacts { width, height, file_name: file_name.as_deref() };
-    let path = args.image.as_ref().and_then(|path| std::path::absolute(path).ok());
-    let objects = input.objects(&ImageFacts {
-        file_name: path.as_ref().and_then(|path| path.to_str()).or(image.file_name),
-        ..image
-    })?;
     let written = format.write(&image, &objects)?;
 
     let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
@@ -124,20 +119,28 @@ fn format_of_output(args: &ConvertAnnotationArgs) -> Result<AnnotationFormat> {
     }
 }
 
-/// Size and name of the image: the image's own, or what the file says of its only one.
-fn image_of(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Result<(u32, u32, Option<String>)> {
+/// Size and name of the image and what is marked on it: by the image itself, or by what the file says of its only one.
+fn read_marks(
+    args: &ConvertAnnotationArgs,
+    input: &AnnotationFile,
+) -> Result<(u32, u32, Option<String>, Vec<Annotation>)> {
     if let Some(path) = &args.image {
         let image = files::read_image(path)?;
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-        return Ok((image.width(), image.height(), name));
+        return Ok((image.width(), image.height(), name, input.objects_on(path, &image)?));
     }
+    let DeclaredImage { file_name, width, height } = declared_image(args, input)?;
+    let objects = input.objects(&ImageFacts { width, height, file_name: file_name.as_deref() })?;
+    input.tell_passed_over();
+    Ok((width, height, file_name, objects))
+}
+
+/// What the file says of its only image.
+fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Result<DeclaredImage> {
     let mut declared =
         AnnotationFormat::declared_images(input.bytes()).with_context(|| args.input.display().to_string())?;
     match declared.len() {
-        1 => {
-            let image = declared.remove(0);
-            Ok((image.width, image.height, image.file_name))
-        }
+        1 => Ok(declared.remove(0)),
         0 => Err(Usage(format!(
             "--image: {} does not say how large its image is; expected the image",
             args.input.display()

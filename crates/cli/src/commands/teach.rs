@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
-use sdg_demonstration::PixelFrame;
+use sdg_demonstration::{Demonstration, PixelFrame};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
 use sdg_kinematics::HAND_OPENING_MAX_M;
@@ -163,7 +163,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
         GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
-        error => anyhow::Error::from(error),
+        error => anyhow::Error::from(error).context(args.demonstrations.join(", ")),
     })?;
     files::write(&args.out, &file.bytes)?;
     let figures = file.figures(&demonstrations, args.seed)?;
@@ -187,6 +187,9 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let failure = figures.failure();
     if let Some(failure) = &failure {
         eprintln!("warning: {failure}");
+    }
+    for told in openings_by_the_box(&taught.model, &demonstrations) {
+        eprintln!("{told}");
     }
     if args.json {
         let line = json!({
@@ -315,6 +318,21 @@ fn too_wide(model: &GraspModel) -> Option<String> {
             1e3 * HAND_OPENING_MAX_M
         )
     })
+}
+
+/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
+fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
+    let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
+        let annotation = &demonstration.annotation;
+        (annotation.outline.is_none() && annotation.jaw_width.is_none()).then(|| {
+            format!(
+                "the opening of the jaws, {:.0} px, is taken from the box of \"{}\", which may be wider than the part: draw its \
+                 outline, or mark the jaws (`sdg annotate`)",
+                taught.marks.width_px, annotation.label
+            )
+        })
+    });
+    told.collect()
 }
 
 /// How the network's teaching went, for people; nothing for a model without.

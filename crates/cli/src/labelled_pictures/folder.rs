@@ -18,6 +18,7 @@ use super::taught::taught_grasps;
 use super::truth_file::{TRUTH_FILE, read_truth};
 use crate::exit::one_line;
 use crate::files::{self, UNREADABLE_EXTENSIONS};
+use crate::marks_check::MarkedPhoto;
 
 /// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
 const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
@@ -185,8 +186,10 @@ fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Percept
     let image = files::read_image(path)?;
     let (width, height) = image.dimensions();
     let name = file_name(path);
-    let facts = ImageFacts { width, height, file_name: Some(&name) };
-    let instances = file.instances(&facts).with_context(|| format!("{}, labels of {name}", labels.display()))?;
+    let marked = MarkedPhoto { photo: path, image: &image, marks: labels, bytes: &[], file_name: Some(&name) };
+    let read =
+        |facts: &ImageFacts| file.instances(facts).with_context(|| format!("{}, labels of {name}", labels.display()));
+    let instances = marked.upright(read, |instance: &LabelledInstance| &instance.annotation)?;
     Ok(ReadPicture {
         path: path.to_owned(),
         labels: labels.to_owned(),

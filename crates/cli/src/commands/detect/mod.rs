@@ -64,9 +64,13 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         drawn: BTreeSet::new(),
         num_used: 0,
         num_failed: 0,
+        is_alone: false,
+        last_error: String::new(),
         found_any: false,
     };
     let inputs: Vec<_> = args.images.iter().map(|argument| (argument, inputs::of_argument(argument))).collect();
+    let num_pictures = |inputs: &Result<Inputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
+    batch.is_alone = inputs.iter().map(|(_, inputs)| num_pictures(inputs)).sum::<usize>() == 1;
     if let Some(folder) = &args.draw {
         let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
         inputs::check_drawn_elsewhere(folder, pictures)?;
@@ -86,6 +90,8 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     match (batch.num_failed, batch.found_any) {
         (0, true) => Ok(Outcome::Done),
         (0, false) => Ok(Outcome::NothingToGrasp),
+        // One line says all of one picture.
+        (1, _) if batch.is_alone => bail!(batch.last_error),
         (failed, _) => bail!("{failed} of {} pictures could not be used", failed + batch.num_used),
     }
 }
@@ -99,6 +105,9 @@ struct Batch<'a, W> {
     drawn: BTreeSet<String>,
     num_used: usize,
     num_failed: usize,
+    /// There is one picture in all.
+    is_alone: bool,
+    last_error: String,
     found_any: bool,
 }
 
@@ -122,12 +131,13 @@ impl<W: Write> Batch<'_, W> {
         self.num_failed += 1;
         let error = one_line(error);
         if self.args.json {
-            let line = ErrorLine { image: name.to_owned(), error };
+            let line = ErrorLine { image: name.to_owned(), error: error.clone() };
             writeln!(self.stdout, "{}", json_line(&line)?)?;
-        } else {
+        } else if !self.is_alone {
             self.stdout.flush()?;
             eprintln!("error: {error}");
         }
+        self.last_error = error;
         Ok(())
     }
 

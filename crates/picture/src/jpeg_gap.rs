@@ -1,0 +1,151 @@
+//! JPEG data of which a stretch is zeros, as an interrupted copy or a broken card leaves it.
+//!
+//! Zeros are valid codes, so that the decoder reads on and gives another picture without an error. They stand for another number of
+//! blocks than the data that were there: at the next marker, the data run out too early or are left over.
+
+use image::{DynamicImage, GenericImageView, ImageFormat};
+
+use crate::error::PictureError;
+
+/// Fewer zeros in a row do occur in whole pictures; more do where much of a picture has one colour, which the check then tells apart.
+const MIN_ZEROS: usize = 32;
+/// Bytes that are put behind the data to learn whether the decoder reads them.
+const ADDED_BYTES: usize = 64;
+/// Bytes that are exchanged at the end of the data, for the same.
+const EXCHANGED_BYTES: usize = 8;
+/// Two fillers: the data's own bytes may happen to give what one of them gives.
+const PROBES: [u8; 2] = [0x55, 0xaa];
+
+/// Entropy-coded data up to the next marker.
+struct Stretch {
+    start: usize,
+    end: usize,
+    /// The number of the restart marker behind it, of 0 to 7.
+    restart: Option<u8>,
+}
+
+/// Makes sure that zeros in the data are codes of the picture.
+///
+/// # Errors
+/// A stretch of zeros after which the data and the blocks do not end together, or restart markers that do not follow each other.
+pub(crate) fn check_has_no_gap(jpeg: &[u8]) -> Result<(), PictureError> {
+    let stretches = stretches(jpeg);
+    let zeros_in = |stretch: &Stretch| {
+        let data = &jpeg[stretch.start..stretch.end];
+        data.windows(MIN_ZEROS).position(|run| run.iter().all(|byte| *byte == 0)).map(|at| stretch.start + at)
+    };
+    for (idx, stretch) in stretches.iter().enumerate() {
+        let Some(at) = zeros_in(stretch) else { continue };
+        let before = idx.checked_sub(1).and_then(|before| stretches[before].restart);
+        let is_in_order = match (before, stretch.restart) {
+            (Some(before), Some(after)) => after == (before + 1) % 8,
+            (None, Some(after)) => after == 0,
+            (_, None) => true,
+        };
+        if !is_in_order || !ends_with_its_blocks(jpeg, stretch) {
+            let count = jpeg[at..].iter().take_while(|byte| **byte == 0).count();
+            let reason = format!(
+                "{count} zeros in a row from byte {at} on, where a part of the picture was: copy it again from where it came"
+            );
+            return Err(PictureError::DamagedImage { format: "JPEG", reason });
+        }
+    }
+    Ok(())
+}
+
+/// Whether the decoder reads the data to their end, and nothing behind it.
+fn ends_with_its_blocks(jpeg: &[u8], stretch: &Stretch) -> bool {
+    let decoded =
+        |bytes: &[u8]| -> Option<DynamicImage> { image::load_from_memory_with_format(bytes, ImageFormat::Jpeg).ok() };
+    let Some(whole) = decoded(jpeg) else { return true };
+    // Such a picture may have codes of zeros alone, and the decoder fills what is missing with the same colour.
+    let first = whole.get_pixel(0, 0);
+    if whole.pixels().all(|(.., pixel)| pixel == first) {
+        return true;
+    }
+    let is_same = |kept_to: usize, filler: &[u8]| {
+        decoded(&[&jpeg[..kept_to], filler, &jpeg[stretch.end..]].concat()).is_some_and(|other| other == whole)
+    };
+    let runs_out = PROBES.into_iter().any(|probe| !is_same(stretch.end, &[probe; ADDED_BYTES]));
+    let last = stretch.end.saturating_sub(EXCHANGED_BYTES).max(stretch.start);
+    let is_left_over = PROBES.into_iter().all(|probe| is_same(last, &[probe; EXCHANGED_BYTES]));
+    !runs_out && !is_left_over
+}
+
+/// All entropy-coded data; what is no JPEG ends the list.
+fn stretches(jpeg: &[u8]) -> Vec<Stretch> {
+    const START_OF_SCAN: u8 = 0xda;
+    let mut found = Vec::new();
+    let mut at = 2;
+    while let Some(&[0xff, marker]) = jpeg.get(at..at + 2).and_then(|pair| pair.first_chunk()) {
+        let is_restart = (0xd0..=0xd7).contains(&marker);
+        if marker == 0xff {
+            at += 1;
+            continue;
+        }
+        let length = match jpeg.get(at + 2..at + 4) {
+            _ if is_restart => 0,
+            Some(length) => usize::from(u16::from_be_bytes([length[0], length[1]])),
+            None => break,
+        };
+        at += 2 + length;
+        if marker != START_OF_SCAN && !is_restart {
+            continue;
+        }
+        let Some(rest) = jpeg.get(at..) else { break };
+        let Some(length) = rest.windows(2).position(|pair| pair[0] == 0xff && pair[1] != 0) else { break };
+        let end = at + length;
+        let restart = Some(jpeg[end + 1]).filter(|marker| (0xd0..=0xd7).contains(marker)).map(|marker| marker - 0xd0);
+        found.push(Stretch { start: at, end, restart });
+        at = end;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::codecs::jpeg::JpegEncoder;
+    use image::{Rgb, RgbImage};
+
+    fn jpeg(picture: &RgbImage) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        JpegEncoder::new_with_quality(&mut bytes, 90).encode_image(picture).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn zeros_instead_of_a_part_are_told() {
+        let original = jpeg(&RgbImage::from_fn(160, 120, |x, y| Rgb([(x * 7) as u8, (y * 5) as u8, (x * y) as u8])));
+        check_has_no_gap(&original).unwrap();
+        let [data] = &stretches(&original)[..] else { panic!("one scan") };
+        for part in [8, 20, 40] {
+            let (start, length) = ((data.start + data.end) / 2, (data.end - data.start) / part);
+            let mut damaged = original.clone();
+            damaged[start..start + length].fill(0);
+            assert!(image::load_from_memory(&damaged).is_ok(), "the decoder does not tell");
+            let told = check_has_no_gap(&damaged).unwrap_err().to_string();
+            assert!(told.contains("zeros in a row from byte"), "{told}");
+        }
+    }
+
+    #[test]
+    fn zeros_that_are_codes_are_read() {
+        // A block has the difference 0 and the block's end, a bit each; of 320 blocks the second and the last have the difference 1,
+        // which makes them four bits. Together 80 bytes and a half.
+        let table = |class: u8| [&[0xff, 0xc4, 0, 21, class, 1, 1][..], &[0; 14], &[0, 1]].concat();
+        let quantization = [&[0xff, 0xdb, 0, 67, 0][..], &[8; 64]].concat();
+        let frame = [0xff, 0xc0, 0, 11, 8, 0, 64, 1, 64, 1, 1, 0x11, 0];
+        let scan = [0xff, 0xda, 0, 8, 1, 1, 0, 0, 63, 0];
+        let of_data = |data: &[u8]| {
+            let parts = [&[0xff, 0xd8][..], &quantization, &frame, &table(0), &table(0x10), &scan];
+            [&parts.concat(), data, &[0xff, 0xd9]].concat()
+        };
+        let with_zeros = |count: usize| of_data(&[&[0b0010_1000][..], &vec![0; count], &[0b1010_0000]].concat());
+        check_has_no_gap(&with_zeros(79)).unwrap();
+        assert!(check_has_no_gap(&with_zeros(99)).is_err(), "20 bytes are left over");
+        assert!(check_has_no_gap(&with_zeros(59)).is_err(), "20 bytes are missing");
+        // Codes of zeros alone: a picture of one colour.
+        check_has_no_gap(&of_data(&[0; 80])).unwrap();
+    }
+}
