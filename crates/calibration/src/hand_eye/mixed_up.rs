@@ -2,9 +2,9 @@
 
 use nalgebra::Isometry3;
 
-use super::MIN_POSES;
 use super::closed_form::{self, BoardSize};
 use super::solve::Evidence;
+use super::view::MIN_POSES;
 
 /// What is wrong with the poses of a few pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -31,7 +31,7 @@ use sdg_geometry::PinholeCamera;
 
 pub use self::poses_file::{RobotPose, read_robot_poses};
 use self::solve::{Evidence, ROBOT_SIGMA};
-pub use self::view::{HandEyeView, Mount};
+pub use self::view::{HandEyeView, MIN_POSES, Mount};
 use crate::board::Board;
 use crate::error::CalibrationError;
 use crate::pose::{BoardPose, board_pose};
@@ -59,8 +59,6 @@ pub struct HandEye {
     pub spread: Vec<[f64; 2]>,
 }
 
-/// With three pictures nothing is left when one is taken away.
-pub const MIN_POSES: usize = 4;
 /// Finds the camera on the robot or beside it.
 ///
 /// # Units and frames

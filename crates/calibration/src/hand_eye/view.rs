@@ -4,6 +4,9 @@ use nalgebra::Isometry3;
 
 use crate::detection::SeenCorner;
 
+/// With three pictures nothing is left when one is taken away.
+pub const MIN_POSES: usize = 4;
+
 /// What the camera is fixed to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
