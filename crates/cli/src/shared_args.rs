@@ -117,9 +117,9 @@ pub fn height_mm(text: &str) -> Result<f64, String> {
     millimetres(text, "a height", [0.0, 500.0])
 }
 
-/// The size of a part. No part is smaller than a millimetre, or larger than a metre.
+/// The size of a part. No part is smaller than a millimetre; one that no hand takes is refused by its jaws.
 fn size_mm(text: &str) -> Result<f64, String> {
-    millimetres(text, "a size", [1.0, 1000.0])
+    millimetres(text, "a size", [1.0, 5000.0])
 }
 
 /// A length from `min` to `max`. A tenth of a millimetre is less than anything here is known to: such a number is in metres.

@@ -55,7 +55,7 @@ fn what_the_photo_does_not_show_must_be_told() {
     refused(&[], 2, &["--object NAME", "--length-mm"]);
     refused(&["--length-mm", "166"], 2, &["--height-mm", "model.sdg"]);
     refused(&["--length-mm", "166", "--object", "pendulum"], 2, &["cannot be used with"]);
-    refused(&["--length-mm", "0", "--height-mm", "16"], 2, &["positive number"]);
+    refused(&["--length-mm", "0", "--height-mm", "16"], 2, &["a size of 1 to 5000 millimetres"]);
     // The lever in the size of a table: no hand opens so far.
     refused(&["--length-mm", "1600", "--height-mm", "16"], 1, &["opening of the jaws in m: expected 0.001 to 0.08"]);
     refused(&["--length-mm", "166", "--height-mm", "1"], 1, &["height in m: expected 0.003 to 0.12, found 0.0010"]);
