@@ -74,7 +74,7 @@ pub fn keep(path: &Path) {
     INPUTS.lock().unwrap_or_else(PoisonError::into_inner).extend(kept);
 }
 
-/// Writes a file whole or not at all, and never over an input of this command, or over a picture of another format.
+/// Writes a file whole or not at all, and never over an input of this command, or over a file of another kind.
 ///
 /// # Errors
 /// A path that leads to such a file; the system's reason.
@@ -88,19 +88,35 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// As [`write`].
 pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
     check_is_no_input(path, own)?;
-    check_replaces_no_other_picture(path, bytes)?;
+    check_replaces_its_kind(path, bytes)?;
     Ok(write_atomically(path, bytes)?)
 }
 
-/// Makes sure that no photo is replaced by a report, a drawing of lines or a list.
-fn check_replaces_no_other_picture(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Makes sure that a file is replaced by one of its kind: no photo by a report, no marks by a camera.
+fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     let mut start = Vec::new();
     let _ = File::open(path).and_then(|file| file.take(MAX_SIGNATURE).read_to_end(&mut start));
-    let format = |bytes| image::guess_format(bytes).ok();
-    if let Some(found) = format(&start).filter(|found| format(bytes) != Some(*found)) {
-        bail!("{}: expected a new name for what is written, found a picture ({found:?})", path.display());
+    let (found, written) = (kind_of(&start), kind_of(&bytes[..bytes.len().min(MAX_SIGNATURE as usize)]));
+    if found.is_some() && found != written {
+        let [found, written] = [found, written].map(Option::unwrap_or_default);
+        bail!("{}: expected a new name, or {written} to replace, found {found}", path.display());
     }
     Ok(())
+}
+
+/// What a file is by its first bytes, in words; `None` for an empty one.
+fn kind_of(start: &[u8]) -> Option<String> {
+    let first = start.iter().find(|byte| !byte.is_ascii_whitespace())?;
+    let kind = match (image::guess_format(start), first) {
+        (Ok(format), _) => return Some(format!("a picture ({format:?})")),
+        _ if start.starts_with(b"%PDF") => "a PDF",
+        _ if start.get(8) == Some(&b'{') && start[4..8] == [0; 4] => "a model",
+        (_, b'<') => "XML or HTML",
+        (_, b'{' | b'[') => "JSON",
+        _ if start.contains(&0) => "another file",
+        _ => "text",
+    };
+    Some(kind.to_owned())
 }
 
 /// The file and its length.
@@ -286,15 +302,21 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_replaced_by_its_own_format_alone() {
+    fn a_file_is_replaced_by_its_own_kind_alone() {
         let folder = tempfile::tempdir().unwrap();
-        let photo = folder.path().join("photo.png");
+        let [photo, marks, camera] = ["photo.png", "photo.json", "camera.yaml"].map(|name| folder.path().join(name));
         RgbImage::new(4, 3).save(&photo).unwrap();
-        let before = fs::read(&photo).unwrap();
-        let error = write(&photo, b"<svg/>").unwrap_err().to_string();
-        assert!(error.contains("found a picture (Png)"), "{error}");
-        assert_eq!(fs::read(&photo).unwrap(), before);
-        write(&photo, &before).unwrap();
+        fs::write(&marks, "{\"shapes\": []}").unwrap();
+        fs::write(&camera, "image_width: 4\n").unwrap();
+        for (path, found) in [(&photo, "found a picture (Png)"), (&marks, "found JSON"), (&camera, "found text")] {
+            let before = fs::read(path).unwrap();
+            let error = write(path, b"<svg/>").unwrap_err().to_string();
+            assert!(error.contains("or XML or HTML to replace") && error.contains(found), "{error}");
+            assert_eq!(fs::read(path).unwrap(), before);
+            write(path, &before).unwrap();
+        }
+        fs::write(&camera, "").unwrap();
+        write(&camera, b"<svg/>").unwrap();
     }
 
     #[test]

@@ -10,8 +10,9 @@ use crate::files;
 
 /// Marks that fit one of two pictures so much better were made on it. Chosen by hand.
 const MIN_GAIN: f64 = 1.25;
-/// Two files of one picture differ by less where the marks are, in grey values: one of them may be a strongly compressed JPEG.
-const MAX_DIFFERENCE: f64 = 12.0;
+/// Two files of one picture agree by more where the marks are, as the correlation of their grey values: one of them may be a strongly
+/// compressed JPEG, a copy without colours or a darker one. Chosen by hand.
+const MIN_CORRELATION: f64 = 0.9;
 
 /// A photo, upright, and the files that it and its marks stand in.
 pub struct MarkedPhoto<'a> {
@@ -134,16 +135,21 @@ impl MarkedPhoto<'_> {
     }
 
     fn is_same_picture(&self, other: &RgbImage, marked: &[&Annotation]) -> bool {
-        let (mut sum, mut count) = (0.0, 0.0_f64);
+        let grey = |image: &RgbImage, x, y| image.get_pixel(x, y).0.iter().map(|value| f64::from(*value)).sum::<f64>();
+        let mut pairs = Vec::new();
         for bbox in marked.iter().map(|one| one.bbox) {
-            for y in bbox.y1.max(0.0) as u32..(bbox.y2 as u32).min(other.height()) {
-                for x in bbox.x1.max(0.0) as u32..(bbox.x2 as u32).min(other.width()) {
-                    let pairs = self.image.get_pixel(x, y).0.into_iter().zip(other.get_pixel(x, y).0);
-                    sum += pairs.map(|(one, other)| f64::from(one.abs_diff(other))).sum::<f64>() / 3.0;
-                    count += 1.0;
-                }
+            let columns = bbox.x1.max(0.0) as u32..(bbox.x2.max(0.0) as u32).min(other.width());
+            for y in bbox.y1.max(0.0) as u32..(bbox.y2.max(0.0) as u32).min(other.height()) {
+                pairs.extend(columns.clone().map(|x| [grey(self.image, x, y), grey(other, x, y)]));
             }
         }
-        sum <= MAX_DIFFERENCE * count
+        let count = pairs.len().max(1) as f64;
+        let [mean, other_mean] = [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).sum::<f64>() / count);
+        let product = |a: usize, b: usize| {
+            let means = [mean, other_mean];
+            pairs.iter().map(|pair| (pair[a] - means[a]) * (pair[b] - means[b])).sum::<f64>()
+        };
+        // Of one colour both are the same for these marks.
+        product(0, 1) >= MIN_CORRELATION * (product(0, 0) * product(1, 1)).sqrt()
     }
 }

@@ -91,6 +91,11 @@ impl Annotation {
             let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
             return contradictory("a grasp line that crosses the box", found);
         }
+        // The opening is measured across the line's middle, and there is nothing to measure.
+        if self.outline.is_none() && self.jaw_width.is_none() && !self.bbox.contains(&nalgebra::center(&start, &end)) {
+            let found = format!("the grasp {} and the box {}", in_words(&of_line), in_words(&self.bbox));
+            return contradictory("a grasp line whose middle lies in the box", found);
+        }
         let is_near = |a: f64, b: f64| (a - b).abs() <= ROUNDING_PX;
         let is_the_line_s = is_near(of_line.x1, self.bbox.x1)
             && is_near(of_line.y1, self.bbox.y1)

@@ -19,6 +19,11 @@ const MIN_GAIN: f64 = 3.0;
 const MIN_DIFFERENCE: f64 = 0.15;
 /// Marks on a pattern of one mixture, whose parts they may well follow: more than a camera's noise, in grey values.
 const MIN_CONTRAST: f64 = 20.0;
+/// Dark photos and those of little contrast have one mixture of colours everywhere: the hundredth and the ninety-ninth percentile of their
+/// grey values differ by less. A photo at 30 % of its brightness has at most 76.
+const MIN_RANGE: f64 = 100.0;
+/// Marks on more of the photo than this are a crop's: their surroundings say nothing. Chosen by hand.
+const MAX_COVER: f64 = 0.5;
 /// Brings the fit of a box to the size of an outline's, should a file have both.
 const BOX_CONTRAST: f64 = 100.0;
 /// Samples across the region and its surroundings, and down.
@@ -71,7 +76,9 @@ impl MarksReading {
 
 /// The reading in which the marks fit the photo far better than as they stand; `None` where they are right, or none are there.
 pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksReading> {
-    if marked.is_empty() {
+    let pixels = f64::from(image.width()) * f64::from(image.height());
+    let is_crop = |annotation: &&Annotation| annotation.region().area() > MAX_COVER * pixels;
+    if marked.is_empty() || marked.iter().any(is_crop) {
         return None;
     }
     let fit_of = |reading: Option<MarksReading>| {
@@ -97,7 +104,7 @@ pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksRe
                     || border_contrast(image, &region, &bounds) >= MIN_CONTRAST
             };
             let is_any_right = marked.iter().any(|annotation| differs(annotation.region()));
-            (!is_any_right).then_some(MarksReading::OtherPhoto)
+            (!is_any_right && grey_range(image) >= MIN_RANGE).then_some(MarksReading::OtherPhoto)
         }
     }
 }
@@ -105,6 +112,19 @@ pub fn other_reading(image: &RgbImage, marked: &[&Annotation]) -> Option<MarksRe
 /// How well marks fit a photo; to be compared with other photos or other marks.
 pub fn marks_fit(image: &RgbImage, annotation: &Annotation) -> f64 {
     region_fit(image, &annotation.region(), annotation.outline.is_some())
+}
+
+/// How far the brightest hundredth of a photo is from the darkest, in grey values.
+fn grey_range(image: &RgbImage) -> f64 {
+    let along = |at: u32, length: u32| ((f64::from(at) + 0.5) / f64::from(GRID) * f64::from(length)) as u32;
+    let place = |at: u32| (along(at % GRID, image.width()), along(at / GRID, image.height()));
+    let mut greys: Vec<u16> = (0..GRID * GRID)
+        .filter_map(|at| image.get_pixel_checked(place(at).0, place(at).1))
+        .map(|pixel| pixel.0.iter().map(|value| u16::from(*value)).sum())
+        .collect();
+    greys.sort_unstable();
+    let rank = |share: f64| greys.get((share * greys.len() as f64) as usize).map_or(0.0, |sum| f64::from(*sum) / 3.0);
+    rank(0.99) - rank(0.01)
 }
 
 fn region_fit(image: &RgbImage, region: &Polygon, is_outline: bool) -> f64 {
@@ -209,9 +229,9 @@ mod tests {
 
     #[test]
     fn marks_around_nothing_are_of_another_photo() {
-        let plain = RgbImage::from_pixel(320, 240, Rgb([90, 95, 100]));
         let noise = |x: u32, y: u32| 90 + (x * x * 31 + y * y * 17 + x * y) as u8 % 25;
-        let ground = RgbImage::from_fn(320, 240, |x, y| Rgb([noise(x, y); 3]));
+        let is_sheet = |x: u32, y: u32| x < 50 && y < 30;
+        let ground = RgbImage::from_fn(320, 240, |x, y| Rgb([if is_sheet(x, y) { 240 } else { noise(x, y) }; 3]));
         for corners in [[150.0, 40.0, 210.0, 64.0], [111.0, 92.0, 227.0, 169.0]] {
             for has_outline in [false, true] {
                 let marked = marked(corners, has_outline);
@@ -219,7 +239,24 @@ mod tests {
             }
         }
         let marked = marked([150.0, 40.0, 210.0, 64.0], true);
-        assert_eq!(other_reading(&plain, &[&marked]), Some(MarksReading::OtherPhoto));
+        let plain = RgbImage::from_pixel(320, 240, Rgb([90, 95, 100]));
         assert!(marks_fit(&photo(), &marked) > 10.0 * marks_fit(&plain, &marked));
+    }
+
+    #[test]
+    fn dark_photos_faint_ones_and_crops_are_not_of_another_photo() {
+        let (bright, right) = (photo(), [150.0, 40.0, 210.0, 64.0]);
+        let changed = |change: fn(f64) -> f64| {
+            let mut image = bright.clone();
+            image.pixels_mut().for_each(|pixel| pixel.0 = pixel.0.map(|value| change(f64::from(value)) as u8));
+            image
+        };
+        for image in [changed(|value| 0.15 * value), changed(|value| 100.0 + 0.12 * value)] {
+            for has_outline in [false, true] {
+                assert_eq!(other_reading(&image, &[&marked(right, has_outline)]), None);
+            }
+        }
+        let crop = image::imageops::crop_imm(&bright, 142, 32, 76, 40).to_image();
+        assert_eq!(other_reading(&crop, &[&marked([8.0, 8.0, 68.0, 32.0], false)]), None);
     }
 }
