@@ -197,7 +197,7 @@ pub enum CalibrationError {
         found: String,
         /// Places of the pictures among those given, from 0.
         pictures: Vec<usize>,
-        /// What the pictures are called, in the same order: by their numbers from 1 before [`Self::with_picture_names`].
+        /// The pictures' names, in the same order: their numbers from 1 before [`Self::with_picture_names`].
         names: Vec<String>,
         /// Whether each of two has the pose of the other.
         are_exchanged: bool,

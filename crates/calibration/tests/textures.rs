@@ -3,7 +3,7 @@
 use crate::rendering::Random;
 use image::{GrayImage, Luma};
 
-/// What is shown.
+/// The picture shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Texture {
     /// Planks with grain, knots and dark joints.

@@ -31,7 +31,7 @@ pub struct TakenPicture {
 
 /// Source of pictures while a grasp runs.
 pub trait Pictures<A: Arm> {
-    /// A picture that was taken after the arm came to rest, which is before this call.
+    /// Takes a picture after the arm has stopped, which is before this call.
     ///
     /// # Errors
     /// No such picture in time; the camera's own errors.

@@ -80,7 +80,7 @@ impl Perception {
     /// Finds the part in a picture, best score first.
     ///
     /// # Errors
-    /// A picture of another size than the calibrated camera's; what the model refuses.
+    /// A picture of another size than the calibrated camera's; the model's own errors.
     pub fn detect(&self, picture: &RgbImage, verification: Verification) -> Result<Vec<Found>> {
         self.check_picture(picture)?;
         Ok(match &self.view {
@@ -130,7 +130,7 @@ impl Perception {
         }
     }
 
-    /// What positions are given in, as the camera's file says.
+    /// The frame of positions, as the camera's file says.
     pub fn frame(&self) -> Option<Frame> {
         self.frame
     }

@@ -55,7 +55,7 @@ impl AnnotationFile {
         })
     }
 
-    /// What is marked on a photo, read upright, with a word on marks of other things; checked against its pixels.
+    /// The marks on a photo, read upright and checked against its pixels, with a notice of marks of other things.
     ///
     /// # Errors
     /// Those of [`Self::objects`] and of [`MarkedPhoto::checked`].
@@ -69,7 +69,7 @@ impl AnnotationFile {
         Ok(objects)
     }
 
-    /// Says what of the file marks no part.
+    /// Prints the file's entries that mark no part.
     pub fn tell_passed_over(&self) {
         for foreign in Annotation::passed_over(&self.bytes) {
             eprintln!("{}: passed over {foreign}", self.path.display());

@@ -104,7 +104,7 @@ fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// What a file is by its first bytes, in words; `None` for an empty one.
+/// The kind of a file by its first bytes, in words; `None` for an empty one.
 fn kind_of(start: &[u8]) -> Option<String> {
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace())?;
     let kind = match (image::guess_format(start), first) {

@@ -11,7 +11,7 @@ pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.
 const SAME_SIZE: f64 = 0.03;
 
-/// What would help where a refused detection is the part after all.
+/// The advice for a refused detection that is the part after all, in words.
 pub fn advice_in_words(advice: Advice) -> &'static str {
     match advice {
         Advice::CheckSize => {

@@ -95,7 +95,7 @@ impl MarkedPhoto<'_> {
         if let Some(other) = self.other_picture(&annotations) {
             bail!("{}: {other}", self.marks.display());
         }
-        // Without a grasp nothing is taken from the marks, and what lacks is said.
+        // Marks without a grasp are not taught from, and the missing points are named.
         let grasps: Vec<&Annotation> = annotations.into_iter().filter(|one| one.grasp.is_some()).collect();
         if let Some(reading) = other_reading(self.image, &grasps) {
             bail!(
@@ -109,7 +109,7 @@ impl MarkedPhoto<'_> {
         Ok(marked)
     }
 
-    /// What is wrong where the file names another picture that is there and that its marks fit as well.
+    /// The error where the file names another picture that exists and that its marks fit as well.
     fn other_picture(&self, marked: &[&Annotation]) -> Option<String> {
         let (field, name) = AnnotationFormat::named_picture(self.bytes)?;
         let base_name = name.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;

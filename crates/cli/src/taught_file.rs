@@ -1,4 +1,4 @@
-//! A model taught, written and read again: what is tried and used is the file, whose weights are rounded, and no network apart from it.
+//! A model taught, written and read again: the file, whose weights are rounded, is tried and used, not the network in memory.
 
 use std::ops::ControlFlow;
 
@@ -22,7 +22,7 @@ impl TaughtFile {
     /// Teaches; `observe` may end it early.
     ///
     /// # Errors
-    /// What [`teach`] refuses.
+    /// The errors of [`teach`].
     pub fn teach(
         demonstrations: &[Demonstration],
         options: &TeachOptions,

@@ -42,7 +42,7 @@ fn off(corners: &[SeenCorner]) -> Option<f64> {
     Some((squares.sum::<f64>() / corners.len() as f64).sqrt())
 }
 
-/// What brightness varies by within squares, over what it differs by from squares beside them.
+/// Variation of brightness within squares, over its difference between neighbouring squares.
 fn variation(picture: &Luminance, corners: &[SeenCorner]) -> Option<f64> {
     let pixels: BTreeMap<[u32; 2], Point2<f64>> = corners.iter().map(|seen| (seen.corner, seen.pixel)).collect();
     let rings = pixels.keys().filter_map(|&[i, j]| {

@@ -28,13 +28,13 @@ pub(super) enum BoardSize {
     Free,
 }
 
-/// What the equations give.
+/// A solution of the equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Closed {
     pub(super) x: Isometry3<f64>,
     pub(super) y: Isometry3<f64>,
     pub(super) board_scale: f64,
-    /// What the equations of motions between pictures leave: root mean square, radians, shifts over [`LEVER_M`].
+    /// Residual of the equations of motions between pictures: root mean square, radians, shifts over [`LEVER_M`].
     pub(super) left_rad: f64,
 }
 
@@ -79,7 +79,7 @@ pub(super) fn solve(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>], size:
     Some(Closed { x, y, board_scale, left_rad: left.sqrt() })
 }
 
-/// What the turns between pictures taken near each other leave, root mean square, radians.
+/// Residual of the turns between pictures taken near each other, root mean square, radians.
 pub(super) fn turns_left(motions: &[Isometry3<f64>], boards: &[Isometry3<f64>]) -> f64 {
     let pairs = pairs(motions, boards, NEAR);
     let left = turn_between(&pairs).map(|rotation| squares_of_turns(&rotation, &pairs) / pairs.len() as f64);

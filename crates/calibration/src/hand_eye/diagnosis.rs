@@ -26,7 +26,7 @@ const MAX_LEFT_RAD: f64 = 0.007;
 /// What the closed form leaves at most before the minimum is looked for, which takes long where there is none: robot errors that leave
 /// [`MAX_LEFT_RAD`] leave a fifth of it between two pictures.
 const MAX_CLOSED_RAD: f64 = 0.1;
-/// By how much what two explanations leave may differ where they count as alike.
+/// Ratio of two explanations' residuals up to which they count as alike.
 const ALIKE: f64 = 1.2;
 /// A difference that no corner shows, in pixels.
 const ALIKE_PX: f64 = 0.02;
@@ -41,7 +41,7 @@ const MAX_ROBOT_SHARE: f64 = 0.85;
 /// A turn by which the robot's and the board's turns between two pictures may differ, radians: 3 degrees, twice [`MAX_ROBOT_SCALE`].
 const MAX_TURN_DIFFERENCE_RAD: f64 = 0.05;
 
-/// An explanation, and what it leaves.
+/// An explanation, and its residual.
 struct Explanation {
     rms_px: f64,
     kind: Kind,
@@ -55,7 +55,7 @@ enum Kind {
     BoardScale([f64; 2]),
 }
 
-/// What is found, unless poses and pictures contradict each other or another explanation fits far better.
+/// The solution, unless poses and pictures contradict each other or another explanation fits far better.
 ///
 /// # Errors
 /// As [`super::calibrate_hand_eye`].
@@ -213,7 +213,7 @@ fn evidence_rms_px(evidence: &Evidence) -> f64 {
     (squares / num as f64).sqrt()
 }
 
-/// What to say where the robot turns by other angles than the board: no mistake in translations explains it.
+/// The hint where the robot turns by other angles than the board: no mistake in translations explains it.
 fn turns_that_differ(evidence: &Evidence, robot: &[Isometry3<f64>]) -> Option<String> {
     let boards = evidence.boards();
     let turn = |poses: &[Isometry3<f64>], k: usize| poses[k].rotation.angle_to(&poses[k - 1].rotation);

@@ -6,7 +6,7 @@ use super::closed_form::{self, BoardSize};
 use super::solve::Evidence;
 use super::view::MIN_POSES;
 
-/// What is wrong with the poses of a few pictures.
+/// The mistake in the poses of a few pictures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum MixedUp {
     /// These are wrong.

@@ -8,7 +8,7 @@ use super::view::Mount;
 
 /// Robot poses as they may have been meant.
 pub(super) struct Reading {
-    /// What seems to be the case, as part of a sentence.
+    /// The reading in words, as part of a sentence.
     pub(super) name: String,
     /// `base_from_flange` of each picture.
     pub(super) robot: Vec<Isometry3<f64>>,
@@ -38,7 +38,7 @@ const READINGS: [(&str, OfPose); 8] = [
 const MAX_TURNS_SHARE: f64 = 0.5;
 /// Readings of Euler angles that leave the least in closed form, and are looked at further.
 const NUM_EULER: usize = 3;
-/// By how much what they leave may differ where they count as alike.
+/// Ratio of two readings' residuals up to which they count as alike.
 const ALIKE: f64 = 1.1;
 /// Below it all digits are rounding, radians.
 const ROUNDING_RAD: f64 = 1e-5;

@@ -27,7 +27,7 @@ const MAX_RETRY_RAD: f64 = 0.2;
 /// What corners are off by at least, in pixels.
 const MIN_CORNER_SIGMA_PX: f64 = 0.02;
 
-/// Pictures, and what they show without the robot's poses.
+/// Pictures, and their solution without the robot's poses.
 #[derive(Clone)]
 pub(super) struct Evidence<'a> {
     pub(super) camera: &'a PinholeCamera,

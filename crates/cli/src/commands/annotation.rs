@@ -135,7 +135,7 @@ fn read_marks(
     Ok((width, height, file_name, objects))
 }
 
-/// What the file says of its only image.
+/// The file's entry for its only image.
 fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Result<DeclaredImage> {
     let mut declared =
         AnnotationFormat::declared_images(input.bytes()).with_context(|| args.input.display().to_string())?;
