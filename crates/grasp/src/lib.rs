@@ -66,6 +66,7 @@ mod explanation;
 mod facts;
 #[cfg(feature = "teach")]
 pub mod fitting;
+mod marks_shift;
 mod model;
 mod model_file;
 mod models;
