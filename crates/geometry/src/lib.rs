@@ -37,6 +37,7 @@ mod planar_grasp;
 mod planar_similarity;
 mod polygon;
 mod rotational_symmetry;
+mod slant;
 mod statistics;
 
 pub use angle::Angle;
@@ -53,6 +54,7 @@ pub use planar_grasp::PlanarGrasp;
 pub use planar_similarity::PlanarSimilarity;
 pub use polygon::Polygon;
 pub use rotational_symmetry::RotationalSymmetry;
+pub use slant::Slant;
 pub use statistics::{median, percentile, upper_median};
 
 /// The README's example, which runs with the other examples.

@@ -80,6 +80,7 @@ mod safetensors_file;
 mod same_part;
 mod sighting;
 mod sizes;
+mod slanted;
 mod taught;
 mod taught_marks;
 #[cfg(feature = "teach")]

@@ -77,10 +77,13 @@ impl MarksShift {
     /// `image_from_cutout`, or the same shifted to where the marks' surroundings are seen. Deterministic.
     ///
     /// # Units and frames
-    /// Pixels of the picture, whose middle is taken for the point straight below the camera.
-    pub(crate) fn placed(&self, picture: &Picture<'_>, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
-        let (width, height) = picture.image.dimensions();
-        let below_camera = Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+    /// Pixels of the picture; `below_camera` is the point of the table straight below the camera.
+    pub(crate) fn placed(
+        &self,
+        picture: &Picture<'_>,
+        below_camera: Point2<f64>,
+        image_from_cutout: &PlanarSimilarity,
+    ) -> PlanarSimilarity {
         let diagonal = self.diagonal * image_from_cutout.scale;
         // Both in diagonals.
         let away = (image_from_cutout.apply(&self.photo_middle) - below_camera) / diagonal;
@@ -247,7 +250,7 @@ mod tests {
 
     fn placed(image: &RgbImage, pose: &PlanarSimilarity) -> PlanarSimilarity {
         let (field, table) = (GradientField::new(image), TableColors::new(image));
-        taught().placed(&Picture { image, field: &field, table: &table }, pose)
+        taught().placed(&Picture { image, field: &field, table: &table }, Point2::new(240.0, 180.0), pose)
     }
 
     fn to(middle: Point2<f64>) -> PlanarSimilarity {

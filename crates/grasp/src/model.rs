@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 use burn::tensor::{Device, read_sync};
 use image::RgbImage;
 use nalgebra::Point2;
-use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon};
+use sdg_geometry::{BoundingBox, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
 use sdg_shape::CloseLook;
 
 use crate::calibrations::Calibrations;
@@ -24,9 +24,10 @@ use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::models::{Network, PoseCandidate, Proposals};
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
 use crate::sighting::{Sighting, sightings};
+use crate::slanted::{LevelImage, SLANT_GAIN, suggested_slants, worth};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
-use crate::verification::{PlacedDemonstration, SearchedImage};
+use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
 
 /// No part can be told in an image with a shorter side. Chosen by hand, not measured: a level of the pyramid has 24 pixels.
 const MIN_SIDE_PX: u32 = 32;
@@ -227,14 +228,7 @@ impl GraspModel {
                 .iter()
                 .map(|c| Found { detection: self.unverified(c), placement: None })
                 .collect(),
-            (Some(network), Verification::ByShape) => {
-                let searched = SearchedImage::new(image, &self.demonstrations);
-                let proposals = network.proposals_async(image, &self.demonstrations).await?;
-                self.judged(sightings(&proposals, &searched))
-            }
-            (None, _) => {
-                self.judged(sightings(&Proposals::default(), &SearchedImage::new(image, &self.demonstrations)))
-            }
+            _ => self.find_at_any_slant(image).await?,
         };
         let (width, height) = (f64::from(width), f64::from(height));
         found.iter_mut().for_each(|found| found.detection.bbox = found.detection.bbox.clip(width, height));
@@ -242,6 +236,32 @@ impl GraspModel {
         drop_repeated(&mut found);
         found.truncate(self.demonstrations[0].check().search.max_matches);
         Ok(found)
+    }
+
+    /// As a level camera sees it, or a slanted one where that explains the picture better.
+    async fn find_at_any_slant(&self, image: &RgbImage) -> Result<Vec<Found>> {
+        let (mut best, slants) = self.find_at_slant(image, &Shot::level(image), true).await?;
+        for slant in slants {
+            let Some(level) = LevelImage::new(image, &slant) else { continue };
+            let (found, _) = self.find_at_slant(&level.image, &level.shot(), false).await?;
+            if worth(&found) > worth(&best) + SLANT_GAIN {
+                best = found.into_iter().filter_map(|found| level.seen(found)).collect();
+            }
+        }
+        Ok(best)
+    }
+
+    /// What is found in an image that was taken so, and what slants its best places suggest where they are asked for.
+    async fn find_at_slant(&self, image: &RgbImage, shot: &Shot, suggest: bool) -> Result<(Vec<Found>, Vec<Slant>)> {
+        let searched = SearchedImage::of(image, shot, &self.demonstrations);
+        let proposals = match &self.network {
+            Some(network) => network.proposals_async(image, &self.demonstrations).await?,
+            None => Proposals::default(),
+        };
+        let sightings = sightings(&proposals, &searched);
+        let is_known = self.demonstrations[0].check().score.is_size_known;
+        let slants = if suggest && !is_known { suggested_slants(&sightings, &searched, shot) } else { Vec::new() };
+        Ok((self.judged(sightings), slants))
     }
 
     fn unverified(&self, candidate: &PoseCandidate) -> GraspDetection {

@@ -13,7 +13,7 @@ use image::RgbImage;
 use nalgebra::Point2;
 use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
 use sdg_orientation::halved;
-use sdg_shape::{Differences, Evidence, GradientField, Picture, TableColors};
+use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, TableColors};
 
 use crate::colors::Colors;
 use crate::marks_shift::{MarksShift, Straightened};
@@ -28,9 +28,27 @@ pub(crate) struct SearchedImage<'a> {
     sized: Vec<SizedDemonstration<'a>>,
 }
 
+/// How an image was taken, as far as that is known without a calibration.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shot {
+    /// Width and height of the picture that it was taken as, by which nominal sizes go.
+    pub(crate) size: [u32; 2],
+    /// The point of the table straight below the camera, in pixels of the image.
+    pub(crate) below_camera: Point2<f64>,
+}
+
+impl Shot {
+    /// Of a camera that looks straight down.
+    pub(crate) fn level(image: &RgbImage) -> Self {
+        let (width, height) = image.dimensions();
+        Self { size: [width, height], below_camera: Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)) }
+    }
+}
+
 /// The image, halved some times, with its gradients, which every comparison reads.
 struct View<'a> {
     halvings: u32,
+    below_camera: Point2<f64>,
     image: Cow<'a, RgbImage>,
     field: GradientField,
     table: TableColors,
@@ -57,14 +75,18 @@ impl<'a> SearchedImage<'a> {
     /// Makes every demonstration ready for the image's size. One that shows nothing to compare at some size is not looked
     /// for at that size.
     pub(crate) fn new(image: &'a RgbImage, demonstrations: &'a [TaughtDemonstration]) -> Self {
-        let (width, height) = image.dimensions();
+        Self::of(image, &Shot::level(image), demonstrations)
+    }
+
+    /// The same of an image that was not taken from straight above.
+    pub(crate) fn of(image: &'a RgbImage, shot: &Shot, demonstrations: &'a [TaughtDemonstration]) -> Self {
         let mut searched = Self { views: Vec::new(), sized: Vec::new() };
         let colors = Colors::of(image);
         for (demonstration_idx, demonstration) in demonstrations.iter().enumerate() {
             let tolerance = &demonstration.check().search.scales;
-            for range in SizeRange::all(demonstration.marks.photo_size, [width, height], tolerance) {
+            for range in SizeRange::all(demonstration.marks.photo_size, shot.size, tolerance) {
                 if let Ok((working, prepared)) = demonstration.prepared(&range, colors) {
-                    let view_idx = searched.view(image, working.halvings, demonstration);
+                    let view_idx = searched.view(image, shot, working.halvings, demonstration);
                     let sized = SizedDemonstration {
                         demonstration,
                         demonstration_idx,
@@ -81,8 +103,20 @@ impl<'a> SearchedImage<'a> {
         searched
     }
 
+    /// A demonstration within the sizes that are nearest to one.
+    fn sized_for(&self, demonstration_idx: usize, scale: f64) -> Option<&SizedDemonstration<'a>> {
+        let of_it = self.sized.iter().filter(|sized| sized.demonstration_idx == demonstration_idx);
+        of_it.min_by(|a, b| a.range.distance(scale).total_cmp(&b.range.distance(scale)))
+    }
+
     /// The index of the image halved so often.
-    fn view(&mut self, image: &'a RgbImage, halvings: u32, demonstration: &TaughtDemonstration) -> usize {
+    fn view(
+        &mut self,
+        image: &'a RgbImage,
+        shot: &Shot,
+        halvings: u32,
+        demonstration: &TaughtDemonstration,
+    ) -> usize {
         if let Some(idx) = self.views.iter().position(|view| view.halvings == halvings) {
             return idx;
         }
@@ -92,7 +126,8 @@ impl<'a> SearchedImage<'a> {
         }
         let field = GradientField::with_config(&view, &demonstration.check().search.shape.gradient);
         let table = TableColors::new(&view);
-        self.views.push(View { halvings, image: view, field, table });
+        let below_camera = shot.below_camera / f64::from(1u32 << halvings);
+        self.views.push(View { halvings, below_camera, image: view, field, table });
         self.views.len() - 1
     }
 }
@@ -166,7 +201,9 @@ impl<'a> SizedDemonstration<'a> {
         // camera three were off by 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
-        let marks = marks_shift.map_or(*view_from_working, |shift| shift.placed(&view.picture(), view_from_working));
+        let marks = marks_shift.map_or(*view_from_working, |shift| {
+            shift.placed(&view.picture(), view.below_camera, view_from_working)
+        });
         let (agreement, evidence) = match marks_shift.filter(|_| marks != *view_from_working) {
             Some(shift) => self.raised(view, shift, view_from_working, &marks, (agreement, evidence)),
             None => (agreement, evidence),
@@ -266,15 +303,24 @@ fn better_way_round<'a>(
     scales.contains(&refined.scale).then(|| sized.placed(view, &refined, agreement, comparison.evidence(&refined)))
 }
 
+/// How much a placed demonstration is shortened, its direction in the image; `None` where its size there is not looked for.
+pub(crate) fn foreshortening(
+    searched: &SearchedImage<'_>,
+    placed: &PlacedDemonstration<'_>,
+) -> Option<Foreshortening> {
+    let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
+    let view = &searched.views[sized.view_idx];
+    let pose = sized.view_from_working(&placed.image_from_cutout);
+    sized.prepared.search.template().foreshortening(&view.field, &pose)
+}
+
 /// Where picture and demonstration differ at a pose, in pixels of the picture; `None` where its size is not looked for.
 pub(crate) fn differences(
     searched: &SearchedImage<'_>,
     demonstration_idx: usize,
     image_from_cutout: &PlanarSimilarity,
 ) -> Option<Differences> {
-    let of_it = searched.sized.iter().filter(|sized| sized.demonstration_idx == demonstration_idx);
-    let distance = |sized: &&SizedDemonstration<'_>| sized.range.distance(image_from_cutout.scale);
-    let sized = of_it.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let sized = searched.sized_for(demonstration_idx, image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
     let comparison = sized.prepared.search.comparison(&view.picture());
     let mut differences = comparison.differences(&sized.view_from_working(image_from_cutout));

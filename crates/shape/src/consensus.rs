@@ -9,7 +9,7 @@
 //! Legend: `row` is how far a point moves along its normal per unit of (x, y, angle, ln scale), units
 //! that move edges by about a level pixel; a crest at distance `d` asks for `row · step = d`.
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Const, DimMin, SMatrix, SVector, Vector4};
 
 use crate::capture_range::{CaptureRange, step_units};
 use crate::edge_points::parabola_peak;
@@ -18,14 +18,14 @@ use crate::template::{MatchedLevel, TemplateLevel};
 
 /// How far along its normal an edge point looks for crests, in level pixels: first and later rounds. Chosen by hand,
 /// not measured.
-const FIRST_REACH: usize = 6;
-const LATER_REACH: usize = 3;
+pub(crate) const FIRST_REACH: usize = 6;
+pub(crate) const LATER_REACH: usize = 3;
 /// Most crests kept for a point. Chosen by hand, not measured.
 const MAX_CRESTS: usize = 3;
 /// Least alignment of a crest's direction, noise floor included. Chosen by hand, not measured.
 const MIN_TRUST: f32 = 0.2;
 /// Width of "on the edge" in level pixels, from the first look to the last. Chosen by hand, not measured.
-const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
+pub(crate) const WIDTHS: [f64; 3] = [2.0, 1.2, 0.7];
 /// Starts of the first round, in level pixels of edge movement by shift and by scale. Chosen by hand, not measured.
 const START_STEP: f64 = 3.0;
 /// Rounds of gathering crests anew, and the movement (level pixels) below which they stop. Both bound the
@@ -87,16 +87,16 @@ pub(crate) fn snap_from(
     best
 }
 
-/// What one edge point sees along its normal.
-struct Sighting {
-    row: Vector4<f64>,
+/// What one edge point sees along its normal; `row` has as many entries as a pose has coordinates.
+pub(crate) struct Sighting<const N: usize> {
+    row: SVector<f64, N>,
     weight: f64,
     /// (distance, weight) of each crest.
     crests: [(f64, f64); MAX_CRESTS],
     num_crests: usize,
 }
 
-fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach: usize) -> Vec<Sighting> {
+fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach: usize) -> Vec<Sighting<4>> {
     let map = pose.level_map(matched.image_pixel_size);
     let radius = (level.radius_px * pose.log_scale.exp() / matched.image_pixel_size).max(1.0) as f32;
     let [center_x, center_y] = map.apply([0.0, 0.0]);
@@ -105,23 +105,36 @@ fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Pose, reach:
         let [x, y] = map.apply(point.offset);
         let [nx, ny] = map.turn(point.normal);
         let (rx, ry) = ((x - center_x) / radius, (y - center_y) / radius);
-        let mut sighting = Sighting {
-            row: Vector4::new(nx, ny, ny * rx - nx * ry, nx * rx + ny * ry).map(f64::from),
-            weight: f64::from(point.weight),
-            crests: [(0.0, 0.0); MAX_CRESTS],
-            num_crests: 0,
-        };
-        sighting.look(matched, [x, y], [nx, ny], map.turn_double(point.double), reach);
-        if sighting.num_crests > 0 {
-            sightings.push(sighting);
-        }
+        let row = Vector4::new(nx, ny, ny * rx - nx * ry, nx * rx + ny * ry).map(f64::from);
+        let place = EdgePlace { at: [x, y], normal: [nx, ny], double: map.turn_double(point.double) };
+        sightings.extend(Sighting::new(matched, row, f64::from(point.weight), &place, reach));
     }
     sightings
 }
 
-impl Sighting {
-    /// Finds the crests of the gradient's part along `normal`, the nearest first kept.
-    fn look(&mut self, matched: &MatchedLevel<'_>, at: [f32; 2], normal: [f32; 2], double: [f32; 2], reach: usize) {
+/// An edge point laid over a level of the image, in its pixels; (cos 2φ, sin 2φ) of the normal beside it.
+pub(crate) struct EdgePlace {
+    pub(crate) at: [f32; 2],
+    pub(crate) normal: [f32; 2],
+    pub(crate) double: [f32; 2],
+}
+
+impl<const N: usize> Sighting<N> {
+    /// `None` where no crest is in reach.
+    pub(crate) fn new(
+        matched: &MatchedLevel<'_>,
+        row: SVector<f64, N>,
+        weight: f64,
+        place: &EdgePlace,
+        reach: usize,
+    ) -> Option<Self> {
+        let mut sighting = Self { row, weight, crests: [(0.0, 0.0); MAX_CRESTS], num_crests: 0 };
+        sighting.look(matched, place, reach);
+        (sighting.num_crests > 0).then_some(sighting)
+    }
+
+    /// Finds the crests of the gradient's part along the normal, the nearest first kept.
+    fn look(&mut self, matched: &MatchedLevel<'_>, &EdgePlace { at, normal, double }: &EdgePlace, reach: usize) {
         const MAX_LEN: usize = 2 * FIRST_REACH + 3;
         let len = 2 * reach + 3;
         let middle = (reach + 1) as f32;
@@ -156,7 +169,7 @@ impl Sighting {
 
     /// Residual, and the share in the consensus, of the crest that fits `step` best.
     #[inline]
-    fn best_crest(&self, step: &Vector4<f64>, width: f64) -> (f64, f64) {
+    fn best_crest(&self, step: &SVector<f64, N>, width: f64) -> (f64, f64) {
         let moved = self.row.dot(step);
         let mut best = (0.0, 0.0);
         for &(distance, trust) in &self.crests[..self.num_crests] {
@@ -194,9 +207,13 @@ fn starts(is_free: [bool; 4], first: Starts) -> Vec<Vector4<f64>> {
 
 /// The weighted normal equations of the crests that fit `step` best: the matrix, of which the lower triangle alone is filled
 /// (nothing above it is read), and the right-hand side.
-fn normal_equations(sightings: &[Sighting], step: &Vector4<f64>, width: f64) -> (Matrix4<f64>, Vector4<f64>) {
-    let mut lower = [[0.0; 4]; 4];
-    let mut right = [0.0; 4];
+fn normal_equations<const N: usize>(
+    sightings: &[Sighting<N>],
+    step: &SVector<f64, N>,
+    width: f64,
+) -> (SMatrix<f64, N, N>, SVector<f64, N>) {
+    let mut lower = [[0.0; N]; N];
+    let mut right = [0.0; N];
     for sighting in sightings {
         let (distance, share) = sighting.best_crest(step, width);
         let weight = sighting.weight * share;
@@ -211,18 +228,26 @@ fn normal_equations(sightings: &[Sighting], step: &Vector4<f64>, width: f64) -> 
             }
         }
     }
-    (Matrix4::from_fn(|i, j| lower[i][j]), Vector4::from(right))
+    (SMatrix::from_fn(|i, j| lower[i][j]), SVector::from(right))
 }
 
 /// Iteratively re-weighted least squares from `start`, narrowing; the step and its consensus.
-fn fit_offsets(sightings: &[Sighting], is_free: [bool; 4], start: Vector4<f64>, widths: &[f64]) -> (Vector4<f64>, f64) {
+pub(crate) fn fit_offsets<const N: usize>(
+    sightings: &[Sighting<N>],
+    is_free: [bool; N],
+    start: SVector<f64, N>,
+    widths: &[f64],
+) -> (SVector<f64, N>, f64)
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
     let mut step = start;
     for &width in widths {
         for _ in 0..2 {
             let (mut normal_matrix, right) = normal_equations(sightings, &step, width);
             // Directions that no edge holds (the angle of a ring) stay where they are. The share was chosen by hand.
-            normal_matrix += Matrix4::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
-            for k in 0..4 {
+            normal_matrix += SMatrix::<f64, N, N>::identity() * (2e-3 * normal_matrix.trace()).max(1e-9);
+            for k in 0..N {
                 if !is_free[k] {
                     normal_matrix[(k, k)] += 1e9;
                 }

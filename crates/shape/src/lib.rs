@@ -81,6 +81,7 @@ mod details;
 mod edge_points;
 mod error;
 mod following;
+mod foreshortening;
 mod frame;
 mod gradient_field;
 mod layers;
@@ -102,6 +103,7 @@ pub use config::{
 pub use details::Details;
 pub use error::ShapeError;
 pub use following::Reach;
+pub use foreshortening::Foreshortening;
 pub use gradient_field::GradientField;
 pub use layers::Layer;
 pub use likeness::{LAYERS, Likeness, LikenessNetwork, NUM_CHANNELS, NUM_HIDDEN, Pair, SIDE};

@@ -1,0 +1,81 @@
+//! A table that a camera sees at a slant, and the picture that a camera straight above it would have taken.
+
+use nalgebra::{Point2, Vector2};
+use serde::{Deserialize, Serialize};
+
+use crate::Angle;
+
+/// How a camera without calibration looks at the table: its lens is guessed, and where its middle looks at the table lengths are
+/// those of the level picture across the slant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Slant {
+    /// Angle between the camera's axis and the table's normal, in radians, from 0 to below a quarter turn.
+    pub tilt_rad: f64,
+    /// The direction of the picture in which the table recedes.
+    pub away: Angle,
+    /// Focal length, in pixels of the picture.
+    pub focal_px: f64,
+}
+
+impl Slant {
+    /// A level point as the slanted camera sees it; both from the picture's middle. `None` behind the camera.
+    pub fn picture_from_level(&self, level: Vector2<f64>) -> Option<Vector2<f64>> {
+        let [away, aside] = self.axes();
+        let (sin, cos) = self.tilt_rad.sin_cos();
+        let depth = 1.0 + level.dot(&away) * sin / self.focal_px;
+        (depth > MIN_DEPTH).then(|| (level.dot(&away) * cos * away + level.dot(&aside) * aside) / depth)
+    }
+
+    /// The level point that is seen there; both from the picture's middle. `None` at the horizon and beyond.
+    pub fn level_from_picture(&self, seen: Vector2<f64>) -> Option<Vector2<f64>> {
+        let [away, aside] = self.axes();
+        let (sin, cos) = self.tilt_rad.sin_cos();
+        let nearness = cos - seen.dot(&away) * sin / self.focal_px;
+        if nearness <= MIN_DEPTH {
+            return None;
+        }
+        let along = seen.dot(&away) / nearness;
+        let depth = 1.0 + along * sin / self.focal_px;
+        Some(along * away + seen.dot(&aside) * depth * aside)
+    }
+
+    /// The level point straight below the camera, from the picture's middle.
+    pub fn below_camera(&self) -> Point2<f64> {
+        Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
+    }
+
+    fn axes(&self) -> [Vector2<f64>; 2] {
+        let (sin, cos) = self.away.radians().sin_cos();
+        [Vector2::new(cos, sin), Vector2::new(-sin, cos)]
+    }
+}
+
+/// Nearer to the camera's plane, or to the horizon, nothing is told.
+const MIN_DEPTH: f64 = 0.1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SLANT: Slant = Slant { tilt_rad: 0.5, away: Angle::ZERO, focal_px: 700.0 };
+
+    #[test]
+    fn there_and_back() {
+        for (degrees, x, y) in [(0.0, 30.0, 40.0), (75.0, -200.0, 90.0), (210.0, 250.0, -180.0)] {
+            let slant = Slant { away: Angle::from_degrees(degrees), ..SLANT };
+            let level = Vector2::new(x, y);
+            let back = slant.level_from_picture(slant.picture_from_level(level).unwrap()).unwrap();
+            assert!((back - level).norm() < 1e-9, "{back}");
+        }
+    }
+
+    #[test]
+    fn what_recedes_is_shortened_and_small_and_the_horizon_is_refused() {
+        let seen = |x: f64, y: f64| SLANT.picture_from_level(Vector2::new(x, y)).unwrap();
+        let along = (seen(1.0, 0.0) - seen(-1.0, 0.0)).norm() / 2.0;
+        assert!((along - 0.5f64.cos()).abs() < 1e-4);
+        assert!((seen(0.0, 1.0).norm() - 1.0).abs() < 1e-9);
+        assert!(seen(200.0, 1.0).y < 1.0 && seen(-200.0, 1.0).y > 1.0);
+        assert_eq!(SLANT.level_from_picture(Vector2::new(700.0 / 0.5f64.tan(), 0.0)), None);
+    }
+}

@@ -1,0 +1,142 @@
+//! A camera without calibration that looks at the table at a slant: the picture made level, searched, and what was found there
+//! brought back.
+//!
+//! ```text
+//! level search ─ best places ─ how much they are shortened ─ slants ─ level picture of each ─ search ─ worth more? ─ brought back
+//! ```
+//! All parts lie on one plane, so the surest place says for all how it lies. From one shortened part alone both ends of the slant
+//! can be the far one; both are tried.
+
+use image::{Rgb, RgbImage};
+use image::imageops::interpolate_bilinear;
+use nalgebra::{Point2, Vector2};
+use sdg_geometry::{Angle, PlanarGrasp, PlanarSimilarity, Polygon, Slant};
+
+use crate::model::{Found, GraspDetection};
+use crate::sighting::Sighting;
+use crate::verification::{SearchedImage, Shot, foreshortening};
+
+/// Places that are asked, the best first, and what they agree by at least. Chosen by hand, for time.
+const NUM_ASKED: usize = 4;
+const MIN_AGREEMENT: f64 = 0.25;
+/// Less shortening is as good as none: ln 1.04, a camera tilted by 16°.
+const MIN_LOG_RATIO: f64 = 0.04;
+/// What a shortened pose must have more of its edges on crests.
+const MIN_CONSENSUS_GAIN: f64 = 0.05;
+/// Focal length of the camera in widths of the picture, where nothing tells it: 49° across, as a telephone's. Chosen by hand.
+const FOCAL_WIDTHS: f64 = 1.1;
+/// What a slanted picture must be worth more than the level one: its freedom costs.
+pub(crate) const SLANT_GAIN: f64 = 0.1;
+/// The level picture reaches so far from its middle at most, in sides of the picture.
+const MAX_REACH: f64 = 0.9;
+
+/// What is found together: by how much each score lies above the limit.
+pub(crate) fn worth(found: &[Found]) -> f64 {
+    found.iter().map(|found| (found.detection.score - 0.5).max(0.0)).sum()
+}
+
+/// The slants at which the surest shortened place would look as in the photo; none where the camera may as well be level.
+pub(crate) fn suggested_slants(sightings: &[Sighting<'_>], searched: &SearchedImage<'_>, shot: &Shot) -> Vec<Slant> {
+    let mut best: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
+    best.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
+    best.truncate(NUM_ASKED);
+    let fits = best.iter().filter_map(|sighting| foreshortening(searched, &sighting.placed));
+    let surest = fits.max_by(|a, b| a.consensus.total_cmp(&b.consensus));
+    let Some(fit) = surest.filter(|fit| {
+        fit.log_ratio >= MIN_LOG_RATIO && fit.consensus >= fit.level_consensus + MIN_CONSENSUS_GAIN
+    }) else {
+        return Vec::new();
+    };
+    let focal_px = FOCAL_WIDTHS * f64::from(shot.size[0].max(shot.size[1]));
+    let tilt_rad = (-fit.log_ratio).exp().acos();
+    [0.0, std::f64::consts::PI]
+        .map(|turn| Slant { tilt_rad, away: fit.direction + Angle::from_radians(turn), focal_px })
+        .to_vec()
+}
+
+/// The picture as a camera straight above the table would have taken it.
+pub(crate) struct LevelImage {
+    pub(crate) image: RgbImage,
+    slant: Slant,
+    /// Width and height of the picture.
+    size: [u32; 2],
+    /// Where the picture's middle is, in pixels of the level one.
+    middle: Vector2<f64>,
+}
+
+impl LevelImage {
+    /// `None` where the picture shows the horizon.
+    pub(crate) fn new(picture: &RgbImage, slant: &Slant) -> Option<Self> {
+        let (width, height) = picture.dimensions();
+        let half = Vector2::new(0.5 * f64::from(width), 0.5 * f64::from(height));
+        let reach = 2.0 * MAX_REACH * half;
+        let (mut least, mut largest) = (reach, -reach);
+        for corner in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]] {
+            let level = slant.level_from_picture(half.component_mul(&Vector2::from(corner)))?;
+            least = least.inf(&level);
+            largest = largest.sup(&level);
+        }
+        let (least, largest) = (least.sup(&-reach), largest.inf(&reach));
+        let [columns, rows] = [largest.x - least.x, largest.y - least.y].map(|side| side.ceil().max(1.0) as u32);
+        let image = RgbImage::from_fn(columns, rows, |x, y| {
+            let level = least + Vector2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let Some(seen) = slant.picture_from_level(level) else { return Rgb([0; 3]) };
+            // Beyond the picture's border its last pixels are repeated: an edge there would be none of the table's.
+            let [x, y] = [(seen.x, half.x), (seen.y, half.y)]
+                .map(|(at, half)| (at + half - 0.5).clamp(0.0, 2.0 * half - 1.0) as f32);
+            interpolate_bilinear(picture, x, y).unwrap_or(Rgb([0; 3]))
+        });
+        Some(Self { image, slant: *slant, size: [width, height], middle: -least })
+    }
+
+    pub(crate) fn shot(&self) -> Shot {
+        Shot { size: self.size, below_camera: self.slant.below_camera() + self.middle }
+    }
+
+    fn point(&self, level: &Point2<f64>) -> Option<Point2<f64>> {
+        let [width, height] = self.size.map(f64::from);
+        let seen = self.slant.picture_from_level(level.coords - self.middle)?;
+        Some(Point2::new(0.5 * width, 0.5 * height) + seen)
+    }
+
+    /// A detection of the level picture, in the slanted one; `None` where it lies outside.
+    pub(crate) fn seen(&self, found: Found) -> Option<Found> {
+        let Found { detection, placement } = found;
+        let points = |all: &[Point2<f64>]| all.iter().map(|point| self.point(point)).collect::<Option<Vec<_>>>();
+        let level_outline = detection.outline.as_ref()?;
+        let outline = Polygon { vertices: points(&level_outline.vertices)? };
+        let bbox = outline.bounds();
+        let [width, height] = self.size.map(f64::from);
+        let inside = bbox.clip(width, height);
+        if inside.area() < MIN_INSIDE * bbox.area() {
+            return None;
+        }
+        let grasp = detection.grasp;
+        let center = grasp.center();
+        let (sin, cos) = grasp.angle.radians().sin_cos();
+        let ahead = Vector2::new(cos, sin);
+        let [from, to] = [self.point(&(center - ahead))?, self.point(&(center + ahead))?];
+        let [one, other] = grasp.jaws().map(|jaw| self.point(&jaw));
+        let seen_center = self.point(&center)?;
+        let grasp = PlanarGrasp {
+            x: seen_center.x,
+            y: seen_center.y,
+            angle: Angle::from_direction(to.x - from.x, to.y - from.y),
+            width: (one? - other?).norm(),
+        };
+        let keypoints: Option<Vec<_>> =
+            detection.keypoints.iter().map(|(point, score)| Some((self.point(point)?, *score))).collect();
+        // What tracking goes on from is the nearest pose that is not shortened.
+        let picture_from_level = PlanarSimilarity::fit(&level_outline.vertices, &outline.vertices)?;
+        let placement = placement.map(|mut placement| {
+            placement.image_from_cutout = picture_from_level.compose(&placement.image_from_cutout);
+            placement.image_from_marks = picture_from_level.compose(&placement.image_from_marks);
+            placement
+        });
+        let detection = GraspDetection { bbox, keypoints: keypoints?, outline: Some(outline), grasp, ..detection };
+        Some(Found { detection, placement })
+    }
+}
+
+/// Share of a detection's box that lies in the picture.
+const MIN_INSIDE: f64 = 0.6;

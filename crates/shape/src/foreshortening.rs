@@ -1,0 +1,141 @@
+//! How much shorter a part looks in one direction than in the other, beside the photo: the slant of an uncalibrated camera.
+//!
+//! A camera tilted by t from the vertical shows a flat part shortened by cos t in one direction of the image. From a pose that
+//! only turns, shifts and scales, the part's edge points are followed to a pose that may shorten, too: an affine map, of six
+//! coordinates, by the same consensus of crests as [`crate::consensus`].
+
+use nalgebra::{Matrix2, Point2, SVector, Vector2};
+use sdg_geometry::{Angle, PlanarSimilarity};
+
+use crate::consensus::{EdgePlace, FIRST_REACH, LATER_REACH, Sighting, WIDTHS, fit_offsets};
+use crate::gradient_field::GradientField;
+use crate::pose::Pose;
+use crate::template::{MatchedLevel, ShapeTemplate, TemplateLevel};
+
+/// Starts: no shortening, and so much (ln) in each of so many directions. A start is followed over about half of that.
+const START_LOG_RATIOS: [f64; 2] = [0.1, 0.22];
+const NUM_DIRECTIONS: usize = 6;
+/// Rounds of gathering crests anew. Chosen by hand, for time.
+const ROUNDS: usize = 3;
+/// More is no part on a table: 50°. Derived.
+const MAX_LOG_RATIO: f64 = 0.45;
+
+/// The shortening of a part at a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Foreshortening {
+    /// ln of the length across the direction over the length along it, from 0 on.
+    pub log_ratio: f64,
+    /// The direction of the image in which the part is shortened; turned by half a turn it is the same.
+    pub direction: Angle,
+    /// The share of edge points on a crest of the image, in `[0, 1]`, and that of the pose without shortening.
+    pub consensus: f64,
+    /// See [`Self::consensus`].
+    pub level_consensus: f64,
+}
+
+/// An affine pose: `center` in image pixels, `linear` from demonstration pixels.
+#[derive(Debug, Clone, Copy)]
+struct Affine {
+    center: Point2<f64>,
+    linear: Matrix2<f64>,
+}
+
+impl ShapeTemplate {
+    /// How much the part is shortened where it lies at about this pose; `None` where no edge is near.
+    ///
+    /// # Units and frames
+    /// The pose maps demonstration pixels to pixels of the image the field was computed from.
+    pub fn foreshortening(&self, field: &GradientField, start: &PlanarSimilarity) -> Option<Foreshortening> {
+        let pose = Pose::from_similarity(start, self.center);
+        let level = &self.levels[self.agreement_level_idx];
+        let matched = level.matched_level(field, &pose);
+        let (sin, cos) = pose.angle_rad.sin_cos();
+        let linear = start.scale * Matrix2::new(cos, -sin, sin, cos);
+        let upright = Affine { center: pose.center, linear };
+        let level_consensus = consensus(level, &matched, &upright)?;
+        let mut best: Option<(Affine, f64)> = None;
+        for start in starts() {
+            let followed = follow(level, &matched, Affine { linear: start * linear, ..upright });
+            if let Some((affine, found)) = followed
+                && best.is_none_or(|(_, before)| found > before)
+            {
+                best = Some((affine, found));
+            }
+        }
+        let (affine, consensus) = best?;
+        let svd = affine.linear.svd_unordered(true, false);
+        let (u, lengths) = (svd.u?, svd.singular_values);
+        let (long, short) = if lengths[0] >= lengths[1] { (0, 1) } else { (1, 0) };
+        let log_ratio = (lengths[long] / lengths[short]).ln();
+        let direction = u.column(short);
+        (log_ratio <= MAX_LOG_RATIO).then(|| Foreshortening {
+            log_ratio,
+            direction: Angle::from_direction(direction.x, direction.y),
+            consensus,
+            level_consensus,
+        })
+    }
+}
+
+/// Maps of the image that shorten it in one direction, its area as before.
+fn starts() -> impl Iterator<Item = Matrix2<f64>> {
+    let shortened = START_LOG_RATIOS.into_iter().flat_map(|log_ratio| {
+        (0..NUM_DIRECTIONS).map(move |k| {
+            let (sin, cos) = (k as f64 * std::f64::consts::PI / NUM_DIRECTIONS as f64).sin_cos();
+            let along = Vector2::new(cos, sin);
+            let factor = (-0.5 * log_ratio).exp();
+            let across = Vector2::new(-sin, cos);
+            factor * along * along.transpose() + across * across.transpose() / factor
+        })
+    });
+    std::iter::once(Matrix2::identity()).chain(shortened)
+}
+
+fn consensus(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine) -> Option<f64> {
+    let sightings = gather(level, matched, pose, LATER_REACH)?;
+    Some(fit_offsets(&sightings, [false; 6], SVector::zeros(), &WIDTHS[2..]).1)
+}
+
+/// Moved onto the crests nearby; the pose and its consensus.
+fn follow(level: &TemplateLevel, matched: &MatchedLevel<'_>, mut pose: Affine) -> Option<(Affine, f64)> {
+    let pixel = matched.image_pixel_size;
+    let mut score = 0.0;
+    for round in 0..ROUNDS {
+        let (reach, widths) = if round == 0 { (FIRST_REACH, &WIDTHS[..]) } else { (LATER_REACH, &WIDTHS[1..]) };
+        let sightings = gather(level, matched, &pose, reach)?;
+        let (step, found) = fit_offsets(&sightings, [true; 6], SVector::zeros(), widths);
+        let per_radius = Matrix2::new(step[2], step[3], step[4], step[5]) / radius(level, pixel, &pose);
+        pose.center += pixel * Vector2::new(step[0], step[1]);
+        pose.linear = (Matrix2::identity() + per_radius) * pose.linear;
+        score = found;
+    }
+    Some((pose, score))
+}
+
+/// The template's size in level pixels.
+fn radius(level: &TemplateLevel, image_pixel_size: f64, pose: &Affine) -> f64 {
+    (level.radius_px * pose.linear.determinant().abs().sqrt() / image_pixel_size).max(1.0)
+}
+
+/// What the edge points see at an affine pose; `None` for one that cannot be.
+fn gather(level: &TemplateLevel, matched: &MatchedLevel<'_>, pose: &Affine, reach: usize) -> Option<Vec<Sighting<6>>> {
+    let pixel = matched.image_pixel_size;
+    let normal_map = pose.linear.try_inverse()?.transpose();
+    let radius = radius(level, pixel, pose);
+    let mut sightings = Vec::with_capacity(level.points.len());
+    for point in &level.points {
+        let [offset, normal] = [point.offset, point.normal].map(|v| Vector2::new(f64::from(v[0]), f64::from(v[1])));
+        let from_center = pose.linear * offset / pixel;
+        let n = (normal_map * normal).try_normalize(f64::EPSILON)?;
+        let r = from_center / radius;
+        let at = pose.center.coords / pixel + from_center;
+        let place = EdgePlace {
+            at: [at.x as f32, at.y as f32],
+            normal: [n.x as f32, n.y as f32],
+            double: [(n.x * n.x - n.y * n.y) as f32, (2.0 * n.x * n.y) as f32],
+        };
+        let row = SVector::from([n.x, n.y, n.x * r.x, n.x * r.y, n.y * r.x, n.y * r.y]);
+        sightings.extend(Sighting::new(matched, row, f64::from(point.weight), &place, reach));
+    }
+    Some(sightings)
+}
