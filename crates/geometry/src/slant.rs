@@ -1,6 +1,6 @@
 //! A table that a camera sees at a slant, and the picture that a camera straight above it would have taken.
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
 use crate::Angle;
@@ -44,6 +44,24 @@ impl Slant {
         Point2::from(-self.focal_px * self.tilt_rad.sin() * self.axes()[0])
     }
 
+    /// How a short line is seen at a place of the picture: (ln of the longest over the shortest length, direction of the shortest);
+    /// `None` as for [`Self::level_from_picture`].
+    pub fn shortening_at(&self, seen: Vector2<f64>) -> Option<(f64, Angle)> {
+        const STEP_PX: f64 = 0.5;
+        let level = self.level_from_picture(seen)?;
+        let side = |step: Vector2<f64>| {
+            Some((self.picture_from_level(level + step)? - self.picture_from_level(level - step)?) / (2.0 * STEP_PX))
+        };
+        let jacobian = Matrix2::from_columns(&[side(STEP_PX * Vector2::x())?, side(STEP_PX * Vector2::y())?]);
+        // Lengths and directions of the ellipse that a circle becomes.
+        let ellipse = jacobian * jacobian.transpose();
+        let (difference, cross) = (ellipse[(0, 0)] - ellipse[(1, 1)], 2.0 * ellipse[(0, 1)]);
+        let (mean, radius) = (0.5 * ellipse.trace(), 0.5 * difference.hypot(cross));
+        let long = Angle::from_radians(0.5 * cross.atan2(difference));
+        let log_ratio = 0.5 * ((mean + radius) / (mean - radius).max(f64::MIN_POSITIVE)).ln();
+        Some((log_ratio, long + Angle::from_degrees(90.0)))
+    }
+
     fn axes(&self) -> [Vector2<f64>; 2] {
         let (sin, cos) = self.away.radians().sin_cos();
         [Vector2::new(cos, sin), Vector2::new(-sin, cos)]
@@ -67,6 +85,14 @@ mod tests {
             let back = slant.level_from_picture(slant.picture_from_level(level).unwrap()).unwrap();
             assert!((back - level).norm() < 1e-9, "{back}");
         }
+    }
+
+    #[test]
+    fn shortening_is_that_of_the_tilt_in_the_middle_and_more_where_the_table_recedes() {
+        let (log_ratio, direction) = SLANT.shortening_at(Vector2::zeros()).unwrap();
+        assert!((log_ratio + 0.5f64.cos().ln()).abs() < 1e-4 && direction.radians().sin().abs() < 1e-3);
+        let at = |x: f64| SLANT.shortening_at(Vector2::new(x, 0.0)).unwrap().0;
+        assert!(at(200.0) > log_ratio + 0.05 && at(-200.0) < log_ratio - 0.05);
     }
 
     #[test]

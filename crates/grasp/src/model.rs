@@ -244,6 +244,7 @@ impl GraspModel {
         for slant in slants {
             let Some(level) = LevelImage::new(image, &slant) else { continue };
             let (found, _) = self.find_at_slant(&level.image, &level.shot(), false).await?;
+            if std::env::var_os("SLANTS").is_some() { eprintln!("SLANT {:.1} {:.0} worth {:.2} best {:.2}", slant.tilt_rad.to_degrees(), slant.away.degrees(), worth(&found), worth(&best)); }
             if worth(&found) > worth(&best) + SLANT_GAIN {
                 best = found.into_iter().filter_map(|found| level.seen(found)).collect();
             }

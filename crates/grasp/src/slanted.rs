@@ -17,41 +17,93 @@ use crate::sighting::Sighting;
 use crate::verification::{SearchedImage, Shot, foreshortening};
 
 /// Places that are asked, the best first, and what they agree by at least. Chosen by hand, for time.
-const NUM_ASKED: usize = 4;
+const NUM_ASKED: usize = 6;
 const MIN_AGREEMENT: f64 = 0.25;
-/// Less shortening is as good as none: ln 1.04, a camera tilted by 16°.
-const MIN_LOG_RATIO: f64 = 0.04;
-/// What a shortened pose must have more of its edges on crests.
-const MIN_CONSENSUS_GAIN: f64 = 0.05;
+/// A place of which fewer edges lie on crests tells nothing. Chosen by hand.
+const MIN_CONSENSUS: f64 = 0.3;
+/// Spread of ln shortening about that of the slant. Chosen by hand.
+const SHORTENING_NOISE: f64 = 0.12;
+/// A smaller tilt shortens by less than 3 %: as good as none.
+const MIN_TILT: f64 = 0.24;
 /// Focal length of the camera in widths of the picture, where nothing tells it: 49° across, as a telephone's. Chosen by hand.
 const FOCAL_WIDTHS: f64 = 1.1;
 /// What a slanted picture must be worth more than the level one: its freedom costs.
-pub(crate) const SLANT_GAIN: f64 = 0.1;
+pub(crate) const SLANT_GAIN: f64 = 0.03;
 /// The level picture reaches so far from its middle at most, in sides of the picture.
 const MAX_REACH: f64 = 0.9;
 
-/// What is found together: by how much each score lies above the limit.
+/// What is found together: how well all that is accepted agrees. The scores do not tell: they are as high for a pose that is a
+/// little off.
 pub(crate) fn worth(found: &[Found]) -> f64 {
-    found.iter().map(|found| (found.detection.score - 0.5).max(0.0)).sum()
+    let accepted = found.iter().map(|found| &found.detection).filter(|detection| detection.is_accepted());
+    accepted.filter_map(|detection| detection.agreement).sum()
 }
 
-/// The slants at which the surest shortened place would look as in the photo; none where the camera may as well be level.
+/// A place that is shortened: where, from the picture's middle; how, as a vector that half a turn leaves as it is; and how much
+/// of it lies on edges.
+struct Shortened {
+    at: Vector2<f64>,
+    shortening: Vector2<f64>,
+    weight: f64,
+}
+
+fn shortening_vector(log_ratio: f64, direction: Angle) -> Vector2<f64> {
+    let (sin, cos) = (2.0 * direction.radians()).sin_cos();
+    log_ratio * Vector2::new(cos, sin)
+}
+
+/// The slants under which the best places would look as in the photo: the likeliest, and the likeliest that recedes to the other
+/// side. None where the camera may as well be level.
 pub(crate) fn suggested_slants(sightings: &[Sighting<'_>], searched: &SearchedImage<'_>, shot: &Shot) -> Vec<Slant> {
     let mut best: Vec<_> = sightings.iter().filter(|sighting| sighting.placed.agreement >= MIN_AGREEMENT).collect();
     best.sort_by(|a, b| b.placed.agreement.total_cmp(&a.placed.agreement));
     best.truncate(NUM_ASKED);
-    let fits = best.iter().filter_map(|sighting| foreshortening(searched, &sighting.placed));
-    let surest = fits.max_by(|a, b| a.consensus.total_cmp(&b.consensus));
-    let Some(fit) = surest.filter(|fit| {
-        fit.log_ratio >= MIN_LOG_RATIO && fit.consensus >= fit.level_consensus + MIN_CONSENSUS_GAIN
-    }) else {
-        return Vec::new();
-    };
+    let middle = Vector2::from(shot.size.map(|side| 0.5 * f64::from(side)));
+    let shortened: Vec<Shortened> = best
+        .iter()
+        .filter_map(|sighting| {
+            let fit = foreshortening(searched, &sighting.placed)?;
+            Some(Shortened {
+                at: sighting.placed.outline().bounds().center().coords - middle,
+                shortening: shortening_vector(fit.log_ratio, fit.direction),
+                weight: (fit.consensus - MIN_CONSENSUS).max(0.0),
+            })
+        })
+        .collect();
     let focal_px = FOCAL_WIDTHS * f64::from(shot.size[0].max(shot.size[1]));
-    let tilt_rad = (-fit.log_ratio).exp().acos();
-    [0.0, std::f64::consts::PI]
-        .map(|turn| Slant { tilt_rad, away: fit.direction + Angle::from_radians(turn), focal_px })
-        .to_vec()
+    let costs: Vec<(f64, Slant)> =
+        slants(focal_px).filter_map(|slant| Some((cost(&slant, &shortened)?, slant))).collect();
+    let least = |all: &mut dyn Iterator<Item = &(f64, Slant)>| all.min_by(|a, b| a.0.total_cmp(&b.0)).copied();
+    let Some((_, likeliest)) = least(&mut costs.iter()) else { return Vec::new() };
+    if likeliest.tilt_rad < MIN_TILT {
+        return Vec::new();
+    }
+    let is_opposite = |slant: &Slant| {
+        slant.tilt_rad >= MIN_TILT && slant.away.distance(likeliest.away).to_degrees() > 90.0
+    };
+    let other = least(&mut costs.iter().filter(|(_, slant)| is_opposite(slant))).map(|(_, slant)| slant);
+    std::iter::once(likeliest).chain(other).collect()
+}
+
+/// All that are tried: to 50°, every 2° of tilt and 10° of direction.
+fn slants(focal_px: f64) -> impl Iterator<Item = Slant> {
+    (0..=25).flat_map(move |tilt| {
+        (0..if tilt == 0 { 1 } else { 36 }).map(move |direction| Slant {
+            tilt_rad: f64::from(2 * tilt).to_radians(),
+            away: Angle::from_degrees(f64::from(10 * direction)),
+            focal_px,
+        })
+    })
+}
+
+/// How badly a slant explains the shortened places; one that it cannot explain counts no more than a bound.
+fn cost(slant: &Slant, shortened: &[Shortened]) -> Option<f64> {
+    let terms = shortened.iter().map(|place| {
+        let (log_ratio, direction) = slant.shortening_at(place.at)?;
+        let off = (place.shortening - shortening_vector(log_ratio, direction)).norm() / SHORTENING_NOISE;
+        Some(place.weight * (off * off).min(1.0))
+    });
+    terms.sum()
 }
 
 /// The picture as a camera straight above the table would have taken it.
