@@ -24,7 +24,7 @@ use crate::facts::{ModelKind, TeachingFacts, TurnSource};
 use crate::models::{Network, PoseCandidate, Proposals};
 use crate::same_part::{SAME_PART_IOU, are_outlines_of_same_part};
 use crate::sighting::{Sighting, sightings};
-use crate::slanted::{LevelImage, SLANT_GAIN, suggested_slants, worth};
+use crate::slanted::{LevelImage, explains_more, suggested_slants};
 use crate::taught::TaughtDemonstration;
 use crate::verdict::{Clues, Contributions, judge_picture, judge_picture_of_sequence};
 use crate::verification::{PlacedDemonstration, SearchedImage, Shot};
@@ -240,16 +240,15 @@ impl GraspModel {
 
     /// As a level camera sees it, or a slanted one where that explains the picture better.
     async fn find_at_any_slant(&self, image: &RgbImage) -> Result<Vec<Found>> {
-        let (mut best, slants) = self.find_at_slant(image, &Shot::level(image), true).await?;
+        let (level, slants) = self.find_at_slant(image, &Shot::level(image), true).await?;
         for slant in slants {
-            let Some(level) = LevelImage::new(image, &slant) else { continue };
-            let (found, _) = self.find_at_slant(&level.image, &level.shot(), false).await?;
-            if std::env::var_os("SLANTS").is_some() { eprintln!("SLANT {:.1} {:.0} worth {:.2} best {:.2}", slant.tilt_rad.to_degrees(), slant.away.degrees(), worth(&found), worth(&best)); }
-            if worth(&found) > worth(&best) + SLANT_GAIN {
-                best = found.into_iter().filter_map(|found| level.seen(found)).collect();
+            let Some(made_level) = LevelImage::new(image, &slant) else { continue };
+            let (found, _) = self.find_at_slant(&made_level.image, &made_level.shot(), false).await?;
+            if explains_more(&found, &level) {
+                return Ok(found.into_iter().filter_map(|found| made_level.seen(found)).collect());
             }
         }
-        Ok(best)
+        Ok(level)
     }
 
     /// What is found in an image that was taken so, and what slants its best places suggest where they are asked for.

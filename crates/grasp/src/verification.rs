@@ -110,13 +110,7 @@ impl<'a> SearchedImage<'a> {
     }
 
     /// The index of the image halved so often.
-    fn view(
-        &mut self,
-        image: &'a RgbImage,
-        shot: &Shot,
-        halvings: u32,
-        demonstration: &TaughtDemonstration,
-    ) -> usize {
+    fn view(&mut self, image: &'a RgbImage, shot: &Shot, halvings: u32, demonstration: &TaughtDemonstration) -> usize {
         if let Some(idx) = self.views.iter().position(|view| view.halvings == halvings) {
             return idx;
         }
@@ -201,9 +195,8 @@ impl<'a> SizedDemonstration<'a> {
         // camera three were off by 7 to 8 mm with it, and 2 to 4 mm without (pendulum, rod end).
         let is_flat = self.demonstration.check().score.is_size_known || agreement < MIN_MARKED;
         let marks_shift = self.prepared.marks_shift.as_ref().filter(|_| !is_flat);
-        let marks = marks_shift.map_or(*view_from_working, |shift| {
-            shift.placed(&view.picture(), view.below_camera, view_from_working)
-        });
+        let marks = marks_shift
+            .map_or(*view_from_working, |shift| shift.placed(&view.picture(), view.below_camera, view_from_working));
         let (agreement, evidence) = match marks_shift.filter(|_| marks != *view_from_working) {
             Some(shift) => self.raised(view, shift, view_from_working, &marks, (agreement, evidence)),
             None => (agreement, evidence),
@@ -304,10 +297,7 @@ fn better_way_round<'a>(
 }
 
 /// How much a placed demonstration is shortened, its direction in the image; `None` where its size there is not looked for.
-pub(crate) fn foreshortening(
-    searched: &SearchedImage<'_>,
-    placed: &PlacedDemonstration<'_>,
-) -> Option<Foreshortening> {
+pub(crate) fn foreshortening(searched: &SearchedImage<'_>, placed: &PlacedDemonstration<'_>) -> Option<Foreshortening> {
     let sized = searched.sized_for(placed.demonstration_idx, placed.image_from_cutout.scale)?;
     let view = &searched.views[sized.view_idx];
     let pose = sized.view_from_working(&placed.image_from_cutout);
