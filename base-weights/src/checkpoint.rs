@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use sdg_layers::state_dict::{StateDict, WeightTensor};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use sdg_training::AdamWState;
 use serde::Serialize;
 use serde::de::DeserializeOwned;

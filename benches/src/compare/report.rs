@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use sdg_geometry::median;
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use serde::Serialize;
 
 use crate::compare::machine::Machine;

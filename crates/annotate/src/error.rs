@@ -34,7 +34,7 @@ pub enum Error {
     },
     /// An annotation could not be written.
     #[error(transparent)]
-    Write(#[from] sdg_report::ReportError),
+    Write(#[from] sdg_files::FileError),
     /// The marks are not enough for what was asked.
     #[error("{name}: expected {expected}, found {found}")]
     NotMarked { name: String, expected: &'static str, found: &'static str },

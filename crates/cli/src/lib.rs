@@ -29,7 +29,6 @@ pub mod camera_files;
 mod commands;
 mod demonstrations;
 pub mod detector_config;
-mod drawings;
 #[cfg(feature = "simulation")]
 pub mod evaluation;
 mod exit;

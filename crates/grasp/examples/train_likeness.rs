@@ -21,7 +21,7 @@ mod rendered;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 use crate::drawn::Result;
 use crate::pairs::{Pairs, Stream};

@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::Args as ClapArgs;
 use clap::Command;
 use clap_mangen::Man;
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 use crate::exit::Outcome;
 use crate::files;

@@ -14,11 +14,11 @@
 //! Each JSON file carries the settings that it was made with and is there whole or not at all. A teaching carries those of
 //! teachings alone, so that the protocol and the axes share it, with whatever number of attempts or pictures.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use sdg_report::write_atomically;
+use sdg_files::{Access, Lock, write_atomically};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -35,14 +35,7 @@ pub struct Store {
     folder: PathBuf,
     settings: Settings,
     /// Locked while the store lives.
-    _lock: File,
-}
-
-/// Who else may work in a folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Access {
-    Alone,
-    Shared,
+    _lock: Lock,
 }
 
 /// A file of the store.
@@ -75,20 +68,9 @@ impl Store {
             let inner = folder.join(inner);
             fs::create_dir_all(&inner).with_context(|| format!("{}: cannot make this folder", inner.display()))?;
         }
-        let lock_file = folder.join(".lock");
-        let lock = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&lock_file);
-        let lock = lock.with_context(|| format!("{}: cannot write", lock_file.display()))?;
-        let locked = match access {
-            Access::Alone => lock.try_lock(),
-            Access::Shared => lock.try_lock_shared(),
+        let Some(lock) = Lock::take(&folder.join(".lock"), access)? else {
+            bail!("{}: another evaluation is at work in this folder", folder.display());
         };
-        match locked {
-            // A file system without locks does not keep anyone from working alone.
-            Ok(()) | Err(TryLockError::Error(_)) => {}
-            Err(TryLockError::WouldBlock) => {
-                bail!("{}: another evaluation is at work in this folder", folder.display())
-            }
-        }
         let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
         let teaching = settings.teaching();
         match store.read_made_with::<()>("settings.json", &teaching)? {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

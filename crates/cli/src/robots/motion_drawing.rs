@@ -53,7 +53,7 @@ impl MotionDrawing {
         crate::files::prepare_folder(folder)?;
         let [gif, still] = ["gif", "png"].map(|ending| folder.join(format!("{}.{ending}", self.name)));
         crate::files::write(&gif, animation.gif())?;
-        crate::drawings::write(&still, animation.still())?;
+        crate::sdg_files::write_drawing(&still, animation.still())?;
         Ok(vec![gif, still])
     }
 }

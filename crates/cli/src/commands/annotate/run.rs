@@ -6,15 +6,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use nalgebra::Point2;
 use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
 use sdg_camera::{Address, OpenOptions};
+use sdg_files::{FileError, WriterLock};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
 use super::AnnotateArgs;
-use super::lock::Lock;
 use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage, one_line};
@@ -22,6 +22,17 @@ use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::interrupt::Interrupt;
 use crate::page_camera::PageCamera;
 use crate::page_teacher::PageTeacher;
+
+/// Keeps other pages from writing a file of marks; `None` where it cannot be written at all.
+fn lock(written: &Path) -> Result<Option<WriterLock>> {
+    WriterLock::take(written).map_err(|error| match error {
+        FileError::Held { path, holder } => anyhow!(
+            "{}: another `sdg annotate` ({holder}) writes these marks; go on in its page, or end it first",
+            path.display()
+        ),
+        error => error.into(),
+    })
+}
 
 /// Serves the page until Ctrl-C.
 pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
@@ -48,7 +59,7 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
     let project_file = project.iter().map(|folder| folder.join("sdg-project.json"));
     let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
-    let _locks = written.iter().map(|written| Lock::of(written)).collect::<Result<Vec<_>>>()?;
+    let _locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
         for path in files::entries(folder)? {
             // What stands beside pictures is no news; a picture that is not read is.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 use super::DemoArgs;
 use crate::commands::rehearse::{finish, show_attempt};

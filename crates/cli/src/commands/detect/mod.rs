@@ -19,7 +19,6 @@ use inputs::{Input, Inputs};
 
 use crate::camera_files;
 use crate::commands::devices;
-use crate::drawings;
 use crate::exit::{Outcome, Usage, one_line};
 use crate::files;
 use crate::found_record::FoundRecord;
@@ -150,7 +149,7 @@ impl<W: Write> Batch<'_, W> {
         if let Some(folder) = &self.args.draw {
             let wording = seen.wording(self.detector, self.args.min_score);
             let drawn = drawn(image, &seen.detections, &wording);
-            drawings::write(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
+            sdg_files::write_drawing(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
         }
         Ok(seen)
     }

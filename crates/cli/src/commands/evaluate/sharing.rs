@@ -159,7 +159,9 @@ fn threads() -> usize {
 
 fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let store = asked.open(&args.out)?;
-    let _collecting = Collecting::begin(&args.out)?;
+    let Some(_collecting) = Collecting::begin(&args.out)? else {
+        bail!("{}: another --collect is at work in this folder", args.out.display());
+    };
     let (evaluation, units) = (asked.evaluation(&store), asked.units());
     let faults = faults(&evaluation, &units)?;
     if !faults.is_empty() {

@@ -8,7 +8,6 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use crate::drawings;
 use crate::exit::Outcome;
 use crate::files;
 use crate::robots;
@@ -57,7 +56,7 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
     for line in reach.lines(&workcell) {
         eprintln!("{line}");
     }
-    drawings::write(&args.out, &map.draw(&workcell, &reach))?;
+    sdg_files::write_drawing(&args.out, &map.draw(&workcell, &reach))?;
     eprintln!("{}", args.out.display());
     Ok(Outcome::Done)
 }

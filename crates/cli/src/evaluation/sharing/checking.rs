@@ -1,9 +1,9 @@
 //! What keeps units out of the tables: whatever is missing, at work, failed, done twice, or not what its receipt tells of.
 
-use std::fs::{File, OpenOptions, TryLockError};
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
+use sdg_files::{Access, Lock};
 use sdg_weights_conversion::sha256_of;
 
 use super::super::settings::difference;
@@ -14,21 +14,15 @@ use super::unit_folder::{UnitFolder, UnitState};
 
 /// The right to make the tables of a folder, until it is dropped.
 #[derive(Debug)]
-pub struct Collecting(#[allow(dead_code, reason = "the lock lasts as long as the file is open")] File);
+pub struct Collecting(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl Collecting {
-    /// Takes that right for this process.
+    /// Takes that right for this process; `None` where another one makes them.
     ///
     /// # Errors
-    /// Another process that makes them; a folder that cannot be written.
-    pub fn begin(folder: &Path) -> Result<Self> {
-        let path = folder.join(".collect.lock");
-        let lock = OpenOptions::new().create(true).truncate(false).write(true).open(&path);
-        let lock = lock.with_context(|| format!("{}: cannot write", path.display()))?;
-        match lock.try_lock() {
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self(lock)),
-            Err(TryLockError::WouldBlock) => bail!("{}: another --collect is at work in this folder", folder.display()),
-        }
+    /// A folder that cannot be written.
+    pub fn begin(folder: &Path) -> Result<Option<Self>> {
+        Ok(Lock::take(&folder.join(".collect.lock"), Access::Alone)?.map(Self))
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use sdg_grasp::{ModelKind, Verification};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use sdg_simulation::objects::ObjectSpec;
 use serde::{Deserialize, Serialize};
 

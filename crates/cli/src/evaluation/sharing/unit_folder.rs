@@ -1,11 +1,11 @@
 //! The folder of one unit: who does it, and what came of it.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result};
-use sdg_report::write_atomically;
+use sdg_files::{Access, Lock, write_atomically};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -38,7 +38,7 @@ pub struct UnitState {
 
 /// The right to do a unit, until it is dropped.
 #[derive(Debug)]
-pub(super) struct Held(#[allow(dead_code, reason = "the lock lasts as long as the file is open")] File);
+pub(super) struct Held(#[allow(dead_code, reason = "held until it is dropped")] Lock);
 
 impl UnitFolder {
     /// That of a unit in an evaluation's folder, which need not exist.
@@ -53,14 +53,11 @@ impl UnitFolder {
     /// A folder that cannot be written.
     pub(super) fn hold(&self, wait: &mut dyn FnMut() -> bool) -> Result<Option<Held>> {
         fs::create_dir_all(&self.0).with_context(|| format!("{}: cannot make this folder", self.0.display()))?;
-        let path = self.lock_file();
-        let lock = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
-        let lock = lock.with_context(|| format!("{}: cannot write", path.display()))?;
         loop {
-            match lock.try_lock() {
-                Ok(()) | Err(TryLockError::Error(_)) => return Ok(Some(Held(lock))),
-                Err(TryLockError::WouldBlock) if wait() => std::thread::sleep(LOCK_WAIT),
-                Err(TryLockError::WouldBlock) => return Ok(None),
+            match Lock::take(&self.lock_file(), Access::Alone)? {
+                Some(lock) => return Ok(Some(Held(lock))),
+                None if wait() => std::thread::sleep(LOCK_WAIT),
+                None => return Ok(None),
             }
         }
     }
@@ -87,7 +84,7 @@ impl UnitFolder {
             }
         }
         state.failures.sort_by_key(|failure| failure.started_secs);
-        state.is_abandoned = state.running.is_some() && self.is_free();
+        state.is_abandoned = state.running.is_some() && Lock::is_free(&self.lock_file());
         Ok(state)
     }
 
@@ -128,12 +125,6 @@ impl UnitFolder {
 
     fn lock_file(&self) -> PathBuf {
         self.0.join("lock")
-    }
-
-    /// Whether nobody holds the unit's lock; not so where the file system has no locks.
-    fn is_free(&self) -> bool {
-        let Ok(lock) = File::open(self.lock_file()) else { return false };
-        lock.try_lock_shared().is_ok()
     }
 }
 

@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use anyhow::{Result, bail};
 use image::RgbImage;
 use png::{BitDepth, ColorType, Encoder};
 
-use crate::files;
+use crate::error::{FileError, Result};
+use crate::inputs;
 
 const KEYWORD: &str = "Software";
 const TEXT: &str = "sdg drawing";
@@ -19,12 +19,13 @@ const MAX_TEXT_END: u64 = 100;
 ///
 /// # Errors
 /// An input, or another picture than a drawing of ours, in its place; the system's reason.
-pub fn write(path: &Path, drawing: &RgbImage) -> Result<()> {
+pub fn write_drawing(path: &Path, drawing: &RgbImage) -> Result<()> {
     check_replaces_a_drawing(path)?;
-    files::write(path, &encode(drawing)?)
+    let bytes = encode(drawing).map_err(|source| FileError::Png { path: path.to_owned(), source })?;
+    inputs::write(path, &bytes)
 }
 
-fn encode(drawing: &RgbImage) -> Result<Vec<u8>> {
+fn encode(drawing: &RgbImage) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, drawing.width(), drawing.height());
     encoder.set_color(ColorType::Rgb);
@@ -47,7 +48,7 @@ fn check_replaces_a_drawing(path: &Path) -> Result<()> {
     let text = [KEYWORD, "\0", TEXT].concat();
     let is_drawing = start.windows(text.len()).any(|window| window == text.as_bytes());
     if is_read && !start.is_empty() && !is_drawing {
-        bail!("{}: expected a new name, or an earlier drawing to replace, found another file", path.display());
+        return Err(FileError::NoDrawing { path: path.to_owned() });
     }
     Ok(())
 }
@@ -64,11 +65,11 @@ mod tests {
         picture.save(&photo).unwrap();
         std::fs::write(&empty, "").unwrap();
         for path in [&drawn, &drawn, &empty] {
-            write(path, &picture).unwrap();
+            write_drawing(path, &picture).unwrap();
             assert_eq!(image::open(path).unwrap().to_rgb8(), picture);
         }
         let before = std::fs::read(&photo).unwrap();
-        let error = write(&photo, &picture).unwrap_err().to_string();
+        let error = write_drawing(&photo, &picture).unwrap_err().to_string();
         assert!(error.contains("photo.png: expected a new name, or an earlier drawing"), "{error}");
         assert_eq!(std::fs::read(&photo).unwrap(), before);
     }

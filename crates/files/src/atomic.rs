@@ -6,7 +6,8 @@ use std::path::Path;
 
 use tempfile::NamedTempFile;
 
-use crate::error::ReportError;
+use crate::error::{FileError, Result};
+use crate::folder::folder_of;
 
 /// Writes `bytes` to `path` so that a reader sees the old contents or the new ones, never a part.
 ///
@@ -15,11 +16,11 @@ use crate::error::ReportError;
 /// folder must exist.
 ///
 /// # Errors
-/// [`ReportError::NotAFile`] when `path` cannot name a file, [`ReportError::Write`] when the folder
+/// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder
 /// is missing or read-only, the disk is full or the rename is refused. In each case the temporary
 /// file is removed and whatever stood at `path` before is unchanged.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
-    let not_a_file = |found| ReportError::NotAFile { path: path.to_owned(), found };
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let not_a_file = |found| FileError::NotAFile { path: path.to_owned(), found };
     if path.file_name().is_none() {
         return Err(not_a_file("no file name"));
     }
@@ -32,7 +33,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     if target.exists() && !target.is_file() {
         return Err(not_a_file("a device or a pipe"));
     }
-    let failed = |step| move |source| ReportError::Write { path: path.to_owned(), step, source };
+    let failed = |step| move |source| FileError::Write { path: path.to_owned(), step, source };
 
     let mut file = temporary_beside(&target).map_err(failed("creating a temporary file in its folder"))?;
     file.write_all(bytes).map_err(failed("writing"))?;
@@ -60,16 +61,8 @@ fn sync_folder_of(target: &Path) {
     }
 }
 
-fn folder_of(target: &Path) -> &Path {
-    match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn names_in(folder: &Path) -> Vec<String> {
@@ -118,7 +111,7 @@ mod tests {
         let path = folder.path().join("taken");
         fs::create_dir(&path).unwrap();
         let error = write_atomically(&path, b"x").unwrap_err();
-        assert!(matches!(error, ReportError::NotAFile { found: "a folder", .. }), "{error}");
+        assert!(matches!(error, FileError::NotAFile { found: "a folder", .. }), "{error}");
         assert_eq!(names_in(folder.path()), ["taken"]);
     }
 
@@ -126,7 +119,7 @@ mod tests {
     #[test]
     fn a_device_is_refused_and_a_link_is_followed() {
         let error = write_atomically(Path::new("/dev/null"), b"x").unwrap_err();
-        assert!(matches!(error, ReportError::NotAFile { .. }), "{error}");
+        assert!(matches!(error, FileError::NotAFile { .. }), "{error}");
 
         let folder = tempfile::tempdir().unwrap();
         let (real, link) = (folder.path().join("real"), folder.path().join("link"));
@@ -143,9 +136,9 @@ mod tests {
     #[test]
     #[ignore = "needs a limited file size; another test runs it in a child process"]
     fn child_that_may_not_write_much() {
-        let path = std::env::var_os("SDG_REPORT_LIMITED_FILE").unwrap();
+        let path = std::env::var_os("SDG_LIMITED_FILE").unwrap();
         let error = write_atomically(Path::new(&path), &vec![7; 1 << 20]).unwrap_err();
-        assert!(matches!(error, ReportError::Write { step: "writing", .. }), "{error}");
+        assert!(matches!(error, FileError::Write { step: "writing", .. }), "{error}");
     }
 
     #[cfg(unix)]
@@ -157,8 +150,8 @@ mod tests {
         let output = std::process::Command::new("sh")
             .args(["-c", "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\""])
             .arg(std::env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "atomic_file::tests::child_that_may_not_write_much"])
-            .env("SDG_REPORT_LIMITED_FILE", &path)
+            .args(["--ignored", "--exact", "atomic::tests::child_that_may_not_write_much"])
+            .env("SDG_LIMITED_FILE", &path)
             .output()
             .unwrap();
         let printed = String::from_utf8_lossy(&output.stdout);
