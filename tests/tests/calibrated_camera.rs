@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
-use sdg_cli::shipped;
+use sdg_evaluation::shipped;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 use sdg_grasp::{
     CameraOverTable, Device, GraspModel, ModelKind, PlanDetection, PlanDetector, TeachOptions, Verification,

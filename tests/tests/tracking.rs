@@ -5,9 +5,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sdg_cell::{LiveTracker, Perception, SearchTime};
-use sdg_cli::shipped;
-
 use sdg_demonstration::Demonstration;
+use sdg_evaluation::shipped;
 use sdg_grasp::{
     CameraOverTable, Device, GraspModel, ModelKind, TeachOptions, TrackState, TrackedPart, TrackerConfig,
     seen_from_above, teach,

@@ -6,9 +6,9 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
-use sdg_cli::split::{ReadySet, Side, read_split};
-use sdg_grasp::fitting::{PairFacts, append_pair, likeness_examples};
+use sdg_evaluation::split::{ReadySet, Side, read_split};
 use sdg_files::write_atomically;
+use sdg_grasp::fitting::{PairFacts, append_pair, likeness_examples};
 
 /// Kinds of pictures in which other things cover the part.
 const COVERING: &str = "clutter";

@@ -20,29 +20,14 @@
 #![allow(missing_docs, reason = "the library of a program: nothing but this workspace uses it")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-#[cfg(feature = "simulation")]
-pub mod against_truth;
-mod annotation_files;
 pub mod args;
-pub mod base_weights;
-pub mod camera_files;
 mod commands;
 mod demonstrations;
-pub mod detector_config;
-#[cfg(feature = "simulation")]
-pub mod evaluation;
 mod exit;
-mod files;
-mod found_record;
 mod found_text;
-mod held_back;
 mod interrupt;
 mod json_line;
-pub mod labelled_pictures;
 pub mod live_pictures;
-mod machine;
-mod many_parts;
-mod marks_check;
 #[cfg(feature = "simulation")]
 mod own_part;
 #[cfg(feature = "annotate")]
@@ -51,25 +36,12 @@ mod page_camera;
 mod page_teacher;
 #[cfg(feature = "simulation")]
 mod parts;
-mod pictures;
 mod progress;
-#[cfg(feature = "simulation")]
-pub mod rehearsal;
 pub mod robots;
 #[cfg(feature = "ros2")]
 mod ros_node;
-#[cfg(feature = "simulation")]
-mod run_page;
 mod shared_args;
-#[cfg(feature = "simulation")]
-pub mod shipped;
-pub mod split;
-mod statistics;
-mod taught_file;
-mod teaching_page;
 mod teaching_progress;
-#[cfg(feature = "simulation")]
-pub mod trial;
 
 use std::process::ExitCode;
 

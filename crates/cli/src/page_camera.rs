@@ -10,8 +10,8 @@ use anyhow::Result;
 use image::RgbImage;
 use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 use sdg_camera::{Address, CameraError, Fault, OpenOptions, PixelFrame, Playback};
+use sdg_inputs::camera_files::CameraFile;
 
-use crate::camera_files::CameraFile;
 use crate::exit::one_line;
 use crate::live_pictures;
 

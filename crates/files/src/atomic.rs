@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
@@ -11,36 +11,70 @@ use crate::folder::folder_of;
 
 /// Writes `bytes` to `path` so that a reader sees the old contents or the new ones, never a part.
 ///
-/// The bytes go to a hidden temporary file in the same folder, are flushed to the disk, and take the
-/// name `path` in one step. A symbolic link at `path` is followed, so that the link survives. The
-/// folder must exist.
-///
 /// # Errors
-/// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder
-/// is missing or read-only, the disk is full or the rename is refused. In each case the temporary
-/// file is removed and whatever stood at `path` before is unchanged.
+/// Those of [`AtomicFile`]. In each case whatever stood at `path` before is unchanged.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let not_a_file = |found| FileError::NotAFile { path: path.to_owned(), found };
-    if path.file_name().is_none() {
-        return Err(not_a_file("no file name"));
-    }
-    if path.is_dir() {
-        return Err(not_a_file("a folder"));
-    }
-    // A link that leads nowhere cannot be resolved; it is replaced.
-    let target =
-        if path.is_symlink() { fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
-    if target.exists() && !target.is_file() {
-        return Err(not_a_file("a device or a pipe"));
-    }
-    let failed = |step| move |source| FileError::Write { path: path.to_owned(), step, source };
+    let mut file = AtomicFile::create(path)?;
+    file.as_file().write_all(bytes).map_err(failed(path, "writing"))?;
+    file.commit()
+}
 
-    let mut file = temporary_beside(&target).map_err(failed("creating a temporary file in its folder"))?;
-    file.write_all(bytes).map_err(failed("writing"))?;
-    file.as_file().sync_all().map_err(failed("flushing to the disk"))?;
-    file.persist(&target).map_err(|refused| failed("renaming the temporary file")(refused.error))?;
-    sync_folder_of(&target);
-    Ok(())
+/// A file that takes its name when it is complete; dropped before, it leaves nothing behind.
+///
+/// The bytes go to a hidden temporary file in the same folder, are flushed to the disk, and take the
+/// name in one step. A symbolic link at the path is followed, so that the link survives. The
+/// folder must exist.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    target: PathBuf,
+    file: NamedTempFile,
+}
+
+impl AtomicFile {
+    /// Begins a file of that path.
+    ///
+    /// # Errors
+    /// [`FileError::NotAFile`] when `path` cannot name a file, [`FileError::Write`] when the folder is missing or read-only.
+    pub fn create(path: &Path) -> Result<Self> {
+        let not_a_file = |found| FileError::NotAFile { path: path.to_owned(), found };
+        if path.file_name().is_none() {
+            return Err(not_a_file("no file name"));
+        }
+        if path.is_dir() {
+            return Err(not_a_file("a folder"));
+        }
+        // A link that leads nowhere cannot be resolved; it is replaced.
+        let is_link = path.is_symlink();
+        let target = if is_link { fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()) } else { path.to_owned() };
+        if target.exists() && !target.is_file() {
+            return Err(not_a_file("a device or a pipe"));
+        }
+        let file = temporary_beside(&target).map_err(failed(path, "creating a temporary file in its folder"))?;
+        Ok(Self { path: path.to_owned(), target, file })
+    }
+
+    /// The temporary file, to write and seek in.
+    pub fn as_file(&mut self) -> &mut File {
+        self.file.as_file_mut()
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`FileError::Write`] when the disk is full or the rename is refused.
+    pub fn commit(self) -> Result<()> {
+        let Self { path, target, file } = self;
+        file.as_file().sync_all().map_err(failed(&path, "flushing to the disk"))?;
+        file.persist(&target).map_err(|refused| failed(&path, "renaming the temporary file")(refused.error))?;
+        sync_folder_of(&target);
+        Ok(())
+    }
+}
+
+fn failed(path: &Path, step: &'static str) -> impl FnOnce(io::Error) -> FileError {
+    let path = path.to_owned();
+    move |source| FileError::Write { path, step, source }
 }
 
 /// A file in the folder of `target`, with the permissions that new files have; deleted when it goes out of scope.

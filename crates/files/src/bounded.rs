@@ -1,6 +1,5 @@
 //! Files that are read with a bound.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 

@@ -34,7 +34,7 @@ mod inputs;
 mod kind;
 mod lock;
 
-pub use atomic::write_atomically;
+pub use atomic::{AtomicFile, write_atomically};
 pub use bounded::{read, read_bounded};
 pub use drawing::write_drawing;
 pub use error::{FileError, Result};

@@ -18,7 +18,7 @@ pub enum Access {
 /// The lock of a file, held until it is dropped. A file system without locks gives it to everyone, so that it does not keep anyone
 /// from working alone.
 #[derive(Debug)]
-pub struct Lock(File);
+pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
 
 impl Lock {
     /// Takes the lock of the file at `path`, which is made if it is missing; `None` where another process holds it.

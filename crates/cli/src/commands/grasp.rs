@@ -8,6 +8,7 @@ use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
 use sdg_cell::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
+use sdg_inputs::camera_files;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget,
@@ -15,10 +16,8 @@ use sdg_robot::{
 };
 use serde_json::{Value, json};
 
-use crate::camera_files;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
@@ -128,11 +127,11 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
     })?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
-    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
-    files::check_writable(&args.states)?;
+    sdg_files::check_writable(&args.states)?;
     let config = GraspConfig {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
@@ -163,7 +162,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
     let scene = robots::simulated_scene(text)?;
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(prepared.camera.intrinsics),
-        camera_place: Some(robots::camera_place(&prepared.camera)),
+        camera_place: Some(sdg_evaluation::camera_place(&prepared.camera)),
         obstacles: prepared.workcell.obstacles.clone(),
         ..WorkcellConfig::new(scene)
     })?;
@@ -171,7 +170,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
         fingertip_beyond_tcp_m: sdg_simulation::FINGERTIP_BEYOND_TCP_M,
         ..prepared.workcell.safety_limits()
     };
-    attempt(args, prepared, &mut cell, limits, robots::SimulatedPictures, interrupt, None)
+    attempt(args, prepared, &mut cell, limits, sdg_evaluation::SimulatedPictures, interrupt, None)
 }
 
 #[cfg(not(feature = "simulation"))]

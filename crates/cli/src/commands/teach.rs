@@ -9,23 +9,22 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use sdg_demonstration::{Demonstration, PixelFrame};
+use sdg_evaluation::TaughtFile;
+use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
+use sdg_inputs::base_weights;
+use sdg_inputs::camera_files::CameraFile;
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
-use crate::base_weights;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
-use crate::taught_file::TaughtFile;
-use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
 
 /// `sdg teach`
@@ -136,7 +135,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     }
     let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
     options.negatives =
-        args.negatives.iter().map(|path| files::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
+        args.negatives.iter().map(|path| sdg_inputs::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
     if let Some(path) = &args.camera.file {
         let camera = CameraFile::read(path)?;
         for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
@@ -148,10 +147,10 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
         options.lengths = Some(lengths);
     }
-    files::check_writable(&args.out)?;
-    files::check_replaces_a_model(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
+    sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
-        files::prepare_folder(folder)?;
+        sdg_files::prepare_folder(folder)?;
     }
     let report = read_base_weights(args, &mut options)?;
 
@@ -165,7 +164,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
         error => anyhow::Error::from(error).context(args.demonstrations.join(", ")),
     })?;
-    files::write(&args.out, &file.bytes)?;
+    sdg_files::write(&args.out, &file.bytes)?;
     let figures = file.figures(&demonstrations, args.seed)?;
     let TaughtFile { taught, bytes, .. } = file;
     let page = match &args.report {

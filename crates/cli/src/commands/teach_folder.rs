@@ -5,17 +5,18 @@ use std::path::Path;
 
 use anyhow::{Result, bail};
 use image::RgbImage;
+use sdg_evaluation::Progress;
+use sdg_evaluation::TaughtFile;
+use sdg_evaluation::many_parts::{
+    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page,
+};
 use sdg_grasp::{TeachOptions, TeachingEvent};
 use serde_json::{Value, json};
 
 use super::teach::{TeachArgs, options, read_base_weights, symmetry};
 use crate::exit::{Outcome, Usage, one_line};
 use crate::interrupt::Interrupt;
-use crate::many_parts::{
-    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page,
-};
 use crate::progress::EvaluationProgress;
-use crate::taught_file::TaughtFile;
 
 /// Teaches what is not taught yet; then, unless single parts were asked for, runs each model on every photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {

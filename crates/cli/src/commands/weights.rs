@@ -9,17 +9,17 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use sdg_detection::RcnnConfig;
 use sdg_detection::golden;
+use sdg_inputs::ConfigError;
+use sdg_inputs::base_weights::open;
+use sdg_inputs::detector_config::{architecture_of, preset, preset_for, read_config};
 use sdg_layers::state_dict::{self, StateDict, WeightTensor};
 use sdg_weights_conversion::architecture::Backbone;
 use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
 use serde_json::json;
 
-use crate::base_weights::open;
 use crate::commands::devices;
-use crate::detector_config::{architecture_of, preset, preset_for, read_config};
-use crate::exit::Outcome;
-use crate::files;
+use crate::exit::{Outcome, Usage};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg weights`
@@ -111,6 +111,17 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     }
 }
 
+/// The same error with the options that it is about.
+fn in_options(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(ConfigError::UnknownPreset { .. }) => Usage(format!("--preset: {error}")).into(),
+        Some(ConfigError::OwnNames) => {
+            Usage("expected --preset or --config for a file with this project's names".to_owned()).into()
+        }
+        _ => error,
+    }
+}
+
 /// The detector to fill: as configured, as the file itself says, or as its names say.
 fn config_of(checkpoint: &Checkpoint, config: Option<&Path>, preset_name: Option<&str>) -> Result<RcnnConfig> {
     if let Some(path) = config {
@@ -120,8 +131,8 @@ fn config_of(checkpoint: &Checkpoint, config: Option<&Path>, preset_name: Option
     let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours && preset_name.is_none());
     match (stored, preset_name) {
         (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
-        (None, Some(name)) => preset(name, checkpoint),
-        (None, None) => preset(preset_for(naming)?, checkpoint),
+        (None, Some(name)) => preset(name, checkpoint).map_err(in_options),
+        (None, None) => preset(preset_for(naming).map_err(|error| in_options(error.into()))?, checkpoint),
     }
 }
 
@@ -238,7 +249,7 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
     let named = || args.file.display().to_string();
     let (mut source, checkpoint) = open(&args.file)?;
     let config = config_of(&checkpoint, args.config.as_deref(), None).with_context(named)?.without_sampling();
-    let image = files::read_image(&args.image)?;
+    let image = sdg_inputs::read_image(&args.image)?;
     let reference = read_reference(&args.against)?;
     let conversion = Conversion::plan(&checkpoint, &architecture_of(&config), &[]).with_context(named)?;
     let weights: StateDict = conversion

@@ -24,7 +24,7 @@ pub(crate) use dry_run::DryRun;
 pub(crate) use motion_drawing::MotionDrawing;
 pub(crate) use sequence_run::{Ended, run_sequence};
 #[cfg(feature = "simulation")]
-pub(crate) use simulated_scene::{SimulatedPictures, camera_place, simulated_scene};
+pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;
 pub(crate) use workcell_file::read_workcell;
 

@@ -50,10 +50,10 @@ impl MotionDrawing {
             ..AnimationOptions::default()
         };
         let animation = Animation::encode(&frames, &options)?;
-        crate::files::prepare_folder(folder)?;
+        sdg_files::prepare_folder(folder)?;
         let [gif, still] = ["gif", "png"].map(|ending| folder.join(format!("{}.{ending}", self.name)));
-        crate::files::write(&gif, animation.gif())?;
-        crate::sdg_files::write_drawing(&still, animation.still())?;
+        sdg_files::write(&gif, animation.gif())?;
+        sdg_files::write_drawing(&still, animation.still())?;
         Ok(vec![gif, still])
     }
 }

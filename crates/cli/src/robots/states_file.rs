@@ -13,7 +13,7 @@ pub(crate) fn write_states(path: &Path, watch: &Watch) -> Result<()> {
     if watch.states().len() == 0 {
         return Ok(());
     }
-    crate::files::write(path, watch.states_csv().as_bytes())?;
+    sdg_files::write(path, watch.states_csv().as_bytes())?;
     eprintln!("the arm's last second: {}", path.display());
     Ok(())
 }

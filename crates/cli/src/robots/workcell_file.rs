@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sdg_robot::workcell::Workcell;
 
-use crate::files;
-
 /// Larger workcell files than any person writes.
 const MAX_BYTES: u64 = 1 << 20;
 
@@ -15,7 +13,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// # Errors
 /// A file that cannot be read, with the line.
 pub(crate) fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
-    let Ok(text) = String::from_utf8(files::read(path, MAX_BYTES)?) else {
+    let Ok(text) = String::from_utf8(sdg_files::read(path, MAX_BYTES)?) else {
         bail!("{}: expected TOML, found bytes that are no text", path.display());
     };
     let workcell = Workcell::from_toml(&text).with_context(|| path.display().to_string())?;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::{Context, Result};
 use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
+use sdg_inputs::camera_files;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, PlannedArm, Robot, RobotError, StepObserver,
@@ -16,7 +17,6 @@ use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
 
 use super::pictures::Shared;
-use crate::camera_files;
 use crate::commands::ros2::args::Ros2Args;
 use crate::exit::Usage;
 use crate::interrupt::Interrupt;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant, SystemTime};
 
+use sdg_cell::drawing;
 use sdg_ros2::RosError;
 use sdg_ros2::dds::{Node, Publisher, Qos};
 use sdg_ros2::encoding::{to_compressed, to_image};
@@ -16,7 +17,6 @@ use sdg_ros2::messages::{
 use super::lines::Lines;
 use super::pictures::PictureReader;
 use super::searching::Searched;
-use crate::pictures;
 
 /// Diagnostics are published this often.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
@@ -85,7 +85,7 @@ impl Topics {
         if !raw && !compressed {
             return;
         }
-        let drawn = pictures::with_detections(&searched.picture, &searched.detections);
+        let drawn = drawing::with_detections(&searched.picture, &searched.detections);
         if raw {
             self.told(self.overlays.send(to_image(&drawn, header.clone())));
         }

@@ -12,7 +12,6 @@ use sdg_ros2::found::FoundPart;
 use sdg_ros2::messages::Header;
 
 use super::pictures::Picture;
-use crate::files;
 
 /// A grasp model, and the camera behind which it looks.
 pub(super) struct Searcher {
@@ -45,7 +44,7 @@ impl Searcher {
     /// # Errors
     /// A file that is no model.
     pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
-        *self = Self::new(Some(files::read_model(path, device)?), self.min_score);
+        *self = Self::new(Some(sdg_inputs::read_model(path, device)?), self.min_score);
         Ok(())
     }
 

@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use sdg_grasp::{Device, GraspModel};
+use sdg_inputs::camera_files::CameraFile;
 use sdg_ros2::dds::Qos;
 
 use super::place::PlaceSource;
 use super::teaching::TriggerTeaching;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::commands::ros2::args::Ros2Args;
 use crate::exit::Usage;
-use crate::{files, robots};
+use crate::robots;
 
 /// Pictures that the network keeps for the node.
 const PICTURE_DEPTH: usize = 10;
@@ -38,7 +38,7 @@ impl Settings {
     /// A file that cannot be used; a model without lengths where there is a camera.
     pub(crate) fn read(args: &Ros2Args) -> Result<Self> {
         let device = devices::open(&args.compute)?;
-        let model = args.grasp_model.as_ref().map(|path| files::read_model(path, &device)).transpose()?;
+        let model = args.grasp_model.as_ref().map(|path| sdg_inputs::read_model(path, &device)).transpose()?;
         if args.table_height_mm.is_some() && args.base_frame.is_none() {
             return Err(Usage("--table-height-mm: expected --base-frame, in which it is".to_owned()).into());
         }

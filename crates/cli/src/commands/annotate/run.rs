@@ -11,14 +11,14 @@ use nalgebra::Point2;
 use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
 use sdg_camera::{Address, OpenOptions};
 use sdg_files::{FileError, WriterLock};
+use sdg_inputs::UNREADABLE_EXTENSIONS;
+use sdg_inputs::camera_files::CameraFile;
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
 use super::AnnotateArgs;
-use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::interrupt::Interrupt;
 use crate::page_camera::PageCamera;
 use crate::page_teacher::PageTeacher;
@@ -50,10 +50,10 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let token = args.token_file.as_deref().map(token).transpose()?;
     // Marks are made for minutes before the first is written.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
-        files::check_writable(&written.with_extension("json"))?;
+        sdg_files::check_writable(&written.with_extension("json"))?;
     }
     if let Some(out) = &args.out {
-        files::check_writable(out)?;
+        sdg_files::check_writable(out)?;
     }
     let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
     let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
@@ -61,17 +61,17 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
     let _locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
-        for path in files::entries(folder)? {
+        for path in sdg_files::entries(folder)? {
             // What stands beside pictures is no news; a picture that is not read is.
-            if files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
-                let why = files::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
+            if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
+                let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
                 eprintln!("left out: {why}");
             }
         }
     }
     if camera.is_some() {
         let photos = images.iter().map(|(photo, _)| photo).filter(|photo| photo.exists());
-        photos.into_iter().try_for_each(|photo| files::check_is_not_turned(photo))?;
+        photos.into_iter().try_for_each(|photo| sdg_inputs::check_is_not_turned(photo))?;
     }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
@@ -132,7 +132,7 @@ fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
         ))
         .into());
     }
-    files::check_writable(&folder.join("sdg-project.json"))?;
+    sdg_files::check_writable(&folder.join("sdg-project.json"))?;
     Ok(Some(folder.to_owned()))
 }
 
@@ -149,7 +149,7 @@ fn token(path: &Path) -> Result<String> {
         written.with_context(|| format!("{}: cannot write the key to the page", path.display()))?;
         return Ok(token);
     }
-    let text = String::from_utf8_lossy(&files::read(path, MAX_BYTES)?).trim().to_owned();
+    let text = String::from_utf8_lossy(&sdg_files::read(path, MAX_BYTES)?).trim().to_owned();
     if text.len() < 16 || !text.chars().all(|c| c.is_ascii_alphanumeric()) {
         bail!(
             "{}: expected a key of 16 letters and digits or more, found {} characters (delete the file for a new key)",

@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
 use crate::exit::{Outcome, one_line};
-use crate::files;
 
 /// `sdg camera calibrate`
 #[derive(Debug, Args)]
@@ -52,7 +51,7 @@ const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 /// Finds the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
-    files::check_writable(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
     let looked: Vec<(&Path, Result<Seen<'_>>)> =
         args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
     let mut lines: Vec<Value> = Vec::new();
@@ -97,7 +96,7 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
 }
 
 fn look<'a>(path: &'a Path, board: &Board) -> Result<Seen<'a>> {
-    let picture = files::read_image_in(path, PixelFrame::Sensor)?;
+    let picture = sdg_inputs::read_image_in(path, PixelFrame::Sensor)?;
     let corners = find_board(&grey(&picture), board).with_context(|| named(path))?;
     Ok(Seen { path, size: picture.dimensions(), corners })
 }
@@ -120,9 +119,9 @@ fn warn_of_squares(board: &Board, seen: &[Seen<'_>]) {
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     // Board and pictures are read by now, and the file itself is not: it may be completed, they may not be replaced.
-    files::check_writable(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
     let existing = match fs::exists(&args.out) {
-        Ok(true) => String::from_utf8(files::read(&args.out, MAX_BYTES)?)
+        Ok(true) => String::from_utf8(sdg_files::read(&args.out, MAX_BYTES)?)
             .map_err(|_| anyhow!("{}: expected YAML, found bytes that are no text", args.out.display()))?,
         _ => String::new(),
     };
@@ -140,7 +139,7 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     } else {
         camera.update_yaml(&existing).with_context(|| named(&args.out))?
     };
-    files::extend(&args.out, Some(&args.out), text.as_bytes())
+    Ok(sdg_files::extend(&args.out, Some(&args.out), text.as_bytes())?)
 }
 
 /// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.

@@ -11,7 +11,6 @@ use sdg_camera::{Address, Camera, Frame, LatestFrame};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{LiveArgs, open};
 
@@ -49,13 +48,13 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
             let found = args.out.display();
             return Err(Usage(format!("--out: expected a file that ends in .png, or a folder, found {found}")).into());
         }
-        files::check_writable(&args.out)?;
+        sdg_files::check_writable(&args.out)?;
     } else {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
     }
     if let Address::File { path, .. } | Address::Folder { path, .. } = &args.live.from {
-        files::keep(path);
+        sdg_files::keep(path);
     }
     let interrupt = Interrupt::watch();
     let mut camera = open(&args.live.from, &args.live.options())?;
@@ -105,7 +104,7 @@ fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
 fn write_png(path: &Path, frame: &Frame) -> Result<()> {
     let mut png = Cursor::new(Vec::new());
     frame.picture.write_to(&mut png, ImageFormat::Png)?;
-    files::write(path, &png.into_inner())
+    Ok(sdg_files::write(path, &png.into_inner())?)
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

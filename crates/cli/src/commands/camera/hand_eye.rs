@@ -12,12 +12,11 @@ use sdg_calibration::{
 };
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::upper_median;
+use sdg_inputs::camera_files;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
-use crate::camera_files;
 use crate::exit::{Outcome, one_line};
-use crate::files;
 
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
@@ -70,11 +69,11 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let mount = Mount::from(args.mount);
     let (camera, existing) = camera_files::read(&args.camera)?;
-    let bytes = files::read(&args.poses, MAX_BYTES)?;
+    let bytes = sdg_files::read(&args.poses, MAX_BYTES)?;
     let poses =
         read_robot_poses(&named(&args.poses), &String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
     if let Some(out) = &args.out {
-        files::check_extendable(out, Some(&args.camera))?;
+        sdg_files::check_extendable(out, Some(&args.camera))?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
     check_pictures_exist(&poses, folder)?;
@@ -100,7 +99,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
         let camera = placed(args, camera, &found, mount);
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
-        files::extend(out, Some(&args.camera), text.as_bytes())?;
+        sdg_files::extend(out, Some(&args.camera), text.as_bytes())?;
     }
     for (k, pose) in seen.iter().enumerate() {
         let [metres, radians] = found.spread[k];
@@ -134,7 +133,7 @@ fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
 
 fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {
     let path = folder.join(&pose.picture);
-    let picture = files::read_image_in(&path, PixelFrame::Sensor)?;
+    let picture = sdg_inputs::read_image_in(&path, PixelFrame::Sensor)?;
     if let Err(error) = camera.check_picture(picture.dimensions()) {
         bail!("{}: {error}", path.display());
     }

@@ -12,12 +12,11 @@ use sdg_calibration::{
 };
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::{PinholeCamera, PlumbBob};
+use sdg_inputs::camera_files;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
-use crate::camera_files;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::shared_args::height_mm;
 
 /// `sdg camera table`
@@ -97,8 +96,8 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     let Some(out) = args.out.as_ref().or(args.camera.as_ref()) else {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
-    files::check_extendable(out, args.camera.as_deref())?;
-    let picture = files::read_image_in(&args.picture, PixelFrame::Sensor)?;
+    sdg_files::check_extendable(out, args.camera.as_deref())?;
+    let picture = sdg_inputs::read_image_in(&args.picture, PixelFrame::Sensor)?;
     if let Some((camera, _)) = &existing {
         camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
     }
@@ -122,7 +121,7 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     // What `detect --camera` would refuse is refused here.
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
-    files::extend(out, args.camera.as_deref(), text.as_bytes())?;
+    sdg_files::extend(out, args.camera.as_deref(), text.as_bytes())?;
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
 }

@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use image::RgbImage;
 use sdg_demonstration::{IMAGE_EXTENSIONS, PixelFrame};
+use sdg_inputs::UNREADABLE_EXTENSIONS;
 
 use crate::exit::Usage;
-use crate::files::{self, STANDARD_INPUT, UNREADABLE_EXTENSIONS};
 
+/// The name of standard input among files.
+const STANDARD_INPUT: &str = "-";
 /// How many names of skipped files are printed.
 const MAX_NAMED: usize = 20;
 
@@ -32,8 +34,8 @@ impl Input {
     /// Reads and decodes it.
     pub fn read(&self, frame: PixelFrame) -> Result<RgbImage> {
         match self {
-            Self::File(path) => files::read_image_in(path, frame),
-            Self::StandardInput => files::read_standard_input_image(frame),
+            Self::File(path) => sdg_inputs::read_image_in(path, frame),
+            Self::StandardInput => sdg_inputs::read_standard_input_image(frame),
         }
     }
 
@@ -95,9 +97,10 @@ pub fn of_argument(argument: &Path) -> Result<Inputs> {
     }
     let is_picture = |path: &PathBuf| {
         !path.is_dir()
-            && (files::has_extension(path, &IMAGE_EXTENSIONS) || files::has_extension(path, &UNREADABLE_EXTENSIONS))
+            && (sdg_files::has_extension(path, &IMAGE_EXTENSIONS)
+                || sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS))
     };
-    let (pictures, others): (Vec<_>, Vec<_>) = files::entries(argument)?.into_iter().partition(is_picture);
+    let (pictures, others): (Vec<_>, Vec<_>) = sdg_files::entries(argument)?.into_iter().partition(is_picture);
     if pictures.is_empty() {
         bail!(
             "{}: expected pictures ({}) in this folder, found {} other files and folders",

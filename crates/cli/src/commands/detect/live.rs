@@ -12,18 +12,18 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use anyhow::Result;
 use image::RgbImage;
 use sdg_camera::{Address, Camera, CameraError, Frame, LatestFrame, MjpegServer};
+use sdg_cell::FoundRecord;
+use sdg_cell::drawing;
 use sdg_cell::{Found, LiveTracker, Perception, SearchTime};
 use sdg_grasp::{TrackState, TrackerConfig, Verification};
 use serde::Serialize;
 
 use super::args::DetectArgs;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::found_record::FoundRecord;
 use crate::found_text::Wording;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures;
-use crate::pictures;
 
 /// How long the newest frame is waited for before Ctrl-C is looked at again.
 const MAX_WAIT: Duration = Duration::from_millis(200);
@@ -78,7 +78,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
         if let Some(server) = &server {
             let seen = parts.iter().filter(|part| part.is_seen(args.min_score)).map(|part| &part.found.detection);
             let mut drawn = RgbImage::clone(&picture);
-            pictures::draw_detections(&mut drawn, seen, args.min_score, &[]);
+            drawing::draw_detections(&mut drawn, seen, args.min_score, &[]);
             server.publish(drawn);
         }
     }

@@ -16,15 +16,16 @@ use serde::Serialize;
 
 pub use args::DetectArgs;
 use inputs::{Input, Inputs};
+use sdg_cell::DEFAULT_MIN_SCORE;
+use sdg_cell::FoundRecord;
+use sdg_cell::drawing;
+use sdg_inputs::camera_files;
 
-use crate::camera_files;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files;
-use crate::found_record::FoundRecord;
-use crate::found_text::{DEFAULT_MIN_SCORE, Wording, advice_in_words};
+
+use crate::found_text::{Wording, advice_in_words};
 use crate::json_line::json_line;
-use crate::pictures;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
@@ -44,7 +45,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         )
         .into());
     }
-    let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if let Some(tolerance) = args.size_tolerance {
         model = model.with_size_tolerance(tolerance.range())?;
     }
@@ -73,7 +74,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     if let Some(folder) = &args.draw {
         let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
         inputs::check_drawn_elsewhere(folder, pictures)?;
-        files::prepare_folder(folder)?;
+        sdg_files::prepare_folder(folder)?;
     }
     for (argument, inputs) in inputs {
         match inputs {
@@ -160,9 +161,9 @@ fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImag
     let detections = || found.iter().map(|found| &found.detection);
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
     let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
-    pictures::draw_differences(&mut image, &differences);
+    drawing::draw_differences(&mut image, &differences);
     let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
-    pictures::draw_detections(&mut image, detections(), wording.min_score, &reasons);
+    drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons);
     image
 }
 

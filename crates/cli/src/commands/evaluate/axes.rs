@@ -2,7 +2,12 @@
 
 use std::fmt::Write;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use sdg_evaluation::Store;
+use sdg_evaluation::axes::{
+    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
+};
+use sdg_evaluation::machine;
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -10,15 +15,10 @@ use serde_json::json;
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
-use crate::evaluation::axes::{
-    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
-};
-use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::machine::machine;
+use crate::progress::EvaluationProgress;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
@@ -27,10 +27,10 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let objects = objects(&args.objects, ObjectSpec::names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
-    let against = args.against.as_deref().map(Against::open).transpose()?;
+    let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
     // Beside the page of the paper's protocol, not in its place.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let jobs = jobs(args);
     let evaluation = AxesEvaluation {

@@ -1,6 +1,9 @@
 //! `sdg evaluate --cameras`: parts taught with one calibrated camera and found with others.
 
 use anyhow::{Result, bail};
+use sdg_evaluation::Store;
+use sdg_evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
+use sdg_evaluation::machine;
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -8,13 +11,10 @@ use serde_json::json;
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
-use crate::evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
-use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::machine::machine;
+use crate::progress::EvaluationProgress;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
@@ -24,7 +24,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("cameras"));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let jobs = jobs(args);
     let evaluation = CamerasEvaluation {

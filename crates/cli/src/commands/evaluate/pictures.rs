@@ -3,16 +3,18 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::camera_files;
 use anyhow::Result;
+use sdg_evaluation::Progress;
+use sdg_evaluation::labelled_pictures::{
+    Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json,
+};
 use sdg_grasp::Verification;
+use sdg_inputs::camera_files;
 
 use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::json_line::json_line;
-use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json};
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
 
@@ -26,12 +28,12 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
             Usage("expected --pictures DIR and --grasp-model FILE, found one without the other".to_owned()).into()
         );
     };
-    let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
+    let model = sdg_inputs::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let progress = EvaluationProgress::new();

@@ -4,6 +4,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use sdg_evaluation::machine;
+use sdg_evaluation::{Evaluation, PartGroup, Settings, Store, Summary, markdown, page};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -11,12 +13,10 @@ use serde_json::json;
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
-use crate::evaluation::{Evaluation, EvaluationProgress, PartGroup, Settings, Store, Summary, markdown, page};
 use crate::exit::Outcome;
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::machine::machine;
+use crate::progress::EvaluationProgress;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
@@ -24,7 +24,7 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     let objects = objects(&args.objects, ObjectSpec::paper_names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
-    files::prepare_folder(report_folder(args))?;
+    sdg_files::prepare_folder(report_folder(args))?;
 
     let jobs = jobs(args);
     let evaluation =

@@ -6,6 +6,12 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use sdg_evaluation::Progress;
+use sdg_evaluation::sharing::{
+    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
+    planned_units, submit_script,
+};
+use sdg_evaluation::{Evaluation, Settings, Store};
 use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -14,14 +20,9 @@ use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::protocol;
 use super::selection::{objects, settings};
-use crate::evaluation::sharing::{
-    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
-    planned_units, submit_script,
-};
-use crate::evaluation::{Evaluation, EvaluationProgress, Settings, Store};
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files;
 use crate::interrupt::Interrupt;
+use crate::progress::EvaluationProgress;
 
 /// How often a folder is read again.
 const WATCH_EVERY: Duration = Duration::from_secs(2);
@@ -168,7 +169,7 @@ fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         faults.iter().for_each(|fault| eprintln!("{fault}"));
         bail!("{} of {} units cannot be counted; no tables were written", faults.len(), units.len());
     }
-    files::prepare_folder(protocol::report_folder(args))?;
+    sdg_files::prepare_folder(protocol::report_folder(args))?;
     let remaining = protocol::write_tables(args, &evaluation, &asked.settings)?;
     if remaining > 0 {
         bail!("{}: {remaining} units have a receipt and no result", args.out.display());
@@ -233,7 +234,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         }
         return Ok(Outcome::Done);
     }
-    files::prepare_folder(&folder)?;
+    sdg_files::prepare_folder(&folder)?;
     SavedPlan::new(&units).save(&folder)?;
     let mut bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).spawn().context("bash: cannot run")?;
     bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;

@@ -4,29 +4,28 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
+use sdg_evaluation::run_page::{self, RunPage};
 use sdg_geometry::PinholeCamera;
 use sdg_grasp::{GraspError, Verification};
+use sdg_inputs::camera_files::CameraFile;
 use sdg_report::AttemptSummary;
 use serde_json::json;
 
 use super::RehearseArgs;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::own_part::OwnPart;
 use crate::parts::part_named;
-use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
 use crate::robots;
-use crate::run_page::{self, RunPage};
 use crate::shared_args::OwnPartArgs;
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let shipped = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
-    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     let mut camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
     let model_file = args.grasp_model.display().to_string();
     let (object, model) = match shipped {
@@ -46,7 +45,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         (Some(place), Some(workcell)) => Some(rehearsed_place(place, workcell)?),
         _ => None,
     };
-    files::prepare_folder(&args.out)?;
+    sdg_files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal = Rehearsal {
         model: &model,

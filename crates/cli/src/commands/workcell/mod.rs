@@ -9,7 +9,6 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use crate::exit::Outcome;
-use crate::files;
 use crate::robots;
 use map::Map;
 use reach::Reach;
@@ -50,7 +49,7 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
         }
     }
     let (workcell, _) = robots::read_workcell(&args.workcell)?;
-    files::check_writable(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
     let map = Map::around(&workcell);
     let reach = Reach::of(&workcell, map.area_m(), args.grid_mm * 1e-3, args.height_mm * 1e-3)?;
     for line in reach.lines(&workcell) {

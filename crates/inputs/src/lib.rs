@@ -1,0 +1,46 @@
+//! A user's files as values: photos with their marks, cameras, models, weights to start from.
+//!
+//! ```text
+//! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: are they this photo's? ─ Demonstration
+//! camera.yaml ─ CameraFile ─ Perception, plan views of photos
+//! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
+//! ```
+//!
+//! Every error names the file. What is deliberately absent: arguments of commands, and what is written.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use sdg_inputs::annotation_files::beside_photo;
+//! use sdg_inputs::demonstrations::read_pair;
+//!
+//! # fn main() -> anyhow::Result<()> {
+//! let photo = Path::new("part.png");
+//! let demonstration = read_pair(photo, &beside_photo(photo)?)?;
+//! println!("{}", demonstration.annotation.label);
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "the functions have docs; fields are named for what they are")]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod annotation_files;
+pub mod base_weights;
+pub mod camera_files;
+pub mod demonstrations;
+pub mod detector_config;
+mod error;
+mod error_line;
+pub mod marks_check;
+mod models;
+mod pictures;
+
+pub use annotation_files::MAX_ANNOTATION_BYTES;
+pub use error::ConfigError;
+pub use error_line::one_line;
+pub use models::{check_replaces_a_model, read_model};
+pub use pictures::{
+    UNREADABLE_EXTENSIONS, check_is_not_turned, read_image, read_image_in, read_sensor_pixels_if_turned,
+    read_standard_input_image,
+};
