@@ -4,8 +4,8 @@ use image::imageops::{self, FilterType};
 use sdg_geometry::BoundingBox;
 
 use crate::error::Result;
+use crate::lengths::Lengths;
 use crate::model::GraspModel;
-use crate::plan::Lengths;
 use crate::prepared::scaling;
 use crate::taught::TaughtDemonstration;
 use crate::taught_marks::TaughtMarks;

@@ -23,7 +23,7 @@ pub struct RobotAddress {
 
 impl RobotAddress {
     /// A device at this address, such as `robot` or `hand`, does not let itself be connected to.
-    pub(super) fn refused(&self, device: &str, error: FciError) -> RobotError {
+    pub(crate) fn refused(&self, device: &str, error: FciError) -> RobotError {
         match error {
             // It was reached, and says itself why it cannot be driven.
             FciError::Version { .. } => RobotError::Device(Box::new(error)),
@@ -32,7 +32,7 @@ impl RobotAddress {
     }
 
     /// The connection to a device at this address, such as `robot` or `hand`, is lost.
-    pub(super) fn lost(&self, device: &str, error: &FciError) -> RobotError {
+    pub(crate) fn lost(&self, device: &str, error: &FciError) -> RobotError {
         RobotError::Lost { peer: format!("the {device} at {self}"), why: error.to_string() }
     }
 }

@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 use sdg_geometry::Polygon;
 
-use super::raster::Raster;
+use crate::raster::Raster;
 
 /// Removes the parts inside `regions` from a photo, leaving what `keep` encloses.
 pub(crate) fn erase_parts(image: &RgbImage, regions: &[Polygon], keep: Option<&Polygon>) -> RgbImage {
