@@ -11,7 +11,7 @@ use sdg_grasp::{
     seen_from_above, teach,
 };
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
-use sdg_simulation::scene::{Axis, AxisView, axis_view, demonstration_view};
+use sdg_simulation::views::{Axis, AxisView, axis_view, demonstration_view};
 
 /// Seed of the pictures, which no other test and no evaluation uses.
 const SEED: u64 = 7100;

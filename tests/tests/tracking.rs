@@ -12,8 +12,8 @@ use sdg_grasp::{
     seen_from_above, teach,
 };
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::demonstration_view;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
+use sdg_simulation::views::demonstration_view;
 
 /// Frames that a search takes: 100 to 200 ms on one of two cores that others use, too (docs/tracking.md).
 const SEARCH_FRAMES: u32 = 20;

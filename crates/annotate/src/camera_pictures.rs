@@ -1,19 +1,16 @@
-//! A camera for the annotation page, which does not see the crate `camera`.
+//! A camera's pictures for the page.
 //!
 //! A thread reads the camera without a pause, so that the page, which asks when it likes, gets the newest picture.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
-use anyhow::Result;
 use image::RgbImage;
-use sdg_annotate::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
-use sdg_camera::{Address, CameraError, Fault, OpenOptions, PixelFrame, Playback};
-use sdg_inputs::camera_files::CameraFile;
+use sdg_camera::{Address, Camera, CameraError, Fault, Playback};
 
-use crate::exit::one_line;
-use crate::live_pictures;
+use crate::live::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
 
 /// Pictures a second from files whose address names no pace: a folder that is read as fast as it can be would be over, or take a
 /// core, before anybody has seen it.
@@ -23,36 +20,34 @@ const MAX_TORN_AGE: Duration = Duration::from_secs(1);
 
 /// The newest picture of a camera that a thread reads for as long as the process runs.
 #[derive(Debug)]
-pub struct PageCamera(Arc<Mutex<Newest>>);
+pub struct CameraPictures(Arc<Mutex<Newest>>);
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Newest {
     frame: Option<(Arc<RgbImage>, u64, Instant)>,
     fault: Option<LiveFault>,
-    calibration: Option<CameraFile>,
+    check: Option<Box<SizeCheck>>,
 }
 
-impl PageCamera {
-    /// Opens the camera at an address and begins to read it; gives the address without its password, too. With a calibration
-    /// its size is asked for, and pictures of another size are a fault.
-    ///
-    /// # Errors
-    /// A camera that does not open.
-    pub fn open(address: Address, mut options: OpenOptions, calibration: Option<CameraFile>) -> Result<(Self, String)> {
-        let address = paced(address);
-        if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
-            (options.width, options.height) = (width, height);
-            options.frame = PixelFrame::Sensor;
-        }
-        let mut camera = live_pictures::open(&address, &options)?;
-        let newest = Arc::new(Mutex::new(Newest { calibration, ..Newest::default() }));
+/// Says what is wrong with pictures of that width and height.
+pub type SizeCheck = dyn Fn((u32, u32)) -> Result<(), String> + Send;
+
+impl fmt::Debug for Newest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Newest").field("fault", &self.fault).finish_non_exhaustive()
+    }
+}
+
+impl CameraPictures {
+    /// Begins to read a camera; pictures that `check` refuses are a fault. A simulated camera draws as fast as it can, and is read by
+    /// the clock of its frames.
+    pub fn read(mut camera: Box<dyn Camera>, is_simulated: bool, check: Option<Box<SizeCheck>>) -> Self {
+        let newest = Arc::new(Mutex::new(Newest { check, ..Newest::default() }));
         let writer = Arc::clone(&newest);
-        let is_simulated = matches!(address, Address::Sim(_));
         thread::spawn(move || {
             loop {
                 let next = camera.next_frame();
                 if let (true, Ok(Some(frame))) = (is_simulated, &next) {
-                    // The simulated camera draws as fast as it can; its frames' times are those of its own clock.
                     thread::sleep(frame.captured.duration_since(SystemTime::now()).unwrap_or_default());
                 }
                 if lock(&writer).has_ended_with(next) {
@@ -60,11 +55,11 @@ impl PageCamera {
                 }
             }
         });
-        Ok((Self(newest), address.to_string()))
+        Self(newest)
     }
 }
 
-impl LivePictures for PageCamera {
+impl LivePictures for CameraPictures {
     fn newest(&self) -> Live {
         let newest = lock(&self.0);
         let frame = newest.frame.as_ref().map(|(picture, number, arrived)| LiveFrame {
@@ -86,10 +81,9 @@ impl Newest {
         let fault = |kind, text: String| Some(LiveFault { kind, text });
         match next {
             Ok(Some(frame)) => {
-                let other_size =
-                    self.calibration.as_ref().and_then(|camera| camera.check_picture(&frame.picture).err());
+                let other_size = self.check.as_ref().and_then(|check| check(frame.picture.dimensions()).err());
                 self.fault = match other_size {
-                    Some(error) => fault(LiveFaultKind::OtherSize, one_line(&error)),
+                    Some(error) => fault(LiveFaultKind::OtherSize, error),
                     None => frame.faults.iter().find_map(live_fault),
                 };
                 self.frame = Some((Arc::new(frame.picture), frame.number, Instant::now()));
@@ -129,8 +123,8 @@ fn live_fault(fault: &Fault) -> Option<LiveFault> {
     Some(LiveFault { kind, text })
 }
 
-/// Files at a pace that can be watched.
-fn paced(mut address: Address) -> Address {
+/// The address with a pace that can be watched, where it is one of files without a pace.
+pub fn paced(mut address: Address) -> Address {
     if let Address::Folder { playback: Playback { interval, .. }, .. }
     | Address::File { playback: Playback { interval, .. }, .. } = &mut address
     {
@@ -144,8 +138,10 @@ mod tests {
     use super::*;
     use image::Rgb;
 
-    fn open(address: &str) -> Result<(PageCamera, String)> {
-        PageCamera::open(address.parse().unwrap(), OpenOptions::default(), None)
+    fn open(address: &str) -> (CameraPictures, String) {
+        let address = paced(address.parse().unwrap());
+        let camera = sdg_camera::open(&address, &sdg_camera::OpenOptions::default()).unwrap();
+        (CameraPictures::read(camera, false, None), address.to_string())
     }
 
     fn picture(level: u8) -> RgbImage {
@@ -200,21 +196,15 @@ mod tests {
     fn a_folder_is_read_at_a_pace_that_can_be_watched() {
         let folder = tempfile::tempdir().unwrap();
         picture(7).save(folder.path().join("a.png")).unwrap();
-        let (camera, address) = open(&format!("dir:{}?loop", folder.path().display())).unwrap();
+        let (camera, address) = open(&format!("dir:{}?loop", folder.path().display()));
         assert!(address.ends_with("?fps=5&loop"), "{address}");
         let begun = Instant::now();
-        let number = |camera: &PageCamera| camera.newest().frame.map(|frame| frame.number);
+        let number = |camera: &CameraPictures| camera.newest().frame.map(|frame| frame.number);
         while number(&camera) < Some(2) {
             assert!(begun.elapsed() < Duration::from_secs(30));
             thread::sleep(Duration::from_millis(5));
         }
         assert!(begun.elapsed() >= 2 * FILES_INTERVAL);
         assert_eq!(*camera.newest().frame.unwrap().picture, picture(7));
-    }
-
-    #[test]
-    fn what_cannot_be_opened_is_refused_before_the_page_opens() {
-        let line = one_line(&open("dir:/nowhere/at/all").unwrap_err());
-        assert!(line.starts_with("--from: dir:/nowhere/at/all") && line.contains("expected a folder"), "{line}");
     }
 }

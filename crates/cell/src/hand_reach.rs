@@ -2,9 +2,8 @@
 
 use std::f64::consts::PI;
 
-use anyhow::Result;
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
-use sdg_kinematics::collision::{Body, Checker};
+use sdg_kinematics::collision::{Body, Checker, CollisionError};
 use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, Panda, ready_pose};
 use sdg_robot::workcell::Workcell;
 
@@ -14,17 +13,20 @@ const NUM_TURNS: usize = 4;
 const MARGIN_M: f64 = 0.003;
 
 /// Squares of the table, and in how many turns of the hand each is reached.
-pub(super) struct Reach {
-    pub(super) squares: Vec<Square>,
-    pub(super) grid_m: f64,
+pub struct Reach {
+    /// All squares of the area.
+    pub squares: Vec<Square>,
+    /// Width of a square, m.
+    pub grid_m: f64,
     height_m: f64,
 }
 
 /// One of them.
-pub(super) struct Square {
+pub struct Square {
     /// Its middle in the base frame, m.
-    pub(super) at_m: Point2<f64>,
-    pub(super) num_turns: usize,
+    pub at_m: Point2<f64>,
+    /// Turns of the hand that reach it.
+    pub num_turns: usize,
 }
 
 impl Reach {
@@ -32,7 +34,7 @@ impl Reach {
     ///
     /// # Errors
     /// None for a workcell that was read.
-    pub(super) fn of(workcell: &Workcell, [x, y]: [[f64; 2]; 2], grid_m: f64, height_m: f64) -> Result<Self> {
+    pub fn of(workcell: &Workcell, [x, y]: [[f64; 2]; 2], grid_m: f64, height_m: f64) -> Result<Self, CollisionError> {
         let mut model = workcell.collision_model(HAND_OPENING_MAX_M)?;
         model.allow(Body::HAND, "table")?;
         let mut checker = Checker::new(&model, MARGIN_M);
@@ -49,7 +51,7 @@ impl Reach {
     }
 
     /// What there is to say.
-    pub(super) fn lines(&self, workcell: &Workcell) -> Vec<String> {
+    pub fn lines(&self, workcell: &Workcell) -> Vec<String> {
         let square_m2 = self.grid_m * self.grid_m;
         let area_m2 =
             |least: usize| self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2;

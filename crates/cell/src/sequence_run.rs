@@ -6,22 +6,22 @@ use sdg_robot::{
 };
 
 /// How a sequence ended.
-pub(crate) struct Ended {
+pub struct Ended {
     /// The grasp.
-    pub(crate) grasp: GraspReport,
+    pub grasp: GraspReport,
     /// The step that failed, and why; `None` where all is as it was asked for.
-    pub(crate) failed: Option<(GraspStep, String)>,
+    pub failed: Option<(GraspStep, String)>,
     /// How far the part lay beside its place at the last look, where one was asked for.
-    pub(crate) beside: Option<PlaceError>,
+    pub beside: Option<PlaceError>,
     /// What was felt each time it was put down.
-    pub(crate) touched: Vec<Touched>,
+    pub touched: Vec<Touched>,
 }
 
 /// Grasps the part and, where a place is given, puts it there.
 ///
 /// # Errors
 /// As [`sdg_robot::grasp`].
-pub(crate) fn run_sequence<A: CompliantArm>(
+pub fn run_sequence<A: CompliantArm>(
     robot: &mut Robot<'_, A>,
     finder: &mut dyn PartFinder<A>,
     mount: CameraMount,

@@ -8,7 +8,7 @@ use sdg_report::{Color, Pen, draw_box, draw_label, draw_line, draw_polygon, labe
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{LookOut, Place};
 
-use super::reach::Reach;
+use crate::hand_reach::Reach;
 
 /// Pixels for a metre, and around the map.
 const PX_PER_M: f64 = 720.0;
@@ -32,14 +32,14 @@ const LOOK: Color = Color([20, 120, 150]);
 const PAPER: Color = Color([250, 249, 246]);
 
 /// The area that is drawn, x and y in the base frame, m.
-pub(super) struct Map {
+pub struct WorkcellMap {
     x_m: [f64; 2],
     y_m: [f64; 2],
 }
 
-impl Map {
+impl WorkcellMap {
     /// All of the workspace, the table and the arm's foot.
-    pub(super) fn around(workcell: &Workcell) -> Self {
+    pub fn around(workcell: &Workcell) -> Self {
         let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
         let mut map = Self { x_m: [min.x.min(FOOT_M[0][0]), max.x], y_m: [min.y.min(-0.2), max.y.max(0.2)] };
         let corners = workcell.places.iter().flat_map(Place::corners);
@@ -54,7 +54,8 @@ impl Map {
         Self { x_m: round(map.x_m), y_m: round(map.y_m) }
     }
 
-    pub(super) fn area_m(&self) -> [[f64; 2]; 2] {
+    /// The area that is drawn, x and y in the base frame, m.
+    pub fn area_m(&self) -> [[f64; 2]; 2] {
         [self.x_m, self.y_m]
     }
 
@@ -72,7 +73,7 @@ impl Map {
     }
 
     /// Draws everything.
-    pub(super) fn draw(&self, workcell: &Workcell, reach: &Reach) -> RgbImage {
+    pub fn draw(&self, workcell: &Workcell, reach: &Reach) -> RgbImage {
         let width = (self.x_m[1] - self.x_m[0]) * PX_PER_M + 2.0 * FRAME_PX;
         let height = (self.y_m[1] - self.y_m[0]) * PX_PER_M + 2.0 * FRAME_PX + KEY_PX;
         let mut image = RgbImage::from_pixel(width.ceil() as u32, height.ceil() as u32, GROUND);

@@ -5,31 +5,25 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use sdg_demonstration::Demonstration;
 use sdg_inputs::annotation_files::beside_photo;
-use sdg_inputs::check_is_not_turned;
 use sdg_inputs::demonstrations::read_pair;
 
 use crate::exit::Usage;
 
-/// Makes sure that the photos of the arguments are a calibrated camera's.
-///
-/// # Errors
-/// A photo that an Exif orientation turns.
-pub fn check_are_not_turned(arguments: &[String]) -> Result<()> {
-    arguments.iter().try_for_each(|argument| check_is_not_turned(&photo_and_marks(argument)?.0))
-}
-
 /// Reads one demonstration from each argument.
 pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
-    arguments.iter().map(|argument| read(argument)).collect()
+    pairs(arguments)?.iter().map(|(photo, marks)| read_pair(photo, marks)).collect()
 }
 
-fn read(argument: &str) -> Result<Demonstration> {
-    let (image_path, annotation_path) = photo_and_marks(argument)?;
-    read_pair(&image_path, &annotation_path)
+/// The two files of each argument.
+///
+/// # Errors
+/// A photo that is not there or has no marks beside it; [`Usage`] for what is no such argument.
+pub fn pairs(arguments: &[String]) -> Result<Vec<(PathBuf, PathBuf)>> {
+    arguments.iter().map(|argument| photo_and_marks(argument)).collect()
 }
 
 /// The two files of an argument; a photo alone has its marks beside it.
-fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
+pub fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let photo = Path::new(argument);
     if argument.contains(':') && !photo.exists() {
         return split(argument);

@@ -4,6 +4,7 @@ use std::fmt;
 use std::io;
 use std::process::ExitCode;
 
+use sdg_calibration::CalibrationError;
 use sdg_cell::CellError;
 use sdg_evaluation::EvaluationError;
 use sdg_grasp::GraspError;
@@ -110,6 +111,18 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             }
             EvaluationError::UnitOfOtherSettings { .. } => Some("give another folder with --out".to_owned()),
             EvaluationError::SeveralLabels { .. } => Some("choose one with --label".to_owned()),
+            _ => None,
+        };
+    }
+    if let Some(error) = cause.downcast_ref() {
+        return match error {
+            CalibrationError::OtherCheckerboard { .. } => {
+                Some("give its squares with --squares, or show the whole board".to_owned())
+            }
+            CalibrationError::OtherBoard { .. } => Some("give its squares with --squares".to_owned()),
+            CalibrationError::HandEyeDisagrees { is_other_mount: true, .. } => {
+                Some("with --mount the other one is chosen".to_owned())
+            }
             _ => None,
         };
     }

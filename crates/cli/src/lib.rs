@@ -28,18 +28,12 @@ mod found_text;
 mod interrupt;
 mod json_line;
 pub mod live_pictures;
-#[cfg(feature = "simulation")]
-mod own_part;
-#[cfg(feature = "annotate")]
-mod page_camera;
 #[cfg(feature = "annotate")]
 mod page_teacher;
 #[cfg(feature = "simulation")]
 mod parts;
 mod progress;
 pub mod robots;
-#[cfg(feature = "ros2")]
-mod ros_node;
 mod shared_args;
 mod teaching_progress;
 

@@ -26,10 +26,15 @@
 #[cfg(feature = "simulation")]
 mod against_truth;
 mod error;
+mod footer;
 pub mod held_back;
 pub mod labelled_pictures;
 mod machine;
 pub mod many_parts;
+#[cfg(feature = "simulation")]
+mod motion_drawing;
+#[cfg(feature = "simulation")]
+mod own_part;
 mod progress;
 #[cfg(feature = "simulation")]
 pub mod rehearsal;
@@ -50,6 +55,10 @@ pub mod trial;
 
 pub use error::EvaluationError;
 pub use machine::machine;
+#[cfg(feature = "simulation")]
+pub use motion_drawing::MotionDrawing;
+#[cfg(feature = "simulation")]
+pub use own_part::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
 pub use progress::Progress;
 #[cfg(feature = "simulation")]
 pub use simulated::*;

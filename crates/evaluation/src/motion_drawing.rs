@@ -9,20 +9,20 @@ use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
 
 /// How a motion is drawn, and the name of its files.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct MotionDrawing {
+pub struct MotionDrawing {
     /// Name of the files, without their endings.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// Width of the pictures, px; they are three quarters as high.
-    pub(crate) width_px: u32,
+    pub width_px: u32,
     /// Pictures a second.
-    pub(crate) fps: f64,
+    pub fps: f64,
     /// Pictures of a motion at most: a slow one is shown faster.
-    pub(crate) max_frames: f64,
+    pub max_frames: f64,
 }
 
 impl MotionDrawing {
     /// Time of the arm between two pictures of a motion, s.
-    pub(crate) fn period_secs(&self, duration_secs: f64) -> f64 {
+    pub fn period_secs(&self, duration_secs: f64) -> f64 {
         (duration_secs / self.max_frames).max(1.0 / self.fps)
     }
 
@@ -30,7 +30,7 @@ impl MotionDrawing {
     ///
     /// # Errors
     /// Files that cannot be written, and errors of the renderer.
-    pub(crate) fn draw(
+    pub fn draw(
         &self,
         folder: &Path,
         config: &WorkcellConfig,

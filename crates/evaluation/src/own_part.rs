@@ -4,9 +4,7 @@ use anyhow::{Context, Result};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{GraspModel, Lengths};
 use sdg_simulation::objects::{Extrusion, ObjectSpec};
-
-use crate::exit::Usage;
-use crate::shared_args::OwnPartArgs;
+use thiserror::Error;
 
 /// Between plastic and aluminium, in kg/m³: the density of a part without a given mass.
 const ASSUMED_DENSITY: f64 = 1500.0;
@@ -25,41 +23,76 @@ pub struct OwnPart {
     pub facts: String,
 }
 
-impl OwnPartArgs {
-    /// Makes the part; `model_file` names the model in errors.
+/// What the photo does not show of a part; `None` where it is not given.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct OwnPartSizes {
+    /// Its height over the table.
+    pub height_mm: Option<f64>,
+    /// The longer side of its box.
+    pub length_mm: Option<f64>,
+    pub mass_g: Option<f64>,
+    /// Coefficient of friction of its surface.
+    pub friction: Option<f64>,
+}
+
+/// What was assumed of a part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Assumption {
+    /// The mass, of plastic's and aluminium's density.
+    Mass,
+    Friction,
+    UprightWalls,
+    /// A photo from straight above.
+    PhotoFromAbove,
+    /// The box as its outline, since none was marked.
+    BoxAsOutline,
+}
+
+/// Sizes that do not go with a model.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum OwnPartError {
+    /// Neither given nor known.
+    #[error("expected the longer side of the part's box, which a model taught without a camera does not know")]
+    NeedsLength,
+    /// Neither given nor known.
+    #[error("expected the part's height over the table, which a model taught without a camera does not know")]
+    NeedsHeight,
+    /// Given and known.
+    #[error("expected a model taught without a camera, found one that knows that its part is {known_mm:.1} mm long")]
+    LengthIsKnown { known_mm: f64 },
+}
+
+impl OwnPart {
+    /// Makes the part; `model_file` names the model in errors, and `in_words` says what was assumed.
     ///
     /// # Errors
-    /// [`Usage`] where height or length are neither given nor known; a part that no simulated hand can take.
-    pub fn make(&self, model: GraspModel, model_file: &str) -> Result<OwnPart> {
+    /// [`OwnPartError`]; a part that no simulated hand can take.
+    pub fn make(
+        model: GraspModel,
+        model_file: &str,
+        sizes: &OwnPartSizes,
+        in_words: &dyn Fn(Assumption) -> &'static str,
+    ) -> Result<Self> {
         let known = model.facts().lengths;
         let demonstration = model.demonstrations()[0].clone();
         let marks = &demonstration.marks;
         let region = marks.region();
         let bounds = region.bounds();
         let (long, short) = (bounds.width().max(bounds.height()), bounds.width().min(bounds.height()));
-        let needed = |option: &str, what: &str| {
-            Usage(format!(
-                "expected --object NAME for a shipped part, or {option} for the part of {model_file}: {what}, which a model \
-                 taught without --camera does not know"
-            ))
-        };
-        let metres_per_pixel = match (self.length_mm, known) {
+        let metres_per_pixel = match (sizes.length_mm, known) {
             (Some(length_mm), None) => 1e-3 * length_mm / long,
             (None, Some(lengths)) => 1.0 / lengths.pixels_per_m,
-            (None, None) => return Err(needed("--length-mm MM", "the longer side of its box").into()),
+            (None, None) => return Err(OwnPartError::NeedsLength.into()),
             (Some(_), Some(lengths)) => {
-                return Err(Usage(format!(
-                    "--length-mm: expected a model taught without --camera, found {model_file}, which knows that its part is \
-                     {:.1} mm long",
-                    1e3 * long / lengths.pixels_per_m
-                ))
-                .into());
+                return Err(OwnPartError::LengthIsKnown { known_mm: 1e3 * long / lengths.pixels_per_m }.into());
             }
         };
-        let height_m = match (self.height_mm, known) {
+        let height_m = match (sizes.height_mm, known) {
             (Some(height_mm), _) => 1e-3 * height_mm,
             (None, Some(lengths)) => lengths.mark_height_m,
-            (None, None) => return Err(needed("--height-mm MM", "its height over the table").into()),
+            (None, None) => return Err(OwnPartError::NeedsHeight.into()),
         };
         let mut extrusion = Extrusion {
             name: &marks.label,
@@ -70,23 +103,23 @@ impl OwnPartArgs {
             metres_per_pixel,
             height_m,
             mass_kg: 0.0,
-            friction: self.friction.unwrap_or(ASSUMED_FRICTION),
+            friction: sizes.friction.unwrap_or(ASSUMED_FRICTION),
             symmetry: model.facts().symmetry,
         };
         if extrusion.symmetry == RotationalSymmetry::Fold(1) {
             extrusion.symmetry = RotationalSymmetry::None;
         }
-        extrusion.mass_kg = match self.mass_g {
+        extrusion.mass_kg = match sizes.mass_g {
             Some(grams) => 1e-3 * grams,
             None => (ASSUMED_DENSITY * extrusion.volume_m3()).min(MAX_ASSUMED_KG),
         };
         let mut object = ObjectSpec::extruded(&extrusion).with_context(|| model_file.to_owned())?;
         let assumed = [
-            self.mass_g.is_none().then_some("the mass, of 1.5 g/cm³ (--mass-g)"),
-            self.friction.is_none().then_some("the friction (--friction)"),
-            Some("upright walls"),
-            known.is_none().then_some("a photo from straight above"),
-            marks.outline.is_none().then_some("the box as its outline, since none was marked"),
+            sizes.mass_g.is_none().then_some(Assumption::Mass),
+            sizes.friction.is_none().then_some(Assumption::Friction),
+            Some(Assumption::UprightWalls),
+            known.is_none().then_some(Assumption::PhotoFromAbove),
+            marks.outline.is_none().then_some(Assumption::BoxAsOutline),
         ];
         let facts = format!(
             "{}: {:.1} x {:.1} x {:.1} mm, {:.0} g, friction {}, closed on {:.1} mm; assumed: {}",
@@ -97,7 +130,7 @@ impl OwnPartArgs {
             1e3 * extrusion.mass_kg,
             extrusion.friction,
             1e3 * object.jaw_width_m,
-            assumed.into_iter().flatten().collect::<Vec<_>>().join(", ")
+            assumed.into_iter().flatten().map(in_words).collect::<Vec<_>>().join(", ")
         );
         object.description.clone_from(&facts);
         let model = match known {

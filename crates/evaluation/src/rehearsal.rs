@@ -17,7 +17,8 @@ use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
 use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Place, PlaceGoal, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{SceneVariation, VariationConfig, base_from_look_camera};
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::views::base_from_look_camera;
 use sdg_simulation::{
     AttemptConfig, AttemptErrors, AttemptReport, RecordConfig, SimulationError, Workcell, WorkcellConfig, part_shape,
 };

@@ -11,9 +11,10 @@ use sdg_robot::GraspStep;
 use sdg_simulation::RecordConfig;
 use sdg_simulation::objects::ObjectSpec;
 
+use crate::footer::FOOTER;
 use crate::machine::machine;
 use crate::rehearsal::Rehearsed;
-use crate::teaching_page::{self, FOOTER};
+use crate::teaching_page;
 use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
 
 /// What every page is made from.

@@ -13,6 +13,7 @@ use sdg_report::{
     draw_demonstration, draw_line,
 };
 
+use crate::footer::FOOTER;
 use crate::held_back::HeldBackFigures;
 use crate::machine::machine;
 
@@ -22,8 +23,6 @@ const SHEET: u64 = 24;
 const TRIED: u64 = 6;
 /// Where those begin: far beyond the samples of any training.
 const FIRST_TRIED: u64 = 1 << 40;
-/// The end of every page.
-pub const FOOTER: &str = "Made by sdg. This page is one file: it fetches nothing and runs no script.";
 
 /// The page of `sdg teach`.
 pub struct TeachingPage<'a> {

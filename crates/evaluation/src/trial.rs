@@ -6,7 +6,7 @@ use sdg_cell::drawing;
 use sdg_grasp::{GraspDetection, GraspModel, Verification};
 use sdg_report::DetectionError;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{TestView, test_views};
+use sdg_simulation::views::{TestView, test_views};
 
 use crate::against_truth::{grasp_error, grasp_pose};
 

@@ -60,7 +60,15 @@ impl CameraFile {
     /// # Errors
     /// A picture of another size.
     pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
-        Ok(self.camera.check_picture(picture.dimensions())?)
+        self.check_size(picture.dimensions())
+    }
+
+    /// The same by its width and height.
+    ///
+    /// # Errors
+    /// Another size.
+    pub fn check_size(&self, size: (u32, u32)) -> Result<()> {
+        Ok(self.camera.check_picture(size)?)
     }
 
     /// Photos of this camera and their marks in the plan view of the marks' plane; heights over the table in metres.

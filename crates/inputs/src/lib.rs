@@ -1,8 +1,8 @@
-//! A user's files as values: photos with their marks, cameras, models, weights to start from.
+//! A user's files as values: photos with their marks, cameras, workcells, models, weights to start from.
 //!
 //! ```text
 //! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: are they this photo's? ─ Demonstration
-//! camera.yaml ─ CameraFile ─ Perception, plan views of photos
+//! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
 //! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
 //! ```
 //!
@@ -34,13 +34,19 @@ mod error;
 mod error_line;
 pub mod marks_check;
 mod models;
+mod picture_inputs;
 mod pictures;
+mod teaching_files;
+mod workcell_files;
 
 pub use annotation_files::MAX_ANNOTATION_BYTES;
 pub use error::ConfigError;
 pub use error_line::one_line;
 pub use models::{check_replaces_a_model, read_model};
+pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};
 pub use pictures::{
     UNREADABLE_EXTENSIONS, check_is_not_turned, read_image, read_image_in, read_sensor_pixels_if_turned,
     read_standard_input_image,
 };
+pub use teaching_files::TeachingFiles;
+pub use workcell_files::read_workcell;

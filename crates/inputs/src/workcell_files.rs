@@ -1,4 +1,4 @@
-//! `--workcell FILE`.
+//! Workcells on disk.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ const MAX_BYTES: u64 = 1 << 20;
 ///
 /// # Errors
 /// A file that cannot be read, with the line.
-pub(crate) fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
+pub fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
     let Ok(text) = String::from_utf8(sdg_files::read(path, MAX_BYTES)?) else {
         bail!("{}: expected TOML, found bytes that are no text", path.display());
     };

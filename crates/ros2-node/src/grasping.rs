@@ -1,6 +1,5 @@
 //! `~/grasp`: the grasp sequence with an arm behind ROS 2, in a thread.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
@@ -8,51 +7,31 @@ use std::time::{Duration, Instant, SystemTime};
 use anyhow::{Context, Result};
 use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
-use sdg_inputs::camera_files;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, PlannedArm, Robot, RobotError, StepObserver,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, Pace, PartFinder, PlannedArm, Robot, RobotError,
+    StepObserver, StopReason, Watch,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
 
-use super::pictures::Shared;
-use crate::commands::ros2::args::Ros2Args;
-use crate::exit::Usage;
-use crate::interrupt::Interrupt;
-use crate::robots;
+use crate::pictures::Shared;
+use crate::settings::IsInterrupted;
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What a grasp needs besides an arm and a model.
-pub(crate) struct GraspSettings {
-    workcell: Workcell,
-    camera: PlacedCamera,
-    speed: f64,
-    base_frame: String,
-}
-
-impl GraspSettings {
-    /// Reads and checks the workcell and the camera.
-    ///
-    /// # Errors
-    /// Files that cannot be used.
-    pub(crate) fn read(args: &Ros2Args) -> Result<Self> {
-        let workcell_path: &PathBuf =
-            args.arm.workcell.as_ref().ok_or_else(|| Usage("--allow-motion: expected --workcell FILE".to_owned()))?;
-        let (workcell, camera_of_workcell) = robots::read_workcell(workcell_path)?;
-        robots::pace(args.arm.speed)?;
-        let camera_path = args
-            .camera
-            .clone()
-            .or(camera_of_workcell)
-            .ok_or_else(|| Usage("--allow-motion: expected --camera FILE".to_owned()))?;
-        let (calibrated, _) = camera_files::read(&camera_path)?;
-        let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
-        let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
-        Ok(Self { workcell, camera, speed: args.arm.speed, base_frame })
-    }
+#[derive(Debug, Clone)]
+pub struct GraspSettings {
+    /// The cell, with the limits of motions in it.
+    pub workcell: Workcell,
+    /// The camera of the pictures.
+    pub camera: PlacedCamera,
+    /// Share of the joints' velocity limits, unless a request says another.
+    pub speed: f64,
+    /// The frame of poses in answers.
+    pub base_frame: String,
 }
 
 /// The newest picture of the topic, once the arm is at rest.
@@ -86,7 +65,7 @@ type Ended = (TrajectoryArm, GraspResponse, Option<String>);
 pub(super) struct Grasping {
     settings: Arc<GraspSettings>,
     pictures: TopicPictures,
-    interrupt: Interrupt,
+    is_interrupted: IsInterrupted,
     arm: Option<TrajectoryArm>,
     running: Option<JoinHandle<Ended>>,
     /// Why nothing moves any more.
@@ -98,12 +77,12 @@ impl Grasping {
         settings: GraspSettings,
         arm: TrajectoryArm,
         pictures: Arc<Shared>,
-        interrupt: &Interrupt,
+        is_interrupted: &IsInterrupted,
     ) -> Self {
         Self {
             settings: Arc::new(settings),
             pictures: TopicPictures(pictures),
-            interrupt: interrupt.clone(),
+            is_interrupted: Arc::clone(is_interrupted),
             arm: Some(arm),
             running: None,
             latched: None,
@@ -119,7 +98,7 @@ impl Grasping {
             anyhow::bail!("nothing moves until a person has looked and starts the node again: {why}");
         }
         let speed = if request.speed > 0.0 { request.speed } else { self.settings.speed };
-        let pace = robots::pace(speed)?;
+        let pace = Pace::at_speed(speed)?;
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }
@@ -130,14 +109,14 @@ impl Grasping {
             ..self.settings.workcell.grasp_config()
         };
         let mut arm = self.arm.take().context("the arm is lost")?;
-        let (settings, interrupt) = (Arc::clone(&self.settings), self.interrupt.clone());
+        let (settings, is_interrupted) = (Arc::clone(&self.settings), Arc::clone(&self.is_interrupted));
         let mut finder = ModelFinder::new(model.clone(), settings.camera, self.pictures.clone());
         let is_dry_run = request.dry_run;
         self.running = Some(std::thread::spawn(move || {
             let (answer, latched) = if is_dry_run {
                 (planned(&settings, &config, &mut arm, &mut finder), None)
             } else {
-                grasped(&settings, &config, &mut arm, &mut finder, &interrupt)
+                grasped(&settings, &config, &mut arm, &mut finder, &is_interrupted)
             };
             (arm, answer, latched)
         }));
@@ -165,9 +144,9 @@ fn grasped(
     config: &GraspConfig,
     arm: &mut TrajectoryArm,
     finder: &mut ModelFinder<TopicPictures>,
-    interrupt: &Interrupt,
+    is_interrupted: &IsInterrupted,
 ) -> (GraspResponse, Option<String>) {
-    let mut robot = Robot::new(arm, settings.workcell.safety_limits(), robots::watch(interrupt));
+    let mut robot = Robot::new(arm, settings.workcell.safety_limits(), watch(is_interrupted));
     let mut step = LastStep(GraspStep::Detect);
     let ended = sdg_robot::grasp(&mut robot, finder, &mut step, settings.camera.mount(), config);
     let latched = robot.latched().map(str::to_owned);
@@ -192,6 +171,12 @@ fn grasped(
         }
     };
     (answer, latched)
+}
+
+/// Stops the arm where the node is to end.
+fn watch(is_interrupted: &IsInterrupted) -> Watch {
+    let is_interrupted = Arc::clone(is_interrupted);
+    Watch::new(Box::new(move || is_interrupted().then_some(StopReason::Interrupted)))
 }
 
 /// The same with an arm that moves nothing, from where the real one stands.

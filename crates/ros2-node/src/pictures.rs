@@ -11,7 +11,7 @@ use sdg_ros2::dds::{Node, Qos, Received, Subscription, stamp_or_now};
 use sdg_ros2::messages::{CompressedImage, Header, Image, Message};
 use sdg_ros2::{PictureError, RosError, encoding};
 
-use super::lines::Lines;
+use crate::lines::Lines;
 
 /// How often a thread looks whether it is to end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);

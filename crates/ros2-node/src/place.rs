@@ -11,20 +11,27 @@ use sdg_ros2::dds::{Node, Qos};
 use sdg_ros2::messages::{CameraInfo, Header, TfMessage};
 use sdg_ros2::{RosError, Transforms, camera_info};
 
-use super::lines::Lines;
+use crate::lines::Lines;
 
 /// How often a thread looks whether it is to end.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Where the camera's place comes from.
 #[derive(Debug, Clone)]
-pub(crate) enum PlaceSource {
+pub enum PlaceSource {
     /// Nowhere: detections have no poses.
     Unknown,
     /// The camera's file.
     File(CameraOverTable),
     /// tf; intrinsics of the camera's file, or else of camera_info.
-    Transforms { base_frame: String, table_height_m: f64, intrinsics: Option<PinholeCamera> },
+    Transforms {
+        /// The frame of the robot's base.
+        base_frame: String,
+        /// z of the table in that frame.
+        table_height_m: f64,
+        /// Those of the camera's file.
+        intrinsics: Option<PinholeCamera>,
+    },
 }
 
 struct Known {
@@ -33,14 +40,14 @@ struct Known {
 }
 
 /// Follows tf and camera_info in threads.
-pub(super) struct Place {
+pub(super) struct CameraPlace {
     source: PlaceSource,
     known: Arc<Mutex<Known>>,
     is_stopped: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
-impl Place {
+impl CameraPlace {
     pub(super) fn open(
         node: &mut Node,
         source: PlaceSource,
@@ -125,7 +132,7 @@ fn lock(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
     known.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Drop for Place {
+impl Drop for CameraPlace {
     fn drop(&mut self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         for thread in self.threads.drain(..) {

@@ -14,9 +14,9 @@ use sdg_ros2::messages::{
     TfMessage, Time,
 };
 
-use super::lines::Lines;
-use super::pictures::PictureReader;
-use super::searching::Searched;
+use crate::lines::Lines;
+use crate::pictures::PictureReader;
+use crate::searching::Searched;
 
 /// Diagnostics are published this often.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);

@@ -11,7 +11,7 @@ use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspModel, Verificatio
 use sdg_ros2::found::FoundPart;
 use sdg_ros2::messages::Header;
 
-use super::pictures::Picture;
+use crate::pictures::Picture;
 
 /// A grasp model, and the camera behind which it looks.
 pub(super) struct Searcher {
@@ -57,7 +57,7 @@ impl Searcher {
     /// # Errors
     /// No model, one without lengths behind a calibrated camera, a picture of another size than the camera's.
     pub(super) fn search(&mut self, picture: &Picture, place: Option<&CameraOverTable>) -> Result<Searched> {
-        const NO_MODEL: &str = "no grasp model yet: --grasp-model, or the service teach";
+        const NO_MODEL: &str = "no grasp model yet: start the node with one, or call the service teach";
         let perception = self.perception.as_mut().context(NO_MODEL)?;
         let started = Instant::now();
         if let Some(place) = place {

@@ -14,10 +14,10 @@ use sdg_ros2::messages::{
     TriggerResponse,
 };
 
-use super::grasping::Grasping;
-use super::lines::Lines;
-use super::searching::Searched;
-use super::teaching::{Teaching, TriggerTeaching};
+use crate::grasping::Grasping;
+use crate::lines::Lines;
+use crate::searching::Searched;
+use crate::teaching::{Teach, TeachJob, Teaching};
 
 /// How long a picture is waited for unless the request says.
 const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
@@ -99,8 +99,8 @@ pub(super) struct Services {
     detecting: Vec<Detecting>,
     teach: Pair<TeachRequest, TeachResponse>,
     teaching: Option<(Asker, Teaching)>,
-    trigger_teaching: Option<TriggerTeaching>,
-    camera_file: Option<PathBuf>,
+    teach_with: Arc<Teach>,
+    trigger_teaching: Option<TeachJob>,
     grasp: Option<(Pair<GraspRequest, GraspResponse>, Grasping)>,
     grasping: Option<Asker>,
     lines: Arc<Lines>,
@@ -109,8 +109,8 @@ pub(super) struct Services {
 impl Services {
     pub(super) fn open(
         node: &mut Node,
-        trigger_teaching: Option<TriggerTeaching>,
-        camera_file: Option<PathBuf>,
+        teach_with: Arc<Teach>,
+        trigger_teaching: Option<TeachJob>,
         grasping: Option<Grasping>,
         lines: &Arc<Lines>,
     ) -> Result<Self, RosError> {
@@ -123,8 +123,8 @@ impl Services {
             detecting: Vec::new(),
             teach: Pair::open(node, "teach", "Teach")?,
             teaching: None,
+            teach_with,
             trigger_teaching,
-            camera_file,
             grasp,
             grasping: None,
             lines: Arc::clone(lines),
@@ -192,7 +192,9 @@ impl Services {
         for (asker, request) in pair.requests(&self.lines) {
             let begun = match (request, model, self.grasping.is_some()) {
                 (Err(error), ..) => Err(error.to_string()),
-                (_, None, _) => Err("no grasp model yet: --grasp-model, or the service teach".to_owned()),
+                (_, None, _) => {
+                    Err("no grasp model yet: start the node with one, or call the service teach".to_owned())
+                }
                 (_, _, true) => Err("a grasp is under way".to_owned()),
                 (Ok(request), Some(model), false) => {
                     grasping.begin(&request, model).map_err(|error| format!("{error:#}"))
@@ -217,17 +219,17 @@ impl Services {
 
     fn take_teachings(&mut self) {
         for (asker, request) in self.teach.requests(&self.lines) {
-            let request = match (asker, request, &self.trigger_teaching) {
-                (Asker::Trigger(_), Ok(_), Some(teaching)) => Ok(teaching.request()),
+            let begun = match (asker, request, &self.trigger_teaching) {
+                _ if self.teaching.is_some() => Err("a teaching is under way".to_owned()),
+                (Asker::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
                 (Asker::Trigger(_), Ok(_), None) => {
-                    Err("expected a node that was started with --teach-demo and --teach-out".to_owned())
+                    Err("expected a node that was started with a demonstration and a file to teach".to_owned())
                 }
-                (_, request, _) => request.map_err(|error| error.to_string()),
+                (_, Ok(request), _) => {
+                    Teaching::of_request(&request, &self.teach_with).map_err(|error| format!("{error:#}"))
+                }
+                (_, Err(error), _) => Err(error.to_string()),
             };
-            let begun = request.and_then(|request| match self.teaching {
-                Some(_) => Err("a teaching is under way".to_owned()),
-                None => Teaching::begin(&request, self.camera_file.as_deref()).map_err(|error| format!("{error:#}")),
-            });
             match begun {
                 Ok(teaching) => self.teaching = Some((asker, teaching)),
                 Err(message) => self.answer_teaching(asker, Err(message)),

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use nalgebra::Isometry3;
 
-use super::mesh::TriangleMesh;
-use super::texture::Texture;
 use crate::model::Asset;
+use crate::shapes::mesh::TriangleMesh;
+use crate::shapes::texture::Texture;
 
 /// Complete top-level sections (`<visual>`, `<asset>`, `<worldbody>`) to paste into a `<mujoco>` element.
 #[derive(Debug, Clone, Default, PartialEq)]

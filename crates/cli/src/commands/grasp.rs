@@ -6,7 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
-use sdg_cell::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape};
+use sdg_cell::{
+    DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape, run_sequence,
+};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_inputs::camera_files;
 use sdg_robot::workcell::Workcell;
@@ -21,7 +23,7 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
-use crate::robots::{self, Consent, DryRun, Ended, RobotChoice, confirm, run_sequence, write_states};
+use crate::robots::{self, Consent, RobotChoice, confirm, draw_plan, print_plan, write_states};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg grasp`
@@ -112,7 +114,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
 }
 
 fn prepare(args: &GraspArgs) -> Result<Prepared> {
-    let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
+    let (workcell, camera_of_workcell) = sdg_inputs::read_workcell(&args.workcell)?;
     let goal = match &args.place {
         None => None,
         Some(text) => Some(workcell.place(text).map_err(|error| Usage(format!("--{error}")))?),
@@ -240,8 +242,8 @@ fn dry_run<A: Arm>(
     let place = prepared.place.as_ref();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config, place)?;
     eprintln!("what would be done:");
-    plan.print(target.is_some())?;
-    for file in plan.draw(&args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
+    print_plan(&plan, target.is_some())?;
+    for file in draw_plan(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

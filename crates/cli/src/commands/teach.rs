@@ -2,19 +2,19 @@
 
 use std::fmt::Display;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args as ClapArgs;
-use sdg_demonstration::{Demonstration, PixelFrame};
+use sdg_demonstration::Demonstration;
 use sdg_evaluation::TaughtFile;
+use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
-use sdg_inputs::base_weights;
-use sdg_inputs::camera_files::CameraFile;
+use sdg_inputs::{TeachingFiles, base_weights};
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
@@ -125,28 +125,34 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     Ok(options)
 }
 
+/// Teaches with progress on standard error, writes the model's file, and tries it on held-back samples.
+///
+/// # Errors
+/// Those of teaching as [`GraspError`]; a file that cannot be written.
+pub(super) fn teach_to_file(
+    demonstrations: &[Demonstration],
+    options: &TeachOptions,
+    out: &Path,
+    interrupt: &Interrupt,
+) -> Result<(TaughtFile, HeldBackFigures)> {
+    let mut progress = TeachingProgress::new(interrupt.clone());
+    let taught = TaughtFile::teach(demonstrations, options, &mut |event| progress.show(event));
+    progress.finish();
+    let file = taught?;
+    sdg_files::write(out, &file.bytes)?;
+    let figures = file.figures(demonstrations, options.seed)?;
+    Ok((file, figures))
+}
+
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
-    let mut pixel_frame = PixelFrame::Upright;
-    if args.camera.file.is_some() {
-        demonstrations::check_are_not_turned(&args.demonstrations)?;
-        pixel_frame = PixelFrame::Sensor;
-    }
-    let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
-    options.negatives =
-        args.negatives.iter().map(|path| sdg_inputs::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
-    if let Some(path) = &args.camera.file {
-        let camera = CameraFile::read(path)?;
-        for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
-            camera.check_picture(&photo.image).with_context(|| argument.clone())?;
-        }
-        let [mark, grasp] = args.camera.heights_m();
-        let (seen, lengths) = camera.seen_from_above(&demonstrations, mark, grasp)?;
-        demonstrations = seen;
-        options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
-        options.lengths = Some(lengths);
-    }
+    let files = TeachingFiles {
+        demonstrations: &demonstrations::pairs(&args.demonstrations)?,
+        negatives: &args.negatives,
+        camera: args.camera.file.as_deref().map(|path| (path, args.camera.heights_m())),
+    };
+    let demonstrations = files.read(&mut options)?;
     sdg_files::check_writable(&args.out)?;
     sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
@@ -154,18 +160,15 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     }
     let report = read_base_weights(args, &mut options)?;
 
-    let mut progress = TeachingProgress::new(Interrupt::watch());
-    let taught = TaughtFile::teach(&demonstrations, &options, &mut |event| progress.show(event));
-    progress.finish();
-    let file = taught.map_err(|error| match error {
-        GraspError::NeedsBaseWeights { preset } if preset == Preset::Edge.name() => {
+    let taught = teach_to_file(&demonstrations, &options, &args.out, &Interrupt::watch());
+    let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
+        Some(GraspError::NeedsBaseWeights { preset }) if *preset == Preset::Edge.name() => {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
-        GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
-        error => anyhow::Error::from(error).context(args.demonstrations.join(", ")),
+        Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
+        Some(_) => error.context(args.demonstrations.join(", ")),
+        None => error,
     })?;
-    sdg_files::write(&args.out, &file.bytes)?;
-    let figures = file.figures(&demonstrations, args.seed)?;
     let TaughtFile { taught, bytes, .. } = file;
     let page = match &args.report {
         Some(folder) => {

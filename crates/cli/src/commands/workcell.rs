@@ -1,17 +1,12 @@
 //! `sdg workcell`: what a workcell's file says.
 
-mod map;
-mod reach;
-
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use sdg_cell::{Reach, WorkcellMap};
 
 use crate::exit::Outcome;
-use crate::robots;
-use map::Map;
-use reach::Reach;
 
 /// The verbs of `sdg workcell`.
 #[derive(Debug, Subcommand)]
@@ -48,9 +43,9 @@ pub fn run(command: &WorkcellCommand) -> Result<Outcome> {
             return Err(crate::exit::Usage(why).into());
         }
     }
-    let (workcell, _) = robots::read_workcell(&args.workcell)?;
+    let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     sdg_files::check_writable(&args.out)?;
-    let map = Map::around(&workcell);
+    let map = WorkcellMap::around(&workcell);
     let reach = Reach::of(&workcell, map.area_m(), args.grid_mm * 1e-3, args.height_mm * 1e-3)?;
     for line in reach.lines(&workcell) {
         eprintln!("{line}");

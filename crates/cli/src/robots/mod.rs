@@ -3,12 +3,8 @@
 mod confirm;
 mod dry_run;
 #[cfg(feature = "simulation")]
-mod motion_drawing;
-mod sequence_run;
-#[cfg(feature = "simulation")]
 mod simulated_scene;
 mod states_file;
-mod workcell_file;
 
 use std::str::FromStr;
 
@@ -19,14 +15,10 @@ use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 
 pub(crate) use confirm::{Consent, confirm};
-pub(crate) use dry_run::DryRun;
-#[cfg(feature = "simulation")]
-pub(crate) use motion_drawing::MotionDrawing;
-pub(crate) use sequence_run::{Ended, run_sequence};
+pub(crate) use dry_run::{draw_plan, print_plan};
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;
-pub(crate) use workcell_file::read_workcell;
 
 /// `--robot`: an address, or the simulated arm of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -16,6 +16,7 @@ mod page;
 mod picture;
 mod records;
 mod score;
+mod summary;
 mod taught;
 mod truth_file;
 
@@ -25,4 +26,5 @@ pub use picture::{Instance, LabelledPicture};
 pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
 pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
 pub use sdg_cell::DEFAULT_MIN_SCORE;
+pub use summary::summary;
 pub use truth_file::{TRUTH_FILE, TruthEntry};

@@ -13,9 +13,9 @@ use sdg_report::{
 
 use super::records::Evaluated;
 use super::score::{HitError, Judged, Outcome, Tested, Totals, sweep};
+use crate::footer::FOOTER;
 use crate::machine::machine;
 use crate::statistics::{Share, wilson_interval};
-use crate::teaching_page::FOOTER;
 
 /// Pictures drawn on the page at most; of more, the worst.
 const MAX_DRAWN: usize = 200;

@@ -14,9 +14,11 @@ mod findings;
 mod folder;
 mod page;
 mod part_store;
+mod teach;
 
 pub use cross_check::CrossCheck;
 pub use findings::Findings;
 pub use folder::{DemonstrationFolder, PartDemonstrations};
 pub use page::page;
 pub use part_store::{PartOutcome, PartRecord, PartStore};
+pub use teach::teach_part;

@@ -5,8 +5,8 @@ use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, 
 
 use super::findings::Findings;
 use super::part_store::PartOutcome;
+use crate::footer::FOOTER;
 use crate::machine::machine;
-use crate::teaching_page::FOOTER;
 
 /// Pairs of photos that are shown; the table has all.
 const MAX_SHOWN: usize = 24;

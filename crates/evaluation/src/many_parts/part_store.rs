@@ -61,6 +61,16 @@ impl PartOutcome {
             median: figures.median_errors(),
         }
     }
+
+    /// In a few words.
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Taught { seconds, found, parts, .. } => {
+                format!("finds {found} of {parts} held-back samples ({seconds:.1} s)")
+            }
+            Self::Failed { why } => format!("failed: {why}"),
+        }
+    }
 }
 
 impl PartStore {

@@ -3,7 +3,8 @@
 use anyhow::{Context, Result};
 use sdg_grasp::{GraspModel, Verification};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{SceneVariation, TestView, VariationConfig, test_view, test_views};
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::views::{TestView, test_view, test_views};
 
 use super::records::{DetectionRecord, PictureRecord};
 use crate::trial::{Trial, try_view};

@@ -22,6 +22,7 @@ pub mod axes;
 pub mod cameras;
 mod cell;
 mod groups;
+mod jitter;
 mod looking;
 mod one_unit;
 mod page;

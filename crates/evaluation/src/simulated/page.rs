@@ -10,6 +10,7 @@ use super::records::{AttemptRecord, LOSS_STEPS, TeachingRecord};
 use super::store::Store;
 use super::summary::{Figures, ModelSummary, Summary};
 use super::tables::{Titled, notice, tables, this_run};
+use crate::footer::FOOTER;
 
 /// Success at a glance, the tables and a picture of every cell, group by group.
 pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], command: &str) -> Result<Report> {
@@ -62,9 +63,7 @@ pub fn page(summaries: &[Summary], store: &Store, facts: &[(&str, String)], comm
             );
         }
     }
-    Ok(report
-        .section(this_run(facts, command))
-        .footer("Made by sdg. This page is one file: it fetches nothing and runs no script."))
+    Ok(report.section(this_run(facts, command)).footer(FOOTER))
 }
 
 /// Success beside the paper's, and where the attempts of each model and on each part ended.

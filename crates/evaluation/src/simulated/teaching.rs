@@ -10,10 +10,10 @@ use sdg_grasp::{
 };
 use sdg_inputs::one_line;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::demonstration_view;
+use sdg_simulation::views::demonstration_view;
 
-use super::axes::{MARKS_JITTER_PX, with_jittered_marks};
 use super::cell::{Cell, Marks};
+use super::jitter::{MARKS_JITTER_PX, with_jittered_marks};
 use super::looking::part_seed;
 use super::one_unit::caught;
 use super::records::{LOSS_STEPS, TeachingRecord};

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use anyhow::{Context, Result};
 use sdg_grasp::Verification;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{TestView, test_views};
+use sdg_simulation::views::{TestView, test_views};
 
 use super::attempting::{go_on, held_of};
 use super::cell::{Cell, Marks, attempts_of};

@@ -245,7 +245,7 @@ fn short(value: f64, digits: usize) -> String {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::scene::solids::{box_solid, lathe};
+    use crate::shapes::solids::{box_solid, lathe};
     use approx::assert_relative_eq;
 
     #[test]

@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Point2, Point3};
 use sdg_geometry::{GraspLine, Mask, PlanarGrasp, Polygon, PosedCamera, outer_outline};
 use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
 
-use super::{PlacedObject, SceneVariation, VariationConfig};
 use crate::camera::CameraView;
 use crate::error::{Result, SimulationError};
 use crate::model::Body;
 use crate::objects::ObjectSpec;
+use crate::scene::{PlacedObject, SceneVariation, VariationConfig};
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Where the parts lie when they are shown to the system: x, y in metres and yaw in radians, in the base frame.

@@ -13,7 +13,7 @@ use rand_pcg::Pcg64Mcg;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 use sdg_robot::camera_looking_down;
 
-use super::{GraspTruth, PlacedObject, SceneVariation, VariationConfig, pose_attributes, shows_whole};
+use super::{GraspTruth, shows_whole};
 use crate::camera::CameraView;
 use crate::data::Data;
 use crate::error::{Result, SimulationError};
@@ -21,6 +21,7 @@ use crate::lens::Frustum;
 use crate::objects::{LookAlikeKind, ObjectSpec};
 use crate::panda::PandaIds;
 use crate::render::{RenderConfig, Renderer};
+use crate::scene::{PlacedObject, SceneVariation, VariationConfig, pose_attributes};
 use crate::workcell::{WorkcellConfig, build_model};
 
 /// A camera model and where it may hang.

@@ -10,20 +10,15 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_cell::{Found, Perception};
+use sdg_cell::{DEFAULT_MIN_SCORE, Found, FoundRecord, Perception, drawing};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
+use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument};
 use serde::Serialize;
 
 pub use args::DetectArgs;
-use inputs::{Input, Inputs};
-use sdg_cell::DEFAULT_MIN_SCORE;
-use sdg_cell::FoundRecord;
-use sdg_cell::drawing;
-use sdg_inputs::camera_files;
 
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage, one_line};
-
 use crate::found_text::{Wording, advice_in_words};
 use crate::json_line::json_line;
 
@@ -68,8 +63,8 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         last_error: String::new(),
         found_any: false,
     };
-    let inputs: Vec<_> = args.images.iter().map(|argument| (argument, inputs::of_argument(argument))).collect();
-    let num_pictures = |inputs: &Result<Inputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
+    let inputs: Vec<_> = args.images.iter().map(|argument| (argument, pictures_of_argument(argument))).collect();
+    let num_pictures = |inputs: &Result<PictureInputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
     batch.is_alone = inputs.iter().map(|(_, inputs)| num_pictures(inputs)).sum::<usize>() == 1;
     if let Some(folder) = &args.draw {
         let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
@@ -78,7 +73,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
     }
     for (argument, inputs) in inputs {
         match inputs {
-            Ok(Inputs { pictures, skipped }) => {
+            Ok(PictureInputs { pictures, skipped }) => {
                 if let Some(skipped) = skipped {
                     eprintln!("{skipped}");
                 }
@@ -116,7 +111,7 @@ impl<W: Write> Batch<'_, W> {
     ///
     /// # Errors
     /// Standard output that cannot be written.
-    fn picture(&mut self, input: &Input) -> Result<()> {
+    fn picture(&mut self, input: &PictureInput) -> Result<()> {
         match self.detect(input) {
             Ok(seen) => {
                 self.num_used += 1;
@@ -141,7 +136,7 @@ impl<W: Write> Batch<'_, W> {
         Ok(())
     }
 
-    fn detect(&mut self, input: &Input) -> Result<Seen> {
+    fn detect(&mut self, input: &PictureInput) -> Result<Seen> {
         let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
         let image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();

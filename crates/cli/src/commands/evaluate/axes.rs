@@ -5,7 +5,8 @@ use std::fmt::Write;
 use anyhow::{Context, Result, bail};
 use sdg_evaluation::Store;
 use sdg_evaluation::axes::{
-    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
+    Against, AxesEvaluation, AxesSummary, RunEnd, Selection, comparison_lines, comparison_tables, markdown, page,
+    summary_lines,
 };
 use sdg_evaluation::machine;
 use sdg_grasp::ModelKind;
@@ -87,8 +88,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        print_lines(&summary);
-        print_comparisons(&comparisons);
+        print!("{}{}", summary_lines(&summary), comparison_lines(&comparisons));
         println!("seconds of a worker: {}", facts[2].1);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
@@ -99,61 +99,6 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
             "{} units of work failed, {remaining} are to do: the same command tries them again; the first: {first}",
             failures.len()
         ),
-    }
-}
-
-/// A line for each model in each group and way, and for each error.
-fn print_lines(summary: &AxesSummary) {
-    for group in &summary.groups {
-        println!("{}:", group.group.title());
-        let mut rows: Vec<_> = group.axes.iter().map(|figures| (figures.model, figures.way)).collect();
-        rows.extend(group.look_alikes.iter().map(|figures| (figures.model, figures.way)));
-        rows.sort_by_key(|(model, way)| (model.letter(), *way == Way::NetworkAlone));
-        rows.dedup();
-        for (model, way) in rows {
-            let mut told: Vec<String> = group
-                .axes
-                .iter()
-                .filter(|figures| (figures.model, figures.way) == (model, way))
-                .map(|figures| format!("{} {}", figures.axis, figures.found))
-                .collect();
-            told.extend(
-                group
-                    .look_alikes
-                    .iter()
-                    .filter(|figures| (figures.model, figures.way) == (model, way) && figures.is_sum())
-                    .map(|figures| format!("look-alikes of {} accepted {}", figures.kind, figures.accepted)),
-            );
-            println!("  {model} {}: {}", way.name(), told.join(", "));
-        }
-        for figures in &group.grasps {
-            println!(
-                "  {} {}: held {}, {} of them at the first look",
-                figures.model,
-                figures.condition.name(),
-                figures.held,
-                figures.held_at_first_look.count
-            );
-        }
-    }
-}
-
-/// A line for each comparison.
-fn print_comparisons(comparisons: &[Comparison]) {
-    for comparison in comparisons {
-        let [low, high] = comparison.interval.map(|bound| 100.0 * bound);
-        println!(
-            "against, {}: {} {}, {}: {} and {}, difference {:.1} points ({low:.1} to {high:.1}), {}, cases needed {}",
-            comparison.group.title().to_lowercase(),
-            comparison.model,
-            comparison.way.name(),
-            comparison.axis,
-            comparison.counts.first(),
-            comparison.counts.second(),
-            100.0 * comparison.difference,
-            if comparison.differs { "differs" } else { "does not differ" },
-            comparison.cases_needed.map_or("none".to_owned(), |cases| cases.to_string()),
-        );
     }
 }
 

@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use sdg_evaluation::MotionDrawing;
 use sdg_kinematics::Trajectory;
 use sdg_robot::workcell::Workcell;
 use sdg_simulation::WorkcellConfig;
 use sdg_simulation::scene::SceneVariation;
-
-use crate::robots::MotionDrawing;
 
 const DRAWING: MotionDrawing = MotionDrawing { name: "plan", width_px: 480, fps: 10.0, max_frames: 100.0 };
 

@@ -69,7 +69,7 @@ pub struct PlanArgs {
 /// Plans, prints the plan and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
-    let (workcell, _) = robots::read_workcell(&args.workcell)?;
+    let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     let mut model = workcell.collision_model(args.opening_mm * 1e-3).map_err(|error| Usage(error.to_string()))?;
     if let Some(Held { diameter_m, length_m }) = args.held_mm {
         let radius_m = 0.5 * diameter_m;

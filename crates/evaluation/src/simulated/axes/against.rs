@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sdg_grasp::ModelKind;
 use sdg_report::{Cell as TableCell, Column, Table};
-use sdg_simulation::scene::Axis;
+use sdg_simulation::views::Axis;
 use serde::Serialize;
 
 use super::paired::PairedCounts;

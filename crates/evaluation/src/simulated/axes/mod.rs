@@ -12,8 +12,8 @@
 //! paper's protocol.
 
 mod against;
-mod jitter;
 mod known_from_simulator;
+mod lines;
 mod matching;
 mod page;
 mod paired;
@@ -27,7 +27,7 @@ mod way;
 mod work;
 
 pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
-pub use jitter::{MARKS_JITTER_PX, with_jittered_marks};
+pub use lines::{comparison_lines, summary_lines};
 pub(super) use matching::match_one_to_one;
 pub use page::page;
 pub use paired::PairedCounts;

@@ -6,6 +6,7 @@ use sdg_report::{KeyFigure, Report, Section, ShareChart, Tone};
 use super::summary::{AxesSummary, AxisFigures, GroupSummary};
 use super::tables::{notice, tables};
 use super::way::Way;
+use crate::footer::FOOTER;
 use crate::simulated::tables::{Titled, this_run};
 
 /// The shares at a glance, then all tables; `more` are tables to follow.
@@ -34,9 +35,7 @@ pub fn page(summary: &AxesSummary, more: Vec<Titled>, facts: &[(&str, String)], 
     for Titled { title, lead, table } in tables(summary).into_iter().chain(more) {
         report = report.section(begun(Section::new(title).lead(lead)).table(table));
     }
-    report
-        .section(this_run(facts, command))
-        .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
+    report.section(this_run(facts, command)).footer(FOOTER)
 }
 
 /// Of each model the axis on which it finds the least, with the check.

@@ -1,6 +1,6 @@
 //! Records of the pictures of an axis, as the store keeps them.
 
-use sdg_simulation::scene::Axis;
+use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
 
 use super::way::Way;

@@ -1,6 +1,6 @@
 //! What is measured beyond the paper's protocol: axes of pictures, and grasps under errors, by their names.
 
-use sdg_simulation::scene::Axis;
+use sdg_simulation::views::Axis;
 use serde::{Deserialize, Serialize};
 
 /// What is wrong with what the robot is told or has, in attempts.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 use sdg_geometry::percentile;
 use sdg_grasp::ModelKind;
-use sdg_simulation::scene::Axis;
+use sdg_simulation::views::Axis;
 use serde::Serialize;
 
 use super::records::{Answer, AxisRecord};

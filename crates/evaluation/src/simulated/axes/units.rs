@@ -3,7 +3,7 @@
 use anyhow::Result;
 use sdg_grasp::{ModelKind, Preset, Verification};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::Axis;
+use sdg_simulation::views::Axis;
 
 use super::records::AxisRecord;
 use super::selection::{GraspCondition, Selection};

@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use sdg_grasp::{GraspModel, Verification};
 use sdg_inputs::one_line;
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
-use sdg_simulation::scene::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
+use sdg_simulation::views::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
 use sdg_simulation::{AttemptErrors, SimulationError};
 
 use super::matching::place;

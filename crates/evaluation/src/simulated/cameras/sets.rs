@@ -4,7 +4,7 @@ use anyhow::Result;
 use nalgebra::{Isometry3, Vector3};
 use sdg_simulation::CameraView;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{Axis, OTHER_CAMERAS, OnTable, other_view};
+use sdg_simulation::views::{Axis, OTHER_CAMERAS, OnTable, other_view};
 
 use crate::simulated::axes::draw;
 

@@ -3,6 +3,7 @@
 use sdg_report::{Cell, Column, KeyFigure, Report, Section, Table, Tone};
 
 use super::summary::{CamerasSummary, HIGH_M, SetFigures};
+use crate::footer::FOOTER;
 use crate::simulated::tables::{Titled, document, incomplete, this_run};
 
 /// All tables, the most important first.
@@ -99,7 +100,5 @@ pub fn page(summary: &CamerasSummary, facts: &[(&str, String)], command: &str) -
         }
         report = report.section(section.table(table));
     }
-    report
-        .section(this_run(facts, command))
-        .footer("Made by sdg. This page is one file: it fetches nothing and runs no script.")
+    report.section(this_run(facts, command)).footer(FOOTER)
 }

@@ -9,7 +9,8 @@ use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
 
 use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
-use crate::scene::{PlacedObject, shows_whole};
+use crate::scene::PlacedObject;
+use crate::views::shows_whole;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// Heights of the camera over the usual one.

@@ -8,7 +8,8 @@ use rand::Rng;
 use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
 use crate::objects::HeightMap;
-use crate::scene::{Distractor, DistractorKind, SceneVariation, VariationConfig, base_from_look_camera};
+use crate::scene::{Distractor, DistractorKind, SceneVariation, VariationConfig};
+use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// How many things there are.

@@ -10,7 +10,9 @@ use super::request::{AxisParameter, Drawn, Request};
 use super::visible::{hide_distractor, instance_bodies, num_pixels, place_distractor};
 use crate::error::{Result, SimulationError};
 use crate::objects::HeightMap;
-use crate::scene::{Distractor, DistractorKind, PlacedObject, base_from_look_camera, footprint};
+use crate::scene::{Distractor, DistractorKind, PlacedObject};
+use crate::shapes::footprint;
+use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// How much of the part's pixels is covered.

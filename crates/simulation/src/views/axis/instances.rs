@@ -7,9 +7,9 @@ use rand::Rng;
 
 use super::request::{AxisParameter, Drawn, Request};
 use crate::error::{Result, SimulationError};
-use crate::scene::{
-    PlacedObject, SceneVariation, VariationConfig, base_from_look_camera, footprint, sample_distractors,
-};
+use crate::scene::{PlacedObject, SceneVariation, VariationConfig, sample_distractors};
+use crate::shapes::footprint;
+use crate::views::base_from_look_camera;
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// How many of the part there are.

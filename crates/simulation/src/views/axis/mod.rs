@@ -26,10 +26,11 @@ pub use request::{AxisParameter, PICTURES_PER_AXIS};
 use request::{Drawn, Request};
 pub use visible::InstanceTruth;
 
-use super::{SceneVariation, VariationConfig, base_from_look_camera};
+use super::base_from_look_camera;
 use crate::camera::CameraView;
 use crate::error::Result;
 use crate::objects::{LookAlikeKind, ObjectSpec};
+use crate::scene::{SceneVariation, VariationConfig};
 use crate::workcell::{Workcell, WorkcellConfig};
 
 /// A picture of an axis with the truth about it.
@@ -108,7 +109,8 @@ mod tests {
 
     use super::visible::instance_bodies;
     use super::*;
-    use crate::scene::{PlacedObject, footprint};
+    use crate::scene::PlacedObject;
+    use crate::shapes::footprint;
 
     /// Pixels between the middle of the drawn part and of its projected top: a wall of 12 mm seen from 20 degrees beside
     /// it takes 4 px on one side and moves the middle by half of that; the rest is the raster of a millimetre.

@@ -6,7 +6,8 @@ use sdg_geometry::PosedCamera;
 use crate::error::Result;
 use crate::model::{Body, Id, Joint};
 use crate::render::Segmentation;
-use crate::scene::{GraspTruth, PlacedObject, SceneVariation};
+use crate::scene::{PlacedObject, SceneVariation};
+use crate::views::GraspTruth;
 use crate::workcell::Workcell;
 
 /// One of the part's instances in a picture.
