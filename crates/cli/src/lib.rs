@@ -1,13 +1,14 @@
 //! `sdg`: teach a robot a grasp from one photo.
 //!
 //! ```text
-//! args ─ commands/<verb>.rs ─ grasp, simulation, report
+//! args ─ commands/<verb>.rs ─ inputs, cell, evaluation, annotate, ros2-node
 //! ```
 //!
 //! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) it is a small program for
 //! small machines: it teaches and detects, and neither MuJoCo nor EGL nor the annotation page is in it.
 //!
-//! The binary is a thin shell around [`run`]; [`rehearsal`], [`trial`] and [`evaluation`] are open to the end-to-end tests.
+//! The binary is a thin shell around [`run`]. What the command line does stands in the other crates; here are its arguments, words, progress
+//! and exit codes. Nothing here is an interface for programs.
 //!
 //! ```
 //! use clap::Parser;
@@ -20,6 +21,7 @@
 #![allow(missing_docs, reason = "the library of a program: nothing but this workspace uses it")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+#[doc(hidden)]
 pub mod args;
 mod commands;
 mod demonstrations;
@@ -27,13 +29,13 @@ mod exit;
 mod found_text;
 mod interrupt;
 mod json_line;
-pub mod live_pictures;
+mod live_pictures;
 #[cfg(feature = "annotate")]
 mod page_teacher;
 #[cfg(feature = "simulation")]
 mod parts;
 mod progress;
-pub mod robots;
+mod robots;
 mod shared_args;
 mod teaching_progress;
 
@@ -44,16 +46,19 @@ use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 use crate::args::{Args, Command};
 use crate::exit::Outcome;
 
+#[doc(hidden)]
 /// The definition of the command line, with what no verb says by itself.
 pub fn command() -> ClapCommand {
     exit::with_exit_codes(Args::command())
 }
 
+#[doc(hidden)]
 /// Reads the arguments of this process; wrong ones end it with their message, as `--help` does with its text.
 pub fn parse_args() -> Args {
     Args::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
 }
 
+#[doc(hidden)]
 /// Runs one command; prints the one line of an error and returns the exit code.
 pub fn run(args: &Args) -> ExitCode {
     let done = match &args.command {

@@ -49,6 +49,7 @@ mod simulated_pictures;
 pub mod split;
 mod statistics;
 mod taught_file;
+pub mod taught_words;
 pub mod teaching_page;
 #[cfg(feature = "simulation")]
 pub mod trial;
@@ -56,7 +57,7 @@ pub mod trial;
 pub use error::EvaluationError;
 pub use machine::machine;
 #[cfg(feature = "simulation")]
-pub use motion_drawing::MotionDrawing;
+pub use motion_drawing::{draw_dry_run, draw_motions};
 #[cfg(feature = "simulation")]
 pub use own_part::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
 pub use progress::Progress;

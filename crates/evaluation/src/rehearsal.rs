@@ -15,6 +15,7 @@ use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::{GraspModel, Lengths, Verification};
 use sdg_kinematics::collision::Obstacle;
 use sdg_report::AttemptSummary;
+use sdg_robot::workcell::Workcell as WorkcellFile;
 use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Place, PlaceGoal, PlacingConfig};
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
@@ -55,6 +56,25 @@ pub struct RehearsedPlace {
     pub cell: Option<u32>,
     /// Obstacles of the workcell.
     pub obstacles: Vec<Obstacle>,
+}
+
+impl RehearsedPlace {
+    /// A place of a workcell, and one of its cells where the name has one.
+    ///
+    /// # Errors
+    /// A place or a cell that there is not.
+    pub fn named(text: &str, workcell: WorkcellFile) -> sdg_robot::Result<Self> {
+        let (name, cell) = text.split_once(':').map_or((text, None), |(name, cell)| (name, Some(cell)));
+        let place = workcell.places.iter().find(|place| place.name == name).cloned();
+        let takes_turns = cell.is_none() && place.as_ref().is_some_and(|place| place.num_cells() > 1);
+        if !takes_turns {
+            // Says what is wrong with a name or a cell.
+            workcell.place(text)?;
+        }
+        let cell = cell.and_then(|cell| cell.parse().ok());
+        let place = place.expect("a name that the workcell knows");
+        Ok(Self { place, cell, obstacles: workcell.obstacles })
+    }
 }
 
 /// Errors of a rehearsal; by default there is none.

@@ -15,6 +15,17 @@ const TEXT: &str = "sdg drawing";
 /// The text stands before the pixels, behind 33 bytes of signature and size.
 const MAX_TEXT_END: u64 = 100;
 
+/// Writes a picture as PNG, whole or not at all, and never over an input or a file of another kind.
+///
+/// # Errors
+/// As [`crate::write`].
+pub fn write_png(path: &Path, picture: &RgbImage) -> Result<()> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let encoded = picture.write_to(&mut bytes, image::ImageFormat::Png);
+    encoded.map_err(|source| FileError::Picture { path: path.to_owned(), source })?;
+    inputs::write(path, &bytes.into_inner())
+}
+
 /// Writes a drawing, whole or not at all.
 ///
 /// # Errors

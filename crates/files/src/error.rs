@@ -53,6 +53,9 @@ pub enum FileError {
     /// A drawing that could not be encoded.
     #[error("{}: cannot encode the drawing", path.display())]
     Png { path: PathBuf, source: png::EncodingError },
+    /// A picture that could not be encoded.
+    #[error("{}: cannot encode the picture", path.display())]
+    Picture { path: PathBuf, source: image::ImageError },
     /// A file could not be written; its previous contents, if any, are untouched.
     #[error("cannot write {}: {step} failed: {source}; nothing was changed", path.display())]
     Write {

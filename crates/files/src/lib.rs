@@ -36,7 +36,7 @@ mod lock;
 
 pub use atomic::{AtomicFile, write_atomically};
 pub use bounded::{read, read_bounded};
-pub use drawing::write_drawing;
+pub use drawing::{write_drawing, write_png};
 pub use error::{FileError, Result};
 pub use folder::{entries, has_extension, prepare_folder};
 pub use inputs::{

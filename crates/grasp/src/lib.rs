@@ -64,7 +64,7 @@ mod error;
 mod evidence_kind;
 mod explanation;
 mod facts;
-#[cfg(feature = "teach")]
+#[cfg(feature = "fitting")]
 pub mod fitting;
 mod lengths;
 mod model;

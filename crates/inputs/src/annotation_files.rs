@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts};
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
 
 use crate::marks_check::MarkedPhoto;
 
@@ -135,6 +135,39 @@ fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
         }
         _ => None,
     }
+}
+
+/// Writes the labels beside the output; their file. A data.yaml that is there already stays as it is.
+///
+/// # Errors
+/// One that is there and says otherwise; files that cannot be read or written.
+pub fn write_data_yaml(
+    output: &Path,
+    written: &WrittenAnnotation,
+    image: &ImageFacts,
+    objects: &[Annotation],
+) -> Result<Option<PathBuf>> {
+    let Some(text) = &written.data_yaml else { return Ok(None) };
+    let path = output.with_file_name(DATA_YAML);
+    if !path.exists() {
+        sdg_files::write(&path, text.as_bytes())?;
+        return Ok(Some(path));
+    }
+    let there = sdg_files::read(&path, MAX_ANNOTATION_BYTES)?;
+    let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
+        .with_context(|| path.display().to_string())?;
+    for (found, expected) in read.iter().zip(objects) {
+        if found.label != expected.label {
+            bail!(
+                "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
+                 write into another folder",
+                path.display(),
+                expected.label,
+                found.label
+            );
+        }
+    }
+    Ok(Some(path))
 }
 
 #[cfg(test)]

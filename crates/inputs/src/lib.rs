@@ -28,6 +28,7 @@
 pub mod annotation_files;
 pub mod base_weights;
 pub mod camera_files;
+pub mod checkpoints;
 pub mod demonstrations;
 pub mod detector_config;
 mod error;

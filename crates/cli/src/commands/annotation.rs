@@ -1,11 +1,11 @@
 //! `sdg annotation`: annotation files from one tool's format to another's.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::{Args as ClapArgs, Subcommand};
-use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts, WrittenAnnotation};
-use sdg_inputs::annotation_files::{AnnotationFile, DATA_YAML};
+use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts};
+use sdg_inputs::annotation_files::{AnnotationFile, write_data_yaml};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
@@ -149,34 +149,4 @@ fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Resul
             Err(Usage(format!("--image: expected one of the {several} images of {}", args.input.display())).into())
         }
     }
-}
-
-/// Writes the labels beside the output. A data.yaml that is there already stays as it is and must say the same.
-fn write_data_yaml(
-    output: &Path,
-    written: &WrittenAnnotation,
-    image: &ImageFacts,
-    objects: &[Annotation],
-) -> Result<Option<PathBuf>> {
-    let Some(text) = &written.data_yaml else { return Ok(None) };
-    let path = output.with_file_name(DATA_YAML);
-    if !path.exists() {
-        sdg_files::write(&path, text.as_bytes())?;
-        return Ok(Some(path));
-    }
-    let there = sdg_files::read(&path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
-    let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
-        .with_context(|| path.display().to_string())?;
-    for (found, expected) in read.iter().zip(objects) {
-        if found.label != expected.label {
-            bail!(
-                "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
-                 write into another folder",
-                path.display(),
-                expected.label,
-                found.label
-            );
-        }
-    }
-    Ok(Some(path))
 }

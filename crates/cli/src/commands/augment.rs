@@ -1,11 +1,9 @@
 //! `sdg augment`: augmented samples as pictures and COCO JSON, to look at.
 
-use std::io::Cursor;
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
-use image::ImageFormat;
 use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile};
 use sdg_evaluation::held_back::{HeldBackSamples, labels_of};
 use sdg_grasp::CheckConfig;
@@ -71,9 +69,7 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
     for i in 0..u64::from(args.count) {
         let sample = held_back.as_ref().map_or_else(|| augmenter.sample(i), |held_back| held_back.sample(i));
         let name = picture_name(i);
-        let mut png = Cursor::new(Vec::new());
-        sample.image.write_to(&mut png, ImageFormat::Png)?;
-        sdg_files::write(&args.out.join(&name), &png.into_inner())?;
+        sdg_files::write_png(&args.out.join(&name), &sample.image)?;
 
         let instances = labels_of(&sample, &label);
         with_part += usize::from(!instances.is_empty());

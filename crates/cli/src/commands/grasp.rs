@@ -23,7 +23,7 @@ use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
-use crate::robots::{self, Consent, RobotChoice, confirm, draw_plan, print_plan, write_states};
+use crate::robots::{self, Consent, RobotChoice, confirm, draw_dry_run, print_plan, write_states};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg grasp`
@@ -243,7 +243,7 @@ fn dry_run<A: Arm>(
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config, place)?;
     eprintln!("what would be done:");
     print_plan(&plan, target.is_some())?;
-    for file in draw_plan(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
+    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

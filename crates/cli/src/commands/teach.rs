@@ -9,13 +9,12 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 use sdg_demonstration::Demonstration;
-use sdg_evaluation::TaughtFile;
 use sdg_evaluation::held_back::HeldBackFigures;
 use sdg_evaluation::teaching_page::TeachingPage;
+use sdg_evaluation::{TaughtFile, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
+use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, Start, TeachOptions};
 use sdg_inputs::{TeachingFiles, base_weights};
-use sdg_kinematics::HAND_OPENING_MAX_M;
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
@@ -190,7 +189,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     if let Some(failure) = &failure {
         eprintln!("warning: {failure}");
     }
-    for told in openings_by_the_box(&taught.model, &demonstrations) {
+    for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
     }
     if args.json {
@@ -209,7 +208,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
+        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, taught_words::training(&taught));
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
@@ -227,7 +226,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
                 1e3 * lengths.grasp_height_m
             );
         }
-        if let Some(warning) = too_wide(&taught.model) {
+        if let Some(warning) = taught_words::too_wide(&taught.model) {
             eprintln!("{warning}");
         }
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
@@ -307,50 +306,6 @@ pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) ->
     })?;
     options.start = Start::Weights(base_weights);
     Ok(told.map(|report: Report| json!(report)))
-}
-
-/// Where the jaws would have to open farther than the hand can: then nothing that is found can be grasped.
-fn too_wide(model: &GraspModel) -> Option<String> {
-    let pixels_per_m = model.facts().lengths?.pixels_per_m;
-    let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
-    (widest > HAND_OPENING_MAX_M).then(|| {
-        format!(
-            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
-            1e3 * widest,
-            1e3 * HAND_OPENING_MAX_M
-        )
-    })
-}
-
-/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
-fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
-    let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
-        let annotation = &demonstration.annotation;
-        (annotation.outline.is_none() && annotation.jaw_width.is_none()).then(|| {
-            format!(
-                "the opening of the jaws, {:.0} px, is taken from the box of \"{}\", which may be wider than the part: draw its \
-                 outline, or mark the jaws (`sdg annotate`)",
-                taught.marks.width_px, annotation.label
-            )
-        })
-    });
-    told.collect()
-}
-
-/// How the network's teaching went, for people; nothing for a model without.
-fn learnt(taught: &Taught) -> String {
-    let facts = taught.model.facts();
-    let Some(history) = &taught.history else { return String::new() };
-    let ending = match history.ending {
-        Ending::Completed => "",
-        Ending::EarlyStop => ", stopped early: good enough",
-        Ending::TimeBudget => ", stopped by the time budget",
-        Ending::Interrupted => ", interrupted",
-    };
-    let orientation = facts.orientation.map_or(String::new(), |cnn| {
-        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
-    });
-    format!(" ({} steps{ending}{orientation})", facts.steps)
 }
 
 /// An argument that names one of a few things; another name is wrong usage.

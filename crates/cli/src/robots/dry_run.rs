@@ -1,10 +1,7 @@
-//! A planned grasp, described and drawn.
-
-use std::path::{Path, PathBuf};
+//! A planned grasp, described.
 
 use anyhow::{Result, anyhow};
-use sdg_cell::{DryRun, SeenOutline};
-use sdg_kinematics::collision::Obstacle;
+use sdg_cell::DryRun;
 use sdg_robot::PlannedAction;
 
 /// A line for each motion, and how the plan ends.
@@ -43,40 +40,14 @@ pub(crate) fn print_plan(plan: &DryRun, is_seen: bool) -> Result<()> {
     Ok(())
 }
 
-/// Draws the motion and the part that was seen as an animation and its last picture into a folder; the files. The part stays on the
-/// table: it is drawn where the camera saw it.
-///
-/// # Errors
-/// Files that cannot be written, and errors of the renderer.
-#[cfg(feature = "simulation")]
-pub(crate) fn draw_plan(
-    plan: &DryRun,
-    folder: &Path,
-    seen: Option<&SeenOutline>,
-    obstacles: &[Obstacle],
-) -> Result<Vec<PathBuf>> {
-    use sdg_evaluation::MotionDrawing;
-    use sdg_robot::PlannedArm;
-    use sdg_simulation::WorkcellConfig;
-    use sdg_simulation::scene::{SceneVariation, SeenPart};
-
-    const DRAWING: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
-    let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
-    let obstacles = obstacles.to_vec();
-    let config = WorkcellConfig { seen_part, obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
-    let period_secs = DRAWING.period_secs(plan.arm.duration_secs());
-    let positions = PlannedArm::frames(&plan.start.q_commanded, plan.opening_m, plan.arm.actions(), period_secs);
-    DRAWING.draw(folder, &config, &positions)
-}
-
 /// Without the simulator there is nothing to draw with.
 #[cfg(not(feature = "simulation"))]
-pub(crate) fn draw_plan(
+pub(crate) fn draw_dry_run(
     _plan: &DryRun,
-    _folder: &Path,
-    _seen: Option<&SeenOutline>,
-    _obstacles: &[Obstacle],
-) -> Result<Vec<PathBuf>> {
+    _folder: &std::path::Path,
+    _seen: Option<&sdg_cell::SeenOutline>,
+    _obstacles: &[sdg_kinematics::collision::Obstacle],
+) -> Result<Vec<std::path::PathBuf>> {
     eprintln!("this sdg was built without the simulator and draws no motion");
     Ok(Vec::new())
 }

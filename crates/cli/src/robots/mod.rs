@@ -15,7 +15,11 @@ use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 
 pub(crate) use confirm::{Consent, confirm};
-pub(crate) use dry_run::{draw_plan, print_plan};
+#[cfg(not(feature = "simulation"))]
+pub(crate) use dry_run::draw_dry_run;
+pub(crate) use dry_run::print_plan;
+#[cfg(feature = "simulation")]
+pub(crate) use sdg_evaluation::draw_dry_run;
 #[cfg(feature = "simulation")]
 pub(crate) use simulated_scene::simulated_scene;
 pub(crate) use states_file::write_states;

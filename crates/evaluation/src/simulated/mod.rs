@@ -21,6 +21,7 @@ mod attempting;
 pub mod axes;
 pub mod cameras;
 mod cell;
+mod files;
 mod groups;
 mod jitter;
 mod looking;
@@ -41,6 +42,7 @@ mod whole_runs;
 mod work;
 
 pub use cell::{Cell, Marks};
+pub use files::WrittenTables;
 pub use groups::PartGroup;
 pub use page::page;
 pub use records::{

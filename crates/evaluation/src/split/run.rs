@@ -6,15 +6,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sdg_cell::Perception;
 use sdg_demonstration::Demonstration;
-use sdg_geometry::{PlanarGrasp, PlanarSimilarity};
-use sdg_grasp::fitting::{FitInstance, FitPart, FitPicture};
 use sdg_grasp::{ModelKind, TeachOptions, Verification};
 use sdg_inputs::annotation_files::beside_photo;
 use sdg_inputs::demonstrations;
 
 use super::counts::Counts;
 use super::file::SplitSet;
-use crate::labelled_pictures::{Instance, LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
+use crate::labelled_pictures::{LabelledFolder, TRUTH_FILE, Tested, TruthEntry};
 use crate::taught_file::TaughtFile;
 
 /// A set whose files were found.
@@ -64,38 +62,14 @@ impl ReadySet {
         Ok(Self { set, folder, demonstration })
     }
 
-    /// The set as constants and networks are fitted on it: its pictures with the kind of each. `None` without exact truth, which `truth.json` has.
-    ///
-    /// # Errors
-    /// A picture that cannot be read.
-    pub fn fit_part(&self) -> Result<Option<(FitPart, Vec<String>)>> {
-        if !self.folder.join(TRUTH_FILE).exists() {
-            return Ok(None);
-        }
-        let annotation = &self.demonstration.annotation;
-        let marks = annotation.grasp.context("expected a marked grasp")?;
-        let mut symmetry = self.set.symmetry;
-        let (mut kinds, mut pictures) = (Vec::new(), Vec::new());
-        for entry in TruthEntry::read_all(&self.folder)? {
-            let (optional, counted): (Vec<_>, Vec<_>) = entry.instances.iter().partition(|instance| instance.optional);
-            symmetry = counted.iter().find_map(|instance| instance.extent).map_or(symmetry, |extent| extent.symmetry);
-            let instance = |instance: &&Instance| {
-                let (grasp, extent) = instance.grasp.zip(instance.extent)?;
-                let scale = extent.diagonal_px / annotation.bbox.width().hypot(annotation.bbox.height());
-                let [from, to] = [&marks, &grasp].map(|line| PlanarGrasp::from_line(line, 0.0));
-                let image_from_demonstration =
-                    PlanarSimilarity::about(from.center(), to.center(), to.angle - from.angle, scale);
-                Some(FitInstance { grasp, image_from_demonstration })
-            };
-            pictures.push(FitPicture {
-                image: sdg_inputs::read_image(&self.folder.join(&entry.image))?,
-                instances: counted.iter().filter_map(instance).collect(),
-                undecided: optional.iter().map(|instance| instance.bbox).collect(),
-            });
-            kinds.push(entry.kind.unwrap_or_default());
-        }
-        let part = FitPart { demonstration: self.demonstration.clone(), symmetry, pictures };
-        Ok(Some((part, kinds)))
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The photo and its marks.
+    pub fn demonstration(&self) -> &Demonstration {
+        &self.demonstration
     }
 
     /// Teaches a model as `sdg teach` does by default, and runs it on the set's pictures as `sdg detect` does.

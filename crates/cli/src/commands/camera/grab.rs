@@ -1,12 +1,11 @@
 //! `sdg camera grab`.
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use image::ImageFormat;
 use sdg_camera::{Address, Camera, Frame, LatestFrame};
 use serde_json::json;
 
@@ -73,7 +72,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
             break;
         };
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
-        write_png(&path, &frame)?;
+        sdg_files::write_png(&path, &frame.picture)?;
         print_frame(&path, &frame, args.json)?;
         num_written += 1;
     }
@@ -99,12 +98,6 @@ fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
             Err(error) => return Err(error.into()),
         }
     }
-}
-
-fn write_png(path: &Path, frame: &Frame) -> Result<()> {
-    let mut png = Cursor::new(Vec::new());
-    frame.picture.write_to(&mut png, ImageFormat::Png)?;
-    Ok(sdg_files::write(path, &png.into_inner())?)
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use sdg_calibration::{
-    Board, CalibratedCamera, CalibrationError, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose,
-    calibrate_hand_eye, find_board, read_robot_poses,
+    Board, CalibratedCamera, CalibrationError, HandEye, HandEyeView, Mount, RobotPose, calibrate_hand_eye, find_board,
+    read_robot_poses,
 };
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::upper_median;
@@ -96,7 +96,7 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)
         .map_err(|error| explained(error.with_picture_names(|k| seen[k].picture.clone()), args))?;
     if let Some(out) = &args.out {
-        let camera = placed(args, camera, &found, mount);
+        let camera = found.place(camera, mount, args.table_height_mm.map(|height| height / 1000.0));
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
         sdg_files::extend(out, Some(&args.camera), text.as_bytes())?;
@@ -139,23 +139,6 @@ fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Boar
     }
     let corners = find_board(&grey(&picture), board).with_context(|| named(&path))?;
     Ok(HandEyeView { base_from_flange: pose.base_from_flange, corners })
-}
-
-fn placed(args: &HandEyeArgs, camera: CalibratedCamera, found: &HandEye, mount: Mount) -> CalibratedCamera {
-    match mount {
-        Mount::Hand => CalibratedCamera { flange_from_camera: Some(found.frame_from_camera), ..camera },
-        Mount::Base => {
-            let old = camera.table.as_ref().filter(|table| table.frame == Frame::Base);
-            let told = args.table_height_mm.map(|height| height / 1000.0);
-            let table = TablePose {
-                frame: Frame::Base,
-                height_m: told.or(old.map(|table| table.height_m)).unwrap_or_default(),
-                frame_from_camera: found.frame_from_camera,
-                workspace: old.and_then(|table| table.workspace),
-            };
-            CalibratedCamera { table: Some(table), ..camera }
-        }
-    }
 }
 
 fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose], lines: Vec<Value>) -> Result<()> {

@@ -4,11 +4,7 @@ use std::fmt::Write;
 
 use anyhow::{Context, Result, bail};
 use sdg_evaluation::Store;
-use sdg_evaluation::axes::{
-    Against, AxesEvaluation, AxesSummary, RunEnd, Selection, comparison_lines, comparison_tables, markdown, page,
-    summary_lines,
-};
-use sdg_evaluation::machine;
+use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, comparison_lines, summary_lines};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -52,33 +48,9 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
 
     let summary = AxesSummary::collect(&evaluation)?;
     let command = command(args, names);
-    let seconds = summary.seconds;
-    let facts = [
-        ("seed", settings.seed.to_string()),
-        ("preset", settings.preset.clone()),
-        (
-            "seconds of a worker",
-            format!(
-                "{:.0} (teaching {:.0}, pictures {:.0}, grasps {:.0})",
-                seconds.total(),
-                seconds.teaching,
-                seconds.pictures,
-                seconds.grasps
-            ),
-        ),
-        ("side by side", format!("{jobs} units of work")),
-        ("machine", machine()),
-        ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
-    ];
     let comparisons = against.as_ref().map(|against| against.compare(&evaluation)).transpose()?.unwrap_or_default();
-    let other = against.as_ref().map(|against| against.folder().display().to_string()).unwrap_or_default();
-    let more = || comparison_tables(&comparisons, &other);
-    store.write_bytes("axes.md", markdown(&summary, more(), &facts, &command).as_bytes())?;
-    let json = json!({ "summary": summary, "against": comparisons, "machine": machine(), "command": command });
-    store.write_bytes("axes.json", format!("{json:#}\n").as_bytes())?;
-    let report = page(&summary, more(), &facts, &command).write(&report_folder)?;
-
-    let tables = store.path("axes.md");
+    let other = against.as_ref().map(Against::folder);
+    let [tables, report] = summary.write(&store, jobs, (&comparisons, other), &command, &report_folder)?;
     if args.json {
         let line = json!({
             "summary": summary,
@@ -89,7 +61,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         println!("{}", json_line(&line)?);
     } else {
         print!("{}{}", summary_lines(&summary), comparison_lines(&comparisons));
-        println!("seconds of a worker: {}", facts[2].1);
+        println!("seconds of a worker: {}", summary.seconds);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match (failures.first(), remaining) {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, bail};
 use sdg_evaluation::Progress;
 use sdg_evaluation::sharing::{
-    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
+    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, cores, faults, near_names, own_sha256,
     planned_units, submit_script,
 };
 use sdg_evaluation::{Evaluation, Settings, Store};
@@ -125,7 +125,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let mut ended = Vec::new();
     for unit in &named {
         let done =
-            evaluation.do_planned(unit, threads(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
+            evaluation.do_planned(unit, cores(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
@@ -150,12 +150,6 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
             bail!("{several} of {} units failed", named.len())
         }
     }
-}
-
-/// The cores that Slurm gave, or those of the machine.
-fn threads() -> usize {
-    let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
-    given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
 }
 
 fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {

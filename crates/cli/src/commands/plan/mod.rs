@@ -1,8 +1,6 @@
 //! `sdg plan`: a motion around the obstacles of a workcell, described and drawn; nothing moves.
 
 mod arguments;
-#[cfg(feature = "simulation")]
-mod drawing;
 mod explain;
 
 use std::path::PathBuf;
@@ -127,7 +125,7 @@ fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<Stri
 
 #[cfg(feature = "simulation")]
 fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<()> {
-    for file in drawing::draw(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
+    for file in sdg_evaluation::draw_motions(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

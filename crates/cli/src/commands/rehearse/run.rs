@@ -110,25 +110,14 @@ fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<
     })
 }
 
-/// A place of a workcell's file; rehearsals have the table at the base's height.
+/// A place of a workcell's file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
     let (workcell, _) = sdg_inputs::read_workcell(path)?;
     if workcell.table_height_m != 0.0 {
         let found_mm = workcell.table_height_m * 1e3;
         bail!("{}: height_mm: expected 0, the table's height in rehearsals, found {found_mm}", path.display());
     }
-    let name = text.split_once(':').map_or(text, |(name, _)| name);
-    let place = workcell.places.iter().find(|place| place.name == name).cloned();
-    let cell = match text.split_once(':') {
-        None if place.as_ref().is_some_and(|place| place.num_cells() > 1) => None,
-        // Says what is wrong with a name or a cell.
-        _ => {
-            workcell.place(text).map_err(|error| Usage(format!("--{error}")))?;
-            text.split_once(':').and_then(|(_, cell)| cell.parse().ok())
-        }
-    };
-    let place = place.context("the place was found before")?;
-    Ok(RehearsedPlace { place, cell, obstacles: workcell.obstacles })
+    Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 
 /// A line for each attempt; breaks when Ctrl-C was pressed.

@@ -12,6 +12,7 @@
 //! paper's protocol.
 
 mod against;
+mod files;
 mod known_from_simulator;
 mod lines;
 mod matching;

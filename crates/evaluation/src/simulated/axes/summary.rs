@@ -1,6 +1,7 @@
 //! The records of axes and of grasps under errors added up, by model and group of parts.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use anyhow::Result;
 use sdg_geometry::percentile;
@@ -41,6 +42,13 @@ pub struct Seconds {
     /// Of pictures: drawing and detecting.
     pub pictures: f64,
     pub grasps: f64,
+}
+
+impl fmt::Display for Seconds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { teaching, pictures, grasps } = self;
+        write!(f, "{:.0} (teaching {teaching:.0}, pictures {pictures:.0}, grasps {grasps:.0})", self.total())
+    }
 }
 
 impl Seconds {

@@ -8,6 +8,7 @@
 //! ```
 //! Teachings and results stand in the same store as the axes'.
 
+mod files;
 mod records;
 mod sets;
 mod summary;

@@ -32,7 +32,7 @@ pub use doing::Ended;
 pub use near_names::near_names;
 pub use plan::{PlannedUnit, SavedPlan, UnitKind, planned_units};
 pub use records::{Failure, Receipt, Running};
-pub use slurm::{SlurmJob, submit_script};
+pub use slurm::{SlurmJob, cores, submit_script};
 pub use unit_folder::UnitFolder;
 pub use watching::{Progress, Watch};
 pub use worker::{Worker, own_sha256};

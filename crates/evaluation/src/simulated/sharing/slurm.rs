@@ -101,6 +101,12 @@ fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }
 
+/// The cores that Slurm gave, or those of the machine.
+pub fn cores() -> usize {
+    let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
+    given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::plan::planned_units;
