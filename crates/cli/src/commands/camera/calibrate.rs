@@ -45,8 +45,6 @@ struct Seen<'a> {
 
 /// Larger camera files than any tool writes.
 const MAX_BYTES: u64 = 1 << 20;
-/// Names of intrinsics as the library orders them.
-const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 
 /// Finds the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
@@ -142,23 +140,16 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     Ok(sdg_files::extend(&args.out, Some(&args.out), text.as_bytes())?)
 }
 
-/// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.
-fn values(found: &Calibration) -> [f64; 9] {
-    let camera = found.camera;
-    let [k1, k2, p1, p2, k3] = camera.lens.to_array();
-    [camera.fx, camera.fy, camera.cx - 0.5, camera.cy - 0.5, k1, k2, p1, p2, k3]
-}
-
 fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: Vec<Value>) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
     let advice: Vec<String> = found.advice.iter().map(ToString::to_string).collect();
     if args.json {
         let by_name = |values: &[f64]| {
-            NAMES.into_iter().map(str::to_owned).zip(values.iter().map(|v| json!(v))).collect::<Value>()
+            Calibration::NAMES.into_iter().map(str::to_owned).zip(values.iter().map(|v| json!(v))).collect::<Value>()
         };
         let object = json!({
             "out": named(&args.out), "width": found.camera.width, "height": found.camera.height,
-            "intrinsics": by_name(&values(found)), "sigma": by_name(&found.sigma), "rms_px": found.rms_px,
+            "intrinsics": by_name(&found.values()), "sigma": by_name(&found.sigma), "rms_px": found.rms_px,
             "pictures": lines, "advice": advice,
         });
         writeln!(stdout, "{object}")?;
@@ -173,7 +164,7 @@ fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: V
         found.camera.height,
         found.rms_px
     )?;
-    for ((name, value), sigma) in NAMES.into_iter().zip(values(found)).zip(found.sigma) {
+    for ((name, value), sigma) in Calibration::NAMES.into_iter().zip(found.values()).zip(found.sigma) {
         let digits = if name.starts_with(['f', 'c']) { 2 } else { 5 };
         if sigma > 0.0 {
             writeln!(stdout, "  {name} {value:.digits$} ± {sigma:.digits$}")?;
