@@ -51,7 +51,7 @@ impl Frames {
     }
 
     /// The next one, waited for a moment.
-    pub fn next(&mut self) -> Next {
+    pub fn take(&mut self) -> Next {
         match self {
             Self::Newest(newest) => match newest.take(MAX_WAIT) {
                 Ok(Some(frame)) => Next::Frame(frame),

@@ -48,7 +48,7 @@ pub fn run(args: &DetectArgs, address: &Address, detector: Perception) -> Result
     let mut found_any = false;
     let mut left = args.frames.unwrap_or(u64::MAX);
     while left > 0 && !interrupt.is_requested() {
-        let mut frame = match frames.next() {
+        let mut frame = match frames.take() {
             Next::Frame(frame) => frame,
             Next::None => continue,
             Next::End => break,
