@@ -67,6 +67,7 @@ mod facts;
 #[cfg(feature = "fitting")]
 pub mod fitting;
 mod lengths;
+mod marks_shift;
 mod model;
 mod model_file;
 mod models;

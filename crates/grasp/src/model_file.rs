@@ -348,6 +348,7 @@ mod tests {
             outline: Some(outline),
             width_px: 30.0,
             photo_size: None,
+            photo_middle: None,
         };
         let demonstrations = vec![TaughtDemonstration::from_parts(cutout, marks).unwrap()];
         let network = models::rcnn_kind(kind).map(|rcnn| Network {

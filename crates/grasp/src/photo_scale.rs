@@ -1,14 +1,11 @@
 //! The scale of the photo, given to a model that was taught without a camera.
 
 use image::imageops::{self, FilterType};
-use sdg_geometry::BoundingBox;
 
 use crate::error::Result;
 use crate::lengths::Lengths;
 use crate::model::GraspModel;
-use crate::prepared::scaling;
 use crate::taught::TaughtDemonstration;
-use crate::taught_marks::TaughtMarks;
 
 impl GraspModel {
     /// The same model for calibrated cameras, as if its photos had been taken from straight above and far away. `lengths` say how
@@ -42,16 +39,7 @@ fn resized(demonstration: TaughtDemonstration, factor: f64) -> Result<TaughtDemo
     let side = |length: u32| ((f64::from(length) * factor).round() as u32).max(1);
     // Marks go with the pixels, of which there is a whole number.
     let factor = f64::from(side(cutout.width())) / f64::from(cutout.width());
-    let resize = scaling(factor);
-    let BoundingBox { x1, y1, x2, y2 } = marks.bbox;
-    let marks = TaughtMarks {
-        bbox: BoundingBox { x1: factor * x1, y1: factor * y1, x2: factor * x2, y2: factor * y2 },
-        grasp: marks.grasp.transformed(&resize),
-        outline: marks.outline.map(|outline| outline.transformed(&resize)),
-        width_px: factor * marks.width_px,
-        photo_size: None,
-        label: marks.label,
-    };
+    let marks = marks.resized(factor);
     let cutout = imageops::resize(&cutout, side(cutout.width()), side(cutout.height()), FilterType::Triangle);
     TaughtDemonstration::with_config(cutout, marks, check)
 }

@@ -12,11 +12,11 @@ use std::sync::{Arc, Mutex};
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};
-use nalgebra::{Point2, Vector2};
-use sdg_geometry::{Angle, PlanarSimilarity, Polygon};
-use sdg_shape::{GradientField, SearchConfig, ShapeSearch, ShapeTemplate};
+use sdg_geometry::{Angle, PlanarSimilarity};
+use sdg_shape::{SearchConfig, ShapeSearch};
 
 use crate::error::Result;
+use crate::marks_shift::MarksShift;
 use crate::sizes::SizeRange;
 use crate::taught_marks::TaughtMarks;
 
@@ -63,68 +63,29 @@ impl WorkingSize {
 #[derive(Debug)]
 pub(crate) struct Prepared {
     pub(crate) search: ShapeSearch,
-    /// The edges about the marks alone; `None` where there are too few.
-    about_marks: Option<ShapeTemplate>,
-    /// In pixels of the resized cut-out.
-    max_shift: f64,
+    /// `None` where there are too few edges about the marks.
+    pub(crate) marks_shift: Option<MarksShift>,
 }
-
-/// How far the marks may lie from where the whole part puts them, as a share of its diagonal: what is marked stands higher
-/// or lower than the outline, and a camera that does not look straight down on it sees it shifted. Chosen by hand on
-/// photographs of clips 10 mm high; on generated parts the median error stays at 0.88 % of the diagonal (docs/decisions/007-score.md).
-const MAX_MARKS_SHIFT: f64 = 0.05;
-/// The marks' surroundings reach so many lengths of the grasp line from its middle, which counts as no shorter than this
-/// share of the diagonal. Chosen with the above.
-const SURROUNDINGS: f64 = 0.8;
-const MIN_LINE_SHARE: f64 = 0.3;
-/// What the shift must gain in agreement. Chosen by hand, not measured.
-const MIN_SHIFT_GAIN: f64 = 0.01;
 
 impl Prepared {
     fn new(cutout: &RgbImage, marks: &TaughtMarks, cutout_scale: f64, config: &SearchConfig) -> Result<Self> {
         let resized;
-        let (cutout, resize) = if cutout_scale == 1.0 {
-            (cutout, PlanarSimilarity::IDENTITY)
+        let (cutout, marks) = if cutout_scale == 1.0 {
+            (cutout, marks.clone())
         } else {
             let [width, height] =
                 [cutout.width(), cutout.height()].map(|side| ((f64::from(side) * cutout_scale).round() as u32).max(1));
             resized = imageops::resize(cutout, width, height, FilterType::Triangle);
-            (&resized, scaling(cutout_scale))
+            (&resized, marks.resized(cutout_scale))
         };
-        let outline = marks.region().transformed(&resize);
-        let search = ShapeSearch::new(cutout, &outline, config)?;
-        let grasp = marks.grasp.transformed(&resize);
-        let bounds = outline.bounds();
-        let diagonal = bounds.width().hypot(bounds.height());
-        let reach = SURROUNDINGS * grasp.length().max(MIN_LINE_SHARE * diagonal);
-        let surroundings = circle(grasp.center(), reach);
-        // No outline is special there.
-        let mut config = config.shape.clone();
-        config.outline_weight = 1.0;
-        let about_marks = ShapeTemplate::new(cutout, &surroundings, &config).ok();
-        Ok(Self { search, about_marks, max_shift: MAX_MARKS_SHIFT * diagonal })
-    }
-
-    /// Where the marks' surroundings lie, given where the whole part lies: as it, or shifted a little.
-    pub(crate) fn refine_marks(&self, field: &GradientField, image_from_cutout: &PlanarSimilarity) -> PlanarSimilarity {
-        let Some(template) = &self.about_marks else { return *image_from_cutout };
-        let refined = template.refine_shift(field, image_from_cutout, self.max_shift * image_from_cutout.scale);
-        let gain = refined.agreement - refined.initial_agreement;
-        if gain >= MIN_SHIFT_GAIN { refined.image_from_demonstration } else { *image_from_cutout }
+        let search = ShapeSearch::new(cutout, &marks.region(), config)?;
+        Ok(Self { search, marks_shift: MarksShift::new(cutout, &marks, &config.shape) })
     }
 }
 
 /// Scales about the upper left corner.
 pub(crate) fn scaling(factor: f64) -> PlanarSimilarity {
     PlanarSimilarity { scale: factor, angle: Angle::ZERO, tx: 0.0, ty: 0.0 }
-}
-
-fn circle(center: Point2<f64>, radius: f64) -> Polygon {
-    let corner = |k: u32| {
-        let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 24.0).sin_cos();
-        center + radius * Vector2::new(cos, sin)
-    };
-    Polygon { vertices: (0..24).map(corner).collect() }
 }
 
 /// The sizes of one demonstration that were asked for last. Made in milliseconds, and the same whenever they are made.

@@ -75,7 +75,15 @@ impl TaughtDemonstration {
         }));
         Self::from_parts(
             cutout,
-            TaughtMarks { label: label.clone(), bbox, grasp, outline, width_px, photo_size: Some([width, height]) },
+            TaughtMarks {
+                label: label.clone(),
+                bbox,
+                grasp,
+                outline,
+                width_px,
+                photo_size: Some([width, height]),
+                photo_middle: Some([0.5 * f64::from(width) - left, 0.5 * f64::from(height) - top]),
+            },
         )
     }
 

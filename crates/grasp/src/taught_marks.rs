@@ -3,6 +3,8 @@
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use serde::{Deserialize, Serialize};
 
+use crate::prepared::scaling;
+
 /// The marks, in pixels of the kept cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TaughtMarks {
@@ -19,11 +21,29 @@ pub struct TaughtMarks {
     /// Width and height of the photo that the cut-out is from; `None` where it was resized since.
     #[serde(default)]
     pub photo_size: Option<[u32; 2]>,
+    /// The middle of that photo, in pixels of the cut-out; `None` in files that do not have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photo_middle: Option<[f64; 2]>,
 }
 
 impl TaughtMarks {
     /// The outline; the box where none was drawn.
     pub fn region(&self) -> Polygon {
         self.outline.clone().unwrap_or_else(|| Polygon::from_box(&self.bbox))
+    }
+
+    /// The marks on the cut-out made `factor` times as large.
+    pub(crate) fn resized(&self, factor: f64) -> Self {
+        let resize = scaling(factor);
+        let BoundingBox { x1, y1, x2, y2 } = self.bbox;
+        Self {
+            label: self.label.clone(),
+            bbox: BoundingBox { x1: factor * x1, y1: factor * y1, x2: factor * x2, y2: factor * y2 },
+            grasp: self.grasp.transformed(&resize),
+            outline: self.outline.as_ref().map(|outline| outline.transformed(&resize)),
+            width_px: factor * self.width_px,
+            photo_size: None,
+            photo_middle: self.photo_middle.map(|middle| middle.map(|at| factor * at)),
+        }
     }
 }

@@ -56,12 +56,6 @@ impl ShapeTemplate {
         self.refine_within(field, start, &CaptureRange::new(self, field, start))
     }
 
-    /// As [`refine`](Self::refine), but only shifted, by at most `max_shift_px` pixels of the image in x and in y.
-    pub fn refine_shift(&self, field: &GradientField, initial: &PlanarSimilarity, max_shift_px: f64) -> Refinement {
-        let start = Pose::from_similarity(initial, self.center);
-        self.refine_within(field, start, &CaptureRange::around(start, [max_shift_px, max_shift_px, 0.0, 0.0]))
-    }
-
     fn refine_within(&self, field: &GradientField, start: Pose, range: &CaptureRange) -> Refinement {
         let initial_agreement = self.agreement_at(field, &start);
 

@@ -157,6 +157,7 @@ mod tests {
             outline: Some(outline.clone()),
             width_px: 25.0,
             photo_size: None,
+            photo_middle: None,
         };
         let demonstrations = [TaughtDemonstration::from_parts(painted(&outline, 140, 120), marks).unwrap()];
         let matcher = MaskMatcher::new(&demonstrations).unwrap();

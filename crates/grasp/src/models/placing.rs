@@ -73,6 +73,7 @@ mod tests {
             outline: Some(outline),
             width_px: 20.0,
             photo_size: None,
+            photo_middle: None,
         };
         TaughtDemonstration::from_parts(cutout, marks).unwrap()
     }
