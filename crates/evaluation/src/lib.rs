@@ -64,6 +64,6 @@ pub use progress::Progress;
 #[cfg(feature = "simulation")]
 pub use simulated::*;
 #[cfg(feature = "simulation")]
-pub use simulated_pictures::{SimulatedPictures, camera_place};
+pub use simulated_pictures::SimulatedPictures;
 pub use statistics::{Share, newcombe_interval, wilson_interval};
 pub use taught_file::TaughtFile;

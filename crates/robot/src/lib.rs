@@ -29,6 +29,7 @@
 
 mod arm;
 mod arm_state;
+mod camera_pose;
 mod error;
 mod franka;
 mod impedance;
@@ -54,6 +55,7 @@ pub use arm_state::{
     ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
     MotionEnd, PERIOD_SECS,
 };
+pub use camera_pose::CameraPose;
 pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};

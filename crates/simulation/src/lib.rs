@@ -81,4 +81,4 @@ pub use panda::{
 pub use planning_problem::PlanningProblem;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{CameraPlace, Workcell, WorkcellConfig};
+pub use workcell::{Workcell, WorkcellConfig};

@@ -164,7 +164,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
     let scene = robots::simulated_scene(text)?;
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(prepared.camera.intrinsics),
-        camera_place: Some(sdg_evaluation::camera_place(&prepared.camera)),
+        camera_pose: Some(prepared.camera.pose),
         obstacles: prepared.workcell.obstacles.clone(),
         ..WorkcellConfig::new(scene)
     })?;

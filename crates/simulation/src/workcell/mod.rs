@@ -6,7 +6,7 @@ mod pictures;
 
 use nalgebra::Isometry3;
 use sdg_kinematics::{Panda, ready_pose};
-use sdg_robot::{HandCommand, Load, PERIOD_SECS};
+use sdg_robot::{CameraPose, HandCommand, Load, PERIOD_SECS};
 
 use crate::camera::posed_camera;
 use crate::controller::{ArmController, ArmReference};
@@ -20,7 +20,7 @@ use crate::panda::PandaIds;
 use crate::record::Recorder;
 use crate::render::Renderer;
 
-pub use config::{CameraPlace, WorkcellConfig};
+pub use config::WorkcellConfig;
 use model::CAMERA_IN_BASE;
 pub(crate) use model::build_model;
 
@@ -77,9 +77,9 @@ impl Workcell {
         };
         let wrist_renderer = Renderer::new(&model, wrist_render)?;
         let scene_camera = model.id("scene")?;
-        let camera = match config.camera_place {
-            Some(CameraPlace::InBase(_)) => model.id(CAMERA_IN_BASE)?,
-            Some(CameraPlace::OnFlange(_)) | None => panda_ids.wrist_camera,
+        let camera = match config.camera_pose {
+            Some(CameraPose::InBase(_)) => model.id(CAMERA_IN_BASE)?,
+            Some(CameraPose::OnFlange(_)) | None => panda_ids.wrist_camera,
         };
         let mut data = Data::new(model)?;
         panda_ids.set_position(&mut data, &ready_pose());
