@@ -71,7 +71,7 @@ impl Watch {
     pub fn new(folder: &Path) -> Result<Self> {
         if SavedPlan::read_all(folder)?.units.is_empty() {
             bail!(
-                "{}: expected a folder in which `sdg evaluate --unit` works or has worked, found no plan",
+                "{}: expected a folder in which units of an evaluation are done, found no plan",
                 folder.display()
             );
         }
