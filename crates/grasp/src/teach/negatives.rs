@@ -16,8 +16,8 @@ use crate::check_config::ScoreConfig;
 use crate::decimal::decimal;
 use crate::error::Result;
 use crate::models::{Network, Proposals};
-use crate::prepared::scaling;
 use crate::sighting::{best_agreement, sightings};
+use crate::sizes::scaling;
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 

@@ -70,10 +70,7 @@ impl Watch {
     /// A folder without units.
     pub fn new(folder: &Path) -> Result<Self> {
         if SavedPlan::read_all(folder)?.units.is_empty() {
-            bail!(
-                "{}: expected a folder in which units of an evaluation are done, found no plan",
-                folder.display()
-            );
+            bail!("{}: expected a folder in which units of an evaluation are done, found no plan", folder.display());
         }
         Ok(Self { folder: folder.to_owned(), done: HashMap::new() })
     }
