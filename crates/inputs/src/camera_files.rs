@@ -1,4 +1,4 @@
-//! `--camera FILE`: a calibrated camera over a table.
+//! Files of calibrated cameras over a table.
 
 use std::path::Path;
 
