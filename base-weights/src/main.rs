@@ -17,9 +17,9 @@ use sdg_base_weights::outcome::{Outcome, outcomes};
 use sdg_base_weights::run::{Run, Settings, Task};
 use sdg_base_weights::table::table;
 use sdg_comparison::ComparisonConfig;
+use sdg_files::write_atomically;
 use sdg_grasp::{BaseWeights, BaseWeightsFile, ComputeBackend, FineTuning, Preset, TeachOptions};
 use sdg_orientation::OrientationConfig;
-use sdg_report::write_atomically;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 

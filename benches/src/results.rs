@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 /// Puts `new` between the marks `<!-- NAME: begin -->` and `<!-- NAME: end -->` of a file.
 pub fn rewrite(results: &Path, name: &str, new: &str) -> Result<()> {

@@ -5,12 +5,12 @@ use std::path::Path;
 use std::{fs, io};
 
 use crate::paths::{mentions, named_paths};
-use crate::source_text::code_of;
+use crate::source_text::{code_of, modules_for_tests};
 
 /// A module's path from the crate's root, which is empty.
 type ModulePath = Vec<String>;
 
-/// Files of one crate and what they import. A module's `pub use` of its own child is no import, unless the module also uses
+/// Files of one crate and what they import, without those that are compiled for tests only. A module's `pub use` of its own child is no import, unless the module also uses
 /// that name itself. What another file takes through such a re-export, it imports from where it is defined.
 #[derive(Debug, Default)]
 pub struct ModuleGraph {
@@ -40,15 +40,52 @@ impl ModuleGraph {
         Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
     }
 
+    /// The graph of an example: its file, those of the folder of its name, and those of folders that are modules.
+    ///
+    /// # Errors
+    /// A folder or file that cannot be read.
+    pub fn read_example(file: &Path) -> io::Result<Self> {
+        let mut sources = vec![("main.rs".to_owned(), fs::read_to_string(file)?)];
+        let mut add = |folder: &Path, prefix: &str| -> io::Result<()> {
+            for entry in fs::read_dir(folder).into_iter().flatten() {
+                let path = entry?.path();
+                if path.extension().is_some_and(|extension| extension == "rs") {
+                    let name = path.file_name().unwrap_or_default().to_string_lossy();
+                    sources.push((format!("{prefix}{name}"), fs::read_to_string(&path)?));
+                }
+            }
+            Ok(())
+        };
+        add(&file.with_extension(""), "")?;
+        // Modules that several examples have.
+        for entry in fs::read_dir(file.parent().unwrap_or(file))? {
+            let path = entry?.path();
+            if path.join("mod.rs").is_file() {
+                add(&path, &format!("{}/", path.file_name().unwrap_or_default().to_string_lossy()))?;
+            }
+        }
+        Ok(Self::new(sources.iter().map(|(name, source)| (name.as_str(), source.as_str()))))
+    }
+
     /// The graph of sources given with their paths below `src`, with `/` between folders.
     pub fn new<'a>(sources: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
         let mut files = BTreeMap::new();
         let mut codes = BTreeMap::new();
+        let mut tests: BTreeMap<ModulePath, BTreeSet<String>> = BTreeMap::new();
         for (name, source) in sources {
             let module = module_path(name);
             files.insert(module.clone(), name.to_owned());
+            tests.insert(module.clone(), modules_for_tests(source));
             codes.insert(module, code_of(source));
         }
+        let for_tests = |module: &ModulePath| {
+            (1..=module.len()).any(|depth| {
+                let (parent, child) = (&module[..depth - 1], &module[depth - 1]);
+                tests.get(parent).is_some_and(|tests| tests.contains(child))
+            })
+        };
+        files.retain(|module, _| !for_tests(module));
+        codes.retain(|module, _| !for_tests(module));
         let mut graph = Self { files, imports: BTreeMap::new() };
 
         let mut exports: BTreeMap<(ModulePath, String), ModulePath> = BTreeMap::new();
@@ -146,6 +183,49 @@ impl ModuleGraph {
         groups
     }
 
+    /// Groups of a folder's direct entries, files or folders, that import from each other: a folder stands for all files in it, so that two
+    /// folders are seen to form a circle though no two files do. Each group is sorted and written with the folder's path.
+    pub fn folder_cycles(&self) -> Vec<Vec<String>> {
+        let folders: BTreeSet<&[String]> =
+            self.files.keys().flat_map(|module| (0..module.len()).map(|depth| &module[..depth])).collect();
+        let mut groups = Vec::new();
+        for folder in folders {
+            let entry = |module: &ModulePath| {
+                (module.starts_with(folder) && module.len() > folder.len()).then(|| module[..=folder.len()].to_vec())
+            };
+            let mut entries = Self::default();
+            for module in self.files.keys().filter_map(entry) {
+                entries.files.insert(module.clone(), module.join("/"));
+            }
+            for (module, imported) in &self.imports {
+                let Some(from) = entry(module) else { continue };
+                let others = imported.iter().filter_map(entry).filter(|to| *to != from);
+                entries.imports.entry(from.clone()).or_default().extend(others);
+            }
+            groups.extend(entries.cycles());
+        }
+        groups
+    }
+
+    /// The imports among entries of one group of [`Self::folder_cycles`], a line each.
+    pub fn imports_between(&self, group: &[String]) -> String {
+        let entry = |module: &ModulePath| {
+            group.iter().find(|entry| {
+                module.join("/").strip_prefix(*entry).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+            })
+        };
+        let mut lines = String::new();
+        for (module, imported) in &self.imports {
+            for to in imported {
+                let (Some(from_entry), Some(to_entry)) = (entry(module), entry(to)) else { continue };
+                if from_entry != to_entry {
+                    lines.push_str(&format!("    {} -> {}\n", self.files[module], self.files[to]));
+                }
+            }
+        }
+        lines
+    }
+
     /// The imports among the files of one group, a line each.
     pub fn imports_within(&self, group: &[String]) -> String {
         let mut lines = String::new();
@@ -202,6 +282,24 @@ mod tests {
         assert!(only_exported.cycles().is_empty());
         let used = ModuleGraph::new([("a/mod.rs", "mod child; pub use child::C; struct Parent(C);"), child]);
         assert_eq!(used.cycles(), [["a/child.rs", "a/mod.rs"]]);
+    }
+
+    #[test]
+    fn two_folders_form_a_circle_though_no_two_files_do() {
+        let graph = ModuleGraph::new([
+            ("lib.rs", "mod a; mod b; mod c;"),
+            ("a/mod.rs", "mod one; mod two;"),
+            ("a/one.rs", "use crate::b::one::B;"),
+            ("a/two.rs", "struct A;"),
+            ("b/mod.rs", "mod one; mod two;"),
+            ("b/one.rs", "struct B;"),
+            ("b/two.rs", "use crate::a::two::A; use super::one::B;"),
+            ("c.rs", "use crate::a::two::A;"),
+        ]);
+        assert!(graph.cycles().is_empty());
+        let circles = graph.folder_cycles();
+        assert_eq!(circles, [["a", "b"]]);
+        assert_eq!(graph.imports_between(&circles[0]).lines().count(), 2);
     }
 
     #[test]

@@ -1,9 +1,25 @@
 //! Rust source without what is no code: comments, strings, and items under `#[cfg(test)]`.
 
+use std::collections::BTreeSet;
+
 /// `source` without comments, contents of strings and characters, and items that are compiled for tests only.
 pub fn code_of(source: &str) -> String {
     without_test_items(&without_comments_and_strings(source))
 }
+
+/// The modules with files of their own that `source` declares for tests only.
+pub fn modules_for_tests(source: &str) -> BTreeSet<String> {
+    let code = without_comments_and_strings(source);
+    let declared = code.split(TEST_MARK).skip(1).filter_map(|item| {
+        let (declaration, _) = item.split_once(';').filter(|(declaration, _)| !declaration.contains('{'))?;
+        let (_, name) = declaration.rsplit_once("mod ")?;
+        Some(name.trim().to_owned())
+    });
+    declared.collect()
+}
+
+/// What marks an item that is compiled for tests only.
+const TEST_MARK: &str = "#[cfg(test)]";
 
 fn without_comments_and_strings(source: &str) -> String {
     let text: Vec<char> = source.chars().collect();
@@ -69,12 +85,11 @@ fn raw_string_hashes(text: &[char], start: usize) -> Option<usize> {
 }
 
 fn without_test_items(code: &str) -> String {
-    const MARK: &str = "#[cfg(test)]";
     let mut kept = String::with_capacity(code.len());
     let mut rest = code;
-    while let Some(start) = rest.find(MARK) {
+    while let Some(start) = rest.find(TEST_MARK) {
         kept.push_str(&rest[..start]);
-        rest = &rest[start + MARK.len()..];
+        rest = &rest[start + TEST_MARK.len()..];
         rest = &rest[item_length(rest)..];
     }
     kept.push_str(rest);
@@ -110,5 +125,6 @@ mod tests {
     fn items_for_tests_are_left_out() {
         let source = "use crate::a;\n#[cfg(test)]\nmod tests {\n use super::*;\n fn f() {}\n}\n#[cfg(test)]\nmod more;\nfn g() {}";
         assert_eq!(code_of(source), "use crate::a;\n\n\nfn g() {}");
+        assert_eq!(modules_for_tests(source), BTreeSet::from(["more".to_owned()]));
     }
 }

@@ -4,14 +4,14 @@ use std::ops::ControlFlow;
 
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
-use sdg_cli::shipped;
+use sdg_evaluation::shipped;
 use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
 use sdg_grasp::{
     CameraOverTable, Device, GraspModel, ModelKind, PlanDetection, PlanDetector, TeachOptions, Verification,
     seen_from_above, teach,
 };
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
-use sdg_simulation::scene::{Axis, AxisView, axis_view, demonstration_view};
+use sdg_simulation::views::{Axis, AxisView, axis_view, demonstration_view};
 
 /// Seed of the pictures, which no other test and no evaluation uses.
 const SEED: u64 = 7100;

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use sdg_cli::rehearsal::{Rehearsal, RehearsalErrors};
-use sdg_cli::shipped;
-use sdg_cli::trial::{Trial, try_views};
+use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors};
+use sdg_evaluation::shipped;
+use sdg_evaluation::trial::{Trial, try_views};
 use sdg_grasp::{Device, GraspModel, ModelKind, TeachOptions, Verification, teach};
 use sdg_simulation::objects::ObjectSpec;
 

@@ -5,16 +5,15 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sdg_cell::{LiveTracker, Perception, SearchTime};
-use sdg_cli::shipped;
-
 use sdg_demonstration::Demonstration;
+use sdg_evaluation::shipped;
 use sdg_grasp::{
     CameraOverTable, Device, GraspModel, ModelKind, TeachOptions, TrackState, TrackedPart, TrackerConfig,
     seen_from_above, teach,
 };
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::demonstration_view;
 use sdg_simulation::table_camera::{MovingTruth, TableCamera};
+use sdg_simulation::views::demonstration_view;
 
 /// Frames that a search takes: 100 to 200 ms on one of two cores that others use, too (docs/tracking.md).
 const SEARCH_FRAMES: u32 = 20;

@@ -10,6 +10,9 @@ pub enum WeightsError {
     /// The file system refused something.
     #[error("cannot {action}: {source}")]
     Io { action: &'static str, source: io::Error },
+    /// The new file could not be written.
+    #[error(transparent)]
+    File(#[from] sdg_files::FileError),
     /// Bytes of no format that is read here.
     #[error("expected a pickled checkpoint (protocol 2 to 5), a torch checkpoint or a safetensors file, found {found}")]
     NotACheckpoint {

@@ -9,16 +9,16 @@
 //! of half precision's range.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::Path;
 use std::thread;
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
+use sdg_files::AtomicFile;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
-use tempfile::TempPath;
 
 use crate::checkpoint::Checkpoint;
 use crate::conversion::{Conversion, Planned};
@@ -77,26 +77,23 @@ impl Conversion {
     ) -> Result<Written> {
         self.complete()?;
         let [from, out] = paths;
-        let out = &writable(out)?;
         thread::scope(|scope| {
             let hashing = scope.spawn(|| sha256_of(from));
             // The header comes first in the file and holds the hash, which comes last: its place is kept.
-            let (file, temporary) = temporary_beside(out)?;
-            let file = BufWriter::with_capacity(1 << 20, file);
+            let mut file = AtomicFile::create(out)?;
             let metadata = |sha256: &str| self.metadata(checkpoint, from, sha256, extra);
             let header = self.header(&metadata(&"0".repeat(64)), precision);
-            let mut file = self.write_body(source, file, &header, precision)?;
+            let body = BufWriter::with_capacity(1 << 20, file.as_file());
+            self.write_body(source, body, &header, precision)?;
             let sha256 = match hashing.join() {
                 Ok(sha256) => sha256?,
                 Err(panic) => std::panic::resume_unwind(panic),
             };
             let header = self.header(&metadata(&sha256), precision);
-            write_at_start(&mut file, &header)?;
-            let bytes = file.metadata().map_err(WeightsError::io("ask for the new file's size"))?.len();
-            file.sync_all().map_err(WeightsError::io("flush the new file to the disk"))?;
-            drop(file);
-            let renamed = temporary.persist(out);
-            renamed.map_err(|refused| WeightsError::io("give the new file its name")(refused.error))?;
+            write_at_start(file.as_file(), &header)?;
+            let metadata = file.as_file().metadata();
+            let bytes = metadata.map_err(WeightsError::io("ask for the new file's size"))?.len();
+            file.commit()?;
             Ok(Written { bytes, source_sha256: sha256 })
         })
     }
@@ -160,10 +157,10 @@ impl Conversion {
     fn write_body(
         &self,
         source: &mut Source,
-        mut file: BufWriter<File>,
+        mut file: BufWriter<&mut File>,
         header: &[u8],
         precision: Precision,
-    ) -> Result<File> {
+    ) -> Result<()> {
         file.write_all(header).map_err(WeightsError::io("write the new file"))?;
         let mut bytes = Vec::new();
         let mut halves: Vec<f16> = Vec::new();
@@ -182,7 +179,7 @@ impl Conversion {
                 file.write_all(&bytes).map_err(WeightsError::io("write the new file"))
             })?;
         }
-        file.into_inner().map_err(|error| WeightsError::io("write the new file")(error.into_error()))
+        file.flush().map_err(WeightsError::io("write the new file"))
     }
 }
 
@@ -201,31 +198,7 @@ fn check_values(name: &str, values: &[f32], stored: Precision) -> Result<()> {
     Err(WeightsError::Value { name: printable(name), limit, found })
 }
 
-/// The file to replace: a link is followed, and what is no file is left alone.
-fn writable(out: &Path) -> Result<PathBuf> {
-    let target =
-        if out.is_symlink() { fs::canonicalize(out).unwrap_or_else(|_| out.to_owned()) } else { out.to_owned() };
-    if target.file_name().is_none() || (target.exists() && !target.is_file()) {
-        let source = io::Error::other("expected the path of a file, found a folder or a device");
-        return Err(WeightsError::Io { action: "write the new file", source });
-    }
-    Ok(target)
-}
-
 fn write_at_start(file: &mut File, header: &[u8]) -> Result<()> {
     let written = file.seek(SeekFrom::Start(0)).and_then(|_| file.write_all(header));
     written.map_err(WeightsError::io("write the new file's header"))
-}
-
-/// A file in the folder of `out`, with the permissions that new files have, and its path, which deletes it when it goes out
-/// of scope.
-fn temporary_beside(out: &Path) -> Result<(File, TempPath)> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".sdg-").suffix(".tmp");
-    #[cfg(unix)]
-    // What other programs ask for; the umask takes the rest away.
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let made = builder.tempfile_in(folder).map_err(WeightsError::io("make a temporary file beside the output"))?;
-    Ok(made.into_parts())
 }

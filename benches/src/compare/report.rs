@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use sdg_files::write_atomically;
 use sdg_geometry::median;
-use sdg_report::write_atomically;
 use serde::Serialize;
 
 use crate::compare::machine::Machine;

@@ -13,7 +13,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use sdg_demonstration::{Annotation, ImageFacts};
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use serde_json::Value;
 
 use crate::error::{Error, Result};

@@ -34,7 +34,7 @@ pub enum Error {
     },
     /// An annotation could not be written.
     #[error(transparent)]
-    Write(#[from] sdg_report::ReportError),
+    Write(#[from] sdg_files::FileError),
     /// The marks are not enough for what was asked.
     #[error("{name}: expected {expected}, found {found}")]
     NotMarked { name: String, expected: &'static str, found: &'static str },
@@ -50,6 +50,16 @@ pub enum Error {
     /// A project without a photo.
     #[error("{}: expected a photo of the part in this folder (PNG, JPEG, WebP, BMP, TIFF), or a camera (--from), found neither", path.display())]
     EmptyProject { path: PathBuf },
+    /// A file of the page's key that holds something else.
+    #[error(
+        "{}: expected a key of 16 letters and digits or more, found {found} characters (delete the file for a new key)",
+        path.display()
+    )]
+    NotAKey {
+        path: PathBuf,
+        /// How many characters it has.
+        found: usize,
+    },
     /// More pictures than a session keeps.
     #[error("expected at most {most} pictures to try, found one more")]
     TooManyPictures { most: usize },

@@ -8,8 +8,8 @@
 //!    └─ Server: 127.0.0.1 only, behind a Guard (token, Host, Origin) ─ routes ─ page/ (HTML, CSS, JavaScript)
 //! ```
 //!
-//! What is deliberately absent: grasp models, burn and cameras. Teaching and detecting come in through [`GraspTeacher`], live
-//! pictures through [`LivePictures`], so that this crate builds in seconds. No request names a path: pictures have numbers.
+//! What is deliberately absent: grasp models and burn. Teaching and detecting come in through [`GraspTeacher`], live
+//! pictures through [`LivePictures`] (a camera's are [`CameraPictures`]), so that this crate builds in seconds. No request names a path: pictures have numbers.
 //!
 //! ```no_run
 //! use std::sync::Arc;
@@ -27,6 +27,7 @@
 
 mod advice;
 mod annotation_file;
+mod camera_pictures;
 mod error;
 mod gripper;
 mod guard;
@@ -46,9 +47,11 @@ mod session;
 mod session_state;
 mod teacher;
 mod teaching;
+mod token_file;
 mod views;
 
 pub use advice::{Advice, Fix, ModelAdvice, Remark};
+pub use camera_pictures::{CameraPictures, SizeCheck, paced};
 pub use error::{Error, Result, TeacherError};
 pub use gripper::{Gripper, Reach};
 pub use guard::new_token;
@@ -62,4 +65,5 @@ pub use teacher::{
     TeachingMaterial, TeachingStep,
 };
 pub use teaching::{News, Status};
+pub use token_file::token_of_file;
 pub use views::{ComparedPicture, ImageView, ModelView, Saved, SessionView, TrialPictureView};

@@ -1,4 +1,4 @@
-//! Live pictures, which this crate does not take itself: the caller implements [`LivePictures`].
+//! Live pictures, of whatever implements [`LivePictures`].
 //!
 //! A frame that was shown to the page is kept for a while, so that the photo that is taken is the one that the person saw, and
 //! detections are drawn on the picture that they were found in.

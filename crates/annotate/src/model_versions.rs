@@ -11,7 +11,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};

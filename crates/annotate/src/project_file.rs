@@ -15,7 +15,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::annotation_file;

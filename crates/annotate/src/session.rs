@@ -330,7 +330,7 @@ impl Session {
         // Held until the photo is written: the next one finds its name taken.
         let mut state = self.state();
         let path = self.next_photo()?;
-        sdg_report::write_atomically(&path, &bytes)?;
+        sdg_files::write_atomically(&path, &bytes)?;
         let picture = Picture { name: file_name(&path), path, size: [frame.width(), frame.height()] };
         let id = state.add_image(picture, Marks::default())?;
         state.save_project()?;

@@ -120,14 +120,12 @@ pub enum CalibrationError {
     BoardUnclear { corners: usize },
     /// A checkerboard without dots that has other squares, or is not seen whole.
     #[error(
-        "expected a checkerboard of {columns} x {rows} squares, found one of {found_columns} x {found_rows}: give its squares with --squares, or \
-         show the whole board"
+        "expected a checkerboard of {columns} x {rows} squares, found one of {found_columns} x {found_rows}: it has other \
+         squares, or is not seen whole"
     )]
     OtherCheckerboard { columns: u32, rows: u32, found_columns: u32, found_rows: u32 },
     /// The board has more squares than expected.
-    #[error(
-        "expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}: give its squares with --squares"
-    )]
+    #[error("expected a board of {columns} x {rows} squares, found one of at least {found_columns} x {found_rows}")]
     OtherBoard {
         /// Squares along x, as expected.
         columns: u32,
@@ -187,6 +185,8 @@ pub enum CalibrationError {
         /// How far they are apart.
         found: String,
         hint: String,
+        /// Whether the hint is that the camera is mounted at the other place than told.
+        is_other_mount: bool,
     },
     /// One or two robot poses that do not belong to their pictures, among others that agree.
     #[error(

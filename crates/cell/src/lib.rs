@@ -2,16 +2,31 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+pub mod drawing;
+mod dry_run;
 mod error;
 mod finder;
+mod hand_reach;
+mod live_detection;
 mod live_tracker;
 mod part_shape;
 mod perception;
 mod placed_camera;
+mod record;
+mod sequence_run;
+mod workcell_map;
 
+pub use drawing::DEFAULT_MIN_SCORE;
+pub use dry_run::DryRun;
 pub use error::{CellError, Result};
 pub use finder::{LivePictures, ModelFinder, Pictures, SeenOutline, TakenPicture};
+pub use hand_reach::{Reach, Square};
+pub use live_detection::{FrameDetector, Frames, Next, Part};
 pub use live_tracker::{LiveTracker, SearchTime};
 pub use part_shape::part_shape;
 pub use perception::{Found, Perception};
-pub use placed_camera::{CameraPose, PlacedCamera};
+pub use placed_camera::PlacedCamera;
+pub use record::FoundRecord;
+pub use sdg_robot::CameraPose;
+pub use sequence_run::{Ended, run_sequence};
+pub use workcell_map::WorkcellMap;

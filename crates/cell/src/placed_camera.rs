@@ -5,8 +5,8 @@ use sdg_calibration::{CalibratedCamera, Frame};
 use sdg_geometry::{PinholeCamera, PosedCamera};
 use sdg_grasp::CameraOverTable;
 use sdg_kinematics::Panda;
-use sdg_robot::CameraMount;
 use sdg_robot::workcell::Mounting;
+use sdg_robot::{CameraMount, CameraPose};
 
 use crate::error::{CellError, Result};
 
@@ -19,15 +19,6 @@ pub struct PlacedCamera {
     pub pose: CameraPose,
     /// The table's z in the robot's base, in metres.
     pub table_height_m: f64,
-}
-
-/// Where a camera is fixed; lengths in metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraPose {
-    /// `flange_from_camera`.
-    OnFlange(Isometry3<f64>),
-    /// `base_from_camera`.
-    InBase(Isometry3<f64>),
 }
 
 impl PlacedCamera {

@@ -11,8 +11,7 @@ use std::time::{Duration, Instant};
 
 use image::RgbImage;
 use sdg_cell::{LiveTracker, Perception, SearchTime};
-use sdg_cli::shipped;
-
+use sdg_evaluation::shipped;
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{
     Device, GraspDetection, GraspModel, ModelKind, TeachOptions, TrackedPart, TrackerConfig, Verification, teach,

@@ -2,59 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use sdg_demonstration::Demonstration;
+use sdg_inputs::annotation_files::beside_photo;
+use sdg_inputs::demonstrations::read_pair;
 
-use crate::annotation_files::{AnnotationFile, beside_photo};
 use crate::exit::Usage;
-use crate::files;
-
-/// Makes sure that the photos of the arguments are a calibrated camera's.
-///
-/// # Errors
-/// A photo that an Exif orientation turns.
-pub fn check_are_not_turned(arguments: &[String]) -> Result<()> {
-    arguments.iter().try_for_each(|argument| files::check_is_not_turned(&photo_and_marks(argument)?.0))
-}
 
 /// Reads one demonstration from each argument.
 pub fn read_all(arguments: &[String]) -> Result<Vec<Demonstration>> {
-    arguments.iter().map(|argument| read(argument)).collect()
+    pairs(arguments)?.iter().map(|(photo, marks)| read_pair(photo, marks)).collect()
 }
 
-fn read(argument: &str) -> Result<Demonstration> {
-    let (image_path, annotation_path) = photo_and_marks(argument)?;
-    read_pair(&image_path, &annotation_path)
-}
-
-/// Reads a photo and the marks on it.
+/// The two files of each argument.
 ///
 /// # Errors
-/// Files that cannot be read; other than one marked object.
-pub fn read_pair(image_path: &Path, annotation_path: &Path) -> Result<Demonstration> {
-    let image = files::read_image(image_path)?;
-    let file = AnnotationFile::read(annotation_path)?;
-    let mut objects = file.objects_on(image_path, &image)?;
-    // Boxes of other things, which another tool or another person marked as well.
-    if objects.iter().filter(|object| object.grasp.is_some()).count() == 1 {
-        for other in objects.extract_if(.., |object| object.grasp.is_none()) {
-            eprintln!("{}: passed over `{}`, which has no grasp", annotation_path.display(), other.label);
-        }
-    }
-    if objects.len() != 1 {
-        let labels: Vec<&str> = objects.iter().map(|object| object.label.as_str()).collect();
-        bail!(
-            "{}: expected one marked object, found {} ({}): a demonstration shows one part",
-            annotation_path.display(),
-            objects.len(),
-            labels.join(", ")
-        );
-    }
-    Ok(Demonstration { image, annotation: objects.remove(0) })
+/// A photo that is not there or has no marks beside it; [`Usage`] for what is no such argument.
+pub fn pairs(arguments: &[String]) -> Result<Vec<(PathBuf, PathBuf)>> {
+    arguments.iter().map(|argument| photo_and_marks(argument)).collect()
 }
 
 /// The two files of an argument; a photo alone has its marks beside it.
-fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
+pub fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
     let photo = Path::new(argument);
     if argument.contains(':') && !photo.exists() {
         return split(argument);
@@ -63,7 +32,7 @@ fn photo_and_marks(argument: &str) -> Result<(PathBuf, PathBuf)> {
         return Err(Usage("--demo: expected IMAGE or IMAGE:ANNOTATION, found nothing".to_owned()).into());
     }
     // A missing photo is reported as missing, not as one without marks.
-    files::check_readable(photo)?;
+    sdg_files::check_readable(photo)?;
     Ok((photo.to_owned(), beside_photo(photo)?))
 }
 

@@ -4,8 +4,11 @@ use std::fmt;
 use std::io;
 use std::process::ExitCode;
 
+use sdg_calibration::CalibrationError;
 use sdg_cell::CellError;
+use sdg_evaluation::EvaluationError;
 use sdg_grasp::GraspError;
+use sdg_inputs::ConfigError;
 use sdg_robot::RobotError;
 
 /// What every help text and manual page ends with.
@@ -82,17 +85,9 @@ pub fn is_closed_pipe(error: &anyhow::Error) -> bool {
     })
 }
 
-/// The error and its causes on one line, each cause once: messages often quote the cause that they carry.
+/// The error and its causes on one line, and the option that helps.
 pub fn one_line(error: &anyhow::Error) -> String {
-    let mut line = String::new();
-    for cause in error.chain() {
-        let text = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-        if line.is_empty() {
-            line = text;
-        } else if !line.contains(&text) {
-            line = format!("{line}: {text}");
-        }
-    }
+    let line = sdg_inputs::one_line(error);
     match error.chain().find_map(remedy) {
         Some(remedy) => format!("{line}; {remedy}"),
         None => line,
@@ -109,6 +104,31 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     if let Some(error) = cause.downcast_ref() {
         return of_model(error);
     }
+    if let Some(error) = cause.downcast_ref() {
+        return match error {
+            EvaluationError::OtherSettings { .. } => {
+                Some("give these settings, or another folder with --out".to_owned())
+            }
+            EvaluationError::UnitOfOtherSettings { .. } => Some("give another folder with --out".to_owned()),
+            EvaluationError::SeveralLabels { .. } => Some("choose one with --label".to_owned()),
+            _ => None,
+        };
+    }
+    if let Some(error) = cause.downcast_ref() {
+        return match error {
+            CalibrationError::OtherCheckerboard { .. } => {
+                Some("give its squares with --squares, or show the whole board".to_owned())
+            }
+            CalibrationError::OtherBoard { .. } => Some("give its squares with --squares".to_owned()),
+            CalibrationError::HandEyeDisagrees { is_other_mount: true, .. } => {
+                Some("with --mount the other one is chosen".to_owned())
+            }
+            _ => None,
+        };
+    }
+    if let Some(ConfigError::BothHeads) = cause.downcast_ref() {
+        return Some("describe it with --config".to_owned());
+    }
     match cause.downcast_ref() {
         Some(CellError::Grasp(error)) => of_model(error),
         Some(CellError::NotOnHand) => Some("sdg camera hand-eye --mount hand measures it".to_owned()),
@@ -119,19 +139,5 @@ fn remedy(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             Some(RobotError::NoRealTime { .. }) => Some("--no-realtime goes without".to_owned()),
             _ => None,
         },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use anyhow::Context;
-
-    #[test]
-    fn causes_follow_each_other_once() {
-        let cause: anyhow::Result<()> = Err(io::Error::other("disk\nfull")).context("model.sdg: cannot write");
-        assert_eq!(one_line(&cause.unwrap_err()), "model.sdg: cannot write: disk full");
-        let quoted: anyhow::Result<()> = Err(io::Error::other("full")).context("cannot write: full");
-        assert_eq!(one_line(&quoted.unwrap_err()), "cannot write: full");
     }
 }

@@ -1,11 +1,9 @@
 //! A detection as a line of text, and why it is refused.
 
 use sdg_calibration::Frame;
-use sdg_cell::{Found, Perception};
+use sdg_cell::{DEFAULT_MIN_SCORE, Found, Perception};
 use sdg_grasp::{Advice, EvidenceKind, GraspDetection};
 
-/// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
-pub const DEFAULT_MIN_SCORE: f64 = 0.5;
 /// Below it nothing resembles the part: advice would mislead. Chosen by hand.
 pub const MIN_ADVISED_SCORE: f64 = 0.03;
 /// Sizes nearer to the photo's than this are no reason to name. Chosen by hand.

@@ -1,13 +1,14 @@
 //! `sdg`: teach a robot a grasp from one photo.
 //!
 //! ```text
-//! args ─ commands/<verb>.rs ─ grasp, simulation, report
+//! args ─ commands/<verb>.rs ─ inputs, cell, evaluation, annotate, ros2-node
 //! ```
 //!
 //! Without the features `simulation` and `annotate` (`cargo build -p sdg-cli --no-default-features`) it is a small program for
 //! small machines: it teaches and detects, and neither MuJoCo nor EGL nor the annotation page is in it.
 //!
-//! The binary is a thin shell around [`run`]; [`rehearsal`], [`trial`] and [`evaluation`] are open to the end-to-end tests.
+//! The binary is a thin shell around [`run`]. What the command line does stands in the other crates; here are its arguments, words, progress
+//! and exit codes. Nothing here is an interface for programs.
 //!
 //! ```
 //! use clap::Parser;
@@ -20,57 +21,23 @@
 #![allow(missing_docs, reason = "the library of a program: nothing but this workspace uses it")]
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-#[cfg(feature = "simulation")]
-pub mod against_truth;
-mod annotation_files;
+#[doc(hidden)]
 pub mod args;
-pub mod base_weights;
-pub mod camera_files;
 mod commands;
 mod demonstrations;
-pub mod detector_config;
-mod drawings;
-#[cfg(feature = "simulation")]
-pub mod evaluation;
 mod exit;
-mod files;
-mod found_record;
 mod found_text;
-mod held_back;
 mod interrupt;
 mod json_line;
-pub mod labelled_pictures;
-pub mod live_pictures;
-mod machine;
-mod many_parts;
-mod marks_check;
-#[cfg(feature = "simulation")]
-mod own_part;
-#[cfg(feature = "annotate")]
-mod page_camera;
+mod live_pictures;
 #[cfg(feature = "annotate")]
 mod page_teacher;
 #[cfg(feature = "simulation")]
 mod parts;
-mod pictures;
 mod progress;
-#[cfg(feature = "simulation")]
-pub mod rehearsal;
-pub mod robots;
-#[cfg(feature = "ros2")]
-mod ros_node;
-#[cfg(feature = "simulation")]
-mod run_page;
+mod robots;
 mod shared_args;
-#[cfg(feature = "simulation")]
-pub mod shipped;
-pub mod split;
-mod statistics;
-mod taught_file;
-mod teaching_page;
 mod teaching_progress;
-#[cfg(feature = "simulation")]
-pub mod trial;
 
 use std::process::ExitCode;
 
@@ -79,16 +46,19 @@ use clap::{Command as ClapCommand, CommandFactory, FromArgMatches};
 use crate::args::{Args, Command};
 use crate::exit::Outcome;
 
+#[doc(hidden)]
 /// The definition of the command line, with what no verb says by itself.
 pub fn command() -> ClapCommand {
     exit::with_exit_codes(Args::command())
 }
 
+#[doc(hidden)]
 /// Reads the arguments of this process; wrong ones end it with their message, as `--help` does with its text.
 pub fn parse_args() -> Args {
     Args::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
 }
 
+#[doc(hidden)]
 /// Runs one command; prints the one line of an error and returns the exit code.
 pub fn run(args: &Args) -> ExitCode {
     let done = match &args.command {

@@ -133,6 +133,13 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_cannot_be_opened_is_named_with_its_option() {
+        let address = "dir:/nowhere/at/all".parse().unwrap();
+        let line = crate::exit::one_line(&open(&address, &OpenOptions::default()).err().unwrap());
+        assert!(line.starts_with("--from: dir:/nowhere/at/all") && line.contains("expected a folder"), "{line}");
+    }
+
+    #[test]
     fn sizes_have_two_sides() {
         assert_eq!(parse_size("640x480"), Ok((640, 480)));
         for text in ["640", "640x", "0x480", "640x99999", "640 x 480", "640X480"] {

@@ -11,15 +11,16 @@ use sdg_annotate::{
     TeacherError, TeachingMaterial, TeachingStep,
 };
 use sdg_calibration::Frame;
+use sdg_cell::DEFAULT_MIN_SCORE;
 use sdg_cell::{Found, Perception};
+use sdg_evaluation::TaughtFile;
+use sdg_evaluation::held_back::HeldBackFigures;
+use sdg_evaluation::{Share, wilson_interval};
 use sdg_geometry::RotationalSymmetry;
 use sdg_grasp::{Advice, GraspModel, PlanarPose, Preset, TeachOptions, TeachingEvent, Verification};
+use sdg_inputs::camera_files::CameraFile;
 
-use crate::camera_files::CameraFile;
-use crate::found_text::{DEFAULT_MIN_SCORE, MIN_ADVISED_SCORE, Wording};
-use crate::held_back::HeldBackFigures;
-use crate::statistics::{Share, wilson_interval};
-use crate::taught_file::TaughtFile;
+use crate::found_text::{MIN_ADVISED_SCORE, Wording};
 
 /// Teaches with one preset.
 pub struct PageTeacher {

@@ -6,6 +6,7 @@ use std::sync::PoisonError;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use sdg_evaluation::Progress;
 
 /// Shows what was done; shared by all workers.
 pub struct EvaluationProgress {
@@ -40,16 +41,23 @@ impl EvaluationProgress {
         Self { bar, started: Instant::now(), counted: Mutex::default() }
     }
 
-    /// How many units there are to do.
-    pub fn expect(&self, units: usize) {
+    /// Removes the bar.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Progress for EvaluationProgress {
+    fn expect(&self, units: usize) {
         self.counted.lock().unwrap_or_else(PoisonError::into_inner).of += units;
         if let Some(bar) = &self.bar {
             bar.inc_length(units as u64);
         }
     }
 
-    /// A unit ended.
-    pub fn unit_done(&self, what: &str) {
+    fn unit_done(&self, what: &str) {
         let mut counted = self.counted.lock().unwrap_or_else(PoisonError::into_inner);
         counted.done += 1;
         let (done, of) = (counted.done, counted.of);
@@ -60,18 +68,10 @@ impl EvaluationProgress {
         }
     }
 
-    /// A line of its own.
-    pub fn print_line(&self, text: &str) {
+    fn print_line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
             None => eprintln!("{text}"),
-        }
-    }
-
-    /// Removes the bar.
-    pub fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use sdg_evaluation::{Settings, Store};
+
 use crate::support::{Folder, sdg, shipped};
-use sdg_cli::evaluation::{Settings, Store};
 
 /// Asserts exit code and one line on standard error that contains every part.
 fn assert_refused(arguments: &[&str], code: i32, parts: &[&str]) {

@@ -7,15 +7,16 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Instant;
 
-use crate::support::sdg;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_cli::base_weights;
 use sdg_detection::config::{BlockKind, RcnnConfig};
 use sdg_detection::presets::{RcnnKind, edge, edge_of, r50_detectron2, r50_torchvision};
 use sdg_grasp::{BaseWeights, BaseWeightsFile, Device, NUM_KEYPOINTS};
+use sdg_inputs::base_weights;
 use sdg_layers::state_dict;
 use serde_json::{Map, Value, json};
+
+use crate::support::sdg;
 
 /// Runs `sdg` with that much address space and no more.
 fn sdg_within(bytes: u64, arguments: &[&str]) -> Output {

@@ -252,7 +252,11 @@ fn a_camera_on_the_hand_is_found_and_written() {
     assert!(fs::read_to_string(&out).unwrap().contains("hand_eye:\n  flange_from_camera:\n"));
     let told = stdout(&[&common[..], &["--mount", "hand"]].concat());
     assert!(told.contains("flange_from_camera: (") && told.contains("one picture left out"), "{told}");
-    assert_refused(&[&common[..], &["--mount", "base"]].concat(), 1, &["--mount to be the other one"]);
+    assert_refused(
+        &[&common[..], &["--mount", "base"]].concat(),
+        1,
+        &["the mount to be the other one", "with --mount"],
+    );
 
     let of_hand = |poses: &str, measured: &str, parts: &[&str]| {
         let arguments = ["camera", "hand-eye", "--camera", &known, "--poses", poses, "--mount", "hand"];

@@ -8,7 +8,7 @@ use crate::support::{Folder, sdg, shipped};
 use image::RgbImage;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{OTHER_CAMERAS, OnTable, other_view};
+use sdg_simulation::views::{OTHER_CAMERAS, OnTable, other_view};
 use serde_json::{Value, json};
 
 /// The wrist camera as the shipped photos were taken: straight down from 0.58 m, the picture's right along -y of the base.

@@ -12,11 +12,12 @@ use std::process::Command;
 
 use image::RgbImage;
 use safetensors::{Dtype, tensor::TensorView};
-use sdg_cli::{base_weights, shipped};
 use sdg_demonstration::{AugmentationConfig, Augmenter};
 use sdg_detection::config::{KeypointReadout, RcnnConfig};
 use sdg_detection::{Detections, GeneralizedRcnn, presets};
+use sdg_evaluation::shipped;
 use sdg_grasp::{Device, NUM_KEYPOINTS};
+use sdg_inputs::base_weights;
 use sdg_layers::state_dict;
 use sdg_training::{Outcome, SampleSource, TrainingConfig, ValidationConfig, train};
 

@@ -9,7 +9,6 @@ mod browser;
 mod calibration;
 mod camera;
 mod devices;
-mod evaluation;
 mod half_precision;
 mod labelled_pictures;
 mod live_detection;

@@ -7,12 +7,13 @@ use std::process::Command;
 use crate::simulated_arm::Simulated;
 use crate::support::sdg;
 use sdg_calibration::{CalibratedCamera, Frame, TablePose};
+use sdg_cell::CameraPose;
 use sdg_geometry::PinholeCamera;
 use sdg_kinematics::ready_pose;
 use sdg_robot::camera_looking_down;
 use sdg_simulation::objects::ObjectSpec;
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
-use sdg_simulation::{CameraPlace, Workcell, WorkcellConfig};
+use sdg_simulation::{Workcell, WorkcellConfig};
 use serde_json::Value;
 
 fn shipped(name: &str) -> PathBuf {
@@ -255,8 +256,8 @@ fn an_arm_on_the_network_grasps_what_a_live_camera_shows() {
     fs::write(file("camera.yaml"), camera.to_yaml()).unwrap();
     let variation = VariationConfig { appearance: false, distractors: 0..=0, ..VariationConfig::default() };
     let scene = SceneVariation::sample(Some(&ObjectSpec::by_name("pendulum").unwrap()), &variation, SEED);
-    let place = Some(CameraPlace::InBase(base_from_camera));
-    let mut cell = Workcell::new(&WorkcellConfig { camera_place: place, ..WorkcellConfig::new(scene) }).unwrap();
+    let place = Some(CameraPose::InBase(base_from_camera));
+    let mut cell = Workcell::new(&WorkcellConfig { camera_pose: place, ..WorkcellConfig::new(scene) }).unwrap();
     let mut aside = ready_pose();
     aside[0] = 1.6;
     cell.reset(&aside).unwrap();

@@ -3,8 +3,8 @@
 use image::RgbImage;
 use sdg_geometry::{Keypoint, Polygon};
 
-use crate::augmentation::erase_parts;
 use crate::draft::Draft;
+use crate::erase::erase_parts;
 use crate::{Annotation, Error, ImageFacts, ImageLimits, Result, decode_image};
 
 /// How many keypoints stand for a grasp line: the two clicked points and ten evenly spaced between them.

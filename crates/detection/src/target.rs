@@ -55,20 +55,6 @@ impl From<Mask> for ObjectMask {
 }
 
 impl ObjectMask {
-    /// The mask as a bitmap of an image of `width × height` pixels.
-    ///
-    /// # Panics
-    /// Where it is a bitmap of another size.
-    pub fn to_bitmap(&self, width: u32, height: u32) -> Mask {
-        match self {
-            Self::Polygons(polygons) => union(polygons, width, height),
-            Self::Bitmap(mask) => {
-                assert_eq!((mask.width(), mask.height()), (width, height), "a bitmap as large as its image");
-                mask.clone()
-            }
-        }
-    }
-
     /// The mask on the resized image, each pixel of which takes one of the original's.
     fn resized(&self, image: &TransformedImage, kind: MaskTargets) -> Self {
         let [scale_x, scale_y] = image.resized_from_original();

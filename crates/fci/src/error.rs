@@ -4,8 +4,8 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::Duration;
 
-use crate::robot_error::RobotErrors;
 use crate::wire::Status;
+use crate::wire::robot_error::RobotErrors;
 use crate::wire_error::WireError;
 
 /// What ends a call of the client or a server.

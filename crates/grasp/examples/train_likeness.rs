@@ -6,7 +6,7 @@
 //! Draws N parts (700) and others (100) that are held out, half of them in pictures of 640×480 pixels and half of 320×240, searches their
 //! pictures, and trains on what the search finds, right and wrong, for 40 epochs. FILE of `--pairs` keeps what was found: parts
 //! that it holds already are not drawn again. A third of each batch comes from the FILE of `--rendered`, which the example
-//! `rendered_pairs` of sdg-cli writes; with `--hold-out` every fourth of its parts is not trained on, but told. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
+//! `rendered_pairs` of sdg-base-weights writes; with `--hold-out` every fourth of its parts is not trained on, but told. Writes `likeness.safetensors`, half precision. The same arguments give the same file.
 
 mod drawn;
 #[path = "train_likeness/edits.rs"]
@@ -21,7 +21,7 @@ mod rendered;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 use crate::drawn::Result;
 use crate::pairs::{Pairs, Stream};

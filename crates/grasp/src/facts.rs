@@ -4,7 +4,7 @@ pub use sdg_demonstration::ModelKind;
 use sdg_geometry::RotationalSymmetry;
 use serde::{Deserialize, Serialize};
 
-use crate::plan::Lengths;
+use crate::lengths::Lengths;
 
 /// What a part's turn was first read from, before the demonstration was laid over it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -64,8 +64,9 @@ mod error;
 mod evidence_kind;
 mod explanation;
 mod facts;
-#[cfg(feature = "teach")]
+#[cfg(feature = "fitting")]
 pub mod fitting;
+mod lengths;
 mod marks_shift;
 mod model;
 mod model_file;
@@ -100,10 +101,11 @@ pub use device::ComputeBackend;
 pub use error::{GraspError, Result};
 pub use evidence_kind::{Advice, EvidenceKind};
 pub use facts::{ModelKind, NegativeFacts, OrientationFacts, TeachingFacts, TurnSource, ValidationFacts};
+pub use lengths::Lengths;
 pub use model::{GraspDetection, GraspModel, Verification};
 pub use model_file::{FORMAT_VERSION, ModelSummary, summarize};
 pub use plan::{
-    CameraOverTable, Circumstances, ErrorLength, Lengths, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
+    CameraOverTable, Circumstances, ErrorLength, PlanDetection, PlanDetector, PlanarPose, Uncertainty,
     pictures_from_above, seen_from_above,
 };
 pub use pose::{GraspPlane, GraspPose};

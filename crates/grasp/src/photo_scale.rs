@@ -3,8 +3,8 @@
 use image::imageops::{self, FilterType};
 
 use crate::error::Result;
+use crate::lengths::Lengths;
 use crate::model::GraspModel;
-use crate::plan::Lengths;
 use crate::taught::TaughtDemonstration;
 
 impl GraspModel {

@@ -12,7 +12,6 @@ use std::sync::{Arc, Mutex};
 
 use image::RgbImage;
 use image::imageops::{self, FilterType};
-use sdg_geometry::{Angle, PlanarSimilarity};
 use sdg_shape::{SearchConfig, ShapeSearch};
 
 use crate::error::Result;
@@ -81,11 +80,6 @@ impl Prepared {
         let search = ShapeSearch::new(cutout, &marks.region(), config)?;
         Ok(Self { search, marks_shift: MarksShift::new(cutout, &marks, &config.shape) })
     }
-}
-
-/// Scales about the upper left corner.
-pub(crate) fn scaling(factor: f64) -> PlanarSimilarity {
-    PlanarSimilarity { scale: factor, angle: Angle::ZERO, tx: 0.0, ty: 0.0 }
 }
 
 /// The sizes of one demonstration that were asked for last. Made in milliseconds, and the same whenever they are made.

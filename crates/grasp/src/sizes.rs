@@ -6,6 +6,8 @@
 
 use std::ops::RangeInclusive;
 
+use sdg_geometry::{Angle, PlanarSimilarity};
+
 /// Sizes that are looked for at once, in pixels of the picture per pixel of the demonstration's photo.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SizeRange {
@@ -68,6 +70,11 @@ impl SizeRange {
     pub(crate) fn clamp(&self, scale: f64) -> f64 {
         scale.clamp(*self.scales.start(), *self.scales.end())
     }
+}
+
+/// Scales about the upper left corner.
+pub(crate) fn scaling(factor: f64) -> PlanarSimilarity {
+    PlanarSimilarity { scale: factor, angle: Angle::ZERO, tx: 0.0, ty: 0.0 }
 }
 
 #[cfg(test)]

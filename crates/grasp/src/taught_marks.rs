@@ -3,7 +3,7 @@
 use sdg_geometry::{BoundingBox, GraspLine, Polygon};
 use serde::{Deserialize, Serialize};
 
-use crate::prepared::scaling;
+use crate::sizes::scaling;
 
 /// The marks, in pixels of the kept cut-out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -18,8 +18,8 @@ use sdg_shape::{Differences, Evidence, Foreshortening, GradientField, Picture, T
 use crate::colors::Colors;
 use crate::marks_shift::{MarksShift, Straightened};
 use crate::models::PoseCandidate;
-use crate::prepared::{Prepared, WorkingSize, scaling};
-use crate::sizes::SizeRange;
+use crate::prepared::{Prepared, WorkingSize};
+use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
 /// An image and the demonstrations that are looked for in it, at every size that they may have.

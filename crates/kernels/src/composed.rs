@@ -13,7 +13,7 @@ use crate::params::CosineParams;
 use crate::params::RoiAlignParams;
 use crate::params::{Activation, FusedGroupNormParams};
 use crate::params::{Conv2dParams, FusedConv2dParams};
-use crate::roi_align::bins::RoiBins;
+use crate::roi_bins::RoiBins;
 
 /// [`conv2d_fused`](crate::conv2d_fused) by burn's `conv2d`.
 pub fn conv2d<B: Backend>(

@@ -70,6 +70,7 @@ mod product;
 mod reference;
 mod resize;
 mod roi_align;
+mod roi_bins;
 mod scratch;
 mod simd;
 

@@ -16,7 +16,6 @@ use burn::tensor::Tensor;
 use crate::extension::KernelBackend;
 use crate::params::{RoiAlignParams, SamplingRatio};
 
-pub(crate) mod bins;
 pub(crate) mod kernel;
 #[cfg(test)]
 mod tests;

@@ -109,15 +109,6 @@ impl Part {
         let bounds = self.outline.bounds();
         bounds.width().hypot(bounds.height())
     }
-
-    /// How many materials can be seen on it.
-    pub fn num_materials(&self) -> usize {
-        let mut seen = vec![false; self.relief.materials.len()];
-        for texel in self.relief.levels[1].texels.iter().filter(|texel| texel.top > 0) {
-            seen[texel.material as usize] = true;
-        }
-        seen.iter().filter(|&&seen| seen).count()
-    }
 }
 
 /// The outer outline in millimetres.

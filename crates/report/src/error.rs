@@ -12,21 +12,9 @@ pub enum ReportError {
     /// A folder is missing and could not be created.
     #[error("cannot create the folder {}: {source}", path.display())]
     Folder { path: PathBuf, source: std::io::Error },
-    /// A file could not be written; its previous contents, if any, are untouched.
-    #[error("cannot write {}: {step} failed: {source}; nothing was changed", path.display())]
-    Write {
-        path: PathBuf,
-        /// What was being done: creating, writing, flushing or renaming.
-        step: &'static str,
-        source: std::io::Error,
-    },
-    /// The path names no file: it ends in `..`, is empty, or is a folder.
-    #[error("cannot write {}: expected the path of a file, found {found}", path.display())]
-    NotAFile {
-        path: PathBuf,
-        /// What the path is instead.
-        found: &'static str,
-    },
+    /// The page's file could not be written.
+    #[error(transparent)]
+    File(#[from] sdg_files::FileError),
     /// An animation without a frame.
     #[error("an animation needs at least one frame, found none")]
     NoFrames,

@@ -3,15 +3,14 @@
 //! ```text
 //! RgbImage ─ draw_demonstration, draw_detection ─ Figure ─┐
 //! frames   ─ AnimationRecorder ─ Animation ───── Figure ──┤
-//! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ write_atomically ─ DIR/index.html
+//! numbers  ─ Chart, Matrix, ShareChart, Table, KeyFigure ─┼─ Section ─ Report ─ DIR/index.html
 //! ```
 //!
 //! The page is one file that fetches nothing and runs no script: pictures stand in it as base64, charts as inline
 //! SVG. It follows the reader's light or dark theme, folds to a phone's width, and prints.
 //!
 //! What is deliberately absent: grasp models, simulation and burn. The types here are plain data, so that the
-//! crate compiles in seconds and any caller with numbers can report them. [`write_atomically`] is exported for every
-//! file that must be there whole or not at all.
+//! crate compiles in seconds and any caller with numbers can report them.
 //!
 //! ```
 //! use image::RgbImage;
@@ -36,7 +35,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod animation;
-mod atomic_file;
 mod attempts;
 mod chart;
 mod draw;
@@ -50,7 +48,6 @@ mod section;
 mod table;
 
 pub use animation::{Animation, AnimationOptions, AnimationRecorder};
-pub use atomic_file::write_atomically;
 pub use attempts::{AttemptSummary, DetectionError, attempts_table, outcome_matrix};
 pub use chart::{Axis, Chart, Matrix, Scale, Series, ShareChart};
 pub use draw::{

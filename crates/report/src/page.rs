@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::atomic_file::write_atomically;
 use crate::error::ReportError;
 use crate::figure::{Figure, PhotoQuality};
 use crate::html::{escape, slug};
@@ -147,13 +146,13 @@ impl Report {
     /// A previous page stands until the new one is complete.
     ///
     /// # Errors
-    /// Those of [`Report::to_html`], and [`ReportError::Folder`], [`ReportError::Write`] and
-    /// [`ReportError::NotAFile`] when the folder or the file cannot be made.
+    /// Those of [`Report::to_html`], and [`ReportError::Folder`] and
+    /// [`ReportError::File`] when the folder or the file cannot be made.
     pub fn write(&self, folder: &Path) -> Result<PathBuf, ReportError> {
         let html = self.to_html()?;
         std::fs::create_dir_all(folder).map_err(|source| ReportError::Folder { path: folder.to_owned(), source })?;
         let path = folder.join("index.html");
-        write_atomically(&path, html.as_bytes())?;
+        sdg_files::write_atomically(&path, html.as_bytes())?;
         Ok(path)
     }
 

@@ -29,6 +29,7 @@
 
 mod arm;
 mod arm_state;
+mod camera_pose;
 mod error;
 mod franka;
 mod impedance;
@@ -40,6 +41,7 @@ mod place;
 mod planned_arm;
 mod playback;
 mod robot;
+mod robot_address;
 mod room;
 mod safety;
 mod sequence;
@@ -53,8 +55,9 @@ pub use arm_state::{
     ArmMode, ArmState, ContactSensitivity, GRASP_TOLERANCE_M, HandCommand, HandState, Load, MIN_HELD_WIDTH_M,
     MotionEnd, PERIOD_SECS,
 };
+pub use camera_pose::CameraPose;
 pub use error::{Result, RobotError};
-pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
+pub use franka::{FrankaArm, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};
 pub use lying_part::LyingPart;
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
@@ -64,6 +67,7 @@ pub use place::{Place, PlaceError, PlaceGoal, PlaceKind, TrayCell};
 pub use planned_arm::{PlannedAction, PlannedArm};
 pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
+pub use robot_address::RobotAddress;
 pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
     CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,

@@ -13,7 +13,7 @@ use image::imageops::{FilterType, overlay, resize};
 use image::{Rgb, RgbImage};
 use nalgebra::{Point2, Vector2};
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
+use sdg_simulation::views::{Axis, AxisView, PICTURES_PER_AXIS, axis_view};
 
 /// Pictures of each axis on the sheet, and their width there in pixels.
 const COLUMNS: u64 = 5;

@@ -12,7 +12,7 @@ use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use nalgebra::Point2;
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{DemonstrationView, demonstration_view};
+use sdg_simulation::views::{DemonstrationView, demonstration_view};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -12,7 +12,8 @@ use image::imageops::{FilterType, crop_imm, overlay, resize};
 use image::{Rgb, RgbImage};
 use nalgebra::Point3;
 use sdg_simulation::objects::{LookAlikeKind, ObjectSpec};
-use sdg_simulation::scene::{SceneVariation, base_from_look_camera};
+use sdg_simulation::scene::SceneVariation;
+use sdg_simulation::views::base_from_look_camera;
 use sdg_simulation::{RenderConfig, Workcell, WorkcellConfig};
 
 /// Side of a picture on the sheet in pixels.

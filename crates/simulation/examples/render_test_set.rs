@@ -9,7 +9,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use sdg_simulation::objects::ObjectSpec;
-use sdg_simulation::scene::{GraspTruth, test_views};
+use sdg_simulation::views::{GraspTruth, test_views};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

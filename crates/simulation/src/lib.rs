@@ -39,6 +39,7 @@ mod egl;
 mod error;
 mod extent;
 mod fci_plant;
+mod fragment;
 mod gripper;
 mod guard;
 mod inverse_dynamics;
@@ -55,7 +56,9 @@ mod render;
 pub mod scene;
 mod self_distance;
 mod shake;
+pub mod shapes;
 pub mod table_camera;
+pub mod views;
 mod workcell;
 
 pub use attempt::{AttemptConfig, AttemptReport};
@@ -78,4 +81,4 @@ pub use panda::{
 pub use planning_problem::PlanningProblem;
 pub use record::RecordConfig;
 pub use render::{RenderConfig, Renderer, Segmentation};
-pub use workcell::{CameraPlace, Workcell, WorkcellConfig};
+pub use workcell::{Workcell, WorkcellConfig};

@@ -253,11 +253,6 @@ impl Model {
         // SAFETY: the array has `ncam` entries; MuJoCo keeps the angle in degrees.
         unsafe { *self.raw().cam_fovy.add(camera.index) }.to_radians()
     }
-
-    /// The step of time in seconds.
-    pub fn timestep_secs(&self) -> f64 {
-        self.raw().opt.timestep
-    }
 }
 
 impl Drop for Model {

@@ -34,7 +34,7 @@ impl Session {
         // Held until the picture is written: the next one finds its name taken.
         let mut state = self.state();
         let path = free_name(&self.uploads.join("picture"), &shown, extension);
-        sdg_report::write_atomically(&path, bytes)?;
+        sdg_files::write_atomically(&path, bytes)?;
         let picture = Picture::open(&path).map_err(|error| {
             // What is no picture is not kept.
             let _ = std::fs::remove_file(&path);
@@ -135,7 +135,7 @@ impl Session {
             let extension = picture.path.extension().unwrap_or_default().to_string_lossy();
             let target = free_name(&self.home, &picture.name, &extension);
             let bytes = std::fs::read(&picture.path).map_err(Error::file(&picture.path, "cannot read"))?;
-            sdg_report::write_atomically(&target, &bytes)?;
+            sdg_files::write_atomically(&target, &bytes)?;
             picture.name = file_name(&target);
             picture.path = target;
         }

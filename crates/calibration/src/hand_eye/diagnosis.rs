@@ -49,7 +49,10 @@ struct Explanation {
 
 enum Kind {
     /// All poses are to be read otherwise.
-    Reading(String),
+    Reading {
+        name: String,
+        is_other_mount: bool,
+    },
     MixedUp(MixedUp),
     /// The board's size as a multiple of that told, and its standard error.
     BoardScale([f64; 2]),
@@ -94,7 +97,7 @@ pub(super) fn checked<'a>(evidence: &Evidence<'a>, robot: &[Isometry3<f64>]) -> 
                          camera was moved"
                     .to_owned(),
             };
-            Err(CalibrationError::HandEyeDisagrees { found, hint })
+            Err(CalibrationError::HandEyeDisagrees { found, hint, is_other_mount: false })
         }
         None => solved,
     }
@@ -105,7 +108,7 @@ fn suspected(evidence: &Evidence, robot: &[Isometry3<f64>], rms_px: f64) -> Vec<
     let readings = readings::plausible(evidence.mount, robot, &evidence.boards());
     let readings = readings.into_iter().filter_map(|reading| {
         let rms_px = left_px(evidence, &reading.robot)?;
-        Some(Explanation { rms_px, kind: Kind::Reading(reading.name) })
+        Some(Explanation { rms_px, kind: Kind::Reading { name: reading.name, is_other_mount: reading.is_other_mount } })
     });
     let mixed_up = mixed_up::plausible(evidence, robot).into_iter().filter_map(|mixed_up| {
         let rms_px = match &mixed_up {
@@ -185,8 +188,9 @@ fn simplest(mut explanations: Vec<Explanation>) -> Option<Explanation> {
 
 fn refusal(kind: Kind, left_px: f64, found: String, evidence: &Evidence) -> CalibrationError {
     match kind {
-        Kind::Reading(name) => {
-            CalibrationError::HandEyeDisagrees { found, hint: format!(": {name}, which leaves {left_px:.2} px") }
+        Kind::Reading { name, is_other_mount } => {
+            let hint = format!(": {name}, which leaves {left_px:.2} px");
+            CalibrationError::HandEyeDisagrees { found, hint, is_other_mount }
         }
         Kind::MixedUp(MixedUp::Wrong(pictures)) => {
             CalibrationError::WrongPoses { found, are_exchanged: false, left_px, names: numbered(&pictures), pictures }

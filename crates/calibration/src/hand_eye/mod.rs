@@ -33,6 +33,7 @@ pub use self::poses_file::{RobotPose, read_robot_poses};
 use self::solve::{Evidence, ROBOT_SIGMA};
 pub use self::view::{HandEyeView, MIN_POSES, Mount};
 use crate::board::Board;
+use crate::camera_file::{CalibratedCamera, Frame, TablePose};
 use crate::error::CalibrationError;
 use crate::pose::{BoardPose, board_pose};
 
@@ -57,6 +58,26 @@ pub struct HandEye {
     pub pictures_rms_px: Vec<f64>,
     /// How far the camera moves when a picture is left out: metres and radians, in the order given.
     pub spread: Vec<[f64; 2]>,
+}
+
+impl HandEye {
+    /// The camera with its place: on the hand, or over the table. `table_height_m` is the table's z in the base; without it, that of the
+    /// camera's file or 0.
+    pub fn place(&self, camera: CalibratedCamera, mount: Mount, table_height_m: Option<f64>) -> CalibratedCamera {
+        match mount {
+            Mount::Hand => CalibratedCamera { flange_from_camera: Some(self.frame_from_camera), ..camera },
+            Mount::Base => {
+                let old = camera.table.as_ref().filter(|table| table.frame == Frame::Base);
+                let table = TablePose {
+                    frame: Frame::Base,
+                    height_m: table_height_m.or(old.map(|table| table.height_m)).unwrap_or_default(),
+                    frame_from_camera: self.frame_from_camera,
+                    workspace: old.and_then(|table| table.workspace),
+                };
+                CalibratedCamera { table: Some(table), ..camera }
+            }
+        }
+    }
 }
 
 /// Finds the camera on the robot or beside it.

@@ -10,6 +10,8 @@ use super::view::Mount;
 pub(super) struct Reading {
     /// The reading in words, as part of a sentence.
     pub(super) name: String,
+    /// Whether the camera is then mounted at the other place than told.
+    pub(super) is_other_mount: bool,
     /// `base_from_flange` of each picture.
     pub(super) robot: Vec<Isometry3<f64>>,
 }
@@ -19,19 +21,21 @@ type OfPose = fn(&Isometry3<f64>) -> Isometry3<f64>;
 
 /// Mistakes other than Euler angles, the simplest first. A camera on the hand with poses inverted is a camera beside the robot: both have
 /// one equation.
-const READINGS: [(&str, OfPose); 8] = [
-    ("rotation_xyzw seems to hold w first", w_first),
-    ("the poses seem to be flange_from_base, or --mount to be the other one", Isometry3::inverse),
-    ("the rotations seem to be transposed (flange_from_base beside translations in the base)", transposed),
-    ("the translations seem to be in millimetres", |pose| {
+const READINGS: [(&str, bool, OfPose); 8] = [
+    ("rotation_xyzw seems to hold w first", false, w_first),
+    ("the poses seem to be flange_from_base, or the mount to be the other one", true, Isometry3::inverse),
+    ("the rotations seem to be transposed (flange_from_base beside translations in the base)", false, transposed),
+    ("the translations seem to be in millimetres", false, |pose| {
         Isometry3::from_parts((pose.translation.vector / 1000.0).into(), pose.rotation)
     }),
-    ("the translations seem to be those of flange_from_base beside rotations of base_from_flange", |pose| {
+    ("the translations seem to be those of flange_from_base beside rotations of base_from_flange", false, |pose| {
         Isometry3::from_parts((-(pose.rotation * pose.translation.vector)).into(), pose.rotation)
     }),
-    ("rotation_xyzw seems to hold w first, and --mount to be the other one", |pose| w_first(pose).inverse()),
-    ("rotation_xyzw seems to hold w first, and the rotations to be transposed", |pose| transposed(&w_first(pose))),
-    ("the rotations seem to be transposed, and --mount to be the other one", |pose| transposed(pose).inverse()),
+    ("rotation_xyzw seems to hold w first, and the mount to be the other one", true, |pose| w_first(pose).inverse()),
+    ("rotation_xyzw seems to hold w first, and the rotations to be transposed", false, |pose| {
+        transposed(&w_first(pose))
+    }),
+    ("the rotations seem to be transposed, and the mount to be the other one", true, |pose| transposed(pose).inverse()),
 ];
 
 /// Rotations that another reading explains leave at most this share of what those given leave in closed form.
@@ -54,7 +58,11 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
     let given = left(robot);
     let mut readings: Vec<Reading> = READINGS
         .iter()
-        .map(|(name, of_pose)| Reading { name: (*name).to_owned(), robot: robot.iter().map(of_pose).collect() })
+        .map(|&(name, is_other_mount, of_pose)| Reading {
+            name: name.to_owned(),
+            is_other_mount,
+            robot: robot.iter().map(of_pose).collect(),
+        })
         // Those of translations leave the rotations as they are.
         .filter(|reading| left(&reading.robot) <= given)
         .collect();
@@ -77,7 +85,11 @@ pub(super) fn plausible(mount: Mount, robot: &[Isometry3<f64>], boards: &[Isomet
     // Of those alike the likelier ones stand first.
     ways.retain(|(left, ..)| *left <= ALIKE * least + ROUNDING_RAD);
     let likeliest = ways.iter().take(NUM_EULER);
-    readings.extend(likeliest.map(|(_, way, first)| Reading { name: name(way), robot: recomposed(way, *first) }));
+    readings.extend(likeliest.map(|(_, way, first)| Reading {
+        name: name(way),
+        is_other_mount: false,
+        robot: recomposed(way, *first),
+    }));
     readings
 }
 

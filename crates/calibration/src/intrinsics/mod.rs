@@ -52,6 +52,18 @@ pub struct Calibration {
     pub advice: Vec<Advice>,
 }
 
+impl Calibration {
+    /// Names of the intrinsics, in the order of [`Self::sigma`].
+    pub const NAMES: [&str; NUM_INTRINSICS] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
+
+    /// The intrinsics in that order, pixels with the first centre at (0, 0) as a camera's file has them.
+    pub fn values(&self) -> [f64; NUM_INTRINSICS] {
+        let camera = self.camera;
+        let [k1, k2, p1, p2, k3] = camera.lens.to_array();
+        [camera.fx, camera.fy, camera.cx - 0.5, camera.cy - 0.5, k1, k2, p1, p2, k3]
+    }
+}
+
 /// What one picture contributed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PictureFit {

@@ -1,15 +1,14 @@
 //! `sdg annotation`: annotation files from one tool's format to another's.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::{Args as ClapArgs, Subcommand};
-use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts, WrittenAnnotation};
+use sdg_demonstration::{Annotation, AnnotationFormat, DeclaredImage, ImageFacts};
+use sdg_inputs::annotation_files::{AnnotationFile, write_data_yaml};
 use serde_json::json;
 
-use crate::annotation_files::{AnnotationFile, DATA_YAML};
 use crate::exit::{Outcome, Usage};
-use crate::files;
 
 /// `sdg annotation`
 #[derive(Debug, ClapArgs)]
@@ -57,17 +56,17 @@ pub fn run(args: &AnnotationArgs) -> Result<Outcome> {
 /// What the output has no room for is listed on standard error, and in the JSON.
 fn convert(args: &ConvertAnnotationArgs) -> Result<Outcome> {
     let format = format_of_output(args)?;
-    if files::is_same_file(&args.input, &args.output) {
+    if sdg_files::is_same_file(&args.input, &args.output) {
         return Err(Usage(format!("{}: expected another file to write than to read", args.output.display())).into());
     }
-    files::check_writable(&args.output)?;
+    sdg_files::check_writable(&args.output)?;
     let input = AnnotationFile::read(&args.input)?;
     let (width, height, file_name, objects) = read_marks(args, &input)?;
     let image = ImageFacts { width, height, file_name: file_name.as_deref() };
     let written = format.write(&image, &objects)?;
 
     let data_yaml = write_data_yaml(&args.output, &written, &image, &objects)?;
-    files::write(&args.output, written.text.as_bytes())?;
+    sdg_files::write(&args.output, written.text.as_bytes())?;
     for left_out in &written.left_out {
         eprintln!("left out: {left_out}");
     }
@@ -125,7 +124,7 @@ fn read_marks(
     input: &AnnotationFile,
 ) -> Result<(u32, u32, Option<String>, Vec<Annotation>)> {
     if let Some(path) = &args.image {
-        let image = files::read_image(path)?;
+        let image = sdg_inputs::read_image(path)?;
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
         return Ok((image.width(), image.height(), name, input.objects_on(path, &image)?));
     }
@@ -150,34 +149,4 @@ fn declared_image(args: &ConvertAnnotationArgs, input: &AnnotationFile) -> Resul
             Err(Usage(format!("--image: expected one of the {several} images of {}", args.input.display())).into())
         }
     }
-}
-
-/// Writes the labels beside the output. A data.yaml that is there already stays as it is and must say the same.
-fn write_data_yaml(
-    output: &Path,
-    written: &WrittenAnnotation,
-    image: &ImageFacts,
-    objects: &[Annotation],
-) -> Result<Option<PathBuf>> {
-    let Some(text) = &written.data_yaml else { return Ok(None) };
-    let path = output.with_file_name(DATA_YAML);
-    if !path.exists() {
-        files::write(&path, text.as_bytes())?;
-        return Ok(Some(path));
-    }
-    let there = files::read(&path, files::MAX_ANNOTATION_BYTES)?;
-    let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
-        .with_context(|| path.display().to_string())?;
-    for (found, expected) in read.iter().zip(objects) {
-        if found.label != expected.label {
-            bail!(
-                "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
-                 write into another folder",
-                path.display(),
-                expected.label,
-                found.label
-            );
-        }
-    }
-    Ok(Some(path))
 }

@@ -1,19 +1,16 @@
 //! `sdg augment`: augmented samples as pictures and COCO JSON, to look at.
 
-use std::io::Cursor;
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
-use image::ImageFormat;
 use sdg_demonstration::{AugmentationConfig, Augmenter, CocoFile};
+use sdg_evaluation::held_back::{HeldBackSamples, labels_of};
 use sdg_grasp::CheckConfig;
 use serde_json::json;
 
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
-use crate::files;
-use crate::held_back::{HeldBackSamples, labels_of};
 
 /// `sdg augment`
 #[derive(Debug, ClapArgs)]
@@ -62,25 +59,23 @@ pub fn run(args: &AugmentArgs) -> Result<Outcome> {
         .then(|| HeldBackSamples::new(&demonstrations, &CheckConfig::DEFAULT_SIZE_TOLERANCE, args.seed))
         .transpose()?;
     let augmenter = Augmenter::new(&demonstrations, config, args.seed)?;
-    files::prepare_folder(&args.out)?;
+    sdg_files::prepare_folder(&args.out)?;
     let picture_name = |i: u64| format!("{i:06}.png");
     let pictures = (0..u64::from(args.count)).map(picture_name);
-    files::check_are_no_inputs(pictures.chain([ANNOTATIONS.to_owned()]).map(|name| args.out.join(name)))?;
+    sdg_files::check_are_no_inputs(pictures.chain([ANNOTATIONS.to_owned()]).map(|name| args.out.join(name)))?;
 
     let mut coco = CocoFile::new();
     let mut with_part = 0;
     for i in 0..u64::from(args.count) {
         let sample = held_back.as_ref().map_or_else(|| augmenter.sample(i), |held_back| held_back.sample(i));
         let name = picture_name(i);
-        let mut png = Cursor::new(Vec::new());
-        sample.image.write_to(&mut png, ImageFormat::Png)?;
-        files::write(&args.out.join(&name), &png.into_inner())?;
+        sdg_files::write_png(&args.out.join(&name), &sample.image)?;
 
         let instances = labels_of(&sample, &label);
         with_part += usize::from(!instances.is_empty());
         coco.push_labelled(&name, sample.image.width(), sample.image.height(), &instances);
     }
-    files::write(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
+    sdg_files::write(&args.out.join(ANNOTATIONS), coco.to_json().as_bytes())?;
 
     let out = args.out.display();
     if args.json {

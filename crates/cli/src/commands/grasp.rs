@@ -6,8 +6,11 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
-use sdg_cell::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape};
+use sdg_cell::{
+    DryRun, Ended, LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, part_shape, run_sequence,
+};
 use sdg_grasp::{GraspError, GraspModel};
+use sdg_inputs::camera_files;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
     Arm, CompliantArm, DEFAULT_SPEED, FrankaArm, GraspConfig, GraspOutcome, GraspReport, GraspStep, GraspTarget,
@@ -15,14 +18,12 @@ use sdg_robot::{
 };
 use serde_json::{Value, json};
 
-use crate::camera_files;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::live_pictures::{self, RequestArgs};
-use crate::robots::{self, Consent, DryRun, Ended, RobotChoice, confirm, run_sequence, write_states};
+use crate::robots::{self, Consent, RobotChoice, confirm, draw_dry_run, print_plan, write_states};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg grasp`
@@ -113,7 +114,7 @@ pub fn run(args: &GraspArgs) -> Result<Outcome> {
 }
 
 fn prepare(args: &GraspArgs) -> Result<Prepared> {
-    let (workcell, camera_of_workcell) = robots::read_workcell(&args.workcell)?;
+    let (workcell, camera_of_workcell) = sdg_inputs::read_workcell(&args.workcell)?;
     let goal = match &args.place {
         None => None,
         Some(text) => Some(workcell.place(text).map_err(|error| Usage(format!("--{error}")))?),
@@ -128,11 +129,11 @@ fn prepare(args: &GraspArgs) -> Result<Prepared> {
     })?;
     let (calibrated, _) = camera_files::read(&camera_path)?;
     let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
-    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if model.facts().lengths.is_none() {
         return Err(GraspError::NoLengths).with_context(|| args.grasp_model.display().to_string());
     }
-    files::check_writable(&args.states)?;
+    sdg_files::check_writable(&args.states)?;
     let config = GraspConfig {
         pace,
         max_detection_age_secs: args.max_detection_age_secs,
@@ -163,7 +164,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
     let scene = robots::simulated_scene(text)?;
     let mut cell = sdg_simulation::Workcell::new(&WorkcellConfig {
         wrist_camera: Some(prepared.camera.intrinsics),
-        camera_place: Some(robots::camera_place(&prepared.camera)),
+        camera_pose: Some(prepared.camera.pose),
         obstacles: prepared.workcell.obstacles.clone(),
         ..WorkcellConfig::new(scene)
     })?;
@@ -171,7 +172,7 @@ fn simulated(args: &GraspArgs, prepared: &Prepared, interrupt: &Interrupt) -> Re
         fingertip_beyond_tcp_m: sdg_simulation::FINGERTIP_BEYOND_TCP_M,
         ..prepared.workcell.safety_limits()
     };
-    attempt(args, prepared, &mut cell, limits, robots::SimulatedPictures, interrupt, None)
+    attempt(args, prepared, &mut cell, limits, sdg_evaluation::SimulatedPictures, interrupt, None)
 }
 
 #[cfg(not(feature = "simulation"))]
@@ -241,8 +242,8 @@ fn dry_run<A: Arm>(
     let place = prepared.place.as_ref();
     let plan = DryRun::plan(state, hand.opening_m, target, limits, mount, &prepared.config, place)?;
     eprintln!("what would be done:");
-    plan.print(target.is_some())?;
-    for file in plan.draw(&args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
+    print_plan(&plan, target.is_some())?;
+    for file in draw_dry_run(&plan, &args.out, seen.filter(|_| target.is_some()), &prepared.workcell.obstacles)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

@@ -7,10 +7,9 @@ use anyhow::Result;
 use clap::Args as ClapArgs;
 use clap::Command;
 use clap_mangen::Man;
-use sdg_report::write_atomically;
+use sdg_files::write_atomically;
 
 use crate::exit::Outcome;
-use crate::files;
 
 /// `sdg man`
 #[derive(Debug, ClapArgs)]
@@ -28,7 +27,7 @@ pub fn run(args: &ManArgs, root: Command) -> Result<Outcome> {
         std::io::stdout().lock().write_all(&render(&root)?)?;
         return Ok(Outcome::Done);
     };
-    files::prepare_folder(folder)?;
+    sdg_files::prepare_folder(folder)?;
     let mut commands = vec![&root];
     let mut written = 0;
     while let Some(command) = commands.pop() {

@@ -2,30 +2,28 @@
 
 use std::fmt::Display;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args as ClapArgs;
-use sdg_demonstration::{Demonstration, PixelFrame};
+use sdg_demonstration::Demonstration;
+use sdg_evaluation::held_back::HeldBackFigures;
+use sdg_evaluation::teaching_page::TeachingPage;
+use sdg_evaluation::{TaughtFile, taught_words};
 use sdg_geometry::RotationalSymmetry;
-use sdg_grasp::{CheckConfig, Ending, GraspError, GraspModel, NegativeFacts, Preset, Start, Taught, TeachOptions};
-use sdg_kinematics::HAND_OPENING_MAX_M;
+use sdg_grasp::{CheckConfig, GraspError, NegativeFacts, Preset, Start, TeachOptions};
+use sdg_inputs::{TeachingFiles, base_weights};
 use sdg_weights_conversion::Report;
 use serde_json::{Value, json};
 
-use crate::base_weights;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
 use crate::shared_args::{ComputeArgs, SizeTolerance, TaughtCameraArgs, seconds, size_tolerance};
-use crate::taught_file::TaughtFile;
-use crate::teaching_page::TeachingPage;
 use crate::teaching_progress::TeachingProgress;
 
 /// `sdg teach`
@@ -126,47 +124,50 @@ pub(super) fn options(args: &TeachArgs) -> Result<TeachOptions> {
     Ok(options)
 }
 
+/// Teaches with progress on standard error, writes the model's file, and tries it on held-back samples.
+///
+/// # Errors
+/// Those of teaching as [`GraspError`]; a file that cannot be written.
+pub(super) fn teach_to_file(
+    demonstrations: &[Demonstration],
+    options: &TeachOptions,
+    out: &Path,
+    interrupt: &Interrupt,
+) -> Result<(TaughtFile, HeldBackFigures)> {
+    let mut progress = TeachingProgress::new(interrupt.clone());
+    let taught = TaughtFile::teach(demonstrations, options, &mut |event| progress.show(event));
+    progress.finish();
+    let file = taught?;
+    sdg_files::write(out, &file.bytes)?;
+    let figures = file.figures(demonstrations, options.seed)?;
+    Ok((file, figures))
+}
+
 /// Checks everything that can be wrong before it starts to take minutes.
 pub fn run(args: &TeachArgs) -> Result<Outcome> {
     let mut options = options(args)?;
-    let mut pixel_frame = PixelFrame::Upright;
-    if args.camera.file.is_some() {
-        demonstrations::check_are_not_turned(&args.demonstrations)?;
-        pixel_frame = PixelFrame::Sensor;
-    }
-    let mut demonstrations = demonstrations::read_all(&args.demonstrations)?;
-    options.negatives =
-        args.negatives.iter().map(|path| files::read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
-    if let Some(path) = &args.camera.file {
-        let camera = CameraFile::read(path)?;
-        for (photo, argument) in demonstrations.iter().zip(&args.demonstrations) {
-            camera.check_picture(&photo.image).with_context(|| argument.clone())?;
-        }
-        let [mark, grasp] = args.camera.heights_m();
-        let (seen, lengths) = camera.seen_from_above(&demonstrations, mark, grasp)?;
-        demonstrations = seen;
-        options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
-        options.lengths = Some(lengths);
-    }
-    files::check_writable(&args.out)?;
-    files::check_replaces_a_model(&args.out)?;
+    let files = TeachingFiles {
+        demonstrations: &demonstrations::pairs(&args.demonstrations)?,
+        negatives: &args.negatives,
+        camera: args.camera.file.as_deref().map(|path| (path, args.camera.heights_m())),
+    };
+    let demonstrations = files.read(&mut options)?;
+    sdg_files::check_writable(&args.out)?;
+    sdg_inputs::check_replaces_a_model(&args.out)?;
     if let Some(folder) = &args.report {
-        files::prepare_folder(folder)?;
+        sdg_files::prepare_folder(folder)?;
     }
     let report = read_base_weights(args, &mut options)?;
 
-    let mut progress = TeachingProgress::new(Interrupt::watch());
-    let taught = TaughtFile::teach(&demonstrations, &options, &mut |event| progress.show(event));
-    progress.finish();
-    let file = taught.map_err(|error| match error {
-        GraspError::NeedsBaseWeights { preset } if preset == Preset::Edge.name() => {
+    let taught = teach_to_file(&demonstrations, &options, &args.out, &Interrupt::watch());
+    let (file, figures) = taught.map_err(|error| match error.downcast_ref() {
+        Some(GraspError::NeedsBaseWeights { preset }) if *preset == Preset::Edge.name() => {
             Usage(format!("--base-weights: {error}; give {SHIPPED_FILE} of the sources, or none")).into()
         }
-        GraspError::NeedsBaseWeights { .. } => Usage(format!("--base-weights: {error}")).into(),
-        error => anyhow::Error::from(error).context(args.demonstrations.join(", ")),
+        Some(GraspError::NeedsBaseWeights { .. }) => Usage(format!("--base-weights: {error}")).into(),
+        Some(_) => error.context(args.demonstrations.join(", ")),
+        None => error,
     })?;
-    files::write(&args.out, &file.bytes)?;
-    let figures = file.figures(&demonstrations, args.seed)?;
     let TaughtFile { taught, bytes, .. } = file;
     let page = match &args.report {
         Some(folder) => {
@@ -188,7 +189,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
     if let Some(failure) = &failure {
         eprintln!("warning: {failure}");
     }
-    for told in openings_by_the_box(&taught.model, &demonstrations) {
+    for told in taught_words::openings_by_the_box(&taught.model, &demonstrations) {
         eprintln!("{told}");
     }
     if args.json {
@@ -207,7 +208,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, learnt(&taught));
+        println!("taught \"{}\" in {:.1} s{}", taught.model.object(), facts.seconds, taught_words::training(&taught));
         println!("{}", figures.in_words());
         let tolerance = taught.model.size_tolerance();
         println!("looks for it at {} to {} times its size in the photo", tolerance.start(), tolerance.end());
@@ -225,7 +226,7 @@ pub fn run(args: &TeachArgs) -> Result<Outcome> {
                 1e3 * lengths.grasp_height_m
             );
         }
-        if let Some(warning) = too_wide(&taught.model) {
+        if let Some(warning) = taught_words::too_wide(&taught.model) {
             eprintln!("{warning}");
         }
         println!("wrote {} ({:.1} MB)", args.out.display(), bytes.len() as f64 / 1e6);
@@ -305,50 +306,6 @@ pub(super) fn read_base_weights(args: &TeachArgs, options: &mut TeachOptions) ->
     })?;
     options.start = Start::Weights(base_weights);
     Ok(told.map(|report: Report| json!(report)))
-}
-
-/// Where the jaws would have to open farther than the hand can: then nothing that is found can be grasped.
-fn too_wide(model: &GraspModel) -> Option<String> {
-    let pixels_per_m = model.facts().lengths?.pixels_per_m;
-    let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
-    (widest > HAND_OPENING_MAX_M).then(|| {
-        format!(
-            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
-            1e3 * widest,
-            1e3 * HAND_OPENING_MAX_M
-        )
-    })
-}
-
-/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
-fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
-    let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
-        let annotation = &demonstration.annotation;
-        (annotation.outline.is_none() && annotation.jaw_width.is_none()).then(|| {
-            format!(
-                "the opening of the jaws, {:.0} px, is taken from the box of \"{}\", which may be wider than the part: draw its \
-                 outline, or mark the jaws (`sdg annotate`)",
-                taught.marks.width_px, annotation.label
-            )
-        })
-    });
-    told.collect()
-}
-
-/// How the network's teaching went, for people; nothing for a model without.
-fn learnt(taught: &Taught) -> String {
-    let facts = taught.model.facts();
-    let Some(history) = &taught.history else { return String::new() };
-    let ending = match history.ending {
-        Ending::Completed => "",
-        Ending::EarlyStop => ", stopped early: good enough",
-        Ending::TimeBudget => ", stopped by the time budget",
-        Ending::Interrupted => ", interrupted",
-    };
-    let orientation = facts.orientation.map_or(String::new(), |cnn| {
-        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
-    });
-    format!(" ({} steps{ending}{orientation})", facts.steps)
 }
 
 /// An argument that names one of a few things; another name is wrong usage.

@@ -1,21 +1,20 @@
 //! `sdg teach --demos DIR`: many parts taught, checked against each other, and one page.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Result, bail};
 use image::RgbImage;
-use sdg_grasp::{TeachOptions, TeachingEvent};
+use sdg_evaluation::Progress;
+use sdg_evaluation::many_parts::{
+    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page, teach_part,
+};
+use sdg_grasp::TeachOptions;
 use serde_json::{Value, json};
 
 use super::teach::{TeachArgs, options, read_base_weights, symmetry};
-use crate::exit::{Outcome, Usage, one_line};
+use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::many_parts::{
-    CrossCheck, DemonstrationFolder, Findings, PartDemonstrations, PartOutcome, PartRecord, PartStore, page,
-};
 use crate::progress::EvaluationProgress;
-use crate::taught_file::TaughtFile;
 
 /// Teaches what is not taught yet; then, unless single parts were asked for, runs each model on every photo.
 pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
@@ -34,14 +33,14 @@ pub fn run(args: &TeachArgs, folder: &Path) -> Result<Outcome> {
         let outcome = match store.read(&part.name, &key)? {
             Some(outcome) => outcome,
             None => {
-                let Some((model, outcome)) = teach_part(part, options, &interrupt) else {
+                let Some((model, outcome)) = teach_part(part, options, &|| interrupt.is_requested()) else {
                     bail!("interrupted: the same command goes on with {}", part.name);
                 };
                 store.write(&part.name, model.as_deref(), &PartRecord { key, outcome: outcome.clone() })?;
                 outcome
             }
         };
-        progress.unit_done(&format!("teach {}: {}", part.name, in_words(&outcome)));
+        progress.unit_done(&format!("teach {}: {}", part.name, outcome.in_words()));
         outcomes.push((part.name.clone(), outcome));
     }
     if checks == 0 {
@@ -92,35 +91,6 @@ fn asked_for<'a>(args: &TeachArgs, parts: &'a [PartDemonstrations]) -> Result<Ve
     args.parts.iter().map(named).collect()
 }
 
-/// Teaches a part; its failure is a result. `None` when interrupted.
-fn teach_part(
-    part: &PartDemonstrations,
-    options: &TeachOptions,
-    interrupt: &Interrupt,
-) -> Option<(Option<Vec<u8>>, PartOutcome)> {
-    let mut options = options.clone();
-    if let Some(symmetry) = part.symmetry {
-        options.symmetry = symmetry;
-    }
-    let attempt = || -> Result<(Vec<u8>, PartOutcome)> {
-        let demonstrations = part.read()?;
-        let mut observe = |_: &TeachingEvent| {
-            if interrupt.is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let file = TaughtFile::teach(&demonstrations, &options, &mut observe)?;
-        let figures = file.figures(&demonstrations, options.seed)?;
-        Ok((file.bytes, PartOutcome::taught(file.model.facts().seconds, &figures)))
-    };
-    let ended = attempt();
-    if interrupt.is_requested() {
-        return None;
-    }
-    Some(match ended {
-        Ok((bytes, outcome)) => (Some(bytes), outcome),
-        Err(error) => (None, PartOutcome::Failed { why: one_line(&error) }),
-    })
-}
-
 /// What a part's model depends on.
 fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> Result<Value> {
     let symmetry = part.symmetry.unwrap_or(options.symmetry);
@@ -136,15 +106,6 @@ fn key(args: &TeachArgs, part: &PartDemonstrations, options: &TeachOptions) -> R
         "base_weights": args.base_weights,
         "version": env!("CARGO_PKG_VERSION"),
     }))
-}
-
-fn in_words(outcome: &PartOutcome) -> String {
-    match outcome {
-        PartOutcome::Taught { seconds, found, parts, .. } => {
-            format!("finds {found} of {parts} held-back samples ({seconds:.1} s)")
-        }
-        PartOutcome::Failed { why } => format!("failed: {why}"),
-    }
 }
 
 /// What became of single parts: one that has no model is a failure of the call, as for a single teaching.

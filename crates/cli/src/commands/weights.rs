@@ -2,24 +2,22 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
-use sdg_detection::RcnnConfig;
-use sdg_detection::golden;
-use sdg_layers::state_dict::{self, StateDict, WeightTensor};
+use sdg_inputs::ConfigError;
+use sdg_inputs::base_weights::open;
+use sdg_inputs::checkpoints::{config_of, verify_checkpoint};
+use sdg_inputs::detector_config::{architecture_of, read_config};
 use sdg_weights_conversion::architecture::Backbone;
-use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Naming, Precision};
+use sdg_weights_conversion::{Architecture, Checkpoint, Conversion, Precision};
 use sdg_weights_conversion::{is_backbone_alone, naming_of, sha256_of};
 use serde_json::json;
 
-use crate::base_weights::open;
 use crate::commands::devices;
-use crate::detector_config::{architecture_of, preset, preset_for, read_config};
-use crate::exit::Outcome;
-use crate::files;
+use crate::exit::{Outcome, Usage};
 use crate::shared_args::ComputeArgs;
 
 /// `sdg weights`
@@ -111,17 +109,14 @@ pub fn run(args: &WeightsArgs) -> Result<Outcome> {
     }
 }
 
-/// The detector to fill: as configured, as the file itself says, or as its names say.
-fn config_of(checkpoint: &Checkpoint, config: Option<&Path>, preset_name: Option<&str>) -> Result<RcnnConfig> {
-    if let Some(path) = config {
-        return read_config(path);
-    }
-    let naming = naming_of(checkpoint)?;
-    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours && preset_name.is_none());
-    match (stored, preset_name) {
-        (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
-        (None, Some(name)) => preset(name, checkpoint),
-        (None, None) => preset(preset_for(naming)?, checkpoint),
+/// The same error with the options that it is about.
+fn in_options(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(ConfigError::UnknownPreset { .. }) => Usage(format!("--preset: {error}")).into(),
+        Some(ConfigError::OwnNames) => {
+            Usage("expected --preset or --config for a file with this project's names".to_owned()).into()
+        }
+        _ => error,
     }
 }
 
@@ -132,7 +127,8 @@ fn target(args: &ConvertArgs, checkpoint: &Checkpoint) -> Result<(Architecture, 
         let metadata = BTreeMap::from([("part".to_owned(), "backbone.bottom_up".to_owned())]);
         return Ok((Architecture { backbone: Backbone::of(checkpoint, naming)?, heads: None }, metadata));
     }
-    let config = config_of(checkpoint, args.config.as_deref(), args.preset.as_deref())?;
+    let config = args.config.as_deref().map(read_config).transpose()?;
+    let config = config_of(checkpoint, config, args.preset.as_deref()).map_err(in_options)?;
     let mut metadata = BTreeMap::from([("network".to_owned(), serde_json::to_string(&config)?)]);
     if let Some(preset) = &args.preset {
         metadata.insert("preset".to_owned(), preset.clone());
@@ -235,23 +231,10 @@ fn inspect(args: &InspectArgs) -> Result<Outcome> {
 
 /// Builds the detector, fills it and compares it; nothing is written.
 fn verify(args: &VerifyArgs) -> Result<Outcome> {
-    let named = || args.file.display().to_string();
-    let (mut source, checkpoint) = open(&args.file)?;
-    let config = config_of(&checkpoint, args.config.as_deref(), None).with_context(named)?.without_sampling();
-    let image = files::read_image(&args.image)?;
-    let reference = read_reference(&args.against)?;
-    let conversion = Conversion::plan(&checkpoint, &architecture_of(&config), &[]).with_context(named)?;
-    let weights: StateDict = conversion
-        .values(&mut source)
-        .with_context(named)?
-        .into_iter()
-        .map(|(name, (shape, values))| (name, WeightTensor { shape, values }))
-        .collect();
-    let (detector, imported) = state_dict::import(config.init(&devices::open(&args.compute)?.autodiff(), 0)?, &weights);
-    if !imported.is_complete() {
-        bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
-    }
-    let report = golden::verify(&detector, &image, &reference).with_context(|| args.against.display().to_string())?;
+    let config = args.config.as_deref().map(read_config).transpose()?;
+    let image = sdg_inputs::read_image(&args.image)?;
+    let device = devices::open(&args.compute)?;
+    let report = verify_checkpoint(&args.file, config, &image, &args.against, &device).map_err(in_options)?;
     let mut stdout = std::io::stdout().lock();
     if args.json {
         writeln!(stdout, "{}", json!({"passed": report.passed(), "stages": report.stages}))?;
@@ -266,24 +249,6 @@ fn verify(args: &VerifyArgs) -> Result<Outcome> {
             bail!("{failed} of {} stages outside their tolerance (first: {})", report.stages.len(), first.name)
         }
     }
-}
-
-/// The original's outputs; gradients keep the names of the program that made them.
-fn read_reference(path: &Path) -> Result<StateDict> {
-    const GRADIENTS: &str = "gradients.";
-    let (mut source, outputs) = open(path)?;
-    let parameters = outputs.tensors.keys().filter_map(|name| name.strip_prefix(GRADIENTS));
-    let naming = Naming::detect(parameters).unwrap_or(Naming::Ours);
-    let mut reference = StateDict::new();
-    for (name, tensor) in &outputs.tensors {
-        let ours = match name.strip_prefix(GRADIENTS) {
-            Some(parameter) => naming.our_name(parameter).map(|ours| format!("{GRADIENTS}{ours}")),
-            None => Some(name.clone()),
-        };
-        let values = tensor.numbers(&mut source).with_context(|| path.display().to_string())?;
-        reference.insert(ours.unwrap_or_else(|| name.clone()), WeightTensor { shape: tensor.shape().to_vec(), values });
-    }
-    Ok(reference)
 }
 
 /// A text from a file, whatever it holds, on one line.

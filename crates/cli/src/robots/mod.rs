@@ -3,13 +3,9 @@
 mod confirm;
 mod dry_run;
 #[cfg(feature = "simulation")]
-mod motion_drawing;
-mod sequence_run;
-#[cfg(feature = "simulation")]
 mod simulated_scene;
-mod states_file;
-mod workcell_file;
 
+use std::path::Path;
 use std::str::FromStr;
 
 use anyhow::Result;
@@ -19,14 +15,13 @@ use crate::exit::Usage;
 use crate::interrupt::Interrupt;
 
 pub(crate) use confirm::{Consent, confirm};
-pub(crate) use dry_run::DryRun;
+#[cfg(not(feature = "simulation"))]
+pub(crate) use dry_run::draw_dry_run;
+pub(crate) use dry_run::print_plan;
 #[cfg(feature = "simulation")]
-pub(crate) use motion_drawing::MotionDrawing;
-pub(crate) use sequence_run::{Ended, run_sequence};
+pub(crate) use sdg_evaluation::draw_dry_run;
 #[cfg(feature = "simulation")]
-pub(crate) use simulated_scene::{SimulatedPictures, camera_place, simulated_scene};
-pub(crate) use states_file::write_states;
-pub(crate) use workcell_file::read_workcell;
+pub(crate) use simulated_scene::simulated_scene;
 
 /// `--robot`: an address, or the simulated arm of this program.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,6 +76,18 @@ pub(crate) fn pace(speed: f64) -> Result<Pace> {
 pub(crate) fn watch(interrupt: &Interrupt) -> Watch {
     let interrupt = interrupt.clone();
     Watch::new(Box::new(move || interrupt.is_requested().then_some(StopReason::Interrupted)))
+}
+
+/// Writes the last second of an arm's states after an error, and says where; nothing where no state was seen.
+///
+/// # Errors
+/// A file that cannot be written.
+pub(crate) fn write_states(path: &Path, watch: &Watch) -> Result<()> {
+    if watch.states().len() > 0 {
+        sdg_files::write(path, watch.states_csv().as_bytes())?;
+        eprintln!("the arm's last second: {}", path.display());
+    }
+    Ok(())
 }
 
 #[cfg(test)]

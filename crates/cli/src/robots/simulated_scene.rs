@@ -1,9 +1,7 @@
-//! `sim:PART?seed=N` for a simulated arm: the parts on its table, and its camera.
+//! `sim:PART?seed=N` for a simulated arm: the parts on its table.
 
 use anyhow::Result;
-use sdg_cell::{CameraPose, Pictures, PlacedCamera, TakenPicture};
 use sdg_simulation::scene::{SceneVariation, VariationConfig};
-use sdg_simulation::{CameraPlace, Workcell};
 
 use crate::exit::Usage;
 use crate::parts::part_named;
@@ -23,23 +21,6 @@ pub(crate) fn simulated_scene(text: &str) -> Result<SceneVariation> {
         })?;
     }
     Ok(SceneVariation::sample(Some(&part), &VariationConfig::default(), seed))
-}
-
-/// The camera of the simulated workcell.
-pub(crate) struct SimulatedPictures;
-
-impl Pictures<Workcell> for SimulatedPictures {
-    fn take(&mut self, cell: &mut Workcell) -> sdg_robot::Result<TakenPicture> {
-        Ok(TakenPicture { picture: cell.wrist_view()?.image, taken: None })
-    }
-}
-
-/// Where the simulator puts a camera.
-pub(crate) fn camera_place(camera: &PlacedCamera) -> CameraPlace {
-    match camera.pose {
-        CameraPose::OnFlange(flange_from_camera) => CameraPlace::OnFlange(flange_from_camera),
-        CameraPose::InBase(base_from_camera) => CameraPlace::InBase(base_from_camera),
-    }
 }
 
 #[cfg(test)]

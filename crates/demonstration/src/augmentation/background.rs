@@ -4,7 +4,7 @@ use super::homography::Homography;
 use super::noise::NoiseTile;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, log_uniform, uniform};
-use super::raster::{Raster, floor, smoothstep};
+use crate::raster::{Raster, floor, smoothstep};
 
 /// The noises that surfaces are made of, drawn once.
 pub(crate) struct NoiseBank {
@@ -63,7 +63,7 @@ pub(crate) fn paint_surfaces(canvas: &mut Raster, bank: &NoiseBank, part: &Prepa
                 let t = smoothstep(-soft, soft, along) * smoothstep(soft, -soft, along - strip);
                 if t > 0.0 {
                     let from = other.pixels[y * width + x];
-                    super::raster::blend(&mut canvas.pixels[y * width + x], [from[0], from[1], from[2]], t);
+                    crate::raster::blend(&mut canvas.pixels[y * width + x], [from[0], from[1], from[2]], t);
                 }
             }
         }

@@ -7,7 +7,7 @@ use super::mutant::Mutant;
 use super::noise::NoiseTile;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, direction, index_below, uniform};
-use super::raster::{PixelRect, Raster, blend, smoothstep};
+use crate::raster::{PixelRect, Raster, blend, smoothstep};
 
 /// Where the light of a scene comes from and how soft its shadows are.
 #[derive(Debug, Clone, Copy)]

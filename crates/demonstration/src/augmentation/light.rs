@@ -1,7 +1,7 @@
 //! The picture under another light and another camera's colours.
 
 use super::random::{SampleRng, chance, direction, uniform};
-use super::raster::{Raster, smoothstep};
+use crate::raster::{Raster, smoothstep};
 
 /// Steps of a tone curve; fine enough that a step is below half a grey value.
 const CURVE_STEPS: usize = 1024;

@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use super::random::SampleRng;
-use super::raster::floor;
+use crate::raster::floor;
 
 /// Side of a tile; a power of two, so that wrapping is a mask.
 const SIDE: usize = 256;

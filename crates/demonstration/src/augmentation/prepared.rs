@@ -5,12 +5,12 @@ use nalgebra::Point2;
 use sdg_geometry::{BoundingBox, Keypoint, Polygon};
 
 use super::distance::signed_distance;
-use super::erase::fill;
 use super::homography::Homography;
 use super::mutant::Mutant;
 use super::random::{SampleRng, index_below};
-use super::raster::Raster;
 use super::warp::LanePicture;
+use crate::erase::fill;
+use crate::raster::Raster;
 use crate::{Demonstration, NUM_KEYPOINTS};
 
 /// The photo is kept at this many times the resolution it is usually shown at: sharp when shown larger, and not much

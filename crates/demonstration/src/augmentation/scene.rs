@@ -15,9 +15,9 @@ use super::noise::NormalTable;
 use super::pose::draw_pose;
 use super::prepared::Prepared;
 use super::random::{SampleRng, chance, index_below, log_uniform, uniform};
-use super::raster::{PixelRect, Raster, blend, smoothstep};
 use super::sample::{Sample, SampleObject};
 use super::sensor::{blur, expose};
+use crate::raster::{PixelRect, Raster, blend, smoothstep};
 
 /// Size of other parts over that of the part: what is much larger or smaller is refused by its size.
 const OTHER_PART_SIZE: [f32; 2] = [0.6, 1.5];

@@ -9,7 +9,7 @@ use rand::Rng;
 use super::config::SceneStyle;
 use super::noise::NormalTable;
 use super::random::{SampleRng, chance, direction, scramble, uniform};
-use super::raster::Raster;
+use crate::raster::Raster;
 
 /// Blurs at times: out of focus or moved.
 pub(crate) fn blur(canvas: &mut Raster, style: &SceneStyle, rng: &mut SampleRng) {

@@ -6,8 +6,8 @@ use super::plant::{Jacobian, JointVector};
 use super::reference::{PERIOD_SECS, ROUNDING};
 use crate::limits::{Limits, RateLimits};
 use crate::pose::{difference, is_rigid, isometry, moved};
-use crate::robot_error::{RobotError, RobotErrors};
 use crate::wire::MotionCommand;
+use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// The first pose of a motion may be this far from where the end effector is; what libfranka does not publish, as franka-sim has it.
 const START_TRANSLATION_M: f64 = 0.05;

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, SMatrix, Vector6};
 
 use super::plant::{Jacobian, JointVector};
 use super::reference::PERIOD_SECS;
-use crate::robot_error::{RobotError, RobotErrors};
 use crate::wire::CollisionBehavior;
+use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// Cut-off of the estimate's low-pass filter.
 const CUTOFF_HZ: f64 = 30.0;

@@ -3,7 +3,7 @@
 use super::frames::shifted;
 use super::plant::{Observation, Plant};
 use super::robot::RobotCore;
-use crate::robot_error::RobotError;
+use crate::wire::robot_error::RobotError;
 
 /// Measured velocities overshoot commanded ones: by this much, rad/s or m/s, before the robot stops.
 const MEASURED_VELOCITY_MARGIN: f64 = 0.1;

@@ -8,7 +8,7 @@ use super::plant::{Jacobian, JointVector};
 use super::reference::{JointReference, PERIOD_SECS, ROUNDING};
 use crate::limits::Limits;
 use crate::pose::difference;
-use crate::robot_error::{RobotError, RobotErrors};
+use crate::wire::robot_error::{RobotError, RobotErrors};
 use crate::wire::{ControllerMode, MotionCommand, MotionGeneratorMode, RobotCommand};
 
 /// The first position of a motion may be this far from the reference; not published, as franka-sim has it.

@@ -2,8 +2,8 @@
 
 use super::plant::JointVector;
 use crate::limits::Limits;
-use crate::robot_error::{RobotError, RobotErrors};
 use crate::wire::MotionGeneratorMode;
+use crate::wire::robot_error::{RobotError, RobotErrors};
 
 /// One cycle in seconds.
 pub const PERIOD_SECS: f64 = 1e-3;

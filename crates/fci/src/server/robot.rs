@@ -11,7 +11,7 @@ use super::reference::{JointReference, PERIOD_SECS};
 use super::settings::Settings;
 use super::torque::{EndEffector, cartesian_impedance, joint_impedance, load_gravity};
 use crate::limits::Limits;
-use crate::robot_error::{RobotError, RobotErrors};
+use crate::wire::robot_error::{RobotError, RobotErrors};
 use crate::wire::{
     Command, ControllerMode, MotionGeneratorMode, MoveRequest, Request, Response, RobotCommand, RobotMode, Status,
 };

@@ -11,6 +11,7 @@ mod header;
 mod modes;
 mod requests;
 mod robot_command;
+pub(crate) mod robot_error;
 mod state;
 mod status;
 mod version;

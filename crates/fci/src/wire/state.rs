@@ -3,7 +3,7 @@
 use super::codec::{Codec, Decoder, Encoder};
 use super::modes::{ControllerMode, MotionGeneratorMode, RobotMode};
 use super::version::Version;
-use crate::robot_error::RobotErrors;
+use crate::wire::robot_error::RobotErrors;
 use crate::wire_error::WireError;
 
 /// Size of a state in version 5.

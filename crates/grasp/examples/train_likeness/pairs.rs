@@ -5,9 +5,9 @@ use std::path::Path;
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
+use sdg_files::write_atomically;
 use sdg_grasp::fitting::{PAIR_RECORD_BYTES as RECORD, PairFacts, append_pair, likeness_examples, pair_facts, pair_of};
 use sdg_part_generator::{Condition, SceneConfig};
-use sdg_report::write_atomically;
 use sdg_shape::{Pair, SIDE};
 
 use crate::drawn::{Result, absent, draw_parts};

@@ -9,7 +9,6 @@
 //! camera serves any other.
 
 mod demonstration;
-mod lengths;
 mod picture;
 mod uncertainty;
 
@@ -18,11 +17,11 @@ use nalgebra::{Isometry3, Point2, Point3, Rotation2, UnitQuaternion, Vector2, Ve
 use sdg_geometry::{Angle, BoundingBox, PlanView, PlanarGrasp, Polygon, PosedCamera, Workspace};
 
 pub use self::demonstration::{pictures_from_above, seen_from_above};
-pub use self::lengths::Lengths;
 pub(crate) use self::picture::PixelRect;
 use self::picture::PlanMap;
 pub use self::uncertainty::{Circumstances, ErrorLength, Uncertainty};
 use crate::error::{GraspError, Result};
+use crate::lengths::Lengths;
 use crate::model::{GraspDetection, GraspModel, Verification};
 
 /// A table and a camera over it.

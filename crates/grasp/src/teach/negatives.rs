@@ -10,12 +10,14 @@ use sdg_demonstration::{
 use sdg_orientation::halved;
 
 use super::side_by_side::side_by_side;
-use crate::check_config::{CheckConfig, ScoreConfig};
+#[cfg(feature = "fitting")]
+use crate::check_config::CheckConfig;
+use crate::check_config::ScoreConfig;
 use crate::decimal::decimal;
 use crate::error::Result;
 use crate::models::{Network, Proposals};
-use crate::prepared::scaling;
 use crate::sighting::{best_agreement, sightings};
+use crate::sizes::scaling;
 use crate::taught::TaughtDemonstration;
 use crate::verification::SearchedImage;
 
@@ -60,6 +62,7 @@ impl NegativeScenes {
     ///
     /// # Errors
     /// As [`Self::observe`]; a configuration out of range.
+    #[cfg(feature = "fitting")]
     pub(crate) fn observe_as(&self, check: &CheckConfig) -> Result<Resemblances> {
         let changed = |demonstration: &TaughtDemonstration| demonstration.clone().with_check(check.clone());
         self.observe_with(None, &self.demonstrations.iter().map(changed).collect::<Result<Vec<_>>>()?)

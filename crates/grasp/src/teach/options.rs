@@ -14,7 +14,7 @@ use super::start::Start;
 use crate::check_config::CheckConfig;
 use crate::error::Result;
 use crate::facts::ModelKind;
-use crate::plan::Lengths;
+use crate::lengths::Lengths;
 
 /// How to teach.
 #[derive(Debug, Clone)]

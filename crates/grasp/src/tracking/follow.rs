@@ -17,8 +17,8 @@ use super::detector::PartDetector;
 use crate::colors::Colors;
 use crate::model::Placement;
 use crate::plan::PixelRect;
-use crate::prepared::{Prepared, WorkingSize, scaling};
-use crate::sizes::SizeRange;
+use crate::prepared::{Prepared, WorkingSize};
+use crate::sizes::{SizeRange, scaling};
 use crate::taught::TaughtDemonstration;
 
 /// Pixels of the halved picture about the reach, which the gradients' smoothing and the crests beside an edge need: 3 and 6.

@@ -4,7 +4,7 @@
 //! output (r, c, i, j) = mean over the bin's samples (y, x) of the bilinear feature (image of r, c, y, x)
 //! ```
 //!
-//! The conventions are those of [`AxisBins`](crate::roi_align::bins::AxisBins), sample by sample. What differs: an image index
+//! The conventions are those of [`AxisBins`](crate::roi_bins::AxisBins), sample by sample. What differs: an image index
 //! beyond the batch is taken for the last image, since a kernel cannot refuse.
 
 use burn::backend::Cube;

@@ -3,9 +3,9 @@
 //! Maps and crops stand channels last, where a pixel is one run of C floats, so that every weight is applied to a
 //! whole run.
 
-use super::bins::RoiBins;
 use crate::parallel::{SharedSlice, for_each_unit};
 use crate::params::RoiAlignParams;
+use crate::roi_bins::RoiBins;
 use crate::simd::{Isa, widest};
 
 /// Channels of the backward pass's units.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3};
 
-use super::arm_shape::{ArmShape, Body, FIRST_MOVING, HELD, NUM_BODIES, SELF_PAIRS, base_from_body};
+use super::arm_shape::{ArmShape, Body, FIRST_MOVING, NUM_BODIES, SELF_PAIRS, base_from_body};
 use super::capsule::Capsule;
 use super::error::CollisionError;
 use super::lanes::ToLocal;
@@ -201,11 +201,6 @@ impl CollisionModel {
             }
         }
         deepest
-    }
-
-    /// Whether something is in the hand.
-    pub fn holds_a_part(&self) -> bool {
-        !self.arm.capsules[HELD].is_empty()
     }
 }
 

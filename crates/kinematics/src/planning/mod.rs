@@ -10,6 +10,7 @@
 
 mod corners;
 mod error;
+mod explanation;
 mod goals;
 mod line;
 mod plan;
@@ -17,5 +18,6 @@ mod rrt;
 mod shortcut;
 
 pub use error::PlanError;
+pub use explanation::{PlanPart, nearest_on, plan_parts};
 pub use line::{CheckedLine, checked_line};
 pub use plan::{Plan, PlanOptions, StraightApproach};

@@ -4,9 +4,9 @@ use std::thread::JoinHandle;
 
 use sdg_fci::client::{Hand, HandStopHandle};
 
-use super::address::RobotAddress;
 use crate::arm_state::{GRASP_TOLERANCE_M, HandCommand, HandState, MIN_HELD_WIDTH_M};
 use crate::error::{Result, RobotError};
+use crate::robot_address::RobotAddress;
 
 /// A hand that stands still, or moves in a thread.
 #[derive(Debug)]

@@ -7,7 +7,6 @@
 //! ```
 //! Tried against the simulated Panda of `sdg-fci`'s server, never on hardware.
 
-mod address;
 mod correction;
 mod follower;
 mod hand_worker;
@@ -25,12 +24,12 @@ use crate::arm::{Arm, CompliantArm};
 use crate::arm_state::{ArmMode, ArmState, ContactSensitivity, HandCommand, HandState, Load, MotionEnd};
 use crate::error::{Result, RobotError};
 use crate::playback::Playback;
+use crate::robot_address::RobotAddress;
 use crate::safety::CheckedMotion;
 use crate::touch::{Descent, TouchDown, Touched};
 use crate::watch::{StopReason, Watch};
 use crate::workcell::RobotModel;
 
-pub use address::RobotAddress;
 use follower::{Follower, Next};
 use hand_worker::HandWorker;
 pub use real_time::{Scheduling, check_real_time};

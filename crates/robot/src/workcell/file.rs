@@ -10,7 +10,7 @@ use super::obstacle::{ObstacleSection, obstacles};
 use super::place::{BinSection, PlaceSection, Room, TraySection, places};
 use super::source::{MAX_REACH_MM, Numbers, Source};
 use super::{Mounting, RobotModel, Workcell};
-use crate::franka::RobotAddress;
+use crate::robot_address::RobotAddress;
 use crate::safety::WorkspaceBox;
 use crate::sequence::LookOut;
 

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::Vector2;
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{lathe, ring};
-use sdg_simulation::scene::texture::{Noise, Texture};
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{lathe, ring};
+use sdg_simulation::shapes::texture::{Noise, Texture};
 
 use crate::part::{BRASS, Finish, Part, Piece, STEEL, centred_texture, moved};
 

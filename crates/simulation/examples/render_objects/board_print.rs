@@ -3,9 +3,9 @@
 use nalgebra::{Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use sdg_simulation::scene::texture::{Color, Noise, Texture};
+use sdg_simulation::shapes::texture::{Color, Noise, Texture};
 
-use crate::circuit_board::{
+use crate::board_layout::{
     BUTTON, Block, CANS, CHIPS, CONTROLLER, DRIVER, FIXINGS, HEADER, JACK, LAMPS, LENGTH, MEMORY, MIDDLE_X, OPEN_HOLES,
     RELAY, SPAN, TERMINALS, WIDTH,
 };

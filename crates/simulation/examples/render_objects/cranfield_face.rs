@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point2, Point3, Vector2};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{circle, extrude, ring, rounded_path, rounded_rectangle};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{circle, extrude, ring, rounded_path, rounded_rectangle};
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{Finish, PRINTED, Part, Piece, box_between, moved};
 

@@ -4,11 +4,11 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{
     box_solid, cylinder, hex_prism, lathe, lying_along_x, ring, rounded_path, sweep, thread,
 };
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{Finish, Part, Piece, RUBBER, STEEL, moved};
 

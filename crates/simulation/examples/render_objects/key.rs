@@ -2,9 +2,9 @@
 
 use nalgebra::Point2;
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{cylinder, extrude, rounded_rectangle};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{cylinder, extrude, rounded_rectangle};
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{BRASS, Finish, PLASTIC, Part, Piece, box_between, centred_texture, moved};
 use crate::print::{Lettering, plan_texture};

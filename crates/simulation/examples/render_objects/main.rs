@@ -6,6 +6,7 @@
 //! of the grasp marks, x along the marks from `grasp_start` to `grasp_end`. All lengths are in metres.
 
 mod ball_bearing;
+mod board_layout;
 mod board_print;
 mod circuit_board;
 mod common_line;

@@ -7,9 +7,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{extrude, lying_along_x};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{extrude, lying_along_x};
+use sdg_simulation::shapes::texture::Texture;
 
 /// Densities in kg/m³.
 pub const STEEL: f64 = 7850.0;

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Point2};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{circle, cylinder, extrude, lever_outline, ring};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{circle, cylinder, extrude, lever_outline, ring};
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{BRASS, Finish, PRINTED, Part, Piece, STEEL, centred_texture, moved};
 

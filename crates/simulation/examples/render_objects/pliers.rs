@@ -2,9 +2,9 @@
 
 use nalgebra::Point2;
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{cylinder, extrude};
-use sdg_simulation::scene::texture::{Noise, Texture};
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{cylinder, extrude};
+use sdg_simulation::shapes::texture::{Noise, Texture};
 
 use crate::part::{Finish, Part, Piece, RUBBER, STEEL, box_between, centred_texture, moved};
 use crate::print::{Lettering, in_rectangle, plan_texture};

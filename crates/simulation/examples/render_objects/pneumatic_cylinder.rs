@@ -4,9 +4,9 @@ use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{Point2, Point3, Vector2};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{cylinder, hex_prism, ring, rounded_rectangle, sweep, thread};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{cylinder, hex_prism, ring, rounded_rectangle, sweep, thread};
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{
     ALUMINIUM, Finish, PLASTIC, Part, Piece, STEEL, box_between, cylinder_between, drawn_along_x, laid, laid_level,

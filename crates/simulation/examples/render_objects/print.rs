@@ -1,7 +1,7 @@
 //! Textures drawn to scale from above: lettering, pads, tracks and outlines at places in metres.
 
 use nalgebra::Point2;
-use sdg_simulation::scene::texture::{Color, Texture};
+use sdg_simulation::shapes::texture::{Color, Texture};
 
 /// Rows of a letter of 5 by 7 dots from the top, the leftmost dot the highest of five bits.
 const LETTERS: [(char, [u8; 7]); 40] = [

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{hex_prism, lathe, lying_along_x, ring, thread};
-use sdg_simulation::scene::texture::Texture;
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{hex_prism, lathe, lying_along_x, ring, thread};
+use sdg_simulation::shapes::texture::Texture;
 
 use crate::part::{BRASS, Finish, Part, Piece, STEEL, centred_texture, moved};
 

@@ -1,8 +1,8 @@
 //! Solids that only some parts need: flat bars with oval sections, bent strips, polygons with rounded corners.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
-use sdg_simulation::scene::mesh::{MeshVertex, TriangleMesh};
-use sdg_simulation::scene::solids::METRES_PER_REPEAT;
+use sdg_simulation::shapes::mesh::{MeshVertex, TriangleMesh};
+use sdg_simulation::shapes::solids::METRES_PER_REPEAT;
 
 /// A polygon (counter-clockwise) whose corners are rounded: `(x, y, radius)` a corner, zero for a sharp one.
 pub fn rounded_polygon(corners: &[(f64, f64, f64)]) -> Vec<Point2<f64>> {

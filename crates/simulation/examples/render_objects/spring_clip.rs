@@ -3,9 +3,9 @@
 
 use nalgebra::{Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use sdg_simulation::objects::RotationalSymmetry;
-use sdg_simulation::scene::mesh::TriangleMesh;
-use sdg_simulation::scene::solids::{circle, cylinder, extrude, ring, rounded_path, rounded_rectangle};
-use sdg_simulation::scene::texture::{Noise, Texture};
+use sdg_simulation::shapes::mesh::TriangleMesh;
+use sdg_simulation::shapes::solids::{circle, cylinder, extrude, ring, rounded_path, rounded_rectangle};
+use sdg_simulation::shapes::texture::{Noise, Texture};
 
 use crate::part::{BRASS, Finish, Part, Piece, RUBBER, STEEL, box_between, centred_texture};
 use crate::print::{Lettering, plan_texture};

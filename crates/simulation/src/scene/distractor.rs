@@ -5,8 +5,8 @@ use sdg_geometry::convex_hull;
 
 use super::distractor_kind::DistractorKind;
 use super::distractor_pieces::scaled_pieces;
-use super::footprint::placed;
-use super::fragment::{MjcfFragment, pose_attributes};
+use crate::fragment::{MjcfFragment, pose_attributes};
+use crate::shapes::footprint::placed;
 
 /// A distractor of one size and finish at one place.
 #[derive(Debug, Clone, PartialEq)]

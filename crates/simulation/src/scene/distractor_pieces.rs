@@ -7,12 +7,12 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::distractor_kind::DistractorKind;
-use super::mesh::TriangleMesh;
-use super::solids::{
+use crate::shapes::mesh::TriangleMesh;
+use crate::shapes::solids::{
     box_solid, circle, cylinder, extrude, hex_prism, hexagon, lever_outline, lying_along_x, ring, rounded_path,
     rounded_rectangle, sweep, thread,
 };
-use super::texture::{Color, Texture};
+use crate::shapes::texture::{Color, Texture};
 
 /// What a piece of a distractor is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 
-use super::fragment::MjcfFragment;
-use super::texture::Color;
+use crate::fragment::MjcfFragment;
+use crate::shapes::texture::Color;
 
 /// The middle of the table's part that the camera sees, which lamps are aimed at (metres, base frame).
 const AIM: Point3<f64> = Point3::new(0.5, 0.0, 0.0);

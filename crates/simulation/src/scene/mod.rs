@@ -8,20 +8,12 @@
 //! The table's top is the plane z = 0 of the robot's base frame. Each aspect of a scene draws from a stream of its
 //! own: another number of distractors leaves the lamps as they were. The same seed gives the same scene to the bit.
 
-mod axis;
 mod distractor;
 mod distractor_kind;
 mod distractor_pieces;
-pub mod footprint;
-mod fragment;
 mod light;
-pub mod mesh;
-mod other_camera;
 mod seen_part;
-pub mod solids;
 mod table;
-pub mod texture;
-mod views;
 
 use std::ops::{Range, RangeInclusive};
 
@@ -30,20 +22,14 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::objects::ObjectSpec;
+use crate::shapes::footprint;
 
-pub use axis::{Axis, AxisParameter, AxisView, InstanceTruth, PICTURES_PER_AXIS, axis_view};
+pub use crate::fragment::{MjcfFragment, pose_attributes};
 pub use distractor::Distractor;
 pub use distractor_kind::DistractorKind;
-pub use fragment::{MjcfFragment, pose_attributes};
 pub use light::{Lamp, Lighting};
-pub use other_camera::{OTHER_CAMERAS, OnTable, OtherCamera, OtherView, other_view};
 pub use seen_part::SeenPart;
 pub use table::{Table, TableSurface};
-pub(crate) use views::shows_whole;
-pub use views::{
-    DEMONSTRATION_PLACE, DemonstrationView, GraspTruth, TestView, base_from_look_camera, demonstration_view,
-    in_picture, test_view, test_views,
-};
 
 /// Within what a scene is varied.
 #[derive(Debug, Clone, PartialEq)]
@@ -209,7 +195,7 @@ pub(crate) fn sample_distractors_between(x_m: Range<f64>, y_m: Range<f64>, count
 }
 
 /// Distractors at random places that keep apart from each other and from what is `taken`.
-fn sample_distractors(
+pub(crate) fn sample_distractors(
     mut taken: Vec<Vec<Point2<f64>>>,
     config: &VariationConfig,
     rng: &mut Pcg64Mcg,

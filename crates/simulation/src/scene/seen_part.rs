@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Point2};
 
-use super::fragment::MjcfFragment;
-use super::solids::extrude;
+use crate::fragment::MjcfFragment;
+use crate::shapes::solids::extrude;
 
 /// Thinner than this, m, it would not show.
 const MIN_HEIGHT_M: f64 = 2e-3;

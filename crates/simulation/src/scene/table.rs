@@ -3,8 +3,8 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::fragment::MjcfFragment;
-use super::texture::{Color, Noise, Texture};
+use crate::fragment::MjcfFragment;
+use crate::shapes::texture::{Color, Noise, Texture};
 
 /// Metres of table that one repeat of the surface's picture covers.
 const METRES_PER_REPEAT: f64 = 0.5;

@@ -31,7 +31,8 @@ use crate::error::{Result, SimulationError};
 use crate::model::{Camera, Id, Joint, Model};
 use crate::objects::ObjectSpec;
 use crate::render::{RenderConfig, Renderer};
-use crate::scene::{GraspTruth, PlacedObject};
+use crate::scene::PlacedObject;
+use crate::views::GraspTruth;
 
 /// How far above the table the card lies, in metres.
 const CARD_HEIGHT_M: f64 = 0.05;
@@ -254,7 +255,8 @@ fn normal(rng: &mut Pcg64Mcg) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{footprint, in_picture};
+    use crate::shapes::footprint;
+    use crate::views::in_picture;
 
     fn views(text: &str, count: usize) -> Vec<TableView> {
         let mut camera = TableCamera::new(&text.parse().unwrap()).unwrap();

@@ -11,9 +11,9 @@ use crate::model::Asset;
 use crate::objects::ObjectSpec;
 use crate::render::RenderConfig;
 use crate::scene::{
-    MjcfFragment, PlacedObject, SceneVariation, VariationConfig, base_from_look_camera, pose_attributes,
-    sample_distractors_between,
+    MjcfFragment, PlacedObject, SceneVariation, VariationConfig, pose_attributes, sample_distractors_between,
 };
+use crate::views::base_from_look_camera;
 
 /// The part of the table that the camera shows from its usual height, in the base frame.
 const SHOWN: Bounds = Bounds { x_m: [0.26, 0.70], y_m: [-0.31, 0.31] };

@@ -1,8 +1,8 @@
 //! The configuration of a workcell.
 
-use nalgebra::Isometry3;
 use sdg_geometry::PinholeCamera;
 use sdg_kinematics::collision::Obstacle;
+use sdg_robot::CameraPose;
 
 use crate::attempt_errors::AttemptErrors;
 use crate::render::RenderConfig;
@@ -22,7 +22,7 @@ pub struct WorkcellConfig {
     /// A part that a camera has seen, to be drawn and not to be touched.
     pub seen_part: Option<SeenPart>,
     /// Where the camera is, if not in the MJCF's place on the hand.
-    pub camera_place: Option<CameraPlace>,
+    pub camera_pose: Option<CameraPose>,
     /// What stands in the cell besides the table.
     pub obstacles: Vec<Obstacle>,
 }
@@ -36,17 +36,8 @@ impl WorkcellConfig {
             errors: AttemptErrors::default(),
             wrist_camera: None,
             seen_part: None,
-            camera_place: None,
+            camera_pose: None,
             obstacles: Vec::new(),
         }
     }
-}
-
-/// Where a workcell's camera is (optical frame), m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum CameraPlace {
-    /// On the robot's flange.
-    OnFlange(Isometry3<f64>),
-    /// Beside the robot, in its base frame.
-    InBase(Isometry3<f64>),
 }

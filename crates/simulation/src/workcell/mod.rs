@@ -6,7 +6,7 @@ mod pictures;
 
 use nalgebra::Isometry3;
 use sdg_kinematics::{Panda, ready_pose};
-use sdg_robot::{HandCommand, Load, PERIOD_SECS};
+use sdg_robot::{CameraPose, HandCommand, Load, PERIOD_SECS};
 
 use crate::camera::posed_camera;
 use crate::controller::{ArmController, ArmReference};
@@ -15,12 +15,12 @@ use crate::error::{Result, SimulationError};
 use crate::extent::lowest_point_m;
 use crate::gripper::Gripper;
 use crate::lens::Frustum;
-use crate::model::{Body, Camera, Id, Joint};
+use crate::model::{Body, Camera, Id};
 use crate::panda::PandaIds;
 use crate::record::Recorder;
 use crate::render::Renderer;
 
-pub use config::{CameraPlace, WorkcellConfig};
+pub use config::WorkcellConfig;
 use model::CAMERA_IN_BASE;
 pub(crate) use model::build_model;
 
@@ -28,7 +28,6 @@ pub(crate) use model::build_model;
 #[derive(Debug, Clone, Copy)]
 struct PartIds {
     body: Id<Body>,
-    joint: Id<Joint>,
 }
 
 /// A Panda at a table with a part, its physics and its cameras.
@@ -69,7 +68,7 @@ impl Workcell {
 
         let panda_ids = PandaIds::find(&model)?;
         let part = match config.scene.object {
-            Some(_) => Some(PartIds { body: model.id("object")?, joint: model.id("object_joint")? }),
+            Some(_) => Some(PartIds { body: model.id("object")? }),
             None => None,
         };
         let wrist_render = match &config.wrist_camera {
@@ -78,9 +77,9 @@ impl Workcell {
         };
         let wrist_renderer = Renderer::new(&model, wrist_render)?;
         let scene_camera = model.id("scene")?;
-        let camera = match config.camera_place {
-            Some(CameraPlace::InBase(_)) => model.id(CAMERA_IN_BASE)?,
-            Some(CameraPlace::OnFlange(_)) | None => panda_ids.wrist_camera,
+        let camera = match config.camera_pose {
+            Some(CameraPose::InBase(_)) => model.id(CAMERA_IN_BASE)?,
+            Some(CameraPose::OnFlange(_)) | None => panda_ids.wrist_camera,
         };
         let mut data = Data::new(model)?;
         panda_ids.set_position(&mut data, &ready_pose());
@@ -165,20 +164,6 @@ impl Workcell {
     /// Where the part is, in the base frame; `None` in a scene without it.
     pub fn base_from_object(&self) -> Option<Isometry3<f64>> {
         self.part.map(|part| self.data.world_from_body(part.body))
-    }
-
-    /// Puts the part somewhere else, at rest.
-    ///
-    /// # Errors
-    /// [`SimulationError::Configuration`] in a scene without a part.
-    pub fn place_object(&mut self, base_from_object: &Isometry3<f64>) -> Result<()> {
-        let part = self.part.ok_or_else(|| SimulationError::Configuration {
-            field: "scene.object",
-            expected: "a part".into(),
-            found: "none".into(),
-        })?;
-        self.data.place(part.joint, base_from_object);
-        self.data.forward()
     }
 
     /// Height of the part's lowest point above the table, in metres.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use sdg_kinematics::HAND_TURN_RAD;
+use sdg_robot::CameraPose;
 
 use crate::camera::{WRIST_FOCAL_LENGTH_PX, optical_from_mujoco_camera, vertical_field_of_view_rad};
 use crate::error::Result;
@@ -13,7 +14,7 @@ use crate::obstacles::obstacles_mjcf;
 use crate::panda::{PANDA_FILE, changed_panda_asset};
 use crate::scene::pose_attributes;
 
-use super::config::{CameraPlace, WorkcellConfig};
+use super::config::WorkcellConfig;
 
 /// Name of a camera beside the robot.
 pub(crate) const CAMERA_IN_BASE: &str = "beside";
@@ -29,13 +30,13 @@ pub(crate) fn build_model(config: &WorkcellConfig, sections: &str) -> Result<Arc
         None => None,
     };
     let (mut hand_from_camera, mut camera_in_base) = (None, String::new());
-    match config.camera_place {
+    match config.camera_pose {
         None => {}
-        Some(CameraPlace::OnFlange(flange_from_camera)) => {
+        Some(CameraPose::OnFlange(flange_from_camera)) => {
             let flange_from_hand = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), HAND_TURN_RAD);
             hand_from_camera = Some(flange_from_hand.inverse() * flange_from_camera * optical_from_mujoco_camera());
         }
-        Some(CameraPlace::InBase(base_from_camera)) => {
+        Some(CameraPose::InBase(base_from_camera)) => {
             let pose = pose_attributes(&(base_from_camera * optical_from_mujoco_camera()));
             let fovy_deg = fovy_deg
                 .unwrap_or(vertical_field_of_view_rad(WRIST_FOCAL_LENGTH_PX, config.wrist_render.height).to_degrees());

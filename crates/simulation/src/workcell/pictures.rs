@@ -11,7 +11,7 @@ use crate::controller::ArmReference;
 use crate::error::{Result, SimulationError};
 use crate::lens::Frustum;
 use crate::record::{RecordConfig, Recorder};
-use crate::render::{RenderConfig, Renderer, Segmentation};
+use crate::render::{Renderer, Segmentation};
 
 impl Workcell {
     /// What the wrist camera sees now.
@@ -78,14 +78,6 @@ impl Workcell {
         self.panda_ids.set_finger_position_m(&mut self.data, 0.5 * opening_m);
         self.data.forward()?;
         renderer.image(&mut self.data, self.scene_camera)
-    }
-
-    /// A picture of the whole workcell from outside.
-    ///
-    /// # Errors
-    /// As [`Renderer::new`] and [`Renderer::image`].
-    pub fn scene_image(&mut self, config: RenderConfig) -> Result<RgbImage> {
-        Renderer::new(self.data.model(), config)?.image(&mut self.data, self.scene_camera)
     }
 
     /// Takes pictures from outside from now on, while time passes.

@@ -1,7 +1,6 @@
 //! `sdg annotate`: the annotation page.
 
 #[cfg(feature = "annotate")]
-mod lock;
 #[cfg(feature = "annotate")]
 mod run;
 

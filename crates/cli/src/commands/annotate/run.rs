@@ -1,27 +1,37 @@
 //! `sdg annotate`: the annotation page.
 
 use std::collections::BTreeSet;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, anyhow};
 use nalgebra::Point2;
-use sdg_annotate::{LiveOptions, Server, Session, SessionOptions};
-use sdg_camera::{Address, OpenOptions};
+use sdg_annotate::{CameraPictures, LiveOptions, Server, Session, SessionOptions, SizeCheck};
+use sdg_camera::{Address, OpenOptions, PixelFrame};
+use sdg_files::{FileError, WriterLock};
+use sdg_inputs::UNREADABLE_EXTENSIONS;
+use sdg_inputs::camera_files::CameraFile;
 use sdg_kinematics::HAND_OPENING_MAX_M;
 use serde_json::json;
 
 use super::AnnotateArgs;
-use super::lock::Lock;
-use crate::camera_files::CameraFile;
 use crate::demonstrations;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files::{self, UNREADABLE_EXTENSIONS};
 use crate::interrupt::Interrupt;
-use crate::page_camera::PageCamera;
+use crate::live_pictures;
 use crate::page_teacher::PageTeacher;
+
+/// Keeps other pages from writing a file of marks; `None` where it cannot be written at all.
+fn lock(written: &Path) -> Result<Option<WriterLock>> {
+    WriterLock::take(written).map_err(|error| match error {
+        FileError::Held { path, holder } => anyhow!(
+            "{}: another `sdg annotate` ({holder}) writes these marks; go on in its page, or end it first",
+            path.display()
+        ),
+        error => error.into(),
+    })
+}
 
 /// Serves the page until Ctrl-C.
 pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
@@ -36,31 +46,31 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
         (Some(_), Some(folder)) => Some(folder.join("photo.png")),
         (Some(_), None) => Some(photo_path(&mut images)?),
     };
-    let token = args.token_file.as_deref().map(token).transpose()?;
+    let token = args.token_file.as_deref().map(sdg_annotate::token_of_file).transpose()?;
     // Marks are made for minutes before the first is written.
     for written in images.first().map(|(image, _)| image).into_iter().chain(&photo_path) {
-        files::check_writable(&written.with_extension("json"))?;
+        sdg_files::check_writable(&written.with_extension("json"))?;
     }
     if let Some(out) = &args.out {
-        files::check_writable(out)?;
+        sdg_files::check_writable(out)?;
     }
     let marks = images.iter().map(|(image, marks)| marks.clone().unwrap_or_else(|| image.with_extension("json")));
     let photo = photo_path.iter().map(|photo| photo.with_extension("json"));
     let project_file = project.iter().map(|folder| folder.join("sdg-project.json"));
     let written: BTreeSet<PathBuf> = marks.chain(photo).chain(project_file).collect();
-    let _locks = written.iter().map(|written| Lock::of(written)).collect::<Result<Vec<_>>>()?;
+    let _locks = written.iter().map(|written| lock(written)).collect::<Result<Vec<_>>>()?;
     for folder in args.trial_pictures.iter().filter(|path| path.is_dir()) {
-        for path in files::entries(folder)? {
+        for path in sdg_files::entries(folder)? {
             // What stands beside pictures is no news; a picture that is not read is.
-            if files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
-                let why = files::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
+            if sdg_files::has_extension(&path, &UNREADABLE_EXTENSIONS) {
+                let why = sdg_inputs::read_image(&path).err().map(|error| one_line(&error)).unwrap_or_default();
                 eprintln!("left out: {why}");
             }
         }
     }
     if camera.is_some() {
         let photos = images.iter().map(|(photo, _)| photo).filter(|photo| photo.exists());
-        photos.into_iter().try_for_each(|photo| files::check_is_not_turned(photo))?;
+        photos.into_iter().try_for_each(|photo| sdg_inputs::check_is_not_turned(photo))?;
     }
     let calibration = camera.as_ref().map(|(file, _)| file.clone());
     let open = |(from, photo_path)| open_camera(from, args.request.options(), calibration, photo_path);
@@ -99,14 +109,24 @@ pub fn run(args: &AnnotateArgs) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// With a calibration its size is asked for, and pictures of another size are a fault.
 fn open_camera(
     from: Address,
-    options: OpenOptions,
+    mut options: OpenOptions,
     calibration: Option<CameraFile>,
     photo_path: PathBuf,
 ) -> Result<LiveOptions> {
-    let (camera, address) = PageCamera::open(from, options, calibration)?;
-    Ok(LiveOptions { pictures: Arc::new(camera), address, photo_path })
+    if let Some([width, height]) = calibration.as_ref().map(CameraFile::size_px) {
+        (options.width, options.height) = (width, height);
+        options.frame = PixelFrame::Sensor;
+    }
+    let address = sdg_annotate::paced(from);
+    let camera = live_pictures::open(&address, &options)?;
+    let check = calibration.map(|camera| -> Box<SizeCheck> {
+        Box::new(move |size| camera.check_size(size).map_err(|error| one_line(&error)))
+    });
+    let pictures = Arc::new(CameraPictures::read(camera, matches!(address, Address::Sim(_)), check));
+    Ok(LiveOptions { pictures, address: address.to_string(), photo_path })
 }
 
 /// The folder, where the arguments are one.
@@ -121,32 +141,8 @@ fn project(arguments: &[String]) -> Result<Option<PathBuf>> {
         ))
         .into());
     }
-    files::check_writable(&folder.join("sdg-project.json"))?;
+    sdg_files::check_writable(&folder.join("sdg-project.json"))?;
     Ok(Some(folder.to_owned()))
-}
-
-/// Reads the key to the page, or makes one that only its owner can read.
-fn token(path: &Path) -> Result<String> {
-    const MAX_BYTES: u64 = 4096;
-    if !path.exists() {
-        let token = sdg_annotate::new_token()?;
-        let mut options = std::fs::OpenOptions::new();
-        options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-        let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
-        written.with_context(|| format!("{}: cannot write the key to the page", path.display()))?;
-        return Ok(token);
-    }
-    let text = String::from_utf8_lossy(&files::read(path, MAX_BYTES)?).trim().to_owned();
-    if text.len() < 16 || !text.chars().all(|c| c.is_ascii_alphanumeric()) {
-        bail!(
-            "{}: expected a key of 16 letters and digits or more, found {} characters (delete the file for a new key)",
-            path.display(),
-            text.chars().count()
-        );
-    }
-    Ok(text)
 }
 
 /// Takes the one image that is not there yet, which is to be taken with the camera, out of those that are; without one it is
@@ -194,18 +190,6 @@ fn open_browser(url: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_key_is_made_once_and_read_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("key");
-        let made = token(&path).unwrap();
-        assert_eq!((made.len(), token(&path).unwrap()), (32, made));
-        #[cfg(unix)]
-        assert_eq!(std::os::unix::fs::PermissionsExt::mode(&path.metadata().unwrap().permissions()) & 0o777, 0o600);
-        std::fs::write(&path, "short").unwrap();
-        assert!(token(&path).unwrap_err().to_string().contains("16 letters"));
-    }
 
     #[test]
     fn a_folder_is_a_project_and_stands_alone() {

@@ -9,7 +9,6 @@ use sdg_calibration::{Board, Paper, Sheet};
 
 use super::board_in_use::squares;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 
 /// `sdg camera board`
 #[derive(Debug, Args)]
@@ -60,9 +59,9 @@ pub fn run(args: &BoardArgs) -> Result<Outcome> {
         Sheet::new(Board::new(columns, rows, square_m)?, paper).map(|sheet| (sheet, 1000.0 * square_m))
     };
     let (sheet, square_mm) = laid_out().map_err(|error| Usage(error.to_string()))?;
-    files::write(&args.out, sheet.to_svg().as_bytes())?;
+    sdg_files::write(&args.out, sheet.to_svg().as_bytes())?;
     if let Some(pdf) = &args.pdf {
-        files::write(pdf, &sheet.to_pdf())?;
+        sdg_files::write(pdf, &sheet.to_pdf())?;
     }
     let mut stdout = std::io::stdout().lock();
     writeln!(stdout, "{}: {columns} x {rows} squares of {square_mm} mm on {}", args.out.display(), paper.name())?;

@@ -10,7 +10,6 @@ use sdg_calibration::{Board, Sheet};
 use serde_json::{Value, json};
 
 use crate::exit::Usage;
-use crate::files;
 
 /// Larger boards than `sdg camera board` writes.
 const MAX_BYTES: u64 = 4 << 20;
@@ -42,7 +41,7 @@ impl BoardInUse {
     pub fn read(&self) -> Result<Board> {
         let drawn = match &self.board {
             Some(path) => {
-                let bytes = files::read(path, MAX_BYTES)?;
+                let bytes = sdg_files::read(path, MAX_BYTES)?;
                 Sheet::board_of(&String::from_utf8_lossy(&bytes)).with_context(|| path.display().to_string())?
             }
             None => {

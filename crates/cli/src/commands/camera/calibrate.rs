@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named};
 use crate::exit::{Outcome, one_line};
-use crate::files;
 
 /// `sdg camera calibrate`
 #[derive(Debug, Args)]
@@ -46,13 +45,11 @@ struct Seen<'a> {
 
 /// Larger camera files than any tool writes.
 const MAX_BYTES: u64 = 1 << 20;
-/// Names of intrinsics as the library orders them.
-const NAMES: [&str; 9] = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
 
 /// Finds the camera and writes its file.
 pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
     let board = args.board.read()?;
-    files::check_writable(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
     let looked: Vec<(&Path, Result<Seen<'_>>)> =
         args.pictures.par_iter().map(|path| (path.as_path(), look(path, &board))).collect();
     let mut lines: Vec<Value> = Vec::new();
@@ -97,7 +94,7 @@ pub fn run(args: &CalibrateArgs) -> Result<Outcome> {
 }
 
 fn look<'a>(path: &'a Path, board: &Board) -> Result<Seen<'a>> {
-    let picture = files::read_image_in(path, PixelFrame::Sensor)?;
+    let picture = sdg_inputs::read_image_in(path, PixelFrame::Sensor)?;
     let corners = find_board(&grey(&picture), board).with_context(|| named(path))?;
     Ok(Seen { path, size: picture.dimensions(), corners })
 }
@@ -120,9 +117,9 @@ fn warn_of_squares(board: &Board, seen: &[Seen<'_>]) {
 
 fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     // Board and pictures are read by now, and the file itself is not: it may be completed, they may not be replaced.
-    files::check_writable(&args.out)?;
+    sdg_files::check_writable(&args.out)?;
     let existing = match fs::exists(&args.out) {
-        Ok(true) => String::from_utf8(files::read(&args.out, MAX_BYTES)?)
+        Ok(true) => String::from_utf8(sdg_files::read(&args.out, MAX_BYTES)?)
             .map_err(|_| anyhow!("{}: expected YAML, found bytes that are no text", args.out.display()))?,
         _ => String::new(),
     };
@@ -140,14 +137,7 @@ fn write_camera(args: &CalibrateArgs, found: &Calibration) -> Result<()> {
     } else {
         camera.update_yaml(&existing).with_context(|| named(&args.out))?
     };
-    files::extend(&args.out, Some(&args.out), text.as_bytes())
-}
-
-/// Values in the order of [`NAMES`], pixels with the first centre at (0, 0) as the file has them.
-fn values(found: &Calibration) -> [f64; 9] {
-    let camera = found.camera;
-    let [k1, k2, p1, p2, k3] = camera.lens.to_array();
-    [camera.fx, camera.fy, camera.cx - 0.5, camera.cy - 0.5, k1, k2, p1, p2, k3]
+    Ok(sdg_files::extend(&args.out, Some(&args.out), text.as_bytes())?)
 }
 
 fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: Vec<Value>) -> Result<()> {
@@ -155,11 +145,11 @@ fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: V
     let advice: Vec<String> = found.advice.iter().map(ToString::to_string).collect();
     if args.json {
         let by_name = |values: &[f64]| {
-            NAMES.into_iter().map(str::to_owned).zip(values.iter().map(|v| json!(v))).collect::<Value>()
+            Calibration::NAMES.into_iter().map(str::to_owned).zip(values.iter().map(|v| json!(v))).collect::<Value>()
         };
         let object = json!({
             "out": named(&args.out), "width": found.camera.width, "height": found.camera.height,
-            "intrinsics": by_name(&values(found)), "sigma": by_name(&found.sigma), "rms_px": found.rms_px,
+            "intrinsics": by_name(&found.values()), "sigma": by_name(&found.sigma), "rms_px": found.rms_px,
             "pictures": lines, "advice": advice,
         });
         writeln!(stdout, "{object}")?;
@@ -174,7 +164,7 @@ fn report(args: &CalibrateArgs, found: &Calibration, seen: &[Seen<'_>], lines: V
         found.camera.height,
         found.rms_px
     )?;
-    for ((name, value), sigma) in NAMES.into_iter().zip(values(found)).zip(found.sigma) {
+    for ((name, value), sigma) in Calibration::NAMES.into_iter().zip(found.values()).zip(found.sigma) {
         let digits = if name.starts_with(['f', 'c']) { 2 } else { 5 };
         if sigma > 0.0 {
             writeln!(stdout, "  {name} {value:.digits$} ± {sigma:.digits$}")?;

@@ -1,17 +1,15 @@
 //! `sdg camera grab`.
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use image::ImageFormat;
 use sdg_camera::{Address, Camera, Frame, LatestFrame};
 use serde_json::json;
 
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::live_pictures::{LiveArgs, open};
 
@@ -49,13 +47,13 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
             let found = args.out.display();
             return Err(Usage(format!("--out: expected a file that ends in .png, or a folder, found {found}")).into());
         }
-        files::check_writable(&args.out)?;
+        sdg_files::check_writable(&args.out)?;
     } else {
         std::fs::create_dir_all(&args.out)
             .with_context(|| format!("{}: cannot make the folder", args.out.display()))?;
     }
     if let Address::File { path, .. } | Address::Folder { path, .. } = &args.live.from {
-        files::keep(path);
+        sdg_files::keep(path);
     }
     let interrupt = Interrupt::watch();
     let mut camera = open(&args.live.from, &args.live.options())?;
@@ -74,7 +72,7 @@ pub fn run(args: &GrabArgs) -> Result<Outcome> {
             break;
         };
         let path = if is_file { args.out.clone() } else { args.out.join(format!("{num_written:06}.png")) };
-        write_png(&path, &frame)?;
+        sdg_files::write_png(&path, &frame.picture)?;
         print_frame(&path, &frame, args.json)?;
         num_written += 1;
     }
@@ -100,12 +98,6 @@ fn next_frame(camera: &mut dyn Camera) -> Result<Option<Frame>> {
             Err(error) => return Err(error.into()),
         }
     }
-}
-
-fn write_png(path: &Path, frame: &Frame) -> Result<()> {
-    let mut png = Cursor::new(Vec::new());
-    frame.picture.write_to(&mut png, ImageFormat::Png)?;
-    files::write(path, &png.into_inner())
 }
 
 fn print_frame(path: &Path, frame: &Frame, is_json: bool) -> Result<()> {

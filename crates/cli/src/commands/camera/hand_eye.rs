@@ -7,17 +7,16 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use sdg_calibration::{
-    Board, CalibratedCamera, CalibrationError, Frame, HandEye, HandEyeView, Mount, RobotPose, TablePose,
-    calibrate_hand_eye, find_board, read_robot_poses,
+    Board, CalibratedCamera, CalibrationError, HandEye, HandEyeView, Mount, RobotPose, calibrate_hand_eye, find_board,
+    read_robot_poses,
 };
 use sdg_demonstration::PixelFrame;
 use sdg_geometry::upper_median;
+use sdg_inputs::camera_files;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
-use crate::camera_files;
 use crate::exit::{Outcome, one_line};
-use crate::files;
 
 /// `sdg camera hand-eye`
 #[derive(Debug, Args)]
@@ -70,11 +69,11 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let board = args.board.read()?;
     let mount = Mount::from(args.mount);
     let (camera, existing) = camera_files::read(&args.camera)?;
-    let bytes = files::read(&args.poses, MAX_BYTES)?;
+    let bytes = sdg_files::read(&args.poses, MAX_BYTES)?;
     let poses =
         read_robot_poses(&named(&args.poses), &String::from_utf8_lossy(&bytes)).with_context(|| named(&args.poses))?;
     if let Some(out) = &args.out {
-        files::check_extendable(out, Some(&args.camera))?;
+        sdg_files::check_extendable(out, Some(&args.camera))?;
     }
     let folder = args.poses.parent().unwrap_or(Path::new("."));
     check_pictures_exist(&poses, folder)?;
@@ -97,10 +96,10 @@ pub fn run(args: &HandEyeArgs) -> Result<Outcome> {
     let found = calibrate_hand_eye(&camera.intrinsics, &board, mount, &views)
         .map_err(|error| explained(error.with_picture_names(|k| seen[k].picture.clone()), args))?;
     if let Some(out) = &args.out {
-        let camera = placed(args, camera, &found, mount);
+        let camera = found.place(camera, mount, args.table_height_mm.map(|height| height / 1000.0));
         let text = camera.update_yaml(&existing).with_context(|| named(out))?;
         CalibratedCamera::from_yaml(&text).with_context(|| named(out))?;
-        files::extend(out, Some(&args.camera), text.as_bytes())?;
+        sdg_files::extend(out, Some(&args.camera), text.as_bytes())?;
     }
     for (k, pose) in seen.iter().enumerate() {
         let [metres, radians] = found.spread[k];
@@ -134,29 +133,12 @@ fn explained(error: CalibrationError, args: &HandEyeArgs) -> anyhow::Error {
 
 fn look(pose: &RobotPose, folder: &Path, camera: &CalibratedCamera, board: &Board) -> Result<HandEyeView> {
     let path = folder.join(&pose.picture);
-    let picture = files::read_image_in(&path, PixelFrame::Sensor)?;
+    let picture = sdg_inputs::read_image_in(&path, PixelFrame::Sensor)?;
     if let Err(error) = camera.check_picture(picture.dimensions()) {
         bail!("{}: {error}", path.display());
     }
     let corners = find_board(&grey(&picture), board).with_context(|| named(&path))?;
     Ok(HandEyeView { base_from_flange: pose.base_from_flange, corners })
-}
-
-fn placed(args: &HandEyeArgs, camera: CalibratedCamera, found: &HandEye, mount: Mount) -> CalibratedCamera {
-    match mount {
-        Mount::Hand => CalibratedCamera { flange_from_camera: Some(found.frame_from_camera), ..camera },
-        Mount::Base => {
-            let old = camera.table.as_ref().filter(|table| table.frame == Frame::Base);
-            let told = args.table_height_mm.map(|height| height / 1000.0);
-            let table = TablePose {
-                frame: Frame::Base,
-                height_m: told.or(old.map(|table| table.height_m)).unwrap_or_default(),
-                frame_from_camera: found.frame_from_camera,
-                workspace: old.and_then(|table| table.workspace),
-            };
-            CalibratedCamera { table: Some(table), ..camera }
-        }
-    }
 }
 
 fn report(args: &HandEyeArgs, mount: Mount, found: &HandEye, seen: &[&RobotPose], lines: Vec<Value>) -> Result<()> {

@@ -7,17 +7,15 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use sdg_calibration::{
-    Board, CalibratedCamera, FocalCost, Frame, SeenCorner, SheetPose, TablePose, find_board, focal_cost,
-    focal_from_sheet, homography_rms_px, locate_sheet,
+    ASSUMED_VIEW_DEG, CalibratedCamera, FocalCost, FocalSource, Frame, SheetPose, TablePose, bent_px, find_board,
+    focal_cost, guess_camera, locate_sheet,
 };
 use sdg_demonstration::PixelFrame;
-use sdg_geometry::{PinholeCamera, PlumbBob};
+use sdg_inputs::camera_files;
 use serde_json::{Value, json};
 
 use super::board_in_use::{BoardInUse, grey, named, pose_json};
-use crate::camera_files;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::shared_args::height_mm;
 
 /// `sdg camera table`
@@ -78,14 +76,8 @@ pub struct TableArgs {
     json: bool,
 }
 
-/// A focal length taken from the sheet's perspective must be known to this share.
-const MAX_FOCAL_SIGMA: f64 = 0.1;
-/// Pictures of webcams and phones are about so wide.
-const ASSUMED_VIEW_DEG: f64 = 60.0;
 /// The error of the focal length whose cost is reported.
 const FOCAL_ERROR: f64 = 0.1;
-/// A straight lens explains corners to this; more is the lens's distortion.
-const MAX_STRAIGHT_PX: f64 = 1.0;
 /// The longest distance from a robot's base to a sheet.
 const MAX_REACH_MM: f64 = 5000.0;
 
@@ -97,15 +89,24 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     let Some(out) = args.out.as_ref().or(args.camera.as_ref()) else {
         return Err(Usage("expected --out FILE, or --camera FILE to write the table's pose into".to_owned()).into());
     };
-    files::check_extendable(out, args.camera.as_deref())?;
-    let picture = files::read_image_in(&args.picture, PixelFrame::Sensor)?;
+    sdg_files::check_extendable(out, args.camera.as_deref())?;
+    let picture = sdg_inputs::read_image_in(&args.picture, PixelFrame::Sensor)?;
     if let Some((camera, _)) = &existing {
         camera.check_picture(picture.dimensions()).with_context(|| named(&args.picture))?;
     }
     let corners = find_board(&grey(&picture), &board).with_context(|| named(&args.picture))?;
     let (mut camera, source) = match &existing {
-        Some((camera, _)) => (camera.clone(), Source::File),
-        None => guessed(args, picture.dimensions(), &board, &corners)?,
+        Some((camera, _)) => (camera.clone(), FocalSource::File),
+        None => {
+            let guessed = guess_camera(picture.dimensions(), &board, &corners, args.focal_px);
+            let Some((camera, source)) = guessed else {
+                bail!("expected --focal-px of some pixels, found {}", args.focal_px.unwrap_or_default());
+            };
+            if let Some(rms) = bent_px(&board, &corners) {
+                eprintln!("the sheet's lines are bent by {rms:.1} px RMS: calibrate the lens (sdg camera calibrate)");
+            }
+            (camera, source)
+        }
     };
     let sheet = locate_sheet(&camera.intrinsics, &board, &corners).with_context(|| named(&args.picture))?;
     let (frame, height_m) = match args.sheet_in_base_mm[..] {
@@ -122,29 +123,9 @@ pub fn run(args: &TableArgs) -> Result<Outcome> {
     // What `detect --camera` would refuse is refused here.
     CalibratedCamera::from_yaml(&text).with_context(|| named(&args.picture))?;
     let cost = focal_cost(&camera.intrinsics, &board, &corners, args.mark_height_mm / 1000.0, FOCAL_ERROR)?;
-    files::extend(out, args.camera.as_deref(), text.as_bytes())?;
+    sdg_files::extend(out, args.camera.as_deref(), text.as_bytes())?;
     report(args, out, &camera, &sheet, &source, &cost, corners.len())?;
     Ok(Outcome::Done)
-}
-
-/// Where the focal length is from.
-enum Source {
-    File,
-    Given,
-    /// Error as a share, homography's RMS.
-    Perspective(f64),
-    Guess,
-}
-
-impl Source {
-    fn name(&self) -> &'static str {
-        match self {
-            Self::File => "file",
-            Self::Given => "given",
-            Self::Perspective(_) => "perspective",
-            Self::Guess => "guess",
-        }
-    }
 }
 
 /// From the sheet's frame to that of the file.
@@ -164,43 +145,12 @@ fn frame_from_sheet(args: &TableArgs) -> Result<Isometry3<f64>> {
     Ok(Isometry3::from_parts(translation.into(), rotation))
 }
 
-/// A camera without file: its axis in the middle, a straight lens, and a focal length from wherever there is one.
-fn guessed(
-    args: &TableArgs,
-    size: (u32, u32),
-    board: &Board,
-    corners: &[SeenCorner],
-) -> Result<(CalibratedCamera, Source)> {
-    let (width, height) = size;
-    let estimate = focal_from_sheet(size, board, corners).filter(|found| found.relative_sigma() < MAX_FOCAL_SIGMA);
-    let (focal, source) = match (args.focal_px, estimate) {
-        (Some(focal), _) => (focal, Source::Given),
-        (None, Some(found)) => (found.focal_px, Source::Perspective(found.relative_sigma())),
-        (None, None) => {
-            let half = 0.5 * f64::from(width.max(height));
-            (half / (0.5 * ASSUMED_VIEW_DEG).to_radians().tan(), Source::Guess)
-        }
-    };
-    let [cx, cy] = [width, height].map(|side| 0.5 * f64::from(side));
-    let intrinsics = PinholeCamera { width, height, fx: focal, fy: focal, cx, cy, lens: PlumbBob::NONE };
-    let Ok(intrinsics) = intrinsics.checked() else {
-        bail!("expected --focal-px of some pixels, found {focal}");
-    };
-    if let Some(rms) = homography_rms_px(board, corners).filter(|rms| *rms > MAX_STRAIGHT_PX) {
-        eprintln!("the sheet's lines are bent by {rms:.1} px RMS: calibrate the lens (sdg camera calibrate)");
-    }
-    Ok((
-        CalibratedCamera { name: "uncalibrated".to_owned(), intrinsics, table: None, flange_from_camera: None },
-        source,
-    ))
-}
-
 fn report(
     args: &TableArgs,
     out: &Path,
     camera: &CalibratedCamera,
     sheet: &SheetPose,
-    source: &Source,
+    source: &FocalSource,
     cost: &FocalCost,
     num_corners: usize,
 ) -> Result<()> {
@@ -212,7 +162,7 @@ fn report(
     let costs = [cost.at_sheet_m, cost.at_border_m].map(|metres| 1000.0 * metres);
     if args.json {
         let sigma: Value = match source {
-            Source::Perspective(sigma) => json!(sigma * focal),
+            FocalSource::Perspective(sigma) => json!(sigma * focal),
             _ => Value::Null,
         };
         let object = json!({
@@ -240,12 +190,12 @@ fn report(
         sheet.rms_px
     )?;
     match source {
-        Source::File => return Ok(()),
-        Source::Given => writeln!(stdout, "  focal length {focal:.0} px as given")?,
-        Source::Perspective(sigma) => {
+        FocalSource::File => return Ok(()),
+        FocalSource::Given => writeln!(stdout, "  focal length {focal:.0} px as given")?,
+        FocalSource::Perspective(sigma) => {
             writeln!(stdout, "  focal length {focal:.0} px from the sheet's perspective, ± {:.0} %", 100.0 * sigma)?;
         }
-        Source::Guess => {
+        FocalSource::Guess => {
             writeln!(
                 stdout,
                 "  focal length {focal:.0} px guessed for a view of {ASSUMED_VIEW_DEG} degrees: the sheet is tilted too little to tell it"

@@ -3,20 +3,19 @@
 use std::time::Duration;
 
 use anyhow::Result;
+use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors};
+use sdg_evaluation::run_page::{self, RunPage, TaughtHere};
+use sdg_evaluation::shipped;
+use sdg_evaluation::trial::try_views;
+use sdg_files::write_atomically;
 use sdg_grasp::{CheckConfig, TeachOptions, Verification, teach};
-use sdg_report::write_atomically;
 
 use super::DemoArgs;
 use crate::commands::rehearse::{finish, show_attempt};
 use crate::exit::Outcome;
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::parts::part_named;
-use crate::rehearsal::{Rehearsal, RehearsalErrors};
-use crate::run_page::{self, RunPage, TaughtHere};
-use crate::shipped;
 use crate::teaching_progress::TeachingProgress;
-use crate::trial::try_views;
 
 /// Pictures with the part, and without it, on which the model is tried.
 const VIEWS: (usize, usize) = (12, 12);
@@ -27,7 +26,7 @@ const VIEWS_SEED: u64 = 7_000_000;
 pub fn run(args: &DemoArgs) -> Result<Outcome> {
     let object = part_named("--object", &args.object)?;
     let demonstration = shipped::demonstration(&args.object)?;
-    files::prepare_folder(&args.out)?;
+    sdg_files::prepare_folder(&args.out)?;
 
     let interrupt = Interrupt::watch();
     eprintln!("teaching the {} from one photo", object.title.to_lowercase());

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 use sdg_camera::Address;
+use sdg_cell::DEFAULT_MIN_SCORE;
 
-use crate::found_text::DEFAULT_MIN_SCORE;
 use crate::live_pictures::RequestArgs;
 use crate::shared_args::{ComputeArgs, SizeTolerance, share, size_tolerance};
 

@@ -10,22 +10,17 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use image::RgbImage;
-use sdg_cell::{Found, Perception};
+use sdg_cell::{DEFAULT_MIN_SCORE, Found, FoundRecord, Perception, drawing};
 use sdg_grasp::{CheckConfig, GraspDetection, Verification};
+use sdg_inputs::{PictureInput, PictureInputs, camera_files, pictures_of_argument};
 use serde::Serialize;
 
 pub use args::DetectArgs;
-use inputs::{Input, Inputs};
 
-use crate::camera_files;
 use crate::commands::devices;
-use crate::drawings;
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files;
-use crate::found_record::FoundRecord;
-use crate::found_text::{DEFAULT_MIN_SCORE, Wording, advice_in_words};
+use crate::found_text::{Wording, advice_in_words};
 use crate::json_line::json_line;
-use crate::pictures;
 
 /// Every image gets its line; one that cannot be read gets its error, and the next one its turn.
 pub fn run(args: &DetectArgs) -> Result<Outcome> {
@@ -45,7 +40,7 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         )
         .into());
     }
-    let mut model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let mut model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     if let Some(tolerance) = args.size_tolerance {
         model = model.with_size_tolerance(tolerance.range())?;
     }
@@ -68,17 +63,17 @@ pub fn run(args: &DetectArgs) -> Result<Outcome> {
         last_error: String::new(),
         found_any: false,
     };
-    let inputs: Vec<_> = args.images.iter().map(|argument| (argument, inputs::of_argument(argument))).collect();
-    let num_pictures = |inputs: &Result<Inputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
+    let inputs: Vec<_> = args.images.iter().map(|argument| (argument, pictures_of_argument(argument))).collect();
+    let num_pictures = |inputs: &Result<PictureInputs>| inputs.as_ref().map_or(1, |inputs| inputs.pictures.len());
     batch.is_alone = inputs.iter().map(|(_, inputs)| num_pictures(inputs)).sum::<usize>() == 1;
     if let Some(folder) = &args.draw {
         let pictures = inputs.iter().filter_map(|(_, inputs)| inputs.as_ref().ok()).flat_map(|inputs| &inputs.pictures);
         inputs::check_drawn_elsewhere(folder, pictures)?;
-        files::prepare_folder(folder)?;
+        sdg_files::prepare_folder(folder)?;
     }
     for (argument, inputs) in inputs {
         match inputs {
-            Ok(Inputs { pictures, skipped }) => {
+            Ok(PictureInputs { pictures, skipped }) => {
                 if let Some(skipped) = skipped {
                     eprintln!("{skipped}");
                 }
@@ -116,7 +111,7 @@ impl<W: Write> Batch<'_, W> {
     ///
     /// # Errors
     /// Standard output that cannot be written.
-    fn picture(&mut self, input: &Input) -> Result<()> {
+    fn picture(&mut self, input: &PictureInput) -> Result<()> {
         match self.detect(input) {
             Ok(seen) => {
                 self.num_used += 1;
@@ -141,7 +136,7 @@ impl<W: Write> Batch<'_, W> {
         Ok(())
     }
 
-    fn detect(&mut self, input: &Input) -> Result<Seen> {
+    fn detect(&mut self, input: &PictureInput) -> Result<Seen> {
         let verification = if self.args.no_verify { Verification::Off } else { Verification::ByShape };
         let image = input.read(self.detector.pixel_frame())?;
         let start = Instant::now();
@@ -150,7 +145,7 @@ impl<W: Write> Batch<'_, W> {
         if let Some(folder) = &self.args.draw {
             let wording = seen.wording(self.detector, self.args.min_score);
             let drawn = drawn(image, &seen.detections, &wording);
-            drawings::write(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
+            sdg_files::write_drawing(&folder.join(input.drawn_name(&mut self.drawn)), &drawn)?;
         }
         Ok(seen)
     }
@@ -161,9 +156,9 @@ fn drawn(mut image: RgbImage, found: &[Found], wording: &Wording<'_>) -> RgbImag
     let detections = || found.iter().map(|found| &found.detection);
     let refused: Vec<_> = wording.explained(detections()).into_iter().map(|idx| &found[idx].detection).collect();
     let differences: Vec<_> = wording.detector.differences(&image, &refused).into_iter().flatten().collect();
-    pictures::draw_differences(&mut image, &differences);
+    drawing::draw_differences(&mut image, &differences);
     let reasons: Vec<_> = refused.iter().map(|detection| (*detection, wording.reasons(detection, 1))).collect();
-    pictures::draw_detections(&mut image, detections(), wording.min_score, &reasons);
+    drawing::draw_detections(&mut image, detections(), wording.min_score, &reasons);
     image
 }
 

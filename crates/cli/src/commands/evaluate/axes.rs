@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
+use sdg_evaluation::Store;
+use sdg_evaluation::axes::{Against, AxesEvaluation, AxesSummary, RunEnd, Selection, comparison_lines, summary_lines};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -10,15 +12,10 @@ use serde_json::json;
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
-use crate::evaluation::axes::{
-    Against, AxesEvaluation, AxesSummary, Comparison, RunEnd, Selection, Way, comparison_tables, markdown, page,
-};
-use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::machine::machine;
+use crate::progress::EvaluationProgress;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
@@ -27,10 +24,10 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let objects = objects(&args.objects, ObjectSpec::names())?;
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
-    let against = args.against.as_deref().map(Against::open).transpose()?;
+    let against = args.against.as_deref().map(Against::open).transpose().context("--against")?;
     // Beside the page of the paper's protocol, not in its place.
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("axes"));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let jobs = jobs(args);
     let evaluation = AxesEvaluation {
@@ -51,33 +48,9 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
 
     let summary = AxesSummary::collect(&evaluation)?;
     let command = command(args, names);
-    let seconds = summary.seconds;
-    let facts = [
-        ("seed", settings.seed.to_string()),
-        ("preset", settings.preset.clone()),
-        (
-            "seconds of a worker",
-            format!(
-                "{:.0} (teaching {:.0}, pictures {:.0}, grasps {:.0})",
-                seconds.total(),
-                seconds.teaching,
-                seconds.pictures,
-                seconds.grasps
-            ),
-        ),
-        ("side by side", format!("{jobs} units of work")),
-        ("machine", machine()),
-        ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
-    ];
     let comparisons = against.as_ref().map(|against| against.compare(&evaluation)).transpose()?.unwrap_or_default();
-    let other = against.as_ref().map(|against| against.folder().display().to_string()).unwrap_or_default();
-    let more = || comparison_tables(&comparisons, &other);
-    store.write_bytes("axes.md", markdown(&summary, more(), &facts, &command).as_bytes())?;
-    let json = json!({ "summary": summary, "against": comparisons, "machine": machine(), "command": command });
-    store.write_bytes("axes.json", format!("{json:#}\n").as_bytes())?;
-    let report = page(&summary, more(), &facts, &command).write(&report_folder)?;
-
-    let tables = store.path("axes.md");
+    let other = against.as_ref().map(Against::folder);
+    let [tables, report] = summary.write(&store, jobs, (&comparisons, other), &command, &report_folder)?;
     if args.json {
         let line = json!({
             "summary": summary,
@@ -87,9 +60,8 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
         });
         println!("{}", json_line(&line)?);
     } else {
-        print_lines(&summary);
-        print_comparisons(&comparisons);
-        println!("seconds of a worker: {}", facts[2].1);
+        print!("{}{}", summary_lines(&summary), comparison_lines(&comparisons));
+        println!("seconds of a worker: {}", summary.seconds);
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match (failures.first(), remaining) {
@@ -99,61 +71,6 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
             "{} units of work failed, {remaining} are to do: the same command tries them again; the first: {first}",
             failures.len()
         ),
-    }
-}
-
-/// A line for each model in each group and way, and for each error.
-fn print_lines(summary: &AxesSummary) {
-    for group in &summary.groups {
-        println!("{}:", group.group.title());
-        let mut rows: Vec<_> = group.axes.iter().map(|figures| (figures.model, figures.way)).collect();
-        rows.extend(group.look_alikes.iter().map(|figures| (figures.model, figures.way)));
-        rows.sort_by_key(|(model, way)| (model.letter(), *way == Way::NetworkAlone));
-        rows.dedup();
-        for (model, way) in rows {
-            let mut told: Vec<String> = group
-                .axes
-                .iter()
-                .filter(|figures| (figures.model, figures.way) == (model, way))
-                .map(|figures| format!("{} {}", figures.axis, figures.found))
-                .collect();
-            told.extend(
-                group
-                    .look_alikes
-                    .iter()
-                    .filter(|figures| (figures.model, figures.way) == (model, way) && figures.is_sum())
-                    .map(|figures| format!("look-alikes of {} accepted {}", figures.kind, figures.accepted)),
-            );
-            println!("  {model} {}: {}", way.name(), told.join(", "));
-        }
-        for figures in &group.grasps {
-            println!(
-                "  {} {}: held {}, {} of them at the first look",
-                figures.model,
-                figures.condition.name(),
-                figures.held,
-                figures.held_at_first_look.count
-            );
-        }
-    }
-}
-
-/// A line for each comparison.
-fn print_comparisons(comparisons: &[Comparison]) {
-    for comparison in comparisons {
-        let [low, high] = comparison.interval.map(|bound| 100.0 * bound);
-        println!(
-            "against, {}: {} {}, {}: {} and {}, difference {:.1} points ({low:.1} to {high:.1}), {}, cases needed {}",
-            comparison.group.title().to_lowercase(),
-            comparison.model,
-            comparison.way.name(),
-            comparison.axis,
-            comparison.counts.first(),
-            comparison.counts.second(),
-            100.0 * comparison.difference,
-            if comparison.differs { "differs" } else { "does not differ" },
-            comparison.cases_needed.map_or("none".to_owned(), |cases| cases.to_string()),
-        );
     }
 }
 

@@ -1,6 +1,8 @@
 //! `sdg evaluate --cameras`: parts taught with one calibrated camera and found with others.
 
 use anyhow::{Result, bail};
+use sdg_evaluation::Store;
+use sdg_evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet};
 use sdg_grasp::ModelKind;
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -8,13 +10,10 @@ use serde_json::json;
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::selection::{jobs, objects, settings};
-use crate::evaluation::cameras::{CamerasEvaluation, CamerasSummary, PictureSet, markdown, page};
-use crate::evaluation::{EvaluationProgress, Store};
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::machine::machine;
+use crate::progress::EvaluationProgress;
 
 /// Does what is still to do, then writes the tables of all that there is: after Ctrl-C, too.
 pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
@@ -24,7 +23,7 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
     let (preset, settings) = settings(args)?;
     let store = Store::open(&args.out, &settings)?;
     let report_folder = args.report.clone().unwrap_or_else(|| args.out.join("cameras"));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let jobs = jobs(args);
     let evaluation = CamerasEvaluation {
@@ -44,35 +43,12 @@ pub fn run(args: &EvaluateArgs, names: &[String]) -> Result<Outcome> {
 
     let summary = CamerasSummary::collect(&evaluation)?;
     let command = command(args, names);
-    let facts = [
-        ("seed", settings.seed.to_string()),
-        ("preset", settings.preset.clone()),
-        ("seconds of a worker on pictures", format!("{:.0}", summary.seconds)),
-        ("side by side", format!("{jobs} units of work")),
-        ("machine", machine()),
-        ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
-    ];
-    let tables = store.path("cameras.md");
-    store.write_bytes("cameras.md", markdown(&summary, &facts, &command).as_bytes())?;
-    let json = json!({ "summary": summary, "machine": machine(), "command": command });
-    store.write_bytes("cameras.json", format!("{json:#}\n").as_bytes())?;
-    let report = page(&summary, &facts, &command).write(&report_folder)?;
+    let [tables, report] = summary.write(&store, jobs, &command, &report_folder)?;
     if args.json {
         let (tables, report) = (tables.display().to_string(), report.display().to_string());
         println!("{}", json_line(&json!({ "summary": summary, "tables": tables, "report": report }))?);
     } else {
-        for row in &summary.sets {
-            let of =
-                if row.found.of > 0 { format!("found {}", row.found) } else { format!("accepted {}", row.accepted) };
-            let errors = row.errors.map(|errors| {
-                let turn = errors.median_deg.zip(errors.p95_deg);
-                let turn = turn.map(|(median, p95)| format!(", {median:.2}° ({p95:.2}°)")).unwrap_or_default();
-                let [mm, deg] = [errors.within_sigma_mm, errors.within_sigma_deg]
-                    .map(|share| share.percent().map_or("–".to_owned(), |percent| format!("{percent:.0} %")));
-                format!("; {:.2} mm ({:.2} mm){turn}, within sigma {mm} and {deg}", errors.median_mm, errors.p95_mm)
-            });
-            println!("{} {}: {of}, {} wrong{}", row.model, row.set, row.wrong, errors.unwrap_or_default());
-        }
+        print!("{}", summary.lines());
         println!("tables: {}\nreport: {}", tables.display(), report.display());
     }
     match summary.remaining {

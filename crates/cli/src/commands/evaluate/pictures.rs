@@ -3,16 +3,18 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::camera_files;
 use anyhow::Result;
+use sdg_evaluation::Progress;
+use sdg_evaluation::labelled_pictures::{
+    Evaluated, LabelledFolder, Tested, Totals, in_words, judge, page, summary, to_json,
+};
 use sdg_grasp::Verification;
+use sdg_inputs::camera_files;
 
 use super::args::EvaluateArgs;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::json_line::json_line;
-use crate::labelled_pictures::{Evaluated, LabelledFolder, Tested, Totals, by_kind, in_words, judge, page, to_json};
 use crate::progress::EvaluationProgress;
 use crate::shared_args::ComputeArgs;
 
@@ -26,12 +28,12 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
             Usage("expected --pictures DIR and --grasp-model FILE, found one without the other".to_owned()).into()
         );
     };
-    let model = files::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
+    let model = sdg_inputs::read_model(model_file, &devices::open(&ComputeArgs { device: args.device })?)?;
     let detector = camera_files::perception(model, model_file, args.camera.as_deref())?;
     let model = detector.model();
     let labelled = LabelledFolder::read(folder, &detector, args.label.as_deref())?;
     let report_folder = args.report.clone().unwrap_or_else(|| PathBuf::from(DEFAULT_REPORT));
-    files::prepare_folder(&report_folder)?;
+    sdg_files::prepare_folder(&report_folder)?;
 
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let progress = EvaluationProgress::new();
@@ -66,57 +68,6 @@ pub fn run(args: &EvaluateArgs) -> Result<Outcome> {
     }
     let found_nothing = totals.found.of > 0 && judged.iter().all(|judged| judged.hits.is_empty());
     Ok(if found_nothing { Outcome::NothingToGrasp } else { Outcome::Done })
-}
-
-/// The closing lines.
-fn summary(evaluated: &Evaluated, totals: &Totals) -> String {
-    let mut text = String::new();
-    let mut line = |line: String| text += &(line + "\n");
-    let check = if evaluated.verification == Verification::ByShape { "with" } else { "without" };
-    line(format!(
-        "{}: model {}, {check} the check, scores from {} on",
-        evaluated.model.object(),
-        evaluated.model.kind(),
-        evaluated.min_score
-    ));
-    if totals.clean.of > 0 {
-        line(format!(
-            "found {} parts, {} missed, {} wrong; clean {} pictures",
-            totals.found, totals.missed, totals.wrong, totals.clean
-        ));
-    }
-    if totals.optional.of > 0 {
-        line(format!("optional: {} found", totals.optional));
-    }
-    if totals.false_alarms.of > 0 {
-        line(format!("false alarms on {} pictures without the part", totals.false_alarms));
-    }
-    for (kind, totals) in by_kind(&evaluated.tested.iter().collect::<Vec<_>>(), evaluated.min_score) {
-        let with_part = format!("found {} parts, {} wrong", totals.found, totals.wrong);
-        let without_part = format!("false alarms on {} pictures", totals.false_alarms);
-        line(format!("{kind}: {}", if totals.clean.of > 0 { with_part } else { without_part }));
-    }
-    if let Some(errors) = totals.errors {
-        let mm = |mm: Option<f64>| mm.map(|mm| format!(" = {mm:.2} mm")).unwrap_or_default();
-        line(format!(
-            "errors: median {:.2} px{} ({:.2} % of the diagonal), {:.2}°; 95 % within {:.2} px{} ({:.2} %), {:.2}°",
-            errors.median_px,
-            mm(errors.median_mm),
-            errors.median_percent,
-            errors.median_deg,
-            errors.p95_px,
-            mm(errors.p95_mm),
-            errors.p95_percent,
-            errors.p95_deg
-        ));
-    }
-    if evaluated.others > 0 {
-        line(format!("not counted: {} instances of other labels", evaluated.others));
-    }
-    for left_out in &evaluated.left_out {
-        line(format!("left out: {}: {}", left_out.file, left_out.why));
-    }
-    text
 }
 
 /// The command that gives the same results.

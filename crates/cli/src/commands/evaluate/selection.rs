@@ -1,11 +1,11 @@
 //! What all kinds of `sdg evaluate` read from its arguments: parts, preset and workers.
 
 use anyhow::Result;
+use sdg_evaluation::Settings;
 use sdg_grasp::{GraspError, Preset};
 use sdg_simulation::objects::ObjectSpec;
 
 use super::args::EvaluateArgs;
-use crate::evaluation::Settings;
 use crate::exit::Usage;
 use crate::parts::part_named;
 

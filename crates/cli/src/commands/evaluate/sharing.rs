@@ -6,6 +6,12 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow, bail};
+use sdg_evaluation::Progress;
+use sdg_evaluation::sharing::{
+    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, cores, faults, near_names, own_sha256,
+    planned_units, submit_script,
+};
+use sdg_evaluation::{Evaluation, Settings, Store};
 use sdg_grasp::{ModelKind, Preset};
 use sdg_simulation::objects::ObjectSpec;
 use serde_json::json;
@@ -14,14 +20,9 @@ use super::args::EvaluateArgs;
 use super::model_names::models;
 use super::protocol;
 use super::selection::{objects, settings};
-use crate::evaluation::sharing::{
-    Collecting, Ended, PlannedUnit, SavedPlan, SlurmJob, UnitFolder, Watch, faults, near_names, own_sha256,
-    planned_units, submit_script,
-};
-use crate::evaluation::{Evaluation, EvaluationProgress, Settings, Store};
 use crate::exit::{Outcome, Usage, one_line};
-use crate::files;
 use crate::interrupt::Interrupt;
+use crate::progress::EvaluationProgress;
 
 /// How often a folder is read again.
 const WATCH_EVERY: Duration = Duration::from_secs(2);
@@ -124,7 +125,7 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let mut ended = Vec::new();
     for unit in &named {
         let done =
-            evaluation.do_planned(unit, threads(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
+            evaluation.do_planned(unit, cores(), &|| interrupt.is_requested(), &|line| progress.print_line(line));
         let (told, how) = match done {
             Ok(Ended::Done(summary)) => (summary, "done"),
             Ok(Ended::Already(receipt)) => (format!("done already, by {}", receipt.by), "already"),
@@ -151,22 +152,18 @@ fn do_units(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     }
 }
 
-/// The cores that Slurm gave, or those of the machine.
-fn threads() -> usize {
-    let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
-    given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-}
-
 fn collect(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
     let store = asked.open(&args.out)?;
-    let _collecting = Collecting::begin(&args.out)?;
+    let Some(_collecting) = Collecting::begin(&args.out)? else {
+        bail!("{}: another --collect is at work in this folder", args.out.display());
+    };
     let (evaluation, units) = (asked.evaluation(&store), asked.units());
     let faults = faults(&evaluation, &units)?;
     if !faults.is_empty() {
         faults.iter().for_each(|fault| eprintln!("{fault}"));
         bail!("{} of {} units cannot be counted; no tables were written", faults.len(), units.len());
     }
-    files::prepare_folder(protocol::report_folder(args))?;
+    sdg_files::prepare_folder(protocol::report_folder(args))?;
     let remaining = protocol::write_tables(args, &evaluation, &asked.settings)?;
     if remaining > 0 {
         bail!("{}: {remaining} units have a receipt and no result", args.out.display());
@@ -231,7 +228,7 @@ fn submit(asked: &Asked, args: &EvaluateArgs) -> Result<Outcome> {
         }
         return Ok(Outcome::Done);
     }
-    files::prepare_folder(&folder)?;
+    sdg_files::prepare_folder(&folder)?;
     SavedPlan::new(&units).save(&folder)?;
     let mut bash = Command::new("bash").arg("-s").stdin(Stdio::piped()).spawn().context("bash: cannot run")?;
     bash.stdin.take().context("bash: no standard input")?.write_all(script.as_bytes())?;

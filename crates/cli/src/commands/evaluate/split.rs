@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use anyhow::{Result, bail};
+use sdg_evaluation::Progress;
+use sdg_evaluation::split::{Measured, ReadySet, Side, SplitSet, candidates, read_split, summary, tables};
 use sdg_grasp::ModelKind;
 use serde_json::json;
 
 use super::args::EvaluateArgs;
 use super::model_names::models;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::progress::EvaluationProgress;
-use crate::split::{Measured, ReadySet, Side, SplitSet, candidates, read_split, summary, tables};
 
 /// Every set is read first, then taught and measured, one after the other: the detector's speed is part of the result.
 pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
@@ -32,7 +32,7 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
         bail!("{}: expected sets to measure, found none", file.display());
     }
     for path in [&args.split.results, &args.split.records].into_iter().flatten() {
-        files::check_writable(path)?;
+        sdg_files::check_writable(path)?;
     }
 
     let progress = EvaluationProgress::new();
@@ -58,11 +58,11 @@ pub fn run(args: &EvaluateArgs, file: &Path) -> Result<Outcome> {
         "models": measured.iter().map(|of_model| summary(of_model, &sides)).collect::<Vec<_>>(),
     });
     if let Some(path) = &args.split.results {
-        files::write(path, results.to_string().as_bytes())?;
+        sdg_files::write(path, results.to_string().as_bytes())?;
     }
     if let Some(path) = &args.split.records {
         let lines = measured.iter().map(candidates).collect::<Result<String>>()?;
-        files::write(path, lines.as_bytes())?;
+        sdg_files::write(path, lines.as_bytes())?;
     }
     if args.json {
         println!("{results}");

@@ -1,8 +1,6 @@
 //! `sdg plan`: a motion around the obstacles of a workcell, described and drawn; nothing moves.
 
 mod arguments;
-#[cfg(feature = "simulation")]
-mod drawing;
 mod explain;
 
 use std::path::PathBuf;
@@ -69,7 +67,7 @@ pub struct PlanArgs {
 /// Plans, prints the plan and draws it.
 pub fn run(args: &PlanArgs) -> Result<Outcome> {
     let pace = robots::pace(args.speed)?;
-    let (workcell, _) = robots::read_workcell(&args.workcell)?;
+    let (workcell, _) = sdg_inputs::read_workcell(&args.workcell)?;
     let mut model = workcell.collision_model(args.opening_mm * 1e-3).map_err(|error| Usage(error.to_string()))?;
     if let Some(Held { diameter_m, length_m }) = args.held_mm {
         let radius_m = 0.5 * diameter_m;
@@ -127,7 +125,7 @@ fn refused_by_limits(workcell: &Workcell, motions: &[Trajectory]) -> Option<Stri
 
 #[cfg(feature = "simulation")]
 fn draw(args: &PlanArgs, workcell: &Workcell, motions: &[Trajectory]) -> Result<()> {
-    for file in drawing::draw(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
+    for file in sdg_evaluation::draw_motions(&args.out, workcell, motions, args.opening_mm * 1e-3)? {
         eprintln!("  {}", file.display());
     }
     Ok(())

@@ -4,35 +4,33 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use sdg_evaluation::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
+use sdg_evaluation::run_page::{self, RunPage};
+use sdg_evaluation::{Assumption, OwnPart, OwnPartError, OwnPartSizes};
 use sdg_geometry::PinholeCamera;
-use sdg_grasp::{GraspError, Verification};
+use sdg_grasp::{GraspError, GraspModel, Verification};
+use sdg_inputs::camera_files::CameraFile;
 use sdg_report::AttemptSummary;
 use serde_json::json;
 
 use super::RehearseArgs;
-use crate::camera_files::CameraFile;
 use crate::commands::devices;
 use crate::exit::{Outcome, Usage};
-use crate::files;
 use crate::interrupt::Interrupt;
 use crate::json_line::json_line;
-use crate::own_part::OwnPart;
 use crate::parts::part_named;
-use crate::rehearsal::{Rehearsal, RehearsalErrors, Rehearsed, RehearsedPlace, step_name};
-use crate::robots;
-use crate::run_page::{self, RunPage};
 use crate::shared_args::OwnPartArgs;
 
 /// Attempts, then the report; Ctrl-C reports the attempts so far.
 pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     let shipped = args.object.as_deref().map(|name| part_named("--object", name)).transpose()?;
-    let model = files::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
+    let model = sdg_inputs::read_model(&args.grasp_model, &devices::open(&args.compute)?)?;
     let mut camera = args.camera.as_deref().map(CameraFile::read_intrinsics).transpose()?;
     let model_file = args.grasp_model.display().to_string();
     let (object, model) = match shipped {
         Some(object) => (object, model),
         None => {
-            let OwnPart { object, model, facts } = args.own_part.make(model, &model_file)?;
+            let OwnPart { object, model, facts } = own_part(args, model, &model_file)?;
             eprintln!("{facts}");
             // Sizes are known in metres, so it looks through a calibrated camera in any case.
             camera = camera.or(Some(PinholeCamera::WRIST));
@@ -46,7 +44,7 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
         (Some(place), Some(workcell)) => Some(rehearsed_place(place, workcell)?),
         _ => None,
     };
-    files::prepare_folder(&args.out)?;
+    sdg_files::prepare_folder(&args.out)?;
     let verification = if args.no_verify { Verification::Off } else { Verification::ByShape };
     let rehearsal = Rehearsal {
         model: &model,
@@ -83,25 +81,43 @@ pub fn run(args: &RehearseArgs) -> Result<Outcome> {
     finish(&page, None, &report, args.json)
 }
 
-/// A place of a workcell's file; rehearsals have the table at the base's height.
+/// The part that a model was taught from.
+fn own_part(args: &RehearseArgs, model: GraspModel, model_file: &str) -> Result<OwnPart> {
+    let OwnPartArgs { height_mm, length_mm, mass_g, friction } = args.own_part;
+    let sizes = OwnPartSizes { height_mm, length_mm, mass_g, friction };
+    let in_words = |assumption| match assumption {
+        Assumption::Mass => "the mass, of 1.5 g/cm³ (--mass-g)",
+        Assumption::Friction => "the friction (--friction)",
+        Assumption::UprightWalls => "upright walls",
+        Assumption::PhotoFromAbove => "a photo from straight above",
+        Assumption::BoxAsOutline => "the box as its outline, since none was marked",
+    };
+    let needed = |option: &str, what: &str| {
+        format!(
+            "expected --object NAME for a shipped part, or {option} for the part of {model_file}: {what}, which a model \
+             taught without --camera does not know"
+        )
+    };
+    OwnPart::make(model, model_file, &sizes, &in_words).map_err(|error| match error.downcast_ref() {
+        Some(OwnPartError::NeedsLength) => Usage(needed("--length-mm MM", "the longer side of its box")).into(),
+        Some(OwnPartError::NeedsHeight) => Usage(needed("--height-mm MM", "its height over the table")).into(),
+        Some(OwnPartError::LengthIsKnown { known_mm }) => Usage(format!(
+            "--length-mm: expected a model taught without --camera, found {model_file}, which knows that its part is \
+             {known_mm:.1} mm long"
+        ))
+        .into(),
+        _ => error,
+    })
+}
+
+/// A place of a workcell's file.
 fn rehearsed_place(text: &str, path: &Path) -> Result<RehearsedPlace> {
-    let (workcell, _) = robots::read_workcell(path)?;
+    let (workcell, _) = sdg_inputs::read_workcell(path)?;
     if workcell.table_height_m != 0.0 {
         let found_mm = workcell.table_height_m * 1e3;
         bail!("{}: height_mm: expected 0, the table's height in rehearsals, found {found_mm}", path.display());
     }
-    let name = text.split_once(':').map_or(text, |(name, _)| name);
-    let place = workcell.places.iter().find(|place| place.name == name).cloned();
-    let cell = match text.split_once(':') {
-        None if place.as_ref().is_some_and(|place| place.num_cells() > 1) => None,
-        // Says what is wrong with a name or a cell.
-        _ => {
-            workcell.place(text).map_err(|error| Usage(format!("--{error}")))?;
-            text.split_once(':').and_then(|(_, cell)| cell.parse().ok())
-        }
-    };
-    let place = place.context("the place was found before")?;
-    Ok(RehearsedPlace { place, cell, obstacles: workcell.obstacles })
+    Ok(RehearsedPlace::named(text, workcell).map_err(|error| Usage(format!("--{error}")))?)
 }
 
 /// A line for each attempt; breaks when Ctrl-C was pressed.

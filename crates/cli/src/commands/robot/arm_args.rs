@@ -7,7 +7,7 @@ use clap::Args;
 use sdg_robot::{FrankaArm, RobotAddress, Scheduling};
 
 use crate::exit::Usage;
-use crate::robots::{self, RobotChoice};
+use crate::robots::RobotChoice;
 
 /// Which arm.
 #[derive(Debug, Args)]
@@ -23,7 +23,7 @@ pub struct ArmArgs {
 impl ArmArgs {
     pub(super) fn address(&self) -> Result<RobotAddress> {
         let of_workcell = match &self.workcell {
-            Some(path) => robots::read_workcell(path)?.0.address,
+            Some(path) => sdg_inputs::read_workcell(path)?.0.address,
             None => None,
         };
         match RobotChoice::named(self.robot.as_ref(), of_workcell.as_deref())? {

@@ -46,7 +46,7 @@ pub(super) fn run(args: &HomeArgs) -> Result<Outcome> {
         return Err(Usage("expected --workcell FILE, which says where the arm may be".to_owned()).into());
     };
     let pace = robots::pace(args.speed)?;
-    let (workcell, _) = robots::read_workcell(path)?;
+    let (workcell, _) = sdg_inputs::read_workcell(path)?;
     let address = args.arm.address()?;
     let mut arm = FrankaArm::connect(&address, robots::scheduling(args.no_realtime))?;
     arm.check_model(workcell.robot)?;

@@ -1,18 +1,22 @@
 //! `sdg ros2`: detection, teaching and grasping as a node of ROS 2.
 
 pub mod args;
+mod settings;
+mod teaching;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::{Context, Result};
 use sdg_ros2::Naming;
 use sdg_ros2::dds::{ArmConfig, Node, NodeConfig, TrajectoryArm, domain_of_environment};
+use sdg_ros2_node::IsInterrupted;
 
 use crate::exit::{Outcome, Usage};
 use crate::interrupt::Interrupt;
-use crate::ros_node::{self, GraspSettings, Settings};
 use args::{ArmArgs, Ros2Args};
+use settings::{grasp_settings, node_settings};
 
 /// How long the arm's topic and actions are waited for.
 const ARM_TIMEOUT: Duration = Duration::from_secs(20);
@@ -20,9 +24,9 @@ const ARM_TIMEOUT: Duration = Duration::from_secs(20);
 /// Joins ROS 2 and works until Ctrl-C.
 pub fn run(args: &Ros2Args) -> Result<Outcome> {
     let naming = Naming::new(&args.ros.namespace, &args.ros.node_name, &args.ros.remappings).map_err(usage)?;
-    let settings = Settings::read(args)?;
-    let grasp = args.arm.allow_motion.then(|| GraspSettings::read(args)).transpose()?;
     let interrupt = Interrupt::watch();
+    let settings = node_settings(args, &interrupt)?;
+    let grasp = args.arm.allow_motion.then(|| grasp_settings(args)).transpose()?;
     let mut node = Node::join(NodeConfig {
         naming,
         domain_id: args.ros.domain_id.map_or_else(domain_of_environment, Ok).map_err(Usage)?,
@@ -37,7 +41,8 @@ pub fn run(args: &Ros2Args) -> Result<Outcome> {
         }
         None => None,
     };
-    ros_node::run(node, settings, arm, &interrupt)?;
+    let is_interrupted: IsInterrupted = Arc::new(move || interrupt.is_requested());
+    sdg_ros2_node::run(node, settings, arm, &is_interrupted)?;
     Ok(Outcome::Done)
 }
 

@@ -1,0 +1,210 @@
+//! A camera's pictures for the page.
+//!
+//! A thread reads the camera without a pause, so that the page, which asks when it likes, gets the newest picture.
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime};
+
+use image::RgbImage;
+use sdg_camera::{Address, Camera, CameraError, Fault, Playback};
+
+use crate::live::{Live, LiveFault, LiveFaultKind, LiveFrame, LivePictures};
+
+/// Pictures a second from files whose address names no pace: a folder that is read as fast as it can be would be over, or take a
+/// core, before anybody has seen it.
+const FILES_INTERVAL: Duration = Duration::from_millis(200);
+/// A torn frame is a fault only when no whole one has come for so long: single ones are common with cheap cameras.
+const MAX_TORN_AGE: Duration = Duration::from_secs(1);
+
+/// The newest picture of a camera that a thread reads for as long as the process runs.
+#[derive(Debug)]
+pub struct CameraPictures(Arc<Mutex<Newest>>);
+
+#[derive(Default)]
+struct Newest {
+    frame: Option<(Arc<RgbImage>, u64, Instant)>,
+    fault: Option<LiveFault>,
+    check: Option<Box<SizeCheck>>,
+}
+
+/// Says what is wrong with pictures of that width and height.
+pub type SizeCheck = dyn Fn((u32, u32)) -> Result<(), String> + Send;
+
+impl fmt::Debug for Newest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Newest").field("fault", &self.fault).finish_non_exhaustive()
+    }
+}
+
+impl CameraPictures {
+    /// Begins to read a camera; pictures that `check` refuses are a fault. A simulated camera draws as fast as it can, and is read by
+    /// the clock of its frames.
+    pub fn read(mut camera: Box<dyn Camera>, is_simulated: bool, check: Option<Box<SizeCheck>>) -> Self {
+        let newest = Arc::new(Mutex::new(Newest { check, ..Newest::default() }));
+        let writer = Arc::clone(&newest);
+        thread::spawn(move || {
+            loop {
+                let next = camera.next_frame();
+                if let (true, Ok(Some(frame))) = (is_simulated, &next) {
+                    thread::sleep(frame.captured.duration_since(SystemTime::now()).unwrap_or_default());
+                }
+                if lock(&writer).has_ended_with(next) {
+                    return;
+                }
+            }
+        });
+        Self(newest)
+    }
+}
+
+impl LivePictures for CameraPictures {
+    fn newest(&self) -> Live {
+        let newest = lock(&self.0);
+        let frame = newest.frame.as_ref().map(|(picture, number, arrived)| LiveFrame {
+            picture: Arc::clone(picture),
+            number: *number,
+            age: arrived.elapsed(),
+        });
+        Live { frame, fault: newest.fault.clone() }
+    }
+}
+
+fn lock(newest: &Mutex<Newest>) -> MutexGuard<'_, Newest> {
+    newest.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Newest {
+    /// Takes what the camera gave; true where nothing more will come.
+    fn has_ended_with(&mut self, next: Result<Option<sdg_camera::Frame>, CameraError>) -> bool {
+        let fault = |kind, text: String| Some(LiveFault { kind, text });
+        match next {
+            Ok(Some(frame)) => {
+                let other_size = self.check.as_ref().and_then(|check| check(frame.picture.dimensions()).err());
+                self.fault = match other_size {
+                    Some(error) => fault(LiveFaultKind::OtherSize, error),
+                    None => frame.faults.iter().find_map(live_fault),
+                };
+                self.frame = Some((Arc::new(frame.picture), frame.number, Instant::now()));
+                false
+            }
+            Ok(None) => {
+                self.fault = fault(LiveFaultKind::Ended, "there are no more pictures; this is the last one".to_owned());
+                true
+            }
+            Err(error) => {
+                let is_recent = self.frame.as_ref().is_some_and(|(.., arrived)| arrived.elapsed() < MAX_TORN_AGE);
+                match error.fault() {
+                    Some(Fault::Torn { .. }) if is_recent => {}
+                    Some(passing) => self.fault = live_fault(passing),
+                    None => self.fault = fault(LiveFaultKind::Failed, error.to_string()),
+                }
+                !error.is_passing()
+            }
+        }
+    }
+}
+
+/// The page's text for a fault; `None` for what does not matter on it.
+fn live_fault(fault: &Fault) -> Option<LiveFault> {
+    let kind = match fault {
+        Fault::Stale { .. } => LiveFaultKind::Stale,
+        Fault::Torn { .. } => LiveFaultKind::Torn,
+        Fault::Gone { .. } => LiveFaultKind::Gone,
+        Fault::Frozen { .. } => LiveFaultKind::Frozen,
+        Fault::Black => LiveFaultKind::Black,
+        // The page shows pictures of any size, and a camera that is back is seen to be.
+        _ => return None,
+    };
+    // The page names the kind itself.
+    let text = fault.to_string();
+    let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest).to_owned();
+    Some(LiveFault { kind, text })
+}
+
+/// The address with a pace that can be watched, where it is one of files without a pace.
+pub fn paced(mut address: Address) -> Address {
+    if let Address::Folder { playback: Playback { interval, .. }, .. }
+    | Address::File { playback: Playback { interval, .. }, .. } = &mut address
+    {
+        interval.get_or_insert(FILES_INTERVAL);
+    }
+    address
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    fn open(address: &str) -> (CameraPictures, String) {
+        let address = paced(address.parse().unwrap());
+        let camera = sdg_camera::open(&address, &sdg_camera::OpenOptions::default()).unwrap();
+        (CameraPictures::read(camera, false, None), address.to_string())
+    }
+
+    fn picture(level: u8) -> RgbImage {
+        RgbImage::from_pixel(4, 3, Rgb([level; 3]))
+    }
+
+    fn frame(number: u64, faults: Vec<Fault>) -> sdg_camera::Frame {
+        sdg_camera::Frame { faults, ..sdg_camera::Frame::new(picture(90), number, "test:".into()) }
+    }
+
+    fn passing(fault: Fault) -> CameraError {
+        CameraError::Fault { camera: "test:".into(), fault }
+    }
+
+    fn kind(newest: &Newest) -> Option<LiveFaultKind> {
+        newest.fault.as_ref().map(|fault| fault.kind)
+    }
+
+    #[test]
+    fn a_fault_stands_until_a_frame_without_one() {
+        let mut newest = Newest::default();
+        assert!(!newest.has_ended_with(Ok(Some(frame(0, vec![])))));
+        for (told, expected) in [
+            (Err(passing(Fault::Stale { silent_secs: 2.0 })), LiveFaultKind::Stale),
+            (Err(passing(Fault::Gone { why: "cable".into() })), LiveFaultKind::Gone),
+            (Ok(Some(frame(1, vec![Fault::Back { away_secs: 1.0 }, Fault::Black]))), LiveFaultKind::Black),
+            (Ok(Some(frame(2, vec![Fault::Frozen { num_frames: 10 }]))), LiveFaultKind::Frozen),
+        ] {
+            assert!(!newest.has_ended_with(told));
+            assert_eq!(kind(&newest), Some(expected));
+        }
+        assert!(!newest.has_ended_with(Ok(Some(frame(3, vec![Fault::Back { away_secs: 1.0 }])))));
+        assert_eq!((kind(&newest), newest.frame.as_ref().unwrap().1), (None, 3));
+        assert!(!newest.has_ended_with(Err(passing(Fault::Torn { found: "half".into() }))));
+        assert_eq!(kind(&newest), None, "one torn frame between whole ones is not told");
+    }
+
+    #[test]
+    fn an_end_and_a_failure_are_final_and_the_last_picture_stays() {
+        let mut ended = Newest::default();
+        ended.has_ended_with(Ok(Some(frame(0, vec![]))));
+        assert!(ended.has_ended_with(Ok(None)));
+        assert!(kind(&ended).unwrap().is_usable() && ended.frame.is_some());
+        let mut failed = Newest::default();
+        let error = CameraError::Ended { camera: "test:".into(), why: "no such program".into() };
+        assert!(failed.has_ended_with(Err(error)));
+        assert!(!kind(&failed).unwrap().is_usable());
+        assert!(failed.fault.unwrap().text.contains("no such program"));
+    }
+
+    #[test]
+    fn a_folder_is_read_at_a_pace_that_can_be_watched() {
+        let folder = tempfile::tempdir().unwrap();
+        picture(7).save(folder.path().join("a.png")).unwrap();
+        let (camera, address) = open(&format!("dir:{}?loop", folder.path().display()));
+        assert!(address.ends_with("?fps=5&loop"), "{address}");
+        let begun = Instant::now();
+        let number = |camera: &CameraPictures| camera.newest().frame.map(|frame| frame.number);
+        while number(&camera) < Some(2) {
+            assert!(begun.elapsed() < Duration::from_secs(30));
+            thread::sleep(Duration::from_millis(5));
+        }
+        assert!(begun.elapsed() >= 2 * FILES_INTERVAL);
+        assert_eq!(*camera.newest().frame.unwrap().picture, picture(7));
+    }
+}

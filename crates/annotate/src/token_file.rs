@@ -1,0 +1,51 @@
+//! The key to the page in a file, which stays the same from one page to the next.
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::guard::new_token;
+
+/// Reads the key to the page, or makes one that only its owner can read.
+///
+/// # Errors
+/// A file that cannot be read or written, or holds no key.
+pub fn token_of_file(path: &Path) -> Result<String> {
+    const MAX_BYTES: u64 = 4096;
+    if !path.exists() {
+        let token = new_token()?;
+        let mut options = std::fs::OpenOptions::new();
+        options.write(true).create_new(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let written = options.open(path).and_then(|mut file| writeln!(file, "{token}"));
+        written.map_err(|source| Error::File {
+            path: path.to_owned(),
+            action: "cannot write the key to the page",
+            source,
+        })?;
+        return Ok(token);
+    }
+    let text = String::from_utf8_lossy(&sdg_files::read(path, MAX_BYTES)?).trim().to_owned();
+    if text.len() < 16 || !text.chars().all(|c| c.is_ascii_alphanumeric()) {
+        return Err(Error::NotAKey { path: path.to_owned(), found: text.chars().count() });
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_made_once_and_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("key");
+        let made = token_of_file(&path).unwrap();
+        assert_eq!((made.len(), token_of_file(&path).unwrap()), (32, made));
+        #[cfg(unix)]
+        assert_eq!(std::os::unix::fs::PermissionsExt::mode(&path.metadata().unwrap().permissions()) & 0o777, 0o600);
+        std::fs::write(&path, "short").unwrap();
+        assert!(token_of_file(&path).unwrap_err().to_string().contains("16 letters"));
+    }
+}

@@ -1,0 +1,185 @@
+//! Pictures with our marks on them.
+
+use image::{Rgb, RgbImage};
+use nalgebra::Point2;
+use sdg_geometry::{BoundingBox, Keypoint};
+use sdg_grasp::{Differences, GraspDetection};
+use sdg_report::{
+    Color, DetectionMark, Pen, Verdict, draw_box, draw_detection, draw_label, draw_polygon, label_bounds, line_width,
+};
+
+/// The score from which detections are accepted, where nobody sets another: scores are calibrated so that it separates right from wrong.
+pub const DEFAULT_MIN_SCORE: f64 = 0.5;
+/// The image with every detection drawn on it.
+pub fn with_detections(image: &RgbImage, detections: &[GraspDetection]) -> RgbImage {
+    let mut drawn = image.clone();
+    draw_detections(&mut drawn, detections.iter(), DEFAULT_MIN_SCORE, &[]);
+    drawn
+}
+
+/// Draws detections, the best first in their order; those that score at least `min_score` as accepted. Where reasons are given, the
+/// refused ones among them have a tag with score and reason, which no other tag covers, and further refused ones a box alone.
+pub fn draw_detections<'a>(
+    drawn: &mut RgbImage,
+    detections: impl DoubleEndedIterator<Item = &'a GraspDetection>,
+    min_score: f64,
+    reasons: &[(&GraspDetection, String)],
+) {
+    // Worst first, so that the best is on top.
+    for detection in detections.rev() {
+        if detection.score < min_score && !reasons.is_empty() {
+            let width = line_width(drawn);
+            let explained = reasons.iter().any(|(known, _)| *known == detection);
+            let share = if explained { 1.0 } else { 0.5 };
+            let pen = Pen::new(Color::REFUSED).width(share * width).dashed(4.0 * width, 3.0 * width);
+            draw_box(drawn, &detection.bbox, &pen);
+            if let Some(outline) = detection.outline.as_ref().filter(|_| explained) {
+                draw_polygon(drawn, outline, &Pen::new(Color::OUTLINE).width(0.5 * width));
+            }
+            continue;
+        }
+        let keypoints: Vec<Keypoint> = detection.keypoints.iter().map(|(point, _)| Keypoint::visible(*point)).collect();
+        let verdict = match (detection.score >= min_score, detection.agreement) {
+            (false, _) => Verdict::Refused,
+            (true, Some(_)) => Verdict::Verified,
+            (true, None) => Verdict::Unchecked,
+        };
+        let mark = DetectionMark {
+            bounds: Some(detection.bbox),
+            outline: detection.outline.as_ref(),
+            keypoints: &keypoints,
+            grasp: Some(detection.grasp),
+            score: detection.score,
+            verdict,
+        };
+        draw_detection(drawn, &mark);
+    }
+    let mut taken = Vec::new();
+    for (detection, reason) in reasons {
+        draw_reason(drawn, detection, reason, &mut taken);
+    }
+}
+
+/// Colours of the dots where edges and surface differ: apart in lightness, too.
+const EDGES: Color = Color([255, 40, 60]);
+const SURFACE: Color = Color([90, 150, 255]);
+/// Colour of the frames of squares in which a feature or print differs.
+const FEATURES: Color = Color([255, 190, 0]);
+/// Dots of a picture this large are a pixel wide; those of larger ones grow with it.
+const DOT_PX_PER_SIDE: f64 = 400.0;
+
+/// Draws a dot wherever edges (red) or surface (blue) differ from the demonstration, a frame (yellow) where a feature does, and what the colours
+/// mean; nothing where nothing differs.
+pub fn draw_differences(drawn: &mut RgbImage, differences: &[Differences]) {
+    let side = f64::from(drawn.width().max(drawn.height()));
+    let radius = (0.5 * side / DOT_PX_PER_SIDE).max(0.5);
+    for differences in differences {
+        differences.surface.iter().for_each(|at| dot(drawn, at, radius, SURFACE));
+        differences.edges.iter().for_each(|at| dot(drawn, at, radius, EDGES));
+        differences
+            .features
+            .iter()
+            .for_each(|square| draw_polygon(drawn, square, &Pen::new(FEATURES).width(2.0 * radius).without_halo()));
+    }
+    let text_px = (side / 60.0).max(8.0);
+    let mut bottom = f64::from(drawn.height());
+    let shows = |is_there: fn(&Differences) -> bool| differences.iter().any(is_there);
+    let legend = [
+        (shows(|one| !one.surface.is_empty()), "surface differs from the photo", SURFACE),
+        (shows(|one| !one.edges.is_empty()), "edges differ from the photo", EDGES),
+        (shows(|one| !one.features.is_empty()), "a feature differs from the photo", FEATURES),
+    ];
+    for (_, text, color) in legend.into_iter().filter(|(is_shown, ..)| *is_shown) {
+        draw_label(drawn, Point2::new(0.0, bottom), text, color, text_px);
+        bottom -= 2.5 * text_px;
+    }
+}
+
+/// Writes score and reason below a detection's box, farther down where another such tag is.
+fn draw_reason(drawn: &mut RgbImage, detection: &GraspDetection, reason: &str, taken: &mut Vec<BoundingBox>) {
+    let text_px = (f64::from(drawn.width().max(drawn.height())) / 60.0).max(8.0);
+    let text = format!("{:.2} refused: {reason}", detection.score);
+    let step = 2.4 * text_px;
+    let height = f64::from(drawn.height());
+    let below = |row: usize| {
+        // From the foot of the picture it goes on at its head.
+        let y = (detection.bbox.y2 + 3.0 * text_px + row as f64 * step) % (height + step);
+        Point2::new(detection.bbox.x1, y)
+    };
+    let is_free = |at: &Point2<f64>| {
+        let bounds = label_bounds(drawn, *at, &text, text_px);
+        taken.iter().all(|other| other.intersection(&bounds) == 0.0)
+    };
+    let rows = (height / step).ceil() as usize;
+    let at = (0..rows).map(below).find(is_free).unwrap_or_else(|| below(0));
+    taken.push(label_bounds(drawn, at, &text, text_px));
+    draw_label(drawn, at, &text, Color::REFUSED, text_px);
+}
+
+/// A filled square of side 2 · `radius`, clipped to the picture.
+fn dot(drawn: &mut RgbImage, at: &Point2<f64>, radius: f64, color: Color) {
+    if !(0.0..f64::from(drawn.width())).contains(&at.x) || !(0.0..f64::from(drawn.height())).contains(&at.y) {
+        return;
+    }
+    let span = |middle: f64, end: u32| {
+        let [from, to] = [middle - radius, middle + radius].map(|edge| edge.round().clamp(0.0, f64::from(end)) as u32);
+        from..to.max(from + 1).min(end)
+    };
+    for y in span(at.y, drawn.height()) {
+        for x in span(at.x, drawn.width()) {
+            drawn.put_pixel(x, y, Rgb(color.0));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_geometry::Polygon;
+
+    #[test]
+    fn tags_of_refused_ones_do_not_cover_each_other() {
+        let detection = |x: f64, score: f64| GraspDetection {
+            score,
+            network_score: 0.0,
+            agreement: Some(0.4),
+            evidence: None,
+            bbox: BoundingBox { x1: x, y1: 250.0, x2: x + 60.0, y2: 290.0 },
+            keypoints: Vec::new(),
+            outline: None,
+            grasp: sdg_geometry::PlanarGrasp { x: x + 30.0, y: 270.0, angle: sdg_geometry::Angle::ZERO, width: 30.0 },
+            turn_source: sdg_grasp::TurnSource::Search,
+            light: 1.0,
+        };
+        let found = [detection(40.0, 0.4), detection(50.0, 0.3), detection(60.0, 0.2)];
+        let mut taken = Vec::new();
+        let mut drawn = RgbImage::new(400, 300);
+        for one in &found {
+            draw_reason(&mut drawn, one, "too little of it is visible", &mut taken);
+        }
+        for (i, one) in taken.iter().enumerate() {
+            assert!(taken[..i].iter().all(|other| other.intersection(one) == 0.0), "{taken:?}");
+            assert!(one.y2 <= 300.0 && one.y1 >= 0.0);
+        }
+    }
+
+    #[test]
+    fn differences_are_dots_at_their_places_with_a_legend() {
+        let count = |picture: &RgbImage, color: Color| picture.pixels().filter(|pixel| pixel.0 == color.0).count();
+        let mut drawn = RgbImage::new(400, 300);
+        draw_differences(&mut drawn, &[Differences::default()]);
+        assert_eq!(drawn, RgbImage::new(400, 300));
+        let at = [Point2::new(100.5, 50.5), Point2::new(399.9, 299.9), Point2::new(-5.0, 10.0)];
+        draw_differences(&mut drawn, &[Differences { edges: at.to_vec(), ..Differences::default() }]);
+        assert_eq!(drawn.get_pixel(100, 50).0, EDGES.0);
+        assert_eq!(drawn.get_pixel(0, 10).0, [0; 3]);
+        assert!(count(&drawn, EDGES) > 100 && count(&drawn, SURFACE) == 0 && count(&drawn, FEATURES) == 0);
+        let square = BoundingBox { x1: 100.0, y1: 100.0, x2: 140.0, y2: 140.0 };
+        let mut drawn = RgbImage::new(400, 300);
+        draw_differences(
+            &mut drawn,
+            &[Differences { features: vec![Polygon::from_box(&square)], ..Differences::default() }],
+        );
+        assert!(drawn.get_pixel(120, 100).0 != [0; 3] && drawn.get_pixel(120, 120).0 == [0; 3]);
+    }
+}

@@ -1,0 +1,61 @@
+//! A grasp as it would go from where the arm stands: planned with the same sequence and limits; nothing moves.
+
+use nalgebra::Isometry3;
+use sdg_robot::{
+    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedArm,
+    Result, Robot, SafetyLimits, Watch,
+};
+
+use crate::sequence_run::{Ended, run_sequence};
+
+/// A grasp that is planned and not carried out.
+#[derive(Debug)]
+pub struct DryRun {
+    /// The arm before it.
+    pub start: ArmState,
+    /// The hand before it.
+    pub opening_m: f64,
+    /// What was planned.
+    pub arm: PlannedArm,
+    /// The step that cannot be planned, and why.
+    pub failed: Option<(GraspStep, String)>,
+}
+
+/// Finds the same target, or none, wherever the arm is.
+struct FixedTarget(Option<GraspTarget>);
+
+impl PartFinder<PlannedArm> for FixedTarget {
+    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
+        Ok(self.0)
+    }
+
+    /// What was put down lies where it was to lie.
+    fn find_nearest(
+        &mut self,
+        _arm: &mut PlannedArm,
+        base_from_tcp: &Isometry3<f64>,
+    ) -> sdg_robot::Result<Option<GraspTarget>> {
+        Ok(self.0.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
+    }
+}
+
+impl DryRun {
+    /// Plans the sequence from a state of the arm, with the part where it is seen from there, if it is.
+    ///
+    /// # Errors
+    /// A motion that breaks a limit, or a setting that the arm cannot do.
+    pub fn plan(
+        start: ArmState,
+        opening_m: f64,
+        target: Option<GraspTarget>,
+        limits: SafetyLimits,
+        mount: CameraMount,
+        config: &GraspConfig,
+        place: Option<&(PlaceGoal, PlacingConfig)>,
+    ) -> Result<Self> {
+        let mut arm = PlannedArm::new(start.q_commanded, opening_m);
+        let mut robot = Robot::new(&mut arm, limits, Watch::default());
+        let Ended { failed, .. } = run_sequence(&mut robot, &mut FixedTarget(target), mount, config, place)?;
+        Ok(Self { start, opening_m, arm, failed })
+    }
+}

@@ -1,0 +1,121 @@
+//! Where the hand reaches the table.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
+use sdg_kinematics::collision::{Body, Checker, CollisionError};
+use sdg_kinematics::{HAND_OPENING_MAX_M, IkOptions, Panda, ready_pose};
+use sdg_robot::workcell::Workcell;
+
+/// Turns of the hand that are tried, over half a turn: with exchanged fingers the others are the same.
+const NUM_TURNS: usize = 4;
+/// Distance kept from obstacles, m.
+const MARGIN_M: f64 = 0.003;
+
+/// Squares of the table, and in how many turns of the hand each is reached.
+pub struct Reach {
+    /// All squares of the area.
+    pub squares: Vec<Square>,
+    /// Width of a square, m.
+    pub grid_m: f64,
+    height_m: f64,
+}
+
+/// One of them.
+pub struct Square {
+    /// Its middle in the base frame, m.
+    pub at_m: Point2<f64>,
+    /// Turns of the hand that reach it.
+    pub num_turns: usize,
+}
+
+impl Reach {
+    /// Looks at an area of the table (x and y in the base frame, m), with the tcp at a height over it, among the workcell's obstacles and within its workspace.
+    ///
+    /// # Errors
+    /// None for a workcell that was read.
+    pub fn of(workcell: &Workcell, [x, y]: [[f64; 2]; 2], grid_m: f64, height_m: f64) -> Result<Self, CollisionError> {
+        let mut model = workcell.collision_model(HAND_OPENING_MAX_M)?;
+        model.allow(Body::HAND, "table")?;
+        let mut checker = Checker::new(&model, MARGIN_M);
+        let count = |[low, high]: [f64; 2]| ((high - low) / grid_m).floor().max(1.0) as usize;
+        let mut squares = Vec::new();
+        for column in 0..count(x) {
+            for row in 0..count(y) {
+                let at_m = Point2::new(x[0] + (column as f64 + 0.5) * grid_m, y[0] + (row as f64 + 0.5) * grid_m);
+                let num_turns = num_turns(workcell, &mut checker, at_m, workcell.table_height_m + height_m);
+                squares.push(Square { at_m, num_turns });
+            }
+        }
+        Ok(Self { squares, grid_m, height_m })
+    }
+
+    /// What there is to say.
+    pub fn lines(&self, workcell: &Workcell) -> Vec<String> {
+        let square_m2 = self.grid_m * self.grid_m;
+        let area_m2 =
+            |least: usize| self.squares.iter().filter(|square| square.num_turns >= least).count() as f64 * square_m2;
+        let mut lines = vec![format!(
+            "with the tcp {:.0} mm over the table and the hand straight down, {:.2} m² of it are reached, {:.2} m² in every turn of the hand",
+            self.height_m * 1e3,
+            area_m2(1),
+            area_m2(NUM_TURNS)
+        )];
+        let Ok(mut model) = workcell.collision_model(HAND_OPENING_MAX_M) else { return lines };
+        if model.allow(Body::HAND, "table").is_err() {
+            return lines;
+        }
+        let mut checker = Checker::new(&model, MARGIN_M);
+        for place in &workcell.places {
+            let num_cells = place.num_cells();
+            let height_m = place.surface_m + self.height_m;
+            let unreached: Vec<String> = (1..=num_cells)
+                .filter(|&cell| {
+                    place.goal(cell).is_ok_and(|goal| {
+                        let pose = goal.base_from_part(height_m, 0.0);
+                        !is_reached(workcell, &mut checker, &pose)
+                    })
+                })
+                .map(|cell| cell.to_string())
+                .collect();
+            lines.push(match (unreached.len(), num_cells) {
+                (0, 1) => format!("\"{}\" is reached", place.name),
+                (0, num) => format!("\"{}\": all {num} cells are reached", place.name),
+                (_, 1) => format!("\"{}\" is not reached", place.name),
+                (_, num) => {
+                    format!("\"{}\": of {num} cells these are not reached: {}", place.name, unreached.join(", "))
+                }
+            });
+        }
+        lines
+    }
+}
+
+fn num_turns(workcell: &Workcell, checker: &mut Checker<'_>, at_m: Point2<f64>, z_m: f64) -> usize {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    (0..NUM_TURNS)
+        .filter(|&turn| {
+            let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI * turn as f64 / NUM_TURNS as f64);
+            is_reached(workcell, checker, &Isometry3::from_parts(Translation3::new(at_m.x, at_m.y, z_m), yaw * down))
+        })
+        .count()
+}
+
+/// Whether some configuration reaches a pose with either finger on either side, free of obstacles and within the workspace.
+fn is_reached(workcell: &Workcell, checker: &mut Checker<'_>, pose: &Isometry3<f64>) -> bool {
+    let panda = Panda::new();
+    let within = |p: Vector3<f64>| {
+        let (min, max) = (workcell.workspace.min_m, workcell.workspace.max_m);
+        (0..3).all(|axis| (min[axis]..=max[axis]).contains(&p[axis]))
+    };
+    if !within(pose.translation.vector) {
+        return false;
+    }
+    [*pose, sdg_kinematics::with_fingers_exchanged(pose)].iter().any(|pose| {
+        panda.inverse_all(pose, &ready_pose(), &IkOptions::default()).is_ok_and(|solutions| {
+            solutions.iter().any(|solution| {
+                within(panda.base_from_flange(&solution.q).translation.vector) && checker.is_free(&solution.q)
+            })
+        })
+    })
+}

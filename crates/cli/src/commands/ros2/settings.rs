@@ -1,0 +1,86 @@
+//! The node's settings, read and checked before it joins.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use sdg_grasp::GraspError;
+use sdg_inputs::camera_files::{self, CameraFile};
+use sdg_inputs::{read_model, read_workcell};
+use sdg_ros2::dds::Qos;
+use sdg_ros2_node::{GraspSettings, PlaceSource, Settings};
+
+use super::args::Ros2Args;
+use super::teaching::{teach, trigger_job};
+use crate::commands::devices;
+use crate::exit::Usage;
+use crate::interrupt::Interrupt;
+use crate::robots;
+
+/// Pictures that the network keeps for the node.
+const PICTURE_DEPTH: usize = 10;
+
+/// Reads the files of a node.
+///
+/// # Errors
+/// A file that cannot be used; a model without lengths where there is a camera.
+pub(super) fn node_settings(args: &Ros2Args, interrupt: &Interrupt) -> Result<Settings> {
+    let device = devices::open(&args.compute)?;
+    let model = args.grasp_model.as_ref().map(|path| read_model(path, &device)).transpose()?;
+    if args.table_height_mm.is_some() && args.base_frame.is_none() {
+        return Err(Usage("--table-height-mm: expected --base-frame, in which it is".to_owned()).into());
+    }
+    let place = match (&args.base_frame, &args.camera) {
+        (Some(base_frame), camera) => {
+            let of_workcell = match &args.arm.workcell {
+                Some(path) => Some(read_workcell(path)?.0.table_height_m),
+                None => None,
+            };
+            let told_m = args.table_height_mm.map(|height_mm| height_mm * 1e-3);
+            PlaceSource::Transforms {
+                base_frame: base_frame.clone(),
+                table_height_m: told_m.or(of_workcell).unwrap_or(0.0),
+                intrinsics: camera.as_deref().map(CameraFile::read_intrinsics).transpose()?,
+            }
+        }
+        // A camera on the hand has no place of its own: its pictures are searched for the grasp alone.
+        (None, Some(path)) if args.arm.allow_motion => {
+            CameraFile::read(path).map_or(PlaceSource::Unknown, |camera| PlaceSource::File(camera.over_table))
+        }
+        (None, Some(path)) => PlaceSource::File(CameraFile::read(path)?.over_table),
+        (None, None) => PlaceSource::Unknown,
+    };
+    if let (Some(model), false, Some(path)) = (&model, matches!(place, PlaceSource::Unknown), args.grasp_model.as_ref())
+        && model.facts().lengths.is_none()
+    {
+        return Err(anyhow::Error::new(GraspError::NoLengths).context(path.display().to_string()));
+    }
+    let (camera, interrupt) = (args.camera.clone(), interrupt.clone());
+    Ok(Settings {
+        model,
+        device,
+        place,
+        max_transform_age_secs: args.max_transform_age_secs,
+        min_score: args.min_score,
+        queue: args.queue as usize,
+        is_compressed: args.ros.compressed,
+        picture_qos: Qos { is_reliable: args.ros.reliable, depth: PICTURE_DEPTH, ..Qos::SENSORS },
+        teach: Arc::new(move |job| teach(job, camera.as_deref(), &interrupt)),
+        trigger_teaching: trigger_job(&args.teach),
+    })
+}
+
+/// Reads and checks the workcell and the camera of grasps.
+///
+/// # Errors
+/// Files that cannot be used.
+pub(super) fn grasp_settings(args: &Ros2Args) -> Result<GraspSettings> {
+    let needed = |option: &str| Usage(format!("--allow-motion: expected {option} FILE"));
+    let workcell_path = args.arm.workcell.as_ref().ok_or_else(|| needed("--workcell"))?;
+    let (workcell, camera_of_workcell) = read_workcell(workcell_path)?;
+    robots::pace(args.arm.speed)?;
+    let camera_path = args.camera.clone().or(camera_of_workcell).ok_or_else(|| needed("--camera"))?;
+    let (calibrated, _) = camera_files::read(&camera_path)?;
+    let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
+    let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
+    Ok(GraspSettings { workcell, camera, speed: args.arm.speed, base_frame })
+}

@@ -1,0 +1,59 @@
+//! What the node's service teaches, by the function of `sdg teach`.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use sdg_grasp::TeachOptions;
+use sdg_inputs::TeachingFiles;
+use sdg_ros2_node::TeachJob;
+
+use super::args::TeachTriggerArgs;
+use crate::commands::teach::teach_to_file;
+use crate::demonstrations::photo_and_marks;
+use crate::interrupt::Interrupt;
+use crate::shared_args::{TaughtCameraArgs, height_mm};
+
+/// What a Trigger teaches, where that is said.
+pub(super) fn trigger_job(args: &TeachTriggerArgs) -> Option<TeachJob> {
+    Some(TeachJob {
+        photo: args.teach_demo.clone()?,
+        marks: None,
+        out: args.teach_out.clone()?,
+        model: args.teach_model.clone(),
+        seed: TeachJob::DEFAULT_SEED,
+        time_budget: None,
+        mark_height_mm: None,
+        is_used: true,
+    })
+}
+
+/// Teaches and writes the model; `camera` is the file of the node's camera.
+///
+/// # Errors
+/// As `sdg teach`; a height of marks without a camera.
+pub(super) fn teach(job: &TeachJob, camera: Option<&Path>, interrupt: &Interrupt) -> Result<()> {
+    let demonstration = match &job.marks {
+        Some(marks) => (job.photo.clone().into(), marks.clone()),
+        None => photo_and_marks(&job.photo)?,
+    };
+    let camera = match job.mark_height_mm {
+        Some(mark_height_mm) => {
+            let mark_height_mm = height_mm(&mark_height_mm.to_string()).map_err(anyhow::Error::msg);
+            let mark_height_mm = Some(mark_height_mm.context("mark_height_mm")?);
+            let camera = camera.context("mark_height_mm: expected a node that was started with --camera")?;
+            let of_camera = TaughtCameraArgs { file: None, mark_height_mm, grasp_height_mm: None };
+            Some((camera, of_camera.heights_m()))
+        }
+        None => None,
+    };
+    let mut options = TeachOptions::new(job.seed);
+    options.kind = job.model.parse().context("model")?;
+    options.time_budget = job.time_budget;
+    let files = TeachingFiles { demonstrations: &[demonstration], negatives: &[], camera };
+    let demonstrations = files.read(&mut options)?;
+    let (_, figures) = teach_to_file(&demonstrations, &options, &job.out, interrupt)?;
+    if let Some(failure) = figures.failure() {
+        eprintln!("warning: {failure}");
+    }
+    Ok(())
+}

@@ -1,0 +1,242 @@
+//! A finished model tried on samples that nothing was taught or calibrated on, counted as `sdg evaluate --pictures` counts.
+
+use std::ops::RangeInclusive;
+
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use sdg_cell::Perception;
+use sdg_demonstration::{
+    AugmentationConfig, AugmentationStyle, Augmenter, Demonstration, LabelledInstance, Sample, SceneStyle,
+};
+use sdg_geometry::Polygon;
+use sdg_grasp::{GraspDetection, GraspModel, Verification};
+use serde_json::{Value, json};
+
+use crate::labelled_pictures::{DEFAULT_MIN_SCORE, Instance, LabelledPicture, Tested, Totals, Truth, judge};
+use crate::statistics::{Share, wilson_interval};
+
+/// Where held-back samples begin: far beyond those that teaching validates and calibrates with.
+const FIRST: u64 = 1 << 40;
+/// Samples that a model is tried on: three quarters have the part. Chosen for time: one takes 0.15 s of a core.
+const COUNT: u64 = 24;
+/// Larger samples take longer and show no more: the part has at least a few hundred pixels in them, too.
+const MAX_PIXELS: f64 = 640.0 * 480.0;
+/// How far the size of samples goes for a model that knows its part's size.
+const KNOWN_SIZES: RangeInclusive<f64> = 0.97..=1.03;
+
+/// Samples of a teaching that it never saw.
+pub struct HeldBackSamples(Augmenter);
+
+impl HeldBackSamples {
+    /// Those of photos and a seed, with the part in sizes between these; no larger than a part is worth.
+    ///
+    /// # Errors
+    /// Photos of which no samples can be made.
+    pub fn new(demonstrations: &[Demonstration], sizes: &RangeInclusive<f64>, seed: u64) -> Result<Self> {
+        let mut style = SceneStyle::default();
+        style.scale = [style.scale[0].max(*sizes.start() as f32), style.scale[1].min(*sizes.end() as f32)];
+        let (width, height) =
+            demonstrations.first().context("expected a demonstration, found none")?.image.dimensions();
+        let shrink = (MAX_PIXELS / (f64::from(width) * f64::from(height))).sqrt().min(1.0);
+        let side = |length: u32| (f64::from(length) * shrink).round() as u32;
+        let config = AugmentationConfig { style: AugmentationStyle::Scenes(style), ..AugmentationConfig::default() };
+        let config = config.with_output_size(side(width), side(height));
+        Ok(Self(Augmenter::new(demonstrations, config, seed)?))
+    }
+
+    /// The sample of a number.
+    pub fn sample(&self, number: u64) -> Sample {
+        self.0.held_out(FIRST + number)
+    }
+}
+
+/// The objects of a sample as labels.
+pub fn labels_of(sample: &Sample, label: &str) -> Vec<LabelledInstance> {
+    // A part whose grasp the border cuts off need not be found by whoever is tested on the samples.
+    let annotations = sample.objects.iter().map(|object| object.annotation(label, &sample.image));
+    annotations.map(|annotation| LabelledInstance::new(annotation.clone(), annotation.grasp.is_none())).collect()
+}
+
+/// The photos without what the model takes for further parts beside the marked one, and how many these are.
+///
+/// Such a photo is the samples' background, and parts in it would count as wrong. What is marked in a photo was taken out before.
+fn without_others(model: &GraspModel, demonstrations: &[Demonstration]) -> Result<(Vec<Demonstration>, usize)> {
+    let mut num_others = 0;
+    let mut alone = Vec::with_capacity(demonstrations.len());
+    for demonstration in demonstrations {
+        let detections = model.detect(&demonstration.image, Verification::ByShape)?;
+        let marked = demonstration.annotation.bbox;
+        let others = detections.iter().filter(|found| found.is_accepted() && !marked.contains(&found.bbox.center()));
+        let region = |found: &GraspDetection| {
+            found.outline.clone().unwrap_or_else(|| Polygon { vertices: found.bbox.corners().to_vec() })
+        };
+        let regions: Vec<Polygon> = others.map(region).collect();
+        num_others += regions.len();
+        alone.push(demonstration.clone().without(&regions));
+    }
+    Ok((alone, num_others))
+}
+
+/// What a model made of its held-back samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldBackFigures {
+    samples: u64,
+    /// In pixels of the samples, as an evaluation of them has it.
+    totals: Totals,
+    /// Pixels of the photo for one of a sample's.
+    photo_px: f64,
+    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    others_in_photo: usize,
+}
+
+impl HeldBackFigures {
+    /// Tries a model, as its file has it, on samples of the photos that it was taught from.
+    ///
+    /// # Errors
+    /// Samples that cannot be made, and errors of detection.
+    pub fn of(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Self> {
+        let facts = model.facts();
+        let sizes = if facts.lengths.is_some() { KNOWN_SIZES } else { model.size_tolerance() };
+        let (alone, others_in_photo) = without_others(model, demonstrations)?;
+        let samples = HeldBackSamples::new(&alone, &sizes, seed)?;
+        let photo_px = f64::from(demonstrations[0].image.width()) / f64::from(samples.0.output_size()[0]);
+        let detector = Perception::of_any_camera(model.clone());
+        let judged = (0..COUNT).into_par_iter().map(|number| {
+            let sample = samples.sample(number);
+            let detections = model.detect(&sample.image, Verification::ByShape)?;
+            let of_label = |labelled: LabelledInstance| {
+                let LabelledInstance { annotation, optional, .. } = labelled;
+                Instance { bbox: annotation.bbox, grasp: annotation.grasp, optional, extent: None }
+            };
+            let instances: Vec<Instance> = labels_of(&sample, model.object()).into_iter().map(of_label).collect();
+            // Demonstrations of a model that knows lengths are plan views: their pixels are all as large.
+            let metres_per_pixel = facts.lengths.map(|lengths| photo_px / lengths.pixels_per_m);
+            let truth = |instance: &Instance| {
+                let mut truth = Truth::new(instance, &detector);
+                if let Some(grasp) = &mut truth.grasp {
+                    grasp.pixel_m = metres_per_pixel;
+                }
+                truth
+            };
+            let truths = instances.iter().map(truth).collect();
+            let picture = LabelledPicture {
+                path: format!("sample {number}").into(),
+                labels: "augmentation".into(),
+                size: sample.image.dimensions().into(),
+                instances,
+                kind: None,
+            };
+            let tested = Tested { picture, truths, detections, seconds: 0.0 };
+            Ok(judge(&tested, DEFAULT_MIN_SCORE))
+        });
+        let judged = judged.collect::<Result<Vec<_>>>()?;
+        Ok(Self { samples: COUNT, totals: Totals::of(&judged), photo_px, others_in_photo })
+    }
+
+    /// Why the model is of no use, in words: it finds fewer than half of the parts, or accepts something in more than half of the samples
+    /// without. `None` for a model that may be.
+    pub fn failure(&self) -> Option<String> {
+        let Totals { found, false_alarms, .. } = &self.totals;
+        let reason = if 2 * found.count < found.of {
+            format!("it finds {} of {} parts", found.count, found.of)
+        } else if 2 * false_alarms.count > false_alarms.of {
+            format!("it accepts something in {} of {} without the part", false_alarms.count, false_alarms.of)
+        } else {
+            return None;
+        };
+        Some(format!("the model fails its own held-back samples: {reason}; are the marks where the part is?"))
+    }
+
+    /// The share of parts that it found.
+    pub fn found(&self) -> Share {
+        self.totals.found
+    }
+
+    /// Detections beside the part, in samples that have one.
+    pub fn wrong(&self) -> usize {
+        self.totals.wrong
+    }
+
+    /// Samples without the part in which it found one.
+    pub fn false_alarms(&self) -> Share {
+        self.totals.false_alarms
+    }
+
+    /// The median errors of what it found: in pixels of the photo, and in degrees.
+    pub fn median_errors(&self) -> Option<[f64; 2]> {
+        self.totals.errors.map(|errors| [self.photo_px * errors.median_px, errors.median_deg])
+    }
+
+    /// The first of them with its unit: in millimetres where the model knows lengths.
+    pub fn median_distance(&self) -> Option<(f64, &'static str)> {
+        let millimetres = self.totals.errors?.median_mm.map(|mm| (mm, "mm"));
+        millimetres.or(self.median_errors().map(|[px, _]| (px, "px")))
+    }
+
+    /// Parts that it finds in the photos beside those that are marked; they were taken out of the samples.
+    pub fn others_in_photo(&self) -> usize {
+        self.others_in_photo
+    }
+
+    /// One line for people.
+    pub fn in_words(&self) -> String {
+        let interval = |share: Share| {
+            let [low, high] = wilson_interval(share).map(|bound| 100.0 * bound);
+            format!("95 %: {low:.0} to {high:.0} %")
+        };
+        let (found, false_alarms) = (self.found(), self.false_alarms());
+        let errors = self.median_distance().zip(self.median_errors());
+        let errors = errors.map(|((off, unit), [_, deg])| format!("; median {off:.1} {unit} and {deg:.1}°"));
+        let others = self.others_in_photo;
+        let others = (others > 0).then(|| format!("; {others} more found in the photo were taken out of the samples"));
+        format!(
+            "on {} held-back samples it finds {found} parts ({}), {} wrong; false alarms in {false_alarms} without the part ({}){}{}",
+            self.samples,
+            interval(found),
+            self.wrong(),
+            interval(false_alarms),
+            errors.unwrap_or_default(),
+            others.unwrap_or_default()
+        )
+    }
+
+    /// The same for programs: the fields of `sdg evaluate --pictures --json`, and the intervals.
+    pub fn to_json(&self) -> Value {
+        json!({
+            "samples": self.samples,
+            "found": self.totals.found,
+            "found_interval": wilson_interval(self.totals.found),
+            "wrong": self.totals.wrong,
+            "false_alarms": self.totals.false_alarms,
+            "false_alarms_interval": wilson_interval(self.totals.false_alarms),
+            "errors": self.totals.errors,
+            "others_in_photo": self.others_in_photo,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(found: usize, false_alarms: usize) -> HeldBackFigures {
+        let share = |count, of| Share { count, of };
+        let totals = Totals {
+            found: share(found, 18),
+            missed: 18 - found,
+            wrong: 0,
+            optional: share(0, 0),
+            clean: share(found, 18),
+            false_alarms: share(false_alarms, 6),
+            errors: None,
+        };
+        HeldBackFigures { samples: COUNT, totals, photo_px: 1.0, others_in_photo: 0 }
+    }
+
+    #[test]
+    fn a_model_fails_that_finds_less_than_half_or_accepts_more_than_half_without() {
+        assert_eq!(figures(9, 3).failure(), None);
+        assert!(figures(8, 0).failure().unwrap().contains("finds 8 of 18 parts"));
+        assert!(figures(18, 4).failure().unwrap().contains("in 4 of 6 without the part"));
+    }
+}

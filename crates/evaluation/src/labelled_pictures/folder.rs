@@ -1,0 +1,260 @@
+//! A folder of labelled pictures: which label file belongs to which picture, and what each holds.
+//!
+//! LabelMe keeps a JSON file of the same name beside each picture, COCO one file for the folder; `sdg annotate` writes COCO
+//! beside the picture. A label file of a picture's name belongs to that picture, whatever name it gives (people rename
+//! files); any other one belongs to the pictures that it names.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use nalgebra::Point2;
+use sdg_cell::Perception;
+use sdg_demonstration::{AnnotationFormat, Error, IMAGE_EXTENSIONS, ImageFacts, LabelFile, LabelledInstance};
+use sdg_grasp::GraspModel;
+use sdg_inputs::UNREADABLE_EXTENSIONS;
+use sdg_inputs::marks_check::MarkedPhoto;
+use sdg_inputs::one_line;
+
+use super::picture::{Instance, LabelledPicture, LeftOut, file_name};
+use super::taught::taught_grasps;
+use super::truth_file::{TRUTH_FILE, read_truth};
+use crate::error::EvaluationError;
+
+/// A mark this close to the place that the demonstration was cut from, in lengths of the mark, is the demonstration's own.
+const MAX_TAUGHT_DISTANCE_LENGTHS: f64 = 0.1;
+
+/// The pictures to test a model on.
+#[derive(Debug, Clone)]
+pub struct LabelledFolder {
+    pub pictures: Vec<LabelledPicture>,
+    /// What else is there.
+    pub left_out: Vec<LeftOut>,
+    /// Instances of other labels, which are not of the part.
+    pub others: usize,
+}
+
+impl LabelledFolder {
+    /// Reads every label and checks it against its picture, before any minute is spent on detection.
+    ///
+    /// Where the labels are of several names, those of `label` count; without it, those of the model's object. Where there is a
+    /// `truth.json`, no other label is read.
+    ///
+    /// # Errors
+    /// A folder without pictures or without labels, a damaged label file, one that names a picture that is not there,
+    /// marks of a picture of another size or outside the picture, two files that label one picture, an instance
+    /// without a grasp that is not optional, and several labels out of which none is chosen.
+    pub fn read(folder: &Path, detector: &Perception, label: Option<&str>) -> Result<Self> {
+        let mut left_out = Vec::new();
+        let mut others = 0;
+        let read = if folder.join(TRUTH_FILE).exists() {
+            read_truth(folder, detector, &mut left_out)?
+        } else {
+            let read = read_labels(folder, detector, &mut left_out)?;
+            let label = chosen_label(folder, &read, detector.model(), label)?;
+            let all = read.iter().flat_map(|picture| &picture.instances);
+            others = all.filter(|instance| !is_counted(instance, label.as_deref())).count();
+            read.into_iter().map(|picture| picture.counted(label.as_deref())).collect::<Result<_>>()?
+        };
+        let mut pictures = Vec::new();
+        for (mut picture, taught) in read {
+            mark_taught(&mut picture.instances, &taught);
+            if !taught.is_empty() && picture.instances.iter().all(|instance| instance.optional) {
+                left_out.push(LeftOut { file: picture.name(), why: "the model was taught from it".to_owned() });
+            } else {
+                pictures.push(picture);
+            }
+        }
+        if pictures.is_empty() {
+            bail!(
+                "{}: expected labelled pictures that the model was not taught from, found only {}",
+                folder.display(),
+                left_out.iter().map(|left_out| left_out.file.as_str()).collect::<Vec<_>>().join(", ")
+            );
+        }
+        left_out.sort_by(|a, b| a.file.cmp(&b.file));
+        Ok(Self { pictures, left_out, others })
+    }
+}
+
+fn read_labels(folder: &Path, detector: &Perception, left_out: &mut Vec<LeftOut>) -> Result<Vec<ReadPicture>> {
+    let assigned = assign(folder, left_out)?;
+    let read = assigned.pictures.iter().map(|(picture, labels)| {
+        let (path, file) = &assigned.label_files[*labels];
+        read_picture(picture, path, file, detector)
+    });
+    read.collect()
+}
+
+/// Which label file, by its place in the list, labels which picture.
+struct Assigned {
+    pictures: BTreeMap<PathBuf, usize>,
+    label_files: Vec<(PathBuf, LabelFile)>,
+}
+
+fn assign(folder: &Path, left_out: &mut Vec<LeftOut>) -> Result<Assigned> {
+    let paths: Vec<PathBuf> = sdg_files::entries(folder)?.into_iter().filter(|path| path.is_file()).collect();
+    let pictures: Vec<&PathBuf> =
+        paths.iter().filter(|path| sdg_files::has_extension(path, &IMAGE_EXTENSIONS)).collect();
+    if pictures.is_empty() {
+        let known = IMAGE_EXTENSIONS.join(", ");
+        bail!("{}: expected pictures ({known}), found none among {} files", folder.display(), paths.len());
+    }
+    // A phone's photos that are not read are listed here, not missed in the result.
+    for path in paths.iter().filter(|path| sdg_files::has_extension(path, &UNREADABLE_EXTENSIONS)) {
+        let why = sdg_inputs::read_image(path).err().map(|error| one_line(&error)).unwrap_or_default();
+        left_out.push(LeftOut { file: file_name(path), why });
+    }
+    let mut assigned = Assigned { pictures: BTreeMap::new(), label_files: Vec::new() };
+    for path in paths.iter().filter(|path| sdg_files::has_extension(path, &["json"])) {
+        let same_name: Vec<&PathBuf> =
+            pictures.iter().copied().filter(|picture| picture.file_stem() == path.file_stem()).collect();
+        let bytes = sdg_files::read(path, sdg_inputs::MAX_ANNOTATION_BYTES)?;
+        let file = match LabelFile::parse(&bytes) {
+            // Other programs keep JSON beside pictures, too.
+            Err(Error::WrongFile { .. }) if same_name.is_empty() => {
+                let why = "neither LabelMe nor COCO JSON, and no picture has its name".to_owned();
+                left_out.push(LeftOut { file: file_name(path), why });
+                continue;
+            }
+            file => file.with_context(|| path.display().to_string())?,
+        };
+        let labelled = labelled_by(path, &file, &same_name, folder)?;
+        let label_file_idx = assigned.label_files.len();
+        assigned.label_files.push((path.clone(), file));
+        for picture in labelled {
+            if let Some(first) = assigned.pictures.insert(picture.clone(), label_file_idx) {
+                bail!(
+                    "{}: expected one label file, found two: {} and {}",
+                    picture.display(),
+                    file_name(&assigned.label_files[first].0),
+                    file_name(path)
+                );
+            }
+        }
+    }
+    if assigned.pictures.is_empty() {
+        bail!(
+            "{}: expected labels (LabelMe: a JSON file of the same name beside each picture; COCO: one JSON file with \
+             `images` and `annotations`), found {} pictures and none",
+            folder.display(),
+            pictures.len()
+        );
+    }
+    for picture in pictures.iter().filter(|picture| !assigned.pictures.contains_key(picture.as_path())) {
+        left_out.push(LeftOut { file: file_name(picture), why: "no label file speaks of it".to_owned() });
+    }
+    Ok(assigned)
+}
+
+/// The pictures that a label file is about.
+fn labelled_by(path: &Path, file: &LabelFile, same_name: &[&PathBuf], folder: &Path) -> Result<Vec<PathBuf>> {
+    let names = file.picture_names().with_context(|| path.display().to_string())?;
+    let is_of_one_picture = file.format() == AnnotationFormat::LabelMe || names.len() == 1;
+    if let (true, [only]) = (is_of_one_picture, same_name) {
+        return Ok(vec![(*only).clone()]);
+    }
+    if names.is_empty() && file.format() == AnnotationFormat::LabelMe {
+        bail!(
+            "{}: expected a picture of the same name beside it, or its name as `imagePath`, found neither",
+            path.display()
+        );
+    }
+    let picture = |name: &String| {
+        let picture = folder.join(name);
+        if !picture.is_file() {
+            bail!("{}: expected the picture {name} that it labels beside it, found no such file", path.display());
+        }
+        if !sdg_files::has_extension(&picture, &IMAGE_EXTENSIONS) {
+            let known = IMAGE_EXTENSIONS.join(", ");
+            bail!("{}: expected the name of a picture ({known}), found {name}", path.display());
+        }
+        Ok(picture)
+    };
+    names.iter().map(picture).collect()
+}
+
+/// A picture with every instance that is labelled on it, of whatever label.
+struct ReadPicture {
+    path: PathBuf,
+    labels: PathBuf,
+    size: [u32; 2],
+    instances: Vec<LabelledInstance>,
+    /// Where the model's own demonstrations were cut from it.
+    taught: Vec<Point2<f64>>,
+}
+
+fn read_picture(path: &Path, labels: &Path, file: &LabelFile, detector: &Perception) -> Result<ReadPicture> {
+    let image = sdg_inputs::read_image(path)?;
+    let (width, height) = image.dimensions();
+    let name = file_name(path);
+    let marked = MarkedPhoto { photo: path, image: &image, marks: labels, bytes: &[], file_name: Some(&name) };
+    let read =
+        |facts: &ImageFacts| file.instances(facts).with_context(|| format!("{}, labels of {name}", labels.display()));
+    let instances = marked.upright(read, |instance: &LabelledInstance| &instance.annotation)?;
+    Ok(ReadPicture {
+        path: path.to_owned(),
+        labels: labels.to_owned(),
+        size: [width, height],
+        instances,
+        taught: detector.taught_grasps(&image, taught_grasps).with_context(|| path.display().to_string())?,
+    })
+}
+
+impl ReadPicture {
+    /// The picture with the instances that count, and what was taught from it.
+    fn counted(self, label: Option<&str>) -> Result<(LabelledPicture, Vec<Point2<f64>>)> {
+        let counted = self.instances.iter().filter(|instance| is_counted(instance, label));
+        let instances = counted.map(|instance| {
+            let annotation = &instance.annotation;
+            if !instance.optional {
+                annotation.require_grasp().with_context(|| format!("{}, {}", self.labels.display(), instance.place))?;
+            }
+            let (bbox, grasp) = (annotation.bbox, annotation.grasp);
+            Ok(Instance { bbox, grasp, optional: instance.optional, extent: None })
+        });
+        let instances = instances.collect::<Result<Vec<_>>>()?;
+        Ok((
+            LabelledPicture { path: self.path, labels: self.labels, size: self.size, instances, kind: None },
+            self.taught,
+        ))
+    }
+}
+
+/// What the model was taught from is no test, so it is optional.
+fn mark_taught(instances: &mut [Instance], taught: &[Point2<f64>]) {
+    for instance in instances {
+        instance.optional |= instance.grasp.is_some_and(|grasp| {
+            let reach = MAX_TAUGHT_DISTANCE_LENGTHS * grasp.length();
+            taught.iter().any(|taught| (taught - grasp.center()).norm() <= reach)
+        });
+    }
+}
+
+fn is_counted(instance: &LabelledInstance, label: Option<&str>) -> bool {
+    label.is_none_or(|label| instance.annotation.label == label)
+}
+
+/// The label that counts; `None` where all instances are of one label, whatever the model calls its object.
+fn chosen_label(
+    folder: &Path,
+    pictures: &[ReadPicture],
+    model: &GraspModel,
+    label: Option<&str>,
+) -> Result<Option<String>> {
+    let instances = pictures.iter().flat_map(|picture| &picture.instances);
+    let labels: BTreeSet<&str> = instances.map(|instance| instance.annotation.label.as_str()).collect();
+    let listed = || labels.iter().copied().collect::<Vec<_>>().join(", ");
+    match label {
+        Some(label) if labels.contains(label) || labels.is_empty() => Ok(Some(label.to_owned())),
+        Some(label) => bail!("{}: expected instances labelled {label}, found {}", folder.display(), listed()),
+        None if labels.len() <= 1 => Ok(None),
+        None if labels.contains(model.object()) => Ok(Some(model.object().to_owned())),
+        None => Err(EvaluationError::SeveralLabels {
+            folder: folder.to_owned(),
+            object: model.object().to_owned(),
+            found: listed(),
+        }
+        .into()),
+    }
+}

@@ -1,0 +1,30 @@
+//! A taught model on the user's own labelled pictures: found, missed, wrong, false alarms and errors.
+//!
+//! ```text
+//! DIR ─ LabelledFolder: pictures, their instances, what is left out ─┐
+//! GraspModel ─ detect, picture by picture ───────────────────────────┴─ Tested ─ judge(min_score) ─ Judged ─ Totals
+//!                                                                        │                             │
+//!                                                                        └──────────── page, JSON ─────┘
+//! ```
+//!
+//! A **part** is an instance that must be found; an **optional** instance (mostly covered, or seen from another side) is
+//! neither missed nor, when hit, wrong. A **hit** lies within 4 % of the instance's diagonal and 10° of its marks, one
+//! detection to one instance. A picture that the model was taught from is no test and is left out.
+
+mod folder;
+mod page;
+mod picture;
+mod records;
+mod score;
+mod summary;
+mod taught;
+mod truth_file;
+
+pub use folder::LabelledFolder;
+pub use page::{in_words, page};
+pub use picture::{Instance, LabelledPicture};
+pub use records::{Evaluated, by_kind_json, by_min_score, to_json};
+pub use score::{HitError, Judged, Tested, Totals, Truth, by_kind, judge};
+pub use sdg_cell::DEFAULT_MIN_SCORE;
+pub use summary::summary;
+pub use truth_file::{TRUTH_FILE, TruthEntry};

@@ -1,0 +1,137 @@
+//! A folder of demonstrations: which parts it has.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use image::RgbImage;
+use sdg_demonstration::{Demonstration, IMAGE_EXTENSIONS};
+use sdg_geometry::RotationalSymmetry;
+use sdg_inputs::annotation_files::beside_photo;
+use sdg_inputs::demonstrations;
+use sdg_weights_conversion::sha256_of;
+
+/// How often parts look the same in a whole turn, where it is not as `--symmetry` says: lines of a part's name and 1 to 360 or full.
+const SYMMETRIES: &str = "symmetries.txt";
+const MAX_SYMMETRIES_BYTES: u64 = 1 << 20;
+
+/// The parts of a folder by name.
+#[derive(Debug)]
+pub struct DemonstrationFolder {
+    pub parts: Vec<PartDemonstrations>,
+    /// Photos without marks, and why.
+    pub left_out: Vec<(String, String)>,
+}
+
+/// A part's photos with marks beside them.
+#[derive(Debug, Clone)]
+pub struct PartDemonstrations {
+    /// The photo's name without its ending, or that of the folder that holds several photos.
+    pub name: String,
+    /// Photos and their marks.
+    pub files: Vec<(PathBuf, PathBuf)>,
+    /// Where the folder says so.
+    pub symmetry: Option<RotationalSymmetry>,
+}
+
+impl DemonstrationFolder {
+    /// Looks through a folder: each photo with marks beside it is a part, and each folder in it with such photos is one.
+    ///
+    /// # Errors
+    /// A folder that cannot be read or has no marked photo; two parts of one name; symmetries of parts that are not there.
+    pub fn read(folder: &Path, symmetry: impl Fn(&str) -> Result<RotationalSymmetry, String>) -> Result<Self> {
+        let mut found: BTreeMap<String, PartDemonstrations> = BTreeMap::new();
+        let mut left_out = Vec::new();
+        let mut add = |name: String, photo: PathBuf, is_own_part: bool| -> Result<()> {
+            let marks = match beside_photo(&photo) {
+                Ok(marks) => marks,
+                Err(error) => {
+                    left_out.push((photo.display().to_string(), error.to_string()));
+                    return Ok(());
+                }
+            };
+            match found.get_mut(&name) {
+                Some(known) if is_own_part => bail!(
+                    "{}: expected one part of each name, found \"{name}\" in {}, too; several photos of a part go into a folder of \
+                     its name",
+                    photo.display(),
+                    known.files[0].0.display()
+                ),
+                Some(known) => known.files.push((photo, marks)),
+                None => {
+                    let part = PartDemonstrations { name: name.clone(), files: vec![(photo, marks)], symmetry: None };
+                    found.insert(name, part);
+                }
+            }
+            Ok(())
+        };
+        let name_of = |path: &Path, stem: bool| {
+            let name = if stem { path.file_stem() } else { path.file_name() };
+            let name = name.and_then(|name| name.to_str());
+            name.map(str::to_owned).with_context(|| format!("{}: expected a name in UTF-8", path.display()))
+        };
+        for entry in sdg_files::entries(folder)? {
+            if entry.is_dir() {
+                let name = name_of(&entry, false)?;
+                for photo in sdg_files::entries(&entry)? {
+                    if sdg_files::has_extension(&photo, &IMAGE_EXTENSIONS) {
+                        add(name.clone(), photo, false)?;
+                    }
+                }
+            } else if sdg_files::has_extension(&entry, &IMAGE_EXTENSIONS) {
+                add(name_of(&entry, true)?, entry, true)?;
+            }
+        }
+        if found.is_empty() {
+            bail!(
+                "{}: expected photos with marks beside them, or folders of such photos, found none; `sdg annotate IMAGE` makes marks",
+                folder.display()
+            );
+        }
+        let symmetries = folder.join(SYMMETRIES);
+        if symmetries.exists() {
+            let text = String::from_utf8(sdg_files::read(&symmetries, MAX_SYMMETRIES_BYTES)?)
+                .with_context(|| symmetries.display().to_string())?;
+            for line in text.lines().filter(|line| !line.trim().is_empty()) {
+                let named = line
+                    .split_once(char::is_whitespace)
+                    .and_then(|(name, times)| Some((found.get_mut(name)?, symmetry(times.trim()).ok()?)));
+                let Some((part, times)) = named else {
+                    bail!(
+                        "{}: expected a part of this folder and 1 to 360 or full, found \"{line}\"",
+                        symmetries.display()
+                    );
+                };
+                part.symmetry = Some(times);
+            }
+        }
+        Ok(Self { parts: found.into_values().collect(), left_out })
+    }
+}
+
+impl PartDemonstrations {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// Photos or marks that cannot be read.
+    pub fn read(&self) -> Result<Vec<Demonstration>> {
+        self.files.iter().map(|(photo, marks)| demonstrations::read_pair(photo, marks)).collect()
+    }
+
+    /// The first of its photos.
+    ///
+    /// # Errors
+    /// A photo that cannot be read.
+    pub fn first_photo(&self) -> Result<RgbImage> {
+        sdg_inputs::read_image(&self.files[0].0)
+    }
+
+    /// Tells the contents of its files from others.
+    ///
+    /// # Errors
+    /// Files that cannot be read.
+    pub fn sha256(&self) -> Result<Vec<String>> {
+        let paths = self.files.iter().flat_map(|(photo, marks)| [photo, marks]);
+        paths.map(|path| sha256_of(path).with_context(|| path.display().to_string())).collect()
+    }
+}

@@ -1,0 +1,137 @@
+//! Many parts on one page.
+
+use image::RgbImage;
+use sdg_report::{Cell, Column, Figure, GallerySize, KeyFigure, Report, Section, Table, Tone, contact_sheet};
+
+use super::findings::Findings;
+use super::part_store::PartOutcome;
+use crate::footer::FOOTER;
+use crate::machine::machine;
+
+/// Pairs of photos that are shown; the table has all.
+const MAX_SHOWN: usize = 24;
+/// Of two photos beside each other, each so wide, px.
+const PHOTO_WIDTH: u32 = 360;
+
+/// Which parts look alike, which need another photo, and how well each is found. `photos` are those of the taught parts.
+pub fn page(findings: &Findings, photos: &[RgbImage], command: &str) -> Report {
+    let taught = findings.taught.len();
+    let mut report = Report::new(format!("{taught} parts taught"))
+        .kicker("Teaching")
+        .lead(
+            "Each part was taught from its own photos, and each model was then run on every other part's photo. A part whose \
+             model accepts another's photo would be grasped instead of it.",
+        )
+        .key_figure(KeyFigure::new(taught.to_string(), "", format!("of {} parts have a model", findings.parts.len())))
+        .key_figure(count(findings.look_alikes.len(), "pairs look alike"))
+        .key_figure(count(findings.need_photo.len(), "parts need another photo"));
+    report = report.section(look_alikes(findings, photos));
+    let section = Section::new("Another photo");
+    report = report.section(if findings.need_photo.is_empty() && findings.left_out.is_empty() {
+        section.paragraph("No part needs one.")
+    } else {
+        let mut table = Table::new(vec![Column::text("part"), Column::text("why")]);
+        for (name, why) in findings.need_photo.iter().chain(&findings.left_out) {
+            table = table.row(vec![Cell::text(name.clone()), Cell::text(why.clone())]);
+        }
+        section
+            .lead("Take the part in another light or place, on a plain background, and mark it as before.")
+            .table(table)
+    });
+    report
+        .section(all_parts(findings))
+        .section(Section::new("This run").facts([("machine", machine())]).command(command))
+        .footer(FOOTER)
+}
+
+fn count(count: usize, what: &str) -> KeyFigure {
+    KeyFigure::new(count.to_string(), "", what).tone(if count == 0 { Tone::Good } else { Tone::Warning })
+}
+
+fn look_alikes(findings: &Findings, photos: &[RgbImage]) -> Section {
+    let section = Section::new("Which look alike");
+    if findings.look_alikes.is_empty() {
+        return section.paragraph("No model accepts another part's photo.");
+    }
+    let mut table = Table::new(vec![
+        Column::text("part"),
+        Column::text("and part"),
+        Column::number("first model on second photo"),
+        Column::number("second model on first photo"),
+    ]);
+    let mut figures = Vec::new();
+    for pair in &findings.look_alikes {
+        let [first, second] = findings.names(pair);
+        let [there, back] = pair.scores;
+        if figures.len() < MAX_SHOWN {
+            let both = pair.parts.map(|part| photos[part].clone());
+            let caption = format!("{first} and {second}: {there:.2}, {back:.2}");
+            figures.push(Figure::photo(contact_sheet(&both, 2, PHOTO_WIDTH)).caption(caption));
+        }
+        table = table.row(vec![Cell::text(first), Cell::text(second), Cell::number(there, 2), Cell::number(back, 2)]);
+    }
+    let caption = match findings.look_alikes.len() {
+        count if count > MAX_SHOWN => format!("The {MAX_SHOWN} most alike of {count} pairs; the table has all."),
+        _ => "The most alike first.".to_owned(),
+    };
+    section
+        .lead("Scores from 0.5 on are accepted. Two names for one part, or parts that only a mark tells apart: put the mark into the photo, \
+               or give each its own place.")
+        .captioned_gallery(GallerySize::Large, figures, caption)
+        .table(table)
+}
+
+fn all_parts(findings: &Findings) -> Section {
+    let mut table = Table::new(vec![
+        Column::text("part"),
+        Column::number("teaching").unit("s"),
+        Column::text("found").group("held-back samples"),
+        Column::number("wrong").group("held-back samples"),
+        Column::text("false alarms").group("held-back samples"),
+        Column::number("median").unit("px").group("held-back samples"),
+        Column::number("median").unit("°").group("held-back samples"),
+        Column::number("own photo").group("score"),
+        Column::number("most alike").group("score"),
+        Column::text("which"),
+    ]);
+    for (name, outcome) in &findings.parts {
+        let mut row = vec![Cell::text(name.clone())];
+        match outcome {
+            PartOutcome::Failed { .. } => {
+                row.push(Cell::text("not taught"));
+                row.extend((0..8).map(|_| Cell::missing()));
+            }
+            PartOutcome::Taught { seconds, found, parts, wrong, false_alarms, without_part, median } => {
+                let of_median = |at: usize| median.map_or(Cell::missing(), |median| Cell::number(median[at], 1));
+                row.extend([
+                    Cell::number(*seconds, 1),
+                    Cell::text(format!("{found} of {parts}")),
+                    Cell::number(*wrong as f64, 0),
+                    Cell::text(format!("{false_alarms} of {without_part}")),
+                    of_median(0),
+                    of_median(1),
+                ]);
+                row.extend(scores(findings, name));
+            }
+        }
+        table = table.row(row);
+    }
+    Section::new("Every part")
+        .lead("On samples made of its photos that nothing was taught with. The most alike is the other photo on which its model has its best score.")
+        .table(table)
+}
+
+/// A model's score on its own photo, its best on another, and which that is.
+fn scores(findings: &Findings, name: &str) -> [Cell; 3] {
+    let Some(own) = findings.taught.iter().position(|known| known == name) else {
+        return [Cell::missing(), Cell::missing(), Cell::missing()];
+    };
+    let row = &findings.check.scores[own];
+    let others = row.iter().enumerate().filter(|(other, _)| *other != own);
+    let best = others.max_by(|(_, a), (_, b)| a.total_cmp(b)).filter(|(_, score)| **score > 0.0);
+    [
+        Cell::number(row[own], 2),
+        best.map_or(Cell::missing(), |(_, score)| Cell::number(*score, 2)),
+        best.map_or(Cell::missing(), |(other, _)| Cell::text(findings.taught[other].clone())),
+    ]
+}

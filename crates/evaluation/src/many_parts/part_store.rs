@@ -1,0 +1,123 @@
+//! What became of each part: its model's file, and a record that says from what it was taught.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use sdg_files::write_atomically;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::held_back::HeldBackFigures;
+
+/// Larger than any record.
+const MAX_RECORD_BYTES: u64 = 1 << 20;
+
+/// The folder of the models.
+#[derive(Debug, Clone)]
+pub struct PartStore(PathBuf);
+
+/// What became of a part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PartRecord {
+    /// What it was taught from: files, arguments, version.
+    pub key: Value,
+    pub outcome: PartOutcome,
+}
+
+/// How a teaching ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartOutcome {
+    Taught {
+        seconds: f64,
+        /// Parts of held-back samples that it found, and how many there were.
+        found: usize,
+        parts: usize,
+        /// Detections beside the part.
+        wrong: usize,
+        /// Samples without the part in which it found one, and how many there were.
+        false_alarms: usize,
+        without_part: usize,
+        /// Median errors of what it found: in pixels of the photo, and in degrees.
+        median: Option<[f64; 2]>,
+    },
+    Failed {
+        /// In one line.
+        why: String,
+    },
+}
+
+impl PartOutcome {
+    /// With the figures of held-back samples.
+    pub fn taught(seconds: f64, figures: &HeldBackFigures) -> Self {
+        let (found, false_alarms) = (figures.found(), figures.false_alarms());
+        Self::Taught {
+            seconds,
+            found: found.count,
+            parts: found.of,
+            wrong: figures.wrong(),
+            false_alarms: false_alarms.count,
+            without_part: false_alarms.of,
+            median: figures.median_errors(),
+        }
+    }
+
+    /// In a few words.
+    pub fn in_words(&self) -> String {
+        match self {
+            Self::Taught { seconds, found, parts, .. } => {
+                format!("finds {found} of {parts} held-back samples ({seconds:.1} s)")
+            }
+            Self::Failed { why } => format!("failed: {why}"),
+        }
+    }
+}
+
+impl PartStore {
+    /// Opens a folder or makes it.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn open(folder: &Path) -> Result<Self> {
+        for inner in [folder.to_owned(), folder.join("models"), folder.join("parts")] {
+            sdg_files::prepare_folder(&inner)?;
+        }
+        Ok(Self(folder.to_owned()))
+    }
+
+    /// Where a part's model lies.
+    pub fn model_file(&self, part: &str) -> PathBuf {
+        self.0.join("models").join(format!("{part}.sdg"))
+    }
+
+    fn record_file(&self, part: &str) -> PathBuf {
+        self.0.join("parts").join(format!("{part}.json"))
+    }
+
+    /// What became of a part that was taught with this key; `None` where it was not, or otherwise.
+    ///
+    /// # Errors
+    /// A record that cannot be read or is damaged.
+    pub fn read(&self, part: &str, key: &Value) -> Result<Option<PartOutcome>> {
+        let path = self.record_file(part);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let record: PartRecord = serde_json::from_slice(&sdg_files::read(&path, MAX_RECORD_BYTES)?)
+            .with_context(|| format!("{}: expected the record of a part", path.display()))?;
+        Ok((record.key == *key).then_some(record.outcome))
+    }
+
+    /// Keeps what became of a part. The record last: it says that the model is whole.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write(&self, part: &str, model: Option<&[u8]>, record: &PartRecord) -> Result<()> {
+        if let Some(bytes) = model {
+            write_atomically(&self.model_file(part), bytes)?;
+        }
+        let mut bytes = serde_json::to_vec_pretty(record)?;
+        bytes.push(b'\n');
+        Ok(write_atomically(&self.record_file(part), &bytes)?)
+    }
+}

@@ -1,0 +1,106 @@
+//! Motions of the arm as an animation and a still picture.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use sdg_cell::{DryRun, SeenOutline};
+use sdg_kinematics::collision::Obstacle;
+use sdg_kinematics::{JointVector, Trajectory};
+use sdg_report::{Animation, AnimationOptions};
+use sdg_robot::PlannedArm;
+use sdg_robot::workcell::Workcell as CellFile;
+use sdg_simulation::scene::{SceneVariation, SeenPart};
+use sdg_simulation::{RenderConfig, Renderer, Workcell, WorkcellConfig};
+
+const DRY_RUN: MotionDrawing = MotionDrawing { name: "dry-run", width_px: 400, fps: 8.0, max_frames: 120.0 };
+const PLAN: MotionDrawing = MotionDrawing { name: "plan", width_px: 480, fps: 10.0, max_frames: 100.0 };
+
+/// How a motion is drawn, and the name of its files.
+#[derive(Debug, Clone, Copy)]
+struct MotionDrawing {
+    /// Name of the files, without their endings.
+    name: &'static str,
+    /// Width of the pictures, px; they are three quarters as high.
+    width_px: u32,
+    /// Pictures a second.
+    fps: f64,
+    /// Pictures of a motion at most: a slow one is shown faster.
+    max_frames: f64,
+}
+
+impl MotionDrawing {
+    /// Time of the arm between two pictures of a motion, s.
+    fn period_secs(&self, duration_secs: f64) -> f64 {
+        (duration_secs / self.max_frames).max(1.0 / self.fps)
+    }
+
+    /// Draws the arm with each joint position (rad) and opening (m) in a workcell, as files of a folder; these files.
+    ///
+    /// # Errors
+    /// Files that cannot be written, and errors of the renderer.
+    fn draw(&self, folder: &Path, config: &WorkcellConfig, positions: &[(JointVector, f64)]) -> Result<Vec<PathBuf>> {
+        let mut cell = Workcell::new(config)?;
+        let render = RenderConfig { width: self.width_px, height: self.width_px * 3 / 4, ..RenderConfig::default() };
+        let mut renderer = Renderer::new(cell.data().model(), render)?;
+        let frames = positions
+            .iter()
+            .map(|(q, opening_m)| cell.scene_image_at(&mut renderer, q, *opening_m))
+            .collect::<sdg_simulation::Result<Vec<_>>>()?;
+        let options = AnimationOptions {
+            source_fps: self.fps,
+            fps: self.fps,
+            max_width: self.width_px,
+            ..AnimationOptions::default()
+        };
+        let animation = Animation::encode(&frames, &options)?;
+        sdg_files::prepare_folder(folder)?;
+        let [gif, still] = ["gif", "png"].map(|ending| folder.join(format!("{}.{ending}", self.name)));
+        sdg_files::write(&gif, animation.gif())?;
+        sdg_files::write_drawing(&still, animation.still())?;
+        Ok(vec![gif, still])
+    }
+}
+
+/// Draws the motion and the part that was seen as an animation and its last picture into a folder; the files. The part stays on the
+/// table: it is drawn where the camera saw it.
+///
+/// # Errors
+/// Files that cannot be written, and errors of the renderer.
+pub fn draw_dry_run(
+    plan: &DryRun,
+    folder: &Path,
+    seen: Option<&SeenOutline>,
+    obstacles: &[Obstacle],
+) -> Result<Vec<PathBuf>> {
+    let seen_part = seen.map(|seen| SeenPart { outline_in_base: seen.outline_in_base.clone(), z_m: seen.z_m });
+    let obstacles = obstacles.to_vec();
+    let config = WorkcellConfig { seen_part, obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
+    let period_secs = DRY_RUN.period_secs(plan.arm.duration_secs());
+    let positions = PlannedArm::frames(&plan.start.q_commanded, plan.opening_m, plan.arm.actions(), period_secs);
+    DRY_RUN.draw(folder, &config, &positions)
+}
+
+/// Draws motions, one after the other, among the obstacles of a workcell into a folder; the files.
+///
+/// # Errors
+/// Files that cannot be written, and errors of the renderer.
+pub fn draw_motions(
+    folder: &Path,
+    workcell: &CellFile,
+    motions: &[Trajectory],
+    opening_m: f64,
+) -> Result<Vec<PathBuf>> {
+    let obstacles = workcell.obstacles.clone();
+    let config = WorkcellConfig { obstacles, ..WorkcellConfig::new(SceneVariation::nominal(None)) };
+    let period_secs = PLAN.period_secs(motions.iter().map(Trajectory::duration_secs).sum());
+    let mut positions = Vec::new();
+    for motion in motions {
+        // Both ends are drawn: the plan's configurations are where motions meet.
+        let count = (motion.duration_secs() / period_secs).ceil().max(1.0) as usize;
+        for index in 0..=count {
+            let (q, ..) = motion.sample(motion.duration_secs() * index as f64 / count as f64);
+            positions.push((q, opening_m));
+        }
+    }
+    PLAN.draw(folder, &config, &positions)
+}

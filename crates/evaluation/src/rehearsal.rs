@@ -1,0 +1,338 @@
+//! Grasp attempts with a model in the simulated workcell, and their outcomes.
+//!
+//! The arm gets its grasps as a real one does ([`ModelFinder`]): from the picture, the camera's place on the flange, and the lengths that
+//! the model knows. Nothing is taken from the truth but what a cell's owner knows: the intrinsics, the hand-eye calibration, the table's
+//! height, and the heights of marks and grasp.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use nalgebra::{Isometry3, Point2};
+use sdg_cell::{CameraPose, ModelFinder, PlacedCamera};
+use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_grasp::{GraspModel, Lengths, Verification};
+use sdg_kinematics::collision::Obstacle;
+use sdg_report::AttemptSummary;
+use sdg_robot::workcell::Workcell as WorkcellFile;
+use sdg_robot::{GraspConfig, GraspOutcome, GraspStep, Place, PlaceGoal, PlacingConfig};
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::scene::{SceneVariation, VariationConfig};
+use sdg_simulation::views::base_from_look_camera;
+use sdg_simulation::{
+    AttemptConfig, AttemptErrors, AttemptReport, RecordConfig, SimulationError, Workcell, WorkcellConfig, part_shape,
+};
+use serde::{Deserialize, Serialize};
+
+use crate::against_truth::grasp_error;
+use crate::simulated_pictures::SimulatedPictures;
+
+/// What to rehearse.
+pub struct Rehearsal<'a> {
+    /// The model that looks.
+    pub model: &'a GraspModel,
+    /// The part on the table.
+    pub object: &'a ObjectSpec,
+    pub attempts: u32,
+    /// Decides part poses, robot starts, lights, table and distractors.
+    pub seed: u64,
+    /// Whether detections are checked against the demonstration.
+    pub verification: Verification,
+    /// What the robot is told wrong, or has wrong.
+    pub errors: RehearsalErrors,
+    /// The wrist camera, where it is not the paper's.
+    pub camera: Option<PinholeCamera>,
+    /// Where parts are put down: the attempts take its cells in turn. The table is then empty but for the part.
+    pub place: Option<RehearsedPlace>,
+}
+
+/// A place of a rehearsal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RehearsedPlace {
+    /// The place.
+    pub place: Place,
+    /// One of its cells, where not all of them are taken in turn.
+    pub cell: Option<u32>,
+    /// Obstacles of the workcell.
+    pub obstacles: Vec<Obstacle>,
+}
+
+impl RehearsedPlace {
+    /// A place of a workcell, and one of its cells where the name has one.
+    ///
+    /// # Errors
+    /// A place or a cell that there is not.
+    pub fn named(text: &str, workcell: WorkcellFile) -> sdg_robot::Result<Self> {
+        let (name, cell) = text.split_once(':').map_or((text, None), |(name, cell)| (name, Some(cell)));
+        let place = workcell.places.iter().find(|place| place.name == name).cloned();
+        let takes_turns = cell.is_none() && place.as_ref().is_some_and(|place| place.num_cells() > 1);
+        if !takes_turns {
+            // Says what is wrong with a name or a cell.
+            workcell.place(text)?;
+        }
+        let cell = cell.and_then(|cell| cell.parse().ok());
+        let place = place.expect("a name that the workcell knows");
+        Ok(Self { place, cell, obstacles: workcell.obstacles })
+    }
+}
+
+/// Errors of a rehearsal; by default there is none.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RehearsalErrors {
+    /// How far the height of the marks that the robot is told lies beside the true one, in metres: above it in attempts of
+    /// an odd number, below it in the others.
+    pub mark_height_m: f64,
+    /// What is wrong in the workcell, by the attempt's seed.
+    pub of_workcell: Option<fn(u64) -> AttemptErrors>,
+}
+
+/// What became of a rehearsal.
+pub struct Rehearsed {
+    /// One each, in their order.
+    pub attempts: Vec<AttemptSummary>,
+    /// Pictures from outside of the first attempt that succeeded, or of the last one recorded.
+    pub film: Vec<RgbImage>,
+    /// What the wrist camera saw last before each attempt's approach, with the detection drawn.
+    pub views: Vec<RgbImage>,
+    /// Whether parts were to be put down.
+    pub is_placing: bool,
+}
+
+/// A failed attempt, as `--json` lists it (docs/command-line.md).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    attempt: usize,
+    step: &'static str,
+    why: String,
+}
+
+impl Rehearsed {
+    /// How many attempts held the part.
+    pub fn successes(&self) -> usize {
+        self.attempts.iter().filter(|attempt| attempt.success).count()
+    }
+
+    /// The attempts that did not, and why.
+    pub fn failures(&self) -> Vec<Failure> {
+        self.attempts
+            .iter()
+            .filter(|attempt| !attempt.success)
+            .map(|attempt| Failure { attempt: attempt.number, step: step_name(attempt), why: attempt.why.clone() })
+            .collect()
+    }
+
+    /// Whether the part was not seen in any attempt.
+    pub fn found_nothing(&self) -> bool {
+        !self.attempts.is_empty()
+            && self.attempts.iter().all(|attempt| !attempt.success && attempt.step == GraspStep::Detect as usize)
+    }
+}
+
+/// How often the camera looked in an attempt, until the part was found or there was no further place to look from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Looks {
+    /// From the look-out pose and beside it.
+    pub from_afar: usize,
+    /// From above what was found.
+    pub from_above: usize,
+}
+
+/// One attempt, and what there is to see of it.
+pub struct RehearsedAttempt {
+    pub attempt: AttemptSummary,
+    /// How often the camera looked.
+    pub looks: Looks,
+    /// Pictures from outside, if they were asked for.
+    pub frames: Vec<RgbImage>,
+    /// What the wrist camera saw last, with the detection drawn.
+    pub view: Option<RgbImage>,
+}
+
+impl Rehearsal<'_> {
+    /// Runs the attempts one after the other; `observe` is called after each and may end the rehearsal.
+    pub fn run(&self, observe: &mut dyn FnMut(&AttemptSummary) -> ControlFlow<()>) -> Result<Rehearsed> {
+        let mut rehearsed =
+            Rehearsed { attempts: Vec::new(), film: Vec::new(), views: Vec::new(), is_placing: self.place.is_some() };
+        let mut filmed_success = false;
+        for number in 1..=self.attempts as usize {
+            let RehearsedAttempt { attempt, frames, view, .. } =
+                self.attempt(number, (!filmed_success).then(RecordConfig::default))?;
+            if !frames.is_empty() {
+                rehearsed.film = frames;
+                filmed_success = attempt.success;
+            }
+            rehearsed.views.extend(view);
+            let observed = observe(&attempt);
+            rehearsed.attempts.push(attempt);
+            if observed.is_break() {
+                break;
+            }
+        }
+        Ok(rehearsed)
+    }
+
+    /// Refuses a place whose cells leave no room for the part or for the fingers that let it go.
+    ///
+    /// # Errors
+    /// The first of such cells, with a pitch that would do.
+    pub fn check_room(&self) -> Result<()> {
+        let part = part_shape(self.object)?;
+        for number in 1..=self.attempts as usize {
+            if let Some((goal, placing)) = self.placing(number)? {
+                goal.check_room(&part, placing.symmetry, placing.release_margin_m)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs one attempt: the same number of the same rehearsal is always the same scene and start.
+    ///
+    /// A grasp that leads nowhere (wider than the hand, off the table) is a failed attempt.
+    ///
+    /// # Errors
+    /// Errors of the simulation itself.
+    pub fn attempt(&self, number: usize, record: Option<RecordConfig>) -> Result<RehearsedAttempt> {
+        let seed = attempt_seed(self.seed, number);
+        let mut variation = VariationConfig::default();
+        if self.place.is_some() {
+            variation.distractors = 0..=0;
+        }
+        let scene = SceneVariation::sample(Some(self.object), &variation, seed);
+        let base_from_object = scene.object.as_ref().map(|object| object.base_from_object);
+        let errors = self.errors.of_workcell.map(|errors| errors(seed)).unwrap_or_default();
+        let obstacles = self.place.as_ref().map(|place| place.obstacles.clone()).unwrap_or_default();
+        let part = Some(part_shape(self.object)?);
+        let grasp = GraspConfig { obstacles: obstacles.clone(), part, ..GraspConfig::default() };
+        let mut workcell = Workcell::new(&WorkcellConfig {
+            errors,
+            wrist_camera: self.camera,
+            obstacles,
+            ..WorkcellConfig::new(scene)
+        })?;
+        let camera = PlacedCamera {
+            intrinsics: self.camera.unwrap_or(PinholeCamera::WRIST),
+            pose: CameraPose::OnFlange(workcell.told_flange_from_camera()),
+            table_height_m: 0.0,
+        };
+        let mut finder =
+            ModelFinder::new(self.told_model(number)?, camera, SimulatedPictures).with_verification(self.verification);
+        let config = AttemptConfig { grasp, record, placing: self.placing(number)?, ..AttemptConfig::default() };
+        let started = Instant::now();
+        let (attempt, looks, frames) = match workcell.run_attempt(&mut finder, &config, seed) {
+            Ok(mut report) => (self.record(number, &report), looks_of(&report), std::mem::take(&mut report.frames)),
+            Err(SimulationError::Perception(why)) => {
+                let duration_secs = started.elapsed().as_secs_f64();
+                let failed = AttemptSummary { why, duration_secs, ..self.begun(number, base_from_object) };
+                (failed, Looks::default(), Vec::new())
+            }
+            Err(error) => return Err(error).with_context(|| format!("attempt {number}")),
+        };
+        let view = finder.last().map(|(picture, found)| {
+            let detections: Vec<_> = found.iter().map(|found| found.detection.clone()).collect();
+            sdg_cell::drawing::with_detections(picture, &detections)
+        });
+        Ok(RehearsedAttempt { attempt, looks, frames, view })
+    }
+
+    /// Where an attempt puts the part down, and how.
+    fn placing(&self, number: usize) -> Result<Option<(PlaceGoal, PlacingConfig)>> {
+        let Some(RehearsedPlace { place, cell, .. }) = &self.place else { return Ok(None) };
+        let in_turn = (number as u32 - 1) % place.num_cells() + 1;
+        let goal = place.goal(cell.unwrap_or(in_turn))?;
+        Ok(Some((goal, PlacingConfig { symmetry: self.object.symmetry, ..PlacingConfig::default() })))
+    }
+
+    /// The model as the robot is told its lengths in an attempt, with the error of the marks' height.
+    ///
+    /// # Errors
+    /// Lengths that no part has.
+    fn told_model(&self, number: usize) -> Result<GraspModel> {
+        let sign = if number.is_multiple_of(2) { -1.0 } else { 1.0 };
+        let known = self.model.facts().lengths;
+        let lengths = known.map_or_else(|| self.lengths_of_demonstration(), Ok)?;
+        let mark_height_m = lengths.mark_height_m + sign * self.errors.mark_height_m;
+        if known == Some(Lengths { mark_height_m, ..lengths }) {
+            return Ok(self.model.clone());
+        }
+        Ok(self.model.clone().with_lengths(Lengths { mark_height_m, ..lengths }, f64::INFINITY)?)
+    }
+
+    /// The lengths of a model that was taught from a shipped demonstration in its pixels: of the camera that took it, which looked straight
+    /// down, so that a pixel covers as much of the marks' plane everywhere.
+    fn lengths_of_demonstration(&self) -> Result<Lengths> {
+        let camera = PosedCamera { intrinsics: PinholeCamera::WRIST, world_from_camera: base_from_look_camera() };
+        let ObjectSpec { mark_height_m, grasp_height_m, .. } = *self.object;
+        let middle = Point2::new(f64::from(camera.intrinsics.width), f64::from(camera.intrinsics.height)) / 2.0;
+        let metres_per_pixel =
+            camera.metres_per_pixel(&middle, mark_height_m).context("the marks lie above the camera")?;
+        Ok(Lengths { pixels_per_m: 1.0 / metres_per_pixel, mark_height_m, grasp_height_m, slant: [0.0; 2] })
+    }
+
+    fn record(&self, number: usize, report: &AttemptReport) -> AttemptSummary {
+        let (step, why) = match &report.outcome {
+            GraspOutcome::Held if self.place.is_some() => (GraspStep::Check, String::new()),
+            GraspOutcome::Held => (GraspStep::Hold, String::new()),
+            GraspOutcome::Failed { step, why } => (*step, why.clone()),
+        };
+        // The last look decides where the hand goes.
+        let last_target = report.targets.iter().rev().flatten().next();
+        let detection_error = report
+            .base_from_object
+            .zip(last_target)
+            .map(|(base_from_object, target)| grasp_error(self.object, &base_from_object, &target.base_from_tcp));
+        AttemptSummary {
+            detection_error,
+            step: step as usize,
+            success: report.outcome.is_held(),
+            why,
+            duration_secs: report.wall_secs,
+            ..self.begun(number, report.base_from_object)
+        }
+    }
+
+    /// What is known of an attempt before it begins: where the part lies.
+    fn begun(&self, number: usize, base_from_object: Option<Isometry3<f64>>) -> AttemptSummary {
+        let grasp = base_from_object.map(|base_from_object| self.object.grasp_in_base(&base_from_object));
+        let (object_mm, object_angle_deg) = match grasp {
+            Some((tcp, direction_rad)) => ([tcp.x * 1e3, tcp.y * 1e3], direction_rad.to_degrees()),
+            None => ([f64::NAN; 2], f64::NAN),
+        };
+        AttemptSummary {
+            number,
+            object_mm,
+            object_angle_deg,
+            detection_error: None,
+            step: GraspStep::Detect as usize,
+            success: false,
+            why: String::new(),
+            duration_secs: 0.0,
+        }
+    }
+}
+
+/// The name of the step at which an attempt ended.
+pub fn step_name(attempt: &AttemptSummary) -> &'static str {
+    GraspStep::WITH_PLACING[attempt.step].name()
+}
+
+fn looks_of(report: &AttemptReport) -> Looks {
+    let [from_afar, from_above] = report.looks;
+    Looks { from_afar, from_above }
+}
+
+/// A seed of its own for every attempt of every rehearsal.
+fn attempt_seed(seed: u64, number: usize) -> u64 {
+    seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(number as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attempts_of_neighbouring_seeds_differ() {
+        let seeds = |seed| (1..=50).map(move |number| attempt_seed(seed, number));
+        assert!(seeds(1).all(|one| seeds(2).all(|other| one != other)));
+    }
+}

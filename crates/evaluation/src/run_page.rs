@@ -1,0 +1,203 @@
+//! The page of a run: what was taught, how it went, what was found, what was grasped.
+
+use anyhow::Result;
+use sdg_demonstration::Demonstration;
+use sdg_geometry::median;
+use sdg_grasp::{GraspModel, History};
+use sdg_report::{
+    Animation, AnimationOptions, Figure, GallerySize, KeyFigure, Report, Section, Tone, attempts_table, outcome_matrix,
+};
+use sdg_robot::GraspStep;
+use sdg_simulation::RecordConfig;
+use sdg_simulation::objects::ObjectSpec;
+
+use crate::footer::FOOTER;
+use crate::machine::machine;
+use crate::rehearsal::Rehearsed;
+use crate::teaching_page;
+use crate::trial::{RIGHT_DEGREES, RIGHT_MM, Trial};
+
+/// What every page is made from.
+pub struct RunPage<'a> {
+    pub model: &'a GraspModel,
+    pub object: &'a ObjectSpec,
+    pub rehearsed: &'a Rehearsed,
+    /// The command that makes the same run again.
+    pub command: &'a str,
+}
+
+/// What a run that also taught has beside it.
+pub struct TaughtHere<'a> {
+    /// The photo and its marks.
+    pub demonstration: &'a Demonstration,
+    /// Losses and validations of the detector; `None` for a model without.
+    pub history: Option<&'a History>,
+    /// Pictures with and without the part.
+    pub trials: &'a [Trial],
+    pub seed: u64,
+}
+
+/// The film runs at twice the robot's speed.
+const FILM_SPEED: f64 = 2.0;
+
+/// The page of `sdg rehearse`.
+pub fn rehearsal(page: &RunPage) -> Result<Report> {
+    let title = format!("{}: {} grasp attempts", page.object.title, page.rehearsed.attempts.len());
+    let report = Report::new(title).kicker("Rehearsal in simulation").lead(format!(
+        "A grasp model taught from one photo looked for the {} on the table, {}.",
+        page.object.title.to_lowercase(),
+        lifted(page)
+    ));
+    let report = with_film(with_key_figures(report, page), page)?;
+    Ok(report.section(attempts(page)).section(last_looks(page)).section(this_run(page)).footer(FOOTER))
+}
+
+/// The page of `sdg demo`.
+pub fn demo(page: &RunPage, taught: &TaughtHere) -> Result<Report> {
+    let facts = page.model.facts();
+    let report = Report::new(format!("{}, taught from one photo", page.object.title))
+        .kicker("Demonstration to grasp, in simulation")
+        .lead(format!(
+            "One photo, one marked grasp, {:.0} seconds of teaching. The robot then looked for the part in poses it had not \
+             seen, {}.",
+            facts.seconds,
+            lifted(page)
+        ))
+        .key_figure(KeyFigure::new(format!("{:.0}", facts.seconds), "s", "to teach, from one photo"));
+    let mut report = with_key_figures(report, page);
+    let (with_part, without): (Vec<&Trial>, Vec<&Trial>) = taught.trials.iter().partition(|trial| trial.present);
+    if !without.is_empty() {
+        let false_alarms = without.iter().filter(|trial| trial.is_false_alarm()).count();
+        let tone = if false_alarms == 0 { Tone::Good } else { Tone::Bad };
+        report = report.key_figure(
+            KeyFigure::new(false_alarms.to_string(), format!("of {}", without.len()), "false alarms without the part")
+                .tone(tone),
+        );
+    }
+    let mut report = with_film(report, page)?.section(teaching_page::demonstration(
+        page.model,
+        std::slice::from_ref(taught.demonstration),
+        taught.seed,
+    )?);
+    if let Some(history) = taught.history {
+        report = report.section(teaching_page::teaching(history));
+    }
+    Ok(report.section(detections(&with_part, &without)).section(attempts(page)).section(this_run(page)).footer(FOOTER))
+}
+
+/// What became of the attempts, as the end of a sentence: no more than the robot did.
+fn lifted(page: &RunPage) -> String {
+    match (page.rehearsed.successes(), page.rehearsed.attempts.len()) {
+        (0, of) => format!("and lifted it in none of {of} attempts"),
+        (successes, of) if successes == of => format!("went to it and lifted it, {of} times"),
+        (successes, of) => format!("and went to it and lifted it in {successes} of {of} attempts"),
+    }
+}
+
+fn with_key_figures(report: Report, page: &RunPage) -> Report {
+    let attempts = &page.rehearsed.attempts;
+    let successes = page.rehearsed.successes();
+    let tone = if successes * 10 >= attempts.len() * 9 { Tone::Good } else { Tone::Warning };
+    let report = report.key_figure(
+        KeyFigure::new(successes.to_string(), format!("of {}", attempts.len()), "grasped and held").tone(tone),
+    );
+    match median(attempts.iter().filter_map(|a| a.detection_error.map(|e| e.distance_mm))) {
+        Some(mm) => report.key_figure(KeyFigure::new(format!("{mm:.1}"), "mm", "median error where it closed")),
+        None => report,
+    }
+}
+
+fn with_film(report: Report, page: &RunPage) -> Result<Report> {
+    if page.rehearsed.film.is_empty() {
+        return Ok(report);
+    }
+    let options = AnimationOptions {
+        source_fps: 1.0 / RecordConfig::default().period_secs,
+        speed: FILM_SPEED,
+        ..AnimationOptions::default()
+    };
+    let film = Animation::encode(&page.rehearsed.film, &options)?;
+    Ok(report.cover(Figure::animation(film).alt("The robot's attempt, seen from beside the table.").caption(
+        match page.rehearsed.successes() {
+            0 => "An attempt that failed, at twice its speed.",
+            _ => "One attempt, at twice its speed: look, hover, approach, close, lift, hold.",
+        },
+    )))
+}
+
+fn detections(with_part: &[&Trial], without: &[&Trial]) -> Section {
+    let right = with_part.iter().filter(|trial| trial.is_right()).count();
+    let figure = |trial: &&Trial| {
+        let verdict = match (trial.present, trial.error) {
+            (true, Some(e)) => format!("{:.1} mm and {:.1}° off", e.distance_mm, e.angle_deg),
+            (true, None) => "the part is here and was not found".to_owned(),
+            (false, _) if trial.is_false_alarm() => "no part here: a false alarm".to_owned(),
+            (false, _) if trial.best_score > 0.0 => "no part here: the network's proposal was refused".to_owned(),
+            (false, _) => "no part here, nothing found".to_owned(),
+        };
+        Figure::photo(trial.drawn.clone()).caption(format!("{verdict}; score {:.2}", trial.best_score))
+    };
+    let shown = with_part.iter().take(6).chain(without.iter().take(3));
+    Section::new("Detections")
+        .lead(format!(
+            "On pictures of the simulator with other light, tables and things lying about. Right, that is within \
+             {RIGHT_MM:.0} mm and {RIGHT_DEGREES:.0}°: {right} of {}. False alarms without the part: {} of {}.",
+            with_part.len(),
+            without.iter().filter(|trial| trial.is_false_alarm()).count(),
+            without.len()
+        ))
+        .gallery(GallerySize::Medium, shown.map(figure).collect())
+}
+
+fn attempts(page: &RunPage) -> Section {
+    let steps: Vec<&str> = match page.rehearsed.is_placing {
+        true => GraspStep::WITH_PLACING.map(GraspStep::name).to_vec(),
+        false => GraspStep::ALL.map(GraspStep::name).to_vec(),
+    };
+    Section::new("Attempts")
+        .lead(
+            "Random poses of the part, of the robot at the start, of light, table and things lying about. Held means: \
+             at least 10 cm above the table between both fingers, one second after lifting.",
+        )
+        .matrix(outcome_matrix(&steps, &page.rehearsed.attempts, RIGHT_MM, RIGHT_DEGREES))
+        .table(attempts_table(&steps, &page.rehearsed.attempts).caption(
+            "Where the part lay is in the robot's base frame. Errors are those of the second look, from above the part.",
+        ))
+}
+
+fn last_looks(page: &RunPage) -> Section {
+    let figures = page
+        .rehearsed
+        .views
+        .iter()
+        .zip(&page.rehearsed.attempts)
+        .take(12)
+        .map(|(view, attempt)| Figure::photo(view.clone()).caption(format!("Attempt {}", attempt.number)));
+    Section::new("Last looks")
+        .lead("What the wrist camera saw before the hand went down.")
+        .gallery(GallerySize::Medium, figures.collect())
+}
+
+fn this_run(page: &RunPage) -> Section {
+    let facts = page.model.facts();
+    Section::new("This run")
+        .lead("Everything needed to see the same numbers again.")
+        .facts([
+            ("object", page.object.name.clone()),
+            ("part", page.object.description.clone()),
+            ("grasp model", format!("{}, preset {}", page.model.kind(), page.model.preset())),
+            ("taught with", format!("seed {}, {} samples, {} steps", facts.seed, facts.samples, facts.steps)),
+            (
+                "held-back samples",
+                facts.validation.map_or("none".to_owned(), |held_back| {
+                    format!(
+                        "median {:.1} px and {:.1}° after verification",
+                        held_back.error_px, held_back.error_degrees
+                    )
+                }),
+            ),
+            ("machine", machine()),
+            ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
+        ])
+        .command(page.command)
+}

@@ -1,0 +1,45 @@
+//! The axes' results as files of the evaluation's folder.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use serde_json::json;
+
+use super::against::{Comparison, comparison_tables};
+use super::page::page;
+use super::summary::AxesSummary;
+use super::tables::markdown;
+use crate::machine::machine;
+use crate::simulated::store::Store;
+
+impl AxesSummary {
+    /// Writes tables and a page; their files. `jobs` units were done side by side, `against` are the comparisons with another run and
+    /// its folder, and `command` makes the same results again.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write(
+        &self,
+        store: &Store,
+        jobs: usize,
+        (comparisons, other): (&[Comparison], Option<&Path>),
+        command: &str,
+        report_folder: &Path,
+    ) -> Result<[PathBuf; 2]> {
+        let settings = store.settings();
+        let facts = [
+            ("seed", settings.seed.to_string()),
+            ("preset", settings.preset.clone()),
+            ("seconds of a worker", self.seconds.to_string()),
+            ("side by side", format!("{jobs} units of work")),
+            ("machine", machine()),
+            ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
+        ];
+        let other = other.map(|folder| folder.display().to_string()).unwrap_or_default();
+        let more = || comparison_tables(comparisons, &other);
+        store.write_bytes("axes.md", markdown(self, more(), &facts, command).as_bytes())?;
+        let json = json!({ "summary": self, "against": comparisons, "machine": machine(), "command": command });
+        store.write_bytes("axes.json", format!("{json:#}\n").as_bytes())?;
+        Ok([store.path("axes.md"), page(self, more(), &facts, command).write(report_folder)?])
+    }
+}

@@ -1,0 +1,45 @@
+//! Axes along which the paper's protocol is made harder, one at a time, and grasps under errors.
+//!
+//! ```text
+//! AxesEvaluation ─ units: teachings (the protocol's, and from jittered marks), pictures of a part and axis, attempts
+//!       │                                    │
+//!       │              each picture drawn once, shown to every model, with the check and to the network alone
+//!       └─ Store ─ AxesSummary (the paper's parts, and apart from them the held-out ones) ─ Markdown, JSON, page
+//! ```
+//!
+//! A **case** is an instance of the part in a picture, or a look-alike: what two models can be compared on. A **condition**
+//! is what is wrong in an attempt. Pictures depend on the part, axis, number and seed alone; attempts meet the scenes of the
+//! paper's protocol.
+
+mod against;
+mod files;
+mod known_from_simulator;
+mod lines;
+mod matching;
+mod page;
+mod paired;
+mod records;
+mod selection;
+mod settings;
+mod summary;
+mod tables;
+mod units;
+mod way;
+mod work;
+
+pub use against::{ALL_WITH_PART, Against, Comparison, comparison_tables};
+pub use lines::{comparison_lines, summary_lines};
+pub(super) use matching::match_one_to_one;
+pub use page::page;
+pub use paired::PairedCounts;
+pub use records::{Answer, AxisPicture, AxisRecord, Case, LookAlike, PlacedDetection};
+pub use selection::{GraspCondition, Selection};
+pub use settings::{AxisSettings, GraspSettings};
+pub use summary::{
+    AxesSummary, AxisFigures, GraspFigures, GroupSummary, LookAlikeFigures, PartShare, Seconds, Third, lowest,
+};
+pub use tables::{markdown, tables};
+pub use units::{AxesEvaluation, GRASPING_MODELS};
+pub use way::Way;
+pub use work::RunEnd;
+pub(super) use work::draw;

@@ -1,0 +1,425 @@
+//! The records of axes and of grasps under errors added up, by model and group of parts.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use anyhow::Result;
+use sdg_geometry::percentile;
+use sdg_grasp::ModelKind;
+use sdg_simulation::views::Axis;
+use serde::Serialize;
+
+use super::records::{Answer, AxisRecord};
+use super::selection::GraspCondition;
+use super::settings::{AxisSettings, GraspSettings};
+use super::units::{AxesEvaluation, marks_of};
+use super::way::Way;
+use crate::simulated::cell::{Cell, Marks};
+use crate::simulated::groups::PartGroup;
+use crate::simulated::records::{AttemptRecord, TeachingRecord};
+use crate::statistics::{Share, wilson_interval};
+
+/// All there is to report. What has not been done yet is missing from the sums, and `remaining` says how much that is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxesSummary {
+    /// What decides the pictures' results.
+    pub axis_settings: AxisSettings,
+    /// What decides the results of grasps.
+    pub grasp_settings: GraspSettings,
+    /// Units of work that are still to do.
+    pub remaining: usize,
+    /// Seconds of a worker that the results took, teachings among them.
+    pub seconds: Seconds,
+    /// The paper's parts, and apart from them the held-out ones; a group without parts is missing.
+    pub groups: Vec<GroupSummary>,
+}
+
+/// Seconds of a worker.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Of all teachings whose models were measured.
+    pub teaching: f64,
+    /// Of pictures: drawing and detecting.
+    pub pictures: f64,
+    pub grasps: f64,
+}
+
+impl fmt::Display for Seconds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { teaching, pictures, grasps } = self;
+        write!(f, "{:.0} (teaching {teaching:.0}, pictures {pictures:.0}, grasps {grasps:.0})", self.total())
+    }
+}
+
+impl Seconds {
+    /// All of them.
+    pub fn total(self) -> f64 {
+        self.teaching + self.pictures + self.grasps
+    }
+}
+
+/// A group of parts: one row for each model, axis and way.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GroupSummary {
+    pub group: PartGroup,
+    pub objects: Vec<String>,
+    /// Pictures with the part.
+    pub axes: Vec<AxisFigures>,
+    /// Pictures with a look-alike in its place.
+    pub look_alikes: Vec<LookAlikeFigures>,
+    pub grasps: Vec<GraspFigures>,
+}
+
+/// A share and the part it is of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PartShare {
+    pub object: String,
+    pub share: Share,
+}
+
+/// What a model found along an axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AxisFigures {
+    pub axis: &'static str,
+    pub model: ModelKind,
+    /// With the check or without.
+    pub way: Way,
+    /// Instances of the part that were found within 10 mm and 10°, of all in the pictures.
+    pub found: Share,
+    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    pub found_interval: [f64; 2],
+    /// Detections that were accepted and not right.
+    pub wrong: usize,
+    /// Pictures that were shown.
+    pub pictures: usize,
+    /// Median and nine tenths of the accepted detections' distances to the truth, in millimetres, right or not.
+    pub distance_mm: Option<[f64; 2]>,
+    /// The same of their turns, in degrees.
+    pub turn_deg: Option<[f64; 2]>,
+    /// The same in the first, the middle and the last third of the axis' pictures: what the axis changes grows from the first
+    /// picture to the last.
+    pub thirds: [Third; 3],
+    /// The share of each part.
+    pub parts: Vec<PartShare>,
+}
+
+/// A third of an axis' pictures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Third {
+    /// Instances of the part that were found.
+    pub found: Share,
+    /// From where to where the axis' parameter goes; `None` of no pictures.
+    pub range: Option<[f64; 2]>,
+}
+
+/// How often a model took a look-alike for the part.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LookAlikeFigures {
+    /// The kind of look-alike, or one of the sums [`Self::SAME_SIZE`] and [`Self::SIZE_ALONE`].
+    pub kind: String,
+    pub model: ModelKind,
+    /// With the check or without.
+    pub way: Way,
+    /// Pictures in which it was accepted.
+    pub accepted: Share,
+    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    pub accepted_interval: [f64; 2],
+    /// The share of each part.
+    pub parts: Vec<PartShare>,
+}
+
+impl LookAlikeFigures {
+    /// The sum over look-alikes of the part's size.
+    pub const SAME_SIZE: &str = "same size";
+    /// The sum over those that differ in nothing but size, which no picture shows without a camera.
+    pub const SIZE_ALONE: &str = "size alone";
+
+    /// Whether it is one of the sums.
+    pub fn is_sum(&self) -> bool {
+        [Self::SAME_SIZE, Self::SIZE_ALONE].contains(&self.kind.as_str())
+    }
+}
+
+/// What became of a model's grasps under an error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GraspFigures {
+    pub condition: GraspCondition,
+    pub model: ModelKind,
+    /// Attempts that held the part.
+    pub held: Share,
+    /// Within which shares the true one lies with 95 % confidence (Wilson).
+    pub held_interval: [f64; 2],
+    /// Of all attempts, those held in which both detections came of a first look.
+    pub held_at_first_look: Share,
+    /// Of all attempts, those held after further looks.
+    pub held_after_further_looks: Share,
+    /// Failed attempts by the step at which they ended.
+    pub failures_by_step: BTreeMap<String, usize>,
+    /// Median and nine tenths of the last detections' distances to the truth, in millimetres.
+    pub distance_mm: Option<[f64; 2]>,
+    /// The share of each part.
+    pub parts: Vec<PartShare>,
+}
+
+/// The part with the smallest share.
+pub fn lowest(parts: &[PartShare]) -> Option<&PartShare> {
+    parts.iter().min_by(|a, b| {
+        let percent = |part: &PartShare| part.share.percent().unwrap_or(f64::INFINITY);
+        percent(a).total_cmp(&percent(b))
+    })
+}
+
+/// Median and nine tenths.
+fn spread(values: &[f64]) -> Option<[f64; 2]> {
+    Some([percentile(values.iter().copied(), 50.0)?, percentile(values.iter().copied(), 90.0)?])
+}
+
+impl AxesSummary {
+    /// Adds up what is in the store.
+    ///
+    /// # Errors
+    /// Records that cannot be read.
+    pub fn collect(evaluation: &AxesEvaluation) -> Result<Self> {
+        let mut groups = Vec::new();
+        let mut seconds = Seconds::default();
+        for group in PartGroup::ALL {
+            let objects: Vec<&str> = evaluation
+                .objects
+                .iter()
+                .map(|object| object.name.as_str())
+                .filter(|object| PartGroup::of(object) == group)
+                .collect();
+            if !objects.is_empty() {
+                groups.push(GroupSummary {
+                    group,
+                    objects: objects.iter().map(|object| (*object).to_owned()).collect(),
+                    axes: axes(evaluation, &objects, &mut seconds)?,
+                    look_alikes: look_alikes(evaluation, &objects, &mut seconds)?,
+                    grasps: grasps(evaluation, &objects, &mut seconds)?,
+                });
+                seconds.teaching += teaching_secs(evaluation, &objects)?;
+            }
+        }
+        Ok(Self {
+            axis_settings: evaluation.axis_settings(),
+            grasp_settings: evaluation.grasp_settings(),
+            remaining: evaluation.remaining()?,
+            seconds,
+            groups,
+        })
+    }
+}
+
+fn axes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<AxisFigures>> {
+    let mut figures = Vec::new();
+    for &axis in evaluation.selection.axes.iter().filter(|axis| **axis != Axis::LookAlikes) {
+        for &model in evaluation.models {
+            let records = records(evaluation, objects, model, axis)?;
+            seconds.pictures += records.iter().filter_map(|(_, record)| Some(record.as_ref()?.seconds)).sum::<f64>();
+            for way in Way::ALL.into_iter().filter(|way| way.is_of(model)) {
+                figures.push(axis_figures(axis, model, way, &records, evaluation.axis_views as usize));
+            }
+        }
+    }
+    Ok(figures)
+}
+
+/// The records of each part; `None` where teaching led to no model, and no entry where it has not been measured yet.
+fn records<'o>(
+    evaluation: &AxesEvaluation,
+    objects: &[&'o str],
+    model: ModelKind,
+    axis: Axis,
+) -> Result<Vec<(&'o str, Option<AxisRecord>)>> {
+    let mut records = Vec::new();
+    for &object in objects {
+        let cell = Cell { model, object };
+        if cell.is_without_model(Marks::Shipped, evaluation.store)? {
+            records.push((object, None));
+        } else if let Some(record) = evaluation.axis_record(cell, axis)? {
+            records.push((object, Some(record)));
+        }
+    }
+    Ok(records)
+}
+
+/// Where there is no model, every instance was missed.
+fn axis_figures(
+    axis: Axis,
+    model: ModelKind,
+    way: Way,
+    records: &[(&str, Option<AxisRecord>)],
+    axis_views: usize,
+) -> AxisFigures {
+    let instances_each = if axis == Axis::Instances { 3 } else { 1 };
+    let part = |(object, record): &(&str, Option<AxisRecord>)| PartShare {
+        object: (*object).to_owned(),
+        share: match record {
+            Some(record) => Share::of(record.outcomes(axis, way), |(_, is_right)| *is_right),
+            None => Share { count: 0, of: axis_views * instances_each },
+        },
+    };
+    let parts: Vec<PartShare> = records.iter().map(part).collect();
+    let found: Share = parts.iter().map(|part| part.share).sum();
+    let answers: Vec<&Answer> =
+        records.iter().filter_map(|(_, record)| record.as_ref()).flat_map(|record| record.answers(way)).collect();
+    let accepted = || answers.iter().flat_map(|answer| &answer.detections).filter(|detection| detection.is_accepted());
+    let shown = || records.iter().filter_map(|(_, record)| record.as_ref());
+    AxisFigures {
+        axis: axis.name(),
+        model,
+        way,
+        found,
+        found_interval: wilson_interval(found),
+        wrong: answers.iter().map(|answer| answer.num_wrong()).sum(),
+        pictures: records.iter().map(|(_, record)| record.as_ref().map_or(axis_views, |r| r.pictures.len())).sum(),
+        distance_mm: spread(&accepted().filter_map(|detection| detection.error_mm).collect::<Vec<_>>()),
+        turn_deg: spread(&accepted().filter_map(|detection| detection.error_deg).collect::<Vec<_>>()),
+        thirds: [0, 1, 2].map(|third| of_third(third, axis, way, shown())),
+        parts,
+    }
+}
+
+/// A third of the pictures of all parts that were shown.
+fn of_third<'r>(third: usize, axis: Axis, way: Way, records: impl Iterator<Item = &'r AxisRecord>) -> Third {
+    let mut sum = Third::default();
+    for record in records {
+        let count = record.pictures.len();
+        let is_in_third = |number: u64| number as usize * 3 / count.max(1) == third;
+        let outcomes = record.outcomes(axis, way).into_iter().filter(|((number, _), _)| is_in_third(*number));
+        sum.found = sum.found + Share::of(outcomes, |(_, is_right)| *is_right);
+        for picture in record.pictures.iter().filter(|picture| is_in_third(picture.number)) {
+            let [low, high] = sum.range.unwrap_or([picture.parameter; 2]);
+            sum.range = Some([low.min(picture.parameter), high.max(picture.parameter)]);
+        }
+    }
+    sum
+}
+
+/// By kind, then the two sums. A model that could not be taught takes nothing for the part: it is left out.
+fn look_alikes(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<LookAlikeFigures>> {
+    let mut figures = Vec::new();
+    if !evaluation.selection.axes.contains(&Axis::LookAlikes) {
+        return Ok(figures);
+    }
+    for &model in evaluation.models {
+        let records = records(evaluation, objects, model, Axis::LookAlikes)?;
+        seconds.pictures += records.iter().filter_map(|(_, record)| Some(record.as_ref()?.seconds)).sum::<f64>();
+        let mut kinds: Vec<String> = Vec::new();
+        for picture in records.iter().filter_map(|(_, record)| record.as_ref()).flat_map(|record| &record.pictures) {
+            if let Some(look_alike) = &picture.look_alike
+                && !kinds.contains(&look_alike.kind)
+            {
+                kinds.push(look_alike.kind.clone());
+            }
+        }
+        kinds.extend([LookAlikeFigures::SAME_SIZE, LookAlikeFigures::SIZE_ALONE].map(str::to_owned));
+        for way in Way::ALL.into_iter().filter(|way| way.is_of(model)) {
+            figures.extend(kinds.iter().map(|kind| look_alike_figures(kind, model, way, &records)));
+        }
+    }
+    Ok(figures)
+}
+
+fn look_alike_figures(
+    kind: &str,
+    model: ModelKind,
+    way: Way,
+    records: &[(&str, Option<AxisRecord>)],
+) -> LookAlikeFigures {
+    let parts: Vec<PartShare> = records
+        .iter()
+        .filter_map(|(object, record)| {
+            let record = record.as_ref()?;
+            let of_kind = record.pictures.iter().zip(record.answers(way)).filter(|(picture, _)| {
+                picture.look_alike.as_ref().is_some_and(|look_alike| match kind {
+                    LookAlikeFigures::SAME_SIZE => !look_alike.differs_in_size_alone,
+                    LookAlikeFigures::SIZE_ALONE => look_alike.differs_in_size_alone,
+                    kind => look_alike.kind == kind,
+                })
+            });
+            let share = Share::of(of_kind, |(_, answer)| answer.is_accepted());
+            (share.of > 0).then(|| PartShare { object: (*object).to_owned(), share })
+        })
+        .collect();
+    let accepted: Share = parts.iter().map(|part| part.share).sum();
+    LookAlikeFigures {
+        kind: kind.to_owned(),
+        model,
+        way,
+        accepted,
+        accepted_interval: wilson_interval(accepted),
+        parts,
+    }
+}
+
+fn grasps(evaluation: &AxesEvaluation, objects: &[&str], seconds: &mut Seconds) -> Result<Vec<GraspFigures>> {
+    let mut figures = Vec::new();
+    for &condition in &evaluation.selection.conditions {
+        for model in evaluation.grasping_models() {
+            let mut by_part: Vec<(&str, Vec<AttemptRecord>)> = Vec::new();
+            for &object in objects {
+                let cell = Cell { model, object };
+                by_part.push((
+                    object,
+                    match cell.teaching_from(marks_of(condition), evaluation.store)? {
+                        Some(TeachingRecord::Failed { why }) => (1..=evaluation.store.settings().attempts as usize)
+                            .map(|number| AttemptRecord::failed(number, AttemptRecord::TEACH, why.clone()))
+                            .collect(),
+                        _ => evaluation.grasps(cell, condition)?,
+                    },
+                ));
+            }
+            seconds.grasps += by_part.iter().flat_map(|(_, attempts)| attempts).map(|a| a.seconds).sum::<f64>();
+            figures.push(grasp_figures(condition, model, &by_part));
+        }
+    }
+    Ok(figures)
+}
+
+fn grasp_figures(condition: GraspCondition, model: ModelKind, by_part: &[(&str, Vec<AttemptRecord>)]) -> GraspFigures {
+    let attempts: Vec<&AttemptRecord> = by_part.iter().flat_map(|(_, attempts)| attempts).collect();
+    let held = Share::of(&attempts, |attempt| attempt.success);
+    let held_at_first_look = Share::of(&attempts, |attempt| attempt.is_held_at_first_look());
+    let mut failures_by_step = BTreeMap::new();
+    for attempt in attempts.iter().filter(|attempt| !attempt.success) {
+        *failures_by_step.entry(attempt.step.clone()).or_default() += 1;
+    }
+    let part = |(object, attempts): &(&str, Vec<AttemptRecord>)| PartShare {
+        object: (*object).to_owned(),
+        share: Share::of(attempts, |attempt| attempt.success),
+    };
+    GraspFigures {
+        condition,
+        model,
+        held,
+        held_interval: wilson_interval(held),
+        held_at_first_look,
+        held_after_further_looks: Share { count: held.count - held_at_first_look.count, of: held.of },
+        failures_by_step,
+        distance_mm: spread(&attempts.iter().filter_map(|attempt| attempt.error_mm).collect::<Vec<_>>()),
+        parts: by_part.iter().map(part).filter(|part| part.share.of > 0).collect(),
+    }
+}
+
+/// Of the teachings whose models are measured, each once.
+fn teaching_secs(evaluation: &AxesEvaluation, objects: &[&str]) -> Result<f64> {
+    let mut taught: Vec<(ModelKind, Marks)> =
+        evaluation.models.iter().map(|model| (model.taught_as(), Marks::Shipped)).collect();
+    if evaluation.selection.conditions.contains(&GraspCondition::Marks) {
+        taught.extend(evaluation.grasping_models().map(|model| (model.taught_as(), Marks::Jittered)));
+    }
+    taught.sort_by_key(|(model, marks)| (model.letter(), *marks == Marks::Jittered));
+    taught.dedup();
+    let mut seconds = 0.0;
+    for &object in objects {
+        for &(model, marks) in &taught {
+            if let Some(TeachingRecord::Taught { facts, .. }) =
+                (Cell { model, object }).teaching_from(marks, evaluation.store)?
+            {
+                seconds += facts.seconds;
+            }
+        }
+    }
+    Ok(seconds)
+}

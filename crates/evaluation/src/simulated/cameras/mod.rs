@@ -1,0 +1,22 @@
+//! Models taught in the plan view of one calibrated camera, on pictures of others: grasps in metres against the truth.
+//!
+//! ```text
+//! shipped photo and its camera ─ plan view ─ teach ┐
+//! three other cameras ┐                            ├─ PlanDetector ─ error in mm and degrees, and the error that it expects
+//! the axes' pictures  ├─ picture and its camera ───┘
+//! parts of other sizes┘
+//! ```
+//! Teachings and results stand in the same store as the axes'.
+
+mod files;
+mod records;
+mod sets;
+mod summary;
+mod tables;
+mod units;
+
+pub use records::{CameraPicture, CameraRecord, MetricAnswer};
+pub use sets::PictureSet;
+pub use summary::{CamerasSummary, ErrorFigures, SetFigures};
+pub use tables::{markdown, page, tables};
+pub use units::CamerasEvaluation;

@@ -1,0 +1,159 @@
+//! What was found, and how far beside the truth.
+
+use anyhow::Result;
+use sdg_geometry::percentile;
+use sdg_grasp::ModelKind;
+use serde::Serialize;
+
+use super::records::{CameraPicture, MetricAnswer};
+use super::sets::PictureSet;
+use super::units::CamerasEvaluation;
+use crate::simulated::cell::Cell;
+use crate::statistics::Share;
+
+/// Parts whose marks lie higher over the table than this show walls to a camera beside them, in metres.
+pub(super) const HIGH_M: f64 = 0.010;
+
+/// Errors of what was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorFigures {
+    /// Median distance to the truth in the marks' plane, in millimetres.
+    pub median_mm: f64,
+    /// What 95 % stay within.
+    pub p95_mm: f64,
+    /// Median turn, in degrees, modulo the part's symmetry; without parts whose turn cannot be seen.
+    pub median_deg: Option<f64>,
+    /// What 95 % stay within.
+    pub p95_deg: Option<f64>,
+    /// How many lie within the radius that the detection gave for 68 %.
+    pub within_sigma_mm: Share,
+    /// How many are turned by no more than the detection gave.
+    pub within_sigma_deg: Share,
+}
+
+/// Results of a model on a set of pictures, of all parts or of some.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SetFigures {
+    pub model: ModelKind,
+    pub set: &'static str,
+    pub parts: String,
+    /// Instances found, of those in the pictures.
+    pub found: Share,
+    /// Pictures without the part in which something was accepted, of those without it.
+    pub accepted: Share,
+    /// Accepted detections that are not right.
+    pub wrong: usize,
+    /// Of what was found.
+    pub errors: Option<ErrorFigures>,
+}
+
+/// Everything that was measured.
+#[derive(Debug, Clone, Serialize)]
+pub struct CamerasSummary {
+    /// Model by model and set by set, all parts together.
+    pub sets: Vec<SetFigures>,
+    /// The same, low and high parts apart.
+    pub by_height: Vec<SetFigures>,
+    /// The three cameras together, part by part.
+    pub by_part: Vec<SetFigures>,
+    /// A worker's seconds on pictures.
+    pub seconds: f64,
+    /// Units of work that are still to do.
+    pub remaining: usize,
+}
+
+/// The pictures of a part in a set, as a model answered them.
+struct Shown<'a> {
+    object: &'a str,
+    is_high: bool,
+    has_turn: bool,
+    model: ModelKind,
+    set: PictureSet,
+    pictures: Vec<CameraPicture>,
+}
+
+impl CamerasSummary {
+    /// Reads all that is in the store.
+    ///
+    /// # Errors
+    /// Those of the store.
+    pub fn collect(evaluation: &CamerasEvaluation) -> Result<Self> {
+        let mut shown = Vec::new();
+        let mut seconds = 0.0;
+        for &model in evaluation.models {
+            for object in evaluation.objects {
+                for &set in evaluation.sets {
+                    let cell = Cell { model, object: &object.name };
+                    let Some(record) = evaluation.record(cell, set)? else { continue };
+                    seconds += record.seconds;
+                    shown.push(Shown {
+                        object: &object.name,
+                        is_high: object.mark_height_m > HIGH_M,
+                        has_turn: object.symmetry != sdg_geometry::RotationalSymmetry::Full,
+                        model,
+                        set,
+                        pictures: record.pictures,
+                    });
+                }
+            }
+        }
+        let of = |model: ModelKind, set: &'static str, parts: &str, chosen: &dyn Fn(&Shown) -> bool| {
+            let chosen: Vec<&Shown> = shown.iter().filter(|shown| shown.model == model && chosen(shown)).collect();
+            (!chosen.is_empty()).then(|| figures(model, set, parts, &chosen))
+        };
+        let (mut sets, mut by_height, mut by_part) = (Vec::new(), Vec::new(), Vec::new());
+        for &model in evaluation.models {
+            for &set in evaluation.sets {
+                let of_set = |shown: &Shown| shown.set == set;
+                sets.extend(of(model, set.name(), "all", &of_set));
+                for (is_high, parts) in [(false, "low"), (true, "high")] {
+                    by_height.extend(of(model, set.name(), parts, &|shown| of_set(shown) && shown.is_high == is_high));
+                }
+            }
+            let is_camera = |shown: &Shown| matches!(shown.set, PictureSet::Camera(_));
+            for object in evaluation.objects {
+                let of_part = |shown: &Shown| is_camera(shown) && shown.object == object.name;
+                by_part.extend(of(model, "three cameras", &object.name, &of_part));
+            }
+        }
+        Ok(Self { sets, by_height, by_part, seconds, remaining: evaluation.remaining()? })
+    }
+}
+
+fn figures(model: ModelKind, set: &'static str, parts: &str, shown: &[&Shown]) -> SetFigures {
+    let pictures = || shown.iter().flat_map(|shown| &shown.pictures);
+    let found = |has_turn: Option<bool>| {
+        let chosen = shown.iter().filter(move |shown| has_turn.is_none_or(|has| shown.has_turn == has));
+        chosen.flat_map(|shown| &shown.pictures).flat_map(|picture| &picture.answers).filter(|a| a.found.is_some())
+    };
+    let instances = pictures().map(|picture| picture.instances).sum();
+    let without = || pictures().filter(|picture| picture.instances == 0);
+    SetFigures {
+        model,
+        set,
+        parts: parts.to_owned(),
+        found: Share { count: found(None).count(), of: instances },
+        accepted: Share::of(without(), |picture| !picture.answers.is_empty()),
+        wrong: pictures()
+            .filter(|picture| picture.instances > 0)
+            .flat_map(|picture| &picture.answers)
+            .filter(|answer| answer.found.is_none())
+            .count(),
+        errors: errors(found(None).collect(), found(Some(true)).collect()),
+    }
+}
+
+fn errors(found: Vec<&MetricAnswer>, with_turn: Vec<&MetricAnswer>) -> Option<ErrorFigures> {
+    let mm = |percent| percentile(found.iter().filter_map(|answer| answer.error_mm), percent);
+    let deg = |percent| percentile(with_turn.iter().filter_map(|answer| answer.error_deg), percent);
+    Some(ErrorFigures {
+        median_mm: mm(50.0)?,
+        p95_mm: mm(95.0)?,
+        median_deg: deg(50.0),
+        p95_deg: deg(95.0),
+        within_sigma_mm: Share::of(&found, |answer| answer.error_mm.is_some_and(|error| error <= answer.sigma_mm)),
+        within_sigma_deg: Share::of(&with_turn, |answer| {
+            answer.error_deg.is_some_and(|error| error <= answer.sigma_deg)
+        }),
+    })
+}

@@ -1,0 +1,201 @@
+//! The units of work, and how each is done.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use sdg_cell::{Found, Perception};
+use sdg_grasp::{CameraOverTable, ModelKind, Preset, Verification};
+use sdg_report::DetectionError;
+use sdg_simulation::objects::ObjectSpec;
+use serde::{Deserialize, Serialize};
+
+use super::records::{CameraPicture, CameraRecord, MetricAnswer};
+use super::sets::{PictureSet, Shown};
+use crate::against_truth::grasp_error;
+use crate::progress::Progress;
+use crate::simulated::axes::match_one_to_one;
+use crate::simulated::cell::{Cell, Marks};
+use crate::simulated::one_unit::{NO_MODEL, do_unit};
+use crate::simulated::schedule::{Task, run_all};
+use crate::simulated::settings::TeachingSettings;
+use crate::simulated::store::Store;
+use crate::simulated::teaching::Teaching;
+
+/// What is kept or lost as a whole.
+#[derive(Debug, Clone, Copy)]
+enum Unit<'a> {
+    /// A network is taught on a part in the plan view.
+    Teach(Cell<'a>),
+    /// A model looks at a part's pictures of a set.
+    Pictures(Cell<'a>, &'a ObjectSpec, PictureSet),
+}
+
+/// Models, parts and sets of pictures, and the folder for what becomes of them.
+pub struct CamerasEvaluation<'a> {
+    pub models: &'a [ModelKind],
+    pub objects: &'a [ObjectSpec],
+    pub sets: &'a [PictureSet],
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    pub store: &'a Store,
+    /// Pictures of each part and set.
+    pub views: u32,
+    /// Units side by side.
+    pub jobs: usize,
+}
+
+/// Everything that the results of a set depend on, apart from set, model and part.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct CameraSettings {
+    /// How pictures are drawn and scored: raised when either changes.
+    cameras: u32,
+    #[serde(flatten)]
+    teaching: TeachingSettings,
+    views: u32,
+}
+
+impl CamerasEvaluation<'_> {
+    /// Does what is not in the store yet, until `is_interrupted` is true.
+    ///
+    /// # Errors
+    /// The first error of a unit; a store that cannot be read. A teaching that leads to no model is a result.
+    pub fn run(&self, is_interrupted: &(dyn Fn() -> bool + Sync), progress: &dyn Progress) -> Result<()> {
+        let tasks = self.tasks()?;
+        progress.expect(tasks.len());
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let work = |unit: &Unit| do_unit(unit, is_interrupted, progress, || self.work(*unit, is_interrupted));
+        run_all(&tasks, self.jobs, (cores / self.jobs.max(1)).max(1), &work)
+    }
+
+    /// How many units are not in the store yet.
+    pub fn remaining(&self) -> Result<usize> {
+        Ok(self.tasks()?.len())
+    }
+
+    /// A model's detections in a part's pictures of a set, if it was run on them.
+    pub fn record(&self, cell: Cell, set: PictureSet) -> Result<Option<CameraRecord>> {
+        self.store.read_made_with(&file(cell, set), &self.settings())
+    }
+
+    /// Whether the teaching of a cell led to no model.
+    pub(super) fn is_without_model(&self, cell: Cell) -> Result<bool> {
+        cell.is_without_model(Marks::InPlanView, self.store)
+    }
+
+    fn settings(&self) -> CameraSettings {
+        /// The pictures and their scoring of this version.
+        const CAMERAS: u32 = 1;
+        CameraSettings { cameras: CAMERAS, teaching: self.store.settings().teaching(), views: self.views }
+    }
+
+    fn tasks(&self) -> Result<Vec<Task<Unit<'_>>>> {
+        let mut tasks = Vec::new();
+        for object in self.objects {
+            for &model in self.models {
+                let cell = Cell { model, object: &object.name };
+                if self.is_without_model(cell)? {
+                    continue;
+                }
+                let mut after = Vec::new();
+                for &set in self.sets {
+                    if self.record(cell, set)?.is_some() {
+                        continue;
+                    }
+                    if after.is_empty() && cell.teaching_from(Marks::InPlanView, self.store)?.is_none() {
+                        after.push(tasks.len());
+                        tasks.push(Task { unit: Unit::Teach(cell.network()), after: Vec::new() });
+                    }
+                    tasks.push(Task { unit: Unit::Pictures(cell, object, set), after: after.clone() });
+                }
+            }
+        }
+        Ok(tasks)
+    }
+
+    fn work(&self, unit: Unit, is_interrupted: &(dyn Fn() -> bool + Sync)) -> Result<Option<String>> {
+        match unit {
+            Unit::Teach(cell) => {
+                let teaching = Teaching { store: self.store, preset: self.preset, jobs: self.jobs };
+                teaching.teach(cell, Marks::InPlanView, is_interrupted)
+            }
+            Unit::Pictures(cell, object, set) => self.detect_in_pictures(cell, object, set, is_interrupted),
+        }
+    }
+
+    fn detect_in_pictures(
+        &self,
+        cell: Cell,
+        object: &ObjectSpec,
+        set: PictureSet,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let Some(model) = cell.read_model(Marks::InPlanView, self.store)? else {
+            return Ok(Some(NO_MODEL.to_owned()));
+        };
+        let started = Instant::now();
+        let mut perception = Perception::of_any_camera(model);
+        let mut pictures = Vec::new();
+        for number in 0..u64::from(self.views) {
+            if is_interrupted() {
+                return Ok(None);
+            }
+            let shown = set.draw(object, number, u64::from(self.views), self.store.settings().seed)?;
+            let camera = CameraOverTable { camera: shown.view.camera, table_height_m: 0.0, workspace: None };
+            perception.move_to(&camera)?;
+            let found = perception.detect(&shown.view.image, Verification::ByShape)?;
+            pictures.push(judged(object, number, &shown, &found));
+        }
+        let record = CameraRecord { pictures, seconds: started.elapsed().as_secs_f64() };
+        self.store.write_made_with(&file(cell, set), &self.settings(), &record)?;
+        let answers = || record.pictures.iter().flat_map(|picture| &picture.answers);
+        let found = answers().filter(|answer| answer.found.is_some()).count();
+        Ok(Some(format!("found {found}, {} wrong", answers().count() - found)))
+    }
+}
+
+/// Accepted detections beside the truth.
+fn judged(object: &ObjectSpec, number: u64, shown: &Shown, found: &[Found]) -> CameraPicture {
+    let num_counted = if shown.instances.len() <= 1 { 1 } else { usize::MAX };
+    let accepted: Vec<_> = found
+        .iter()
+        .take_while(|found| found.detection.is_accepted())
+        .take(num_counted)
+        .filter_map(|found| Some((found.detection.score, found.pose?)))
+        .collect();
+    let errors: Vec<Vec<Option<DetectionError>>> = accepted
+        .iter()
+        .map(|(_, pose)| {
+            let base_from_tcp = pose.frame_from_tcp();
+            shown.instances.iter().map(|instance| Some(grasp_error(object, instance, &base_from_tcp))).collect()
+        })
+        .collect();
+    let matched = match_one_to_one(&errors, &vec![true; accepted.len()]);
+    let answers = accepted.iter().zip(&errors).zip(matched).map(|(((score, pose), errors), instance)| {
+        let nearest = || errors.iter().flatten().min_by(|a, b| a.distance_mm.total_cmp(&b.distance_mm)).copied();
+        let error = instance.map_or_else(nearest, |instance| errors[instance]);
+        MetricAnswer {
+            score: *score,
+            error_mm: error.map(|error| error.distance_mm),
+            error_deg: error.map(|error| error.angle_deg),
+            sigma_mm: 1e3 * pose.uncertainty.position_m,
+            sigma_deg: pose.uncertainty.yaw_rad.to_degrees(),
+            found: instance,
+        }
+    });
+    let answers = answers.collect();
+    let (height_m, tilt_deg) = shown.height_and_tilt();
+    CameraPicture { number, height_m, tilt_deg, instances: shown.instances.len(), answers }
+}
+
+fn file(cell: Cell, set: PictureSet) -> String {
+    format!("cameras/{cell}.{}.json", set.name())
+}
+
+impl std::fmt::Display for Unit<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Teach(cell) => write!(f, "teach {} {} in the plan view", cell.model, cell.object),
+            Self::Pictures(cell, _, set) => write!(f, "{} {} {}", cell.model, set.name(), cell.object),
+        }
+    }
+}

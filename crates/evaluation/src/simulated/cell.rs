@@ -1,0 +1,141 @@
+//! One model on one part: its name, and what the store has of it.
+
+use anyhow::{Context, Result, anyhow};
+use sdg_grasp::{CheckConfig, Device, GraspModel, ModelKind, Verification};
+use serde::Serialize;
+
+use super::records::{AttemptRecord, AttemptsRecord, LookRecord, SpeedRecord, TeachingRecord};
+use super::store::Store;
+
+/// One model on one part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell<'a> {
+    pub model: ModelKind,
+    pub object: &'a str,
+}
+
+impl Cell<'_> {
+    /// The cell whose network this one's model reads.
+    pub fn network(self) -> Self {
+        Self { model: self.model.taught_as(), ..self }
+    }
+
+    /// Whether its teaching has failed: then there is nothing to try.
+    pub(super) fn is_without_model(self, marks: Marks, store: &Store) -> Result<bool> {
+        Ok(matches!(self.teaching_from(marks, store)?, Some(TeachingRecord::Failed { .. })))
+    }
+
+    /// A file of this cell.
+    pub(super) fn file(self, what: &str) -> String {
+        format!("cells/{self}.{what}.json")
+    }
+
+    /// Where its network lies.
+    pub(super) fn model_file(self, marks: Marks) -> String {
+        format!("models/{}{}.sdg", self.network(), marks.suffix())
+    }
+
+    /// Where it stands how the teaching of its network ended.
+    pub(super) fn teaching_file(self, marks: Marks) -> String {
+        self.network().file(&format!("teaching{}", marks.suffix()))
+    }
+
+    /// Where a picture of its detections lies.
+    pub fn picture_file(self) -> String {
+        format!("pictures/{self}.png")
+    }
+
+    /// How the teaching of its network from the shipped demonstration ended, if it has.
+    pub fn teaching(self, store: &Store) -> Result<Option<TeachingRecord>> {
+        self.teaching_from(Marks::Shipped, store)
+    }
+
+    /// How the teaching of its network ended, if it has.
+    pub fn teaching_from(self, marks: Marks, store: &Store) -> Result<Option<TeachingRecord>> {
+        store.read_made_with(&self.teaching_file(marks), &store.settings().teaching())
+    }
+
+    /// Its detections in pictures, if it was run on them.
+    pub fn look(self, store: &Store) -> Result<Option<LookRecord>> {
+        store.read(&self.file("look"))
+    }
+
+    /// Its attempts so far.
+    pub fn attempts(self, verification: Verification, store: &Store) -> Result<Vec<AttemptRecord>> {
+        read_attempts(store, &self.file(&attempts_of(verification)), store.settings())
+    }
+
+    /// How fast it is, if that was measured.
+    pub fn speed(self, store: &Store) -> Result<Option<SpeedRecord>> {
+        store.read(&self.file("speed"))
+    }
+
+    /// Its model; `None` where teaching led to none.
+    pub(super) fn read_model(self, marks: Marks, store: &Store) -> Result<Option<GraspModel>> {
+        match self.teaching_from(marks, store)? {
+            Some(TeachingRecord::Taught { .. }) => {}
+            Some(TeachingRecord::Failed { .. }) => return Ok(None),
+            None => return Err(anyhow!("{self}: expected a taught model, found none")),
+        }
+        let path = store.path(&self.model_file(marks));
+        let model = sdg_inputs::read_model(&path, &Device::flex())?.read_as(self.model);
+        Ok(Some(model.ok_or_else(|| anyhow!("{}: expected model {}", path.display(), self.network().model))?))
+    }
+
+    /// The same for a camera that is always as high as it was for the photo: the paper's protocol.
+    pub(super) fn read_model_at_fixed_height(self, store: &Store) -> Result<Option<GraspModel>> {
+        let at_fixed_height = |model: GraspModel| model.with_size_tolerance(CheckConfig::FIXED_HEIGHT_TOLERANCE);
+        Ok(self.read_model(Marks::Shipped, store)?.map(at_fixed_height).transpose()?)
+    }
+}
+
+impl std::fmt::Display for Cell<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}-{}", self.model, self.object)
+    }
+}
+
+/// Which marks a network is taught from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Marks {
+    /// Those of the shipped demonstration.
+    Shipped,
+    /// Those, each moved by [`MARKS_JITTER_PX`](super::axes::MARKS_JITTER_PX).
+    Jittered,
+    /// Those of the shipped demonstration, in the plan view of the camera that took it.
+    InPlanView,
+}
+
+impl Marks {
+    /// What file names say of them.
+    fn suffix(self) -> &'static str {
+        match self {
+            Self::Shipped => "",
+            Self::Jittered => "-jittered-marks",
+            Self::InPlanView => "-plan-view",
+        }
+    }
+}
+
+/// The attempts in a file so far; none where they were recorded by an earlier version, so that they are made again.
+///
+/// # Errors
+/// Those of [`Store::read_made_with`].
+pub(super) fn read_attempts(store: &Store, name: &str, settings: &impl Serialize) -> Result<Vec<AttemptRecord>> {
+    let record: Option<serde_json::Value> = store.read_made_with(name, settings)?;
+    let Some(record) = record.filter(|record| record["version"] == AttemptsRecord::VERSION) else {
+        return Ok(Vec::new());
+    };
+    let record: AttemptsRecord =
+        serde_json::from_value(record).with_context(|| format!("{}: expected attempts", store.path(name).display()))?;
+    Ok(record.attempts)
+}
+
+/// The name of a cell's file of attempts.
+pub(super) fn attempts_of(verification: Verification) -> String {
+    let way = match verification {
+        Verification::ByShape => "verified",
+        Verification::Off => "alone",
+    };
+    format!("attempts-{way}")
+}

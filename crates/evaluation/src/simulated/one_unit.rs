@@ -1,0 +1,55 @@
+//! One unit of work: its panics as errors, its time, and what there is to say of it.
+
+use std::fmt::Display;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Instant;
+
+use anyhow::{Result, anyhow};
+
+use crate::progress::Progress;
+
+/// What there is to say of a unit whose teaching failed while it waited.
+pub(super) const NO_MODEL: &str = "there is no model";
+
+/// Does a unit unless the run is interrupted, and says what came of it; `work` gives that in words, or `None` where it
+/// was interrupted.
+///
+/// # Errors
+/// Those of `work`, and its panic.
+pub(super) fn do_unit(
+    unit: &impl Display,
+    is_interrupted: &(dyn Fn() -> bool + Sync),
+    progress: &dyn Progress,
+    work: impl FnOnce() -> Result<Option<String>>,
+) -> Result<ControlFlow<()>> {
+    if is_interrupted() {
+        return Ok(ControlFlow::Break(()));
+    }
+    let started = Instant::now();
+    let Some(summary) = caught(work)? else { return Ok(ControlFlow::Break(())) };
+    progress.unit_done(&format!("{unit}: {summary} ({:.0} s)", started.elapsed().as_secs_f64()));
+    Ok(ControlFlow::Continue(()))
+}
+
+/// Turns a panic into an error, so that the units beside it are kept.
+pub(super) fn caught<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
+    // Unwind safety: whatever the closure was changing is given up with its unit.
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|panic| {
+        let message = panic.downcast_ref::<&str>().map(|message| (*message).to_owned());
+        let message = message.or_else(|| panic.downcast_ref::<String>().cloned());
+        Err(anyhow!("a mistake in this program: {}", message.unwrap_or_else(|| "it panicked".to_owned())))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_an_error() {
+        let error = caught::<()>(|| panic!("index {}", 7)).unwrap_err();
+        assert_eq!(error.to_string(), "a mistake in this program: index 7");
+        assert!(caught(|| Ok(1)).is_ok());
+    }
+}

@@ -1,0 +1,83 @@
+//! What keeps units out of the tables: whatever is missing, at work, failed, done twice, or not what its receipt tells of.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use sdg_files::{Access, Lock};
+use sdg_weights_conversion::sha256_of;
+
+use super::super::settings::difference;
+use super::super::units::Evaluation;
+use super::plan::PlannedUnit;
+use super::records::Receipt;
+use super::unit_folder::{UnitFolder, UnitState};
+
+/// The right to make the tables of a folder, until it is dropped.
+#[derive(Debug)]
+pub struct Collecting(#[allow(dead_code, reason = "held until it is dropped")] Lock);
+
+impl Collecting {
+    /// Takes that right for this process; `None` where another one makes them.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub fn begin(folder: &Path) -> Result<Option<Self>> {
+        Ok(Lock::take(&folder.join(".collect.lock"), Access::Alone)?.map(Self))
+    }
+}
+
+/// A line for each unit that must not be counted; none when the tables can be made.
+///
+/// # Errors
+/// Records that cannot be read.
+pub fn faults(evaluation: &Evaluation, units: &[PlannedUnit]) -> Result<Vec<String>> {
+    let folder = evaluation.store.folder();
+    let mut faults = Vec::new();
+    for unit in units {
+        let state = UnitFolder::of(folder, &unit.name).read()?;
+        let told = match state.receipts.as_slice() {
+            [] => Some(why_missing(&state)),
+            [receipt] => stale(evaluation, unit, receipt)?,
+            several => {
+                let by: Vec<String> = several.iter().map(|receipt| receipt.by.to_string()).collect();
+                Some(format!("duplicate: done by {}; remove units/{} and do it again", by.join(" and by "), unit.name))
+            }
+        };
+        faults.extend(told.map(|told| format!("{}: {told}", unit.name)));
+    }
+    Ok(faults)
+}
+
+fn why_missing(state: &UnitState) -> String {
+    match (&state.running, state.failures.last()) {
+        (Some(running), _) if !state.is_abandoned => format!("still at work on {}", running.by),
+        (Some(running), _) => format!("missing: {} ended without a result", running.by),
+        (None, Some(failure)) => format!(
+            "missing: failed {} on {}: {}",
+            if state.failures.len() == 1 { "once".to_owned() } else { format!("{} times, last", state.failures.len()) },
+            failure.by,
+            failure.why
+        ),
+        (None, None) => "missing: nobody has begun it".to_owned(),
+    }
+}
+
+/// What of a unit's results is not as its receipt says, or not of these settings and this program.
+fn stale(evaluation: &Evaluation, unit: &PlannedUnit, receipt: &Receipt) -> Result<Option<String>> {
+    if let Some(difference) = difference(&evaluation.settings_of(unit)?, &receipt.settings)? {
+        return Ok(Some(format!("stale: done with other settings ({difference})")));
+    }
+    for (file, expected) in &receipt.files {
+        let path = evaluation.store.path(file);
+        if !path.exists() {
+            return Ok(Some(format!("stale: {file} is gone")));
+        }
+        let found = sha256_of(&path).with_context(|| path.display().to_string())?;
+        if found != *expected {
+            return Ok(Some(format!(
+                "stale: {file} is not the file that its receipt tells of (SHA-256: expected {expected}, found {found})"
+            )));
+        }
+    }
+    Ok(None)
+}

@@ -1,0 +1,38 @@
+//! An evaluation's units done by many processes, on as many machines as see one folder: Slurm's job arrays, or a person.
+//!
+//! ```text
+//! planned_units ─ names ─┬─ --unit NAME …  ─ UnitFolder: lock, running, receipt or failure ─ Store (shared)
+//!                        ├─ --watch DIR    ─ Watch: done, running, failed, waiting, time left
+//!                        └─ --collect      ─ faults, or the tables of the ordinary run
+//! DIR/plans/HASH.json            which units there are, for --watch
+//! DIR/units/NAME/lock            held by the process that does the unit
+//! DIR/units/NAME/running.json    that process
+//! DIR/units/NAME/done-*.json     a receipt: by whom, with which settings, and the SHA-256 of each file that the unit wrote
+//! DIR/units/NAME/failed-*.json   why it failed, by whom
+//! ```
+//!
+//! A **unit** has a name that never changes, and a folder of its own, so that a process reads and writes the same few files
+//! however many units there are. Records carry the SHA-256 of the program besides the settings of the ordinary run; the
+//! shipped demonstrations are compiled into the program, so that its hash stands for theirs, too.
+//!
+//! Who does what when is not decided here: that is Slurm's part.
+
+mod checking;
+mod doing;
+mod near_names;
+mod plan;
+mod records;
+mod slurm;
+mod unit_folder;
+mod watching;
+mod worker;
+
+pub use checking::{Collecting, faults};
+pub use doing::Ended;
+pub use near_names::near_names;
+pub use plan::{PlannedUnit, SavedPlan, UnitKind, planned_units};
+pub use records::{Failure, Receipt, Running};
+pub use slurm::{SlurmJob, cores, submit_script};
+pub use unit_folder::UnitFolder;
+pub use watching::{Progress, Watch};
+pub use worker::{Worker, own_sha256};

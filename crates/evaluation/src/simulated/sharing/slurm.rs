@@ -1,0 +1,166 @@
+//! A script that hands an evaluation's units to Slurm: three job arrays, one after the other.
+//!
+//! Teachings; pictures and grasps, when the teachings have ended; speed, each unit alone on a node, when all else has. An array
+//! waits for the end of the one before, not for its success: one teaching that fails keeps no other part's units back, and
+//! those of its own part say what they miss.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use super::plan::{PlannedUnit, UnitKind};
+use super::worker::{Worker, unix_secs};
+
+/// What one task runs.
+const UNIT_JOB: &str = include_str!("unit_job.sh");
+/// Tasks of an array: Slurm's default for the greatest index is 1000.
+const MAX_TASKS: usize = 1000;
+
+/// What each task asks of Slurm, and what it runs.
+#[derive(Debug, Clone)]
+pub struct SlurmJob<'a> {
+    /// The program and its arguments but for --out and --unit.
+    pub command: &'a [String],
+    /// The folder of the evaluation, from the root.
+    pub folder: &'a Path,
+    pub cores: u32,
+    pub memory_mb: u32,
+    pub limit_mins: u32,
+    /// Further arguments of sbatch.
+    pub sbatch: &'a [String],
+}
+
+/// The script.
+pub fn submit_script(job: &SlurmJob, units: &[PlannedUnit]) -> String {
+    let folder = quoted(&job.folder.display().to_string());
+    let host = Worker::this().host;
+    let marker = format!("submitted-{}-{}", unix_secs(), std::process::id());
+    let command: Vec<String> = job.command.iter().map(|word| quoted(word)).collect();
+    let unit_job = UNIT_JOB
+        .replace("@FOLDER@", &folder)
+        .replace("@MARKER@", &marker)
+        .replace("@HOST@", &host)
+        .replace("@COMMAND@", &command.join(" "));
+    let mut script = format!(
+        "#!/usr/bin/env bash\n\
+         # Hands {} units of an evaluation to Slurm; printed by `sdg evaluate --submit slurm`.\n\
+         set -euo pipefail\n\
+         folder={folder}\n\
+         mkdir -p \"$folder/slurm\"\n\
+         : >\"$folder/slurm/{marker}\"\n\
+         cat >\"$folder/slurm/unit.sh\" <<'UNIT_JOB'\n{unit_job}UNIT_JOB\n\
+         submit() {{ sbatch --parsable --requeue --open-mode=append --output=\"$folder/slurm/%x-%A_%a.log\"",
+        units.len()
+    );
+    let mut line = |text: std::fmt::Arguments| {
+        // Writing into a string cannot fail.
+        let _ = script.write_fmt(text);
+    };
+    line(format_args!(" --cpus-per-task={} --mem={}M --time={}", job.cores, job.memory_mb, job.limit_mins));
+    for argument in job.sbatch {
+        line(format_args!(" {}", quoted(argument)));
+    }
+    line(format_args!(" \"$@\" | cut -d ';' -f 1; }}\n"));
+    let mut before: Vec<String> = Vec::new();
+    let arrays: [(&str, &[UnitKind], &str); 3] = [
+        ("teach", &[UnitKind::Teach], ""),
+        ("try", &[UnitKind::Look, UnitKind::Grasp], ""),
+        ("time", &[UnitKind::Time], " --exclusive"),
+    ];
+    for (list, kinds, alone) in arrays {
+        let is_in_list = |unit: &&PlannedUnit| UnitKind::of(&unit.name).is_some_and(|kind| kinds.contains(&kind));
+        let names: Vec<&str> = units.iter().filter(is_in_list).map(|unit| unit.name.as_str()).collect();
+        if names.is_empty() {
+            continue;
+        }
+        line(format_args!("cat >\"$folder/slurm/{list}.units\" <<'UNITS'\n{}\nUNITS\n", names.join("\n")));
+        let waits = match before.is_empty() {
+            true => String::new(),
+            false => format!(" --dependency=\"afterany:{}\"", before.join(":")),
+        };
+        before.clear();
+        for (array, tasks) in names.chunks(MAX_TASKS).enumerate() {
+            let variable = format!("{list}_{array}");
+            line(format_args!(
+                "{variable}=$(submit --job-name=sdg-{list} --array=0-{}{waits}{alone} \"$folder/slurm/unit.sh\" {list} {})\n",
+                tasks.len() - 1,
+                array * MAX_TASKS
+            ));
+            line(format_args!("echo \"{list}: job ${variable}, {} units\"\n", tasks.len()));
+            before.push(format!("${{{variable}}}"));
+        }
+    }
+    script
+}
+
+/// A word as the shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./,=:+%".contains(letter);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// The cores that Slurm gave, or those of the machine.
+pub fn cores() -> usize {
+    let given = std::env::var("SLURM_CPUS_PER_TASK").ok().and_then(|cores| cores.parse().ok());
+    given.filter(|&cores| cores > 0).unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::planned_units;
+    use super::*;
+    use sdg_grasp::ModelKind;
+    use sdg_simulation::objects::ObjectSpec;
+
+    #[test]
+    fn arrays_wait_for_each_other() {
+        let objects = ["pendulum", "rod_end"].map(|name| ObjectSpec::by_name(name).unwrap());
+        let units = planned_units(&[ModelKind::S, ModelKind::C], &objects, false);
+        let command = ["/opt/a program/sdg", "evaluate", "--seed", "3"].map(str::to_owned);
+        let job = SlurmJob {
+            command: &command,
+            folder: Path::new("/shared/run"),
+            cores: 2,
+            memory_mb: 1500,
+            limit_mins: 40,
+            sbatch: &["--partition=cpu".to_owned()],
+        };
+        let script = submit_script(&job, &units);
+        for expected in [
+            "--requeue",
+            "--cpus-per-task=2 --mem=1500M --time=40 --partition=cpu",
+            "teach_0=$(submit --job-name=sdg-teach --array=0-3 \"$folder",
+            "try_0=$(submit --job-name=sdg-try --array=0-5 --dependency=\"afterany:${teach_0}\" ",
+            "time_0=$(submit --job-name=sdg-time --array=0-1 --dependency=\"afterany:${try_0}\" --exclusive",
+            "'/opt/a program/sdg' evaluate --seed 3 --out \"$folder\" --unit \"$unit\"",
+            "\nteach-S-pendulum\nteach-C-pendulum\nteach-S-rod_end\nteach-C-rod_end\nUNITS\n",
+        ] {
+            assert!(script.contains(expected), "{expected}\n{script}");
+        }
+        assert!(!script.contains('@') || !script.contains("@FOLDER@"), "{script}");
+    }
+
+    #[test]
+    fn long_lists_are_several_arrays() {
+        let objects = [ObjectSpec::by_name("pendulum").unwrap()];
+        let one = planned_units(&[ModelKind::S], &objects, false);
+        let many: Vec<_> = (0..2500).map(|i| PlannedUnit { name: format!("teach-S-{i}"), ..one[0].clone() }).collect();
+        let job =
+            SlurmJob { command: &[], folder: Path::new("/shared"), cores: 1, memory_mb: 1, limit_mins: 1, sbatch: &[] };
+        let script = submit_script(&job, &many);
+        assert!(
+            script
+                .contains("teach_2=$(submit --job-name=sdg-teach --array=0-499 \"$folder/slurm/unit.sh\" teach 2000)")
+        );
+        assert_eq!(script.matches("--array=0-999").count(), 2);
+    }
+
+    #[test]
+    fn words_are_quoted_for_the_shell() {
+        assert_eq!(quoted("a-b.c/d"), "a-b.c/d");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
+    }
+}

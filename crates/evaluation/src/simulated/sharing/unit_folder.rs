@@ -1,0 +1,187 @@
+//! The folder of one unit: who does it, and what came of it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use sdg_files::{Access, Lock, write_atomically};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::records::{Failure, Receipt, Running};
+use super::worker::{Worker, unix_secs};
+
+/// Larger than any record of a unit.
+const MAX_RECORD_BYTES: u64 = 1 << 20;
+/// How often a lock is asked for that another process has.
+const LOCK_WAIT: Duration = Duration::from_millis(500);
+const RUNNING: &str = "running.json";
+
+/// Where a unit's records lie.
+#[derive(Debug)]
+pub struct UnitFolder(PathBuf);
+
+/// What is known of a unit.
+#[derive(Debug, Default)]
+pub struct UnitState {
+    /// More than one where two processes did the same.
+    pub receipts: Vec<Receipt>,
+    /// The oldest first.
+    pub failures: Vec<Failure>,
+    /// Who began it last and has not ended it.
+    pub running: Option<Running>,
+    /// Whether that process has gone without a word.
+    pub is_abandoned: bool,
+}
+
+/// The right to do a unit, until it is dropped.
+#[derive(Debug)]
+pub(super) struct Held(#[allow(dead_code, reason = "held until it is dropped")] Lock);
+
+impl UnitFolder {
+    /// That of a unit in an evaluation's folder, which need not exist.
+    pub fn of(evaluation: &Path, unit: &str) -> Self {
+        Self(evaluation.join("units").join(unit))
+    }
+
+    /// Takes the unit for this process, when whoever has it has ended; `wait` is called all the while, and may give it up by
+    /// `false`: then there is `None`. A file system without locks gives it to everyone: then two receipts tell.
+    ///
+    /// # Errors
+    /// A folder that cannot be written.
+    pub(super) fn hold(&self, wait: &mut dyn FnMut() -> bool) -> Result<Option<Held>> {
+        fs::create_dir_all(&self.0).with_context(|| format!("{}: cannot make this folder", self.0.display()))?;
+        loop {
+            match Lock::take(&self.lock_file(), Access::Alone)? {
+                Some(lock) => return Ok(Some(Held(lock))),
+                None if wait() => std::thread::sleep(LOCK_WAIT),
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// What is there.
+    ///
+    /// # Errors
+    /// Records that cannot be read or are damaged.
+    pub fn read(&self) -> Result<UnitState> {
+        let mut state = UnitState::default();
+        for path in self.entries()? {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            if name.starts_with("done-") {
+                state.receipts.push(read_record(&path)?);
+            } else if name.starts_with("failed-") {
+                state.failures.push(read_record(&path)?);
+            } else if name == RUNNING {
+                // It may end between the two readings.
+                state.running = path
+                    .exists()
+                    .then(|| read_record(&path))
+                    .transpose()
+                    .or_else(|error| if path.exists() { Err(error) } else { Ok(None) })?;
+            }
+        }
+        state.failures.sort_by_key(|failure| failure.started_secs);
+        state.is_abandoned = state.running.is_some() && Lock::is_free(&self.lock_file());
+        Ok(state)
+    }
+
+    /// Says that this process has begun.
+    pub(super) fn begin(&self, by: &Worker) -> Result<Running> {
+        let running = Running { by: by.clone(), started_secs: unix_secs() };
+        self.write(RUNNING, &running)?;
+        Ok(running)
+    }
+
+    /// Says that it is done.
+    pub(super) fn finish(&self, receipt: &Receipt) -> Result<()> {
+        self.write(&format!("done-{}.json", receipt.by.file_name_part(receipt.started_secs)), receipt)?;
+        self.end()
+    }
+
+    /// Says that it came to nothing.
+    pub(super) fn fail(&self, failure: &Failure) -> Result<()> {
+        self.write(&format!("failed-{}.json", failure.by.file_name_part(failure.started_secs)), failure)?;
+        self.end()
+    }
+
+    /// Takes back [`Self::begin`].
+    pub(super) fn end(&self) -> Result<()> {
+        let path = self.0.join(RUNNING);
+        fs::remove_file(&path).with_context(|| format!("{}: cannot remove", path.display()))
+    }
+
+    fn write(&self, name: &str, record: &impl Serialize) -> Result<()> {
+        let mut bytes = serde_json::to_vec_pretty(record)?;
+        bytes.push(b'\n');
+        Ok(write_atomically(&self.0.join(name), &bytes)?)
+    }
+
+    fn entries(&self) -> Result<Vec<PathBuf>> {
+        Ok(if self.0.exists() { sdg_files::entries(&self.0)? } else { Vec::new() })
+    }
+
+    fn lock_file(&self) -> PathBuf {
+        self.0.join("lock")
+    }
+}
+
+fn read_record<T: DeserializeOwned>(path: &Path) -> Result<T> {
+    let bytes = sdg_files::read(path, MAX_RECORD_BYTES)?;
+    serde_json::from_slice(&bytes).with_context(|| format!("{}: expected a record of a unit", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn worker() -> Worker {
+        Worker { host: "n1".to_owned(), pid: 7, job: None }
+    }
+
+    #[test]
+    fn a_unit_is_held_by_one_at_a_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let unit = UnitFolder::of(folder.path(), "look-pendulum");
+        let held = unit.hold(&mut || false).unwrap();
+        let mut asked = 0;
+        let mut twice = || {
+            asked += 1;
+            asked < 2
+        };
+        assert!(held.is_some() && unit.hold(&mut twice).unwrap().is_none());
+        assert_eq!(asked, 2);
+        unit.begin(&worker()).unwrap();
+        let state = unit.read().unwrap();
+        assert!(state.running.unwrap().by == worker() && !state.is_abandoned);
+        drop(held);
+        // The process went away without a word.
+        assert!(unit.read().unwrap().is_abandoned);
+        assert!(unit.hold(&mut || false).unwrap().is_some());
+    }
+
+    #[test]
+    fn what_came_of_it_is_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let unit = UnitFolder::of(folder.path(), "look-pendulum");
+        assert!(unit.read().unwrap().receipts.is_empty());
+        let _held = unit.hold(&mut || false).unwrap();
+        let failure = |started_secs, why: &str| Failure {
+            unit: "look-pendulum".to_owned(),
+            by: worker(),
+            started_secs,
+            seconds: 1.0,
+            why: why.to_owned(),
+        };
+        for failure in [failure(20, "second"), failure(10, "first")] {
+            unit.begin(&worker()).unwrap();
+            unit.fail(&failure).unwrap();
+        }
+        let state = unit.read().unwrap();
+        assert!(state.running.is_none() && state.receipts.is_empty());
+        assert_eq!(state.failures.iter().map(|failure| failure.why.as_str()).collect::<Vec<_>>(), ["first", "second"]);
+        fs::write(folder.path().join("units/look-pendulum/done-x.json"), "{").unwrap();
+        assert!(unit.read().unwrap_err().to_string().contains("done-x.json: expected a record of a unit"));
+    }
+}

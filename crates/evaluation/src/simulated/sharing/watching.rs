@@ -1,0 +1,198 @@
+//! How far the units of a folder are, for `--watch`.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use serde::Serialize;
+
+use super::plan::{SavedPlan, SavedUnit, UnitKind};
+use super::unit_folder::UnitFolder;
+use super::worker::{Worker, unix_secs};
+
+/// After so many failures nobody tries again: a job of Slurm's is put back once.
+const MAX_TRIES: usize = 2;
+/// So many units that run, and so many that failed, are listed.
+const MAX_LISTED: usize = 12;
+
+/// Watches a folder; what was done once is not read again.
+#[derive(Debug)]
+pub struct Watch {
+    folder: PathBuf,
+    /// Seconds that each took.
+    done: HashMap<String, f64>,
+}
+
+/// How far the units of a folder are.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Progress {
+    pub units: usize,
+    pub done: usize,
+    pub running: Vec<RunningUnit>,
+    pub failed: Vec<FailedUnit>,
+    /// Neither done nor begun.
+    pub waiting: usize,
+    /// With as many at work as now; none before the first is done.
+    pub seconds_left: Option<f64>,
+    /// Of each kind, how many are done and how many there are.
+    pub kinds: Vec<KindProgress>,
+    /// Whether nothing will change any more: all are done, have failed twice, or wait for one that has.
+    pub is_settled: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KindProgress {
+    pub kind: UnitKind,
+    pub done: usize,
+    pub units: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RunningUnit {
+    pub unit: String,
+    pub by: Worker,
+    /// How long it has been at work.
+    pub seconds: u64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FailedUnit {
+    pub unit: String,
+    pub by: Worker,
+    pub why: String,
+    /// How often.
+    pub tries: usize,
+}
+
+impl Watch {
+    /// # Errors
+    /// A folder without units.
+    pub fn new(folder: &Path) -> Result<Self> {
+        if SavedPlan::read_all(folder)?.units.is_empty() {
+            bail!("{}: expected a folder in which units of an evaluation are done, found no plan", folder.display());
+        }
+        Ok(Self { folder: folder.to_owned(), done: HashMap::new() })
+    }
+
+    /// How far it is now.
+    ///
+    /// # Errors
+    /// Records that cannot be read.
+    pub fn progress(&mut self) -> Result<Progress> {
+        let plan = SavedPlan::read_all(&self.folder)?;
+        let (mut running, mut failed, mut waiting) = (Vec::new(), Vec::new(), Vec::new());
+        for unit in &plan.units {
+            if self.done.contains_key(&unit.name) {
+                continue;
+            }
+            let state = UnitFolder::of(&self.folder, &unit.name).read()?;
+            let tries = state.failures.len() + usize::from(state.is_abandoned);
+            let name = unit.name.clone();
+            match (state.receipts.first(), state.running, state.failures.last()) {
+                (Some(receipt), ..) => {
+                    self.done.insert(name, receipt.seconds);
+                }
+                (None, Some(now), _) if !state.is_abandoned => {
+                    let seconds = unix_secs().saturating_sub(now.started_secs);
+                    running.push(RunningUnit { unit: name, by: now.by, seconds });
+                }
+                (None, Some(last), _) => {
+                    let why = "its process ended without a result".to_owned();
+                    failed.push(FailedUnit { unit: name, by: last.by, why, tries });
+                }
+                (None, None, Some(failure)) => {
+                    let (by, why) = (failure.by.clone(), failure.why.clone());
+                    failed.push(FailedUnit { unit: name, by, why, tries });
+                }
+                (None, None, None) => waiting.push(unit),
+            }
+        }
+        let is_lost = |name: &str| failed.iter().any(|failed| failed.unit == name && failed.tries >= MAX_TRIES);
+        let can_change = |name: &str, after: &[String]| !is_lost(name) && !after.iter().any(|before| is_lost(before));
+        let of_name: HashMap<&str, &SavedUnit> = plan.units.iter().map(|unit| (unit.name.as_str(), unit)).collect();
+        let is_settled = running.is_empty()
+            && !waiting.iter().any(|unit| can_change(&unit.name, &unit.after))
+            && !failed.iter().any(|unit| can_change(&unit.unit, &of_name[unit.unit.as_str()].after));
+        let count = |kind: UnitKind| KindProgress {
+            kind,
+            done: self.done.keys().filter(|name| UnitKind::of(name) == Some(kind)).count(),
+            units: plan.units.iter().filter(|unit| UnitKind::of(&unit.name) == Some(kind)).count(),
+        };
+        Ok(Progress {
+            units: plan.units.len(),
+            done: self.done.len(),
+            waiting: waiting.len(),
+            seconds_left: self.seconds_left(&plan, running.len()),
+            kinds: UnitKind::ALL.map(count).to_vec(),
+            is_settled,
+            running,
+            failed,
+        })
+    }
+
+    /// What is left takes as long as units of its kind took, or as all took where none of its kind is done.
+    fn seconds_left(&self, plan: &SavedPlan, running: usize) -> Option<f64> {
+        let mean = |kind: Option<UnitKind>| {
+            let of_kind = self.done.iter().filter(|(name, _)| kind.is_none() || UnitKind::of(name) == kind);
+            let seconds: Vec<f64> = of_kind.map(|(_, seconds)| *seconds).collect();
+            (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64)
+        };
+        let of_all = mean(None)?;
+        let means = UnitKind::ALL.map(|kind| mean(Some(kind)).unwrap_or(of_all));
+        let left = plan.units.iter().filter(|unit| !self.done.contains_key(&unit.name));
+        let seconds: f64 = left.filter_map(|unit| UnitKind::of(&unit.name)).map(|kind| means[kind as usize]).sum();
+        Some(seconds / running.max(1) as f64)
+    }
+}
+
+impl fmt::Display for Progress {
+    /// A screen; its first line stands alone.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} of {} units done, {} running, {} failed, {} waiting",
+            self.done,
+            self.units,
+            self.running.len(),
+            self.failed.len(),
+            self.waiting
+        )?;
+        match self.seconds_left {
+            Some(seconds) if self.done < self.units => writeln!(f, "; about {} left", duration(seconds))?,
+            _ => writeln!(f)?,
+        }
+        let kinds = self.kinds.iter().filter(|kind| kind.units > 0);
+        let kinds: Vec<String> = kinds.map(|kind| format!("{} {} of {}", kind.kind, kind.done, kind.units)).collect();
+        writeln!(f, "{}", kinds.join(", "))?;
+        if !self.running.is_empty() {
+            writeln!(f, "running:")?;
+        }
+        for unit in self.running.iter().take(MAX_LISTED) {
+            writeln!(f, "  {}  on {} for {}", unit.unit, unit.by, duration(unit.seconds as f64))?;
+        }
+        more(f, self.running.len())?;
+        if !self.failed.is_empty() {
+            writeln!(f, "failed:")?;
+        }
+        for unit in self.failed.iter().take(MAX_LISTED) {
+            let tries = if unit.tries == 1 { "once".to_owned() } else { format!("{} times", unit.tries) };
+            writeln!(f, "  {}  {tries}, last on {}: {}", unit.unit, unit.by, unit.why)?;
+        }
+        more(f, self.failed.len())
+    }
+}
+
+/// What the list had no room for.
+fn more(f: &mut fmt::Formatter<'_>, listed: usize) -> fmt::Result {
+    if listed > MAX_LISTED { writeln!(f, "  and {} more", listed - MAX_LISTED) } else { Ok(()) }
+}
+
+fn duration(seconds: f64) -> String {
+    let seconds = seconds.round() as u64;
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {} min", seconds / 3600, seconds / 60 % 60),
+    }
+}

@@ -1,0 +1,227 @@
+//! The folder of an evaluation: a file for every unit of work that has ended.
+//!
+//! ```text
+//! DIR/settings.json
+//! DIR/models/C-pendulum.sdg                   the taught network
+//! DIR/cells/C-pendulum.teaching.json          how its teaching ended
+//! DIR/cells/C-pendulum.look.json              unseen pictures, with the part and without
+//! DIR/cells/C-pendulum.attempts-verified.json attempts, rewritten as each ends
+//! DIR/pictures/C-pendulum.png                 one of those pictures, for the page
+//! DIR/axes/C-pendulum.tilt.json               pictures of an axis
+//! DIR/axes/C-pendulum.attempts-shake.json     attempts under an error
+//! ```
+//!
+//! Each JSON file carries the settings that it was made with and is there whole or not at all. A teaching carries those of
+//! teachings alone, so that the protocol and the axes share it, with whatever number of attempts or pictures.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sdg_files::{Access, Lock, write_atomically};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::settings::{Settings, difference};
+use crate::error::EvaluationError;
+
+/// Larger than any record.
+const MAX_RECORD_BYTES: u64 = 64 << 20;
+
+/// An evaluation's folder, held by this process.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    settings: Settings,
+    /// Locked while the store lives.
+    _lock: Lock,
+}
+
+/// A file of the store.
+#[derive(Serialize, Deserialize)]
+struct Stored<S, T> {
+    settings: S,
+    record: T,
+}
+
+impl Store {
+    /// Opens the folder of an evaluation or begins one.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, that another process works in, or whose models were taught with other settings.
+    pub fn open(folder: &Path, settings: &Settings) -> Result<Self> {
+        Self::open_with(folder, settings, Access::Alone)
+    }
+
+    /// The same for one of many processes, which divide the units among themselves by other means.
+    ///
+    /// # Errors
+    /// As [`Self::open`], where one process works in the folder alone.
+    pub fn open_shared(folder: &Path, settings: &Settings) -> Result<Self> {
+        Self::open_with(folder, settings, Access::Shared)
+    }
+
+    fn open_with(folder: &Path, settings: &Settings, access: Access) -> Result<Self> {
+        sdg_files::prepare_folder(folder)?;
+        for inner in ["models", "cells", "pictures", "axes", "cameras"] {
+            let inner = folder.join(inner);
+            fs::create_dir_all(&inner).with_context(|| format!("{}: cannot make this folder", inner.display()))?;
+        }
+        let Some(lock) = Lock::take(&folder.join(".lock"), access)? else {
+            bail!("{}: another evaluation is at work in this folder", folder.display());
+        };
+        let store = Self { folder: folder.to_owned(), settings: settings.clone(), _lock: lock };
+        let teaching = settings.teaching();
+        match store.read_made_with::<()>("settings.json", &teaching)? {
+            Some(()) => {}
+            None => store.write_made_with("settings.json", &teaching, &())?,
+        }
+        Ok(store)
+    }
+
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What results of the paper's protocol are made with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// A record of the paper's protocol, if there is one yet. `name` is that of its file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, is damaged, or was made with other settings.
+    pub fn read<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>> {
+        self.read_made_with(name, &self.settings)
+    }
+
+    /// A record, if there is one yet, that depends on `settings`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_made_with<T: DeserializeOwned>(&self, name: &str, settings: &impl Serialize) -> Result<Option<T>> {
+        let path = self.folder.join(name);
+        let Some((made_with, record)) = read_stored(&path)? else { return Ok(None) };
+        if let Some(difference) = difference(settings, &made_with)? {
+            return Err(EvaluationError::OtherSettings { path, difference }.into());
+        }
+        Ok(Some(serde_json::from_value(record).with_context(|| not_a_record(&path))?))
+    }
+
+    /// Writes a record of the paper's protocol, whole or not at all.
+    pub fn write<T: Serialize>(&self, name: &str, record: &T) -> Result<()> {
+        self.write_made_with(name, &self.settings, record)
+    }
+
+    /// Writes a record that depends on `settings`, whole or not at all.
+    pub fn write_made_with(&self, name: &str, settings: &impl Serialize, record: &impl Serialize) -> Result<()> {
+        let stored = Stored { settings, record };
+        let mut bytes = serde_json::to_vec_pretty(&stored)?;
+        bytes.push(b'\n');
+        self.write_bytes(name, &bytes)
+    }
+
+    /// Writes any file of the folder, whole or not at all.
+    pub fn write_bytes(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        Ok(write_atomically(&self.folder.join(name), bytes)?)
+    }
+
+    /// Where a file of the folder lies.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Removes a file that stands for nothing any more; none is no error.
+    pub fn remove(&self, name: &str) -> Result<()> {
+        let path = self.folder.join(name);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("{}: cannot remove", path.display()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The settings and the record of any store's file; `None` where there is no such file.
+///
+/// # Errors
+/// A file that cannot be read or is damaged.
+pub(super) fn read_stored(path: &Path) -> Result<Option<(Value, Value)>> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    let bytes = sdg_files::read(path, MAX_RECORD_BYTES)?;
+    let stored: Stored<Value, Value> = serde_json::from_slice(&bytes).with_context(|| not_a_record(path))?;
+    Ok(Some((stored.settings, stored.record)))
+}
+
+fn not_a_record(path: &Path) -> String {
+    format!("{}: expected a record of an evaluation", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sdg_inputs::one_line;
+
+    fn settings(seed: u64) -> Settings {
+        Settings::for_test(seed, 2, 1)
+    }
+
+    #[test]
+    fn what_was_written_is_there_when_opened_again() {
+        let folder = tempfile::tempdir().unwrap();
+        {
+            let store = Store::open(folder.path(), &settings(1)).unwrap();
+            assert_eq!(store.read::<u32>("cells/a.json").unwrap(), None);
+            store.write("cells/a.json", &7u32).unwrap();
+        }
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        assert_eq!(store.read::<u32>("cells/a.json").unwrap(), Some(7));
+    }
+
+    #[test]
+    fn other_settings_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Store::open(folder.path(), &settings(1)).unwrap());
+        let refused = one_line(&Store::open(folder.path(), &settings(2)).unwrap_err());
+        assert!(refused.contains("settings.json: made with other settings (seed: expected 2, found 1)"), "{refused}");
+        // A file that was carried in from another evaluation, too.
+        let elsewhere = tempfile::tempdir().unwrap();
+        Store::open(elsewhere.path(), &settings(3)).unwrap().write("cells/a.json", &7u32).unwrap();
+        fs::copy(elsewhere.path().join("cells/a.json"), folder.path().join("cells/a.json")).unwrap();
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        assert!(one_line(&store.read::<u32>("cells/a.json").unwrap_err()).contains("seed: expected 1, found 3"));
+    }
+
+    #[test]
+    fn damaged_records_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path(), &settings(1)).unwrap();
+        fs::write(folder.path().join("cells/a.json"), "{\"settings\": {").unwrap();
+        let refused = one_line(&store.read::<u32>("cells/a.json").unwrap_err());
+        assert!(refused.contains("a.json: expected a record of an evaluation"), "{refused}");
+    }
+
+    #[test]
+    fn two_at_once_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let _first = Store::open(folder.path(), &settings(1)).unwrap();
+        let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
+        assert!(refused.contains("another evaluation is at work"), "{refused}");
+    }
+
+    #[test]
+    fn many_share_a_folder_and_keep_those_out_who_work_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let shared = [1, 2].map(|_| Store::open_shared(folder.path(), &settings(1)).unwrap());
+        let refused = Store::open(folder.path(), &settings(1)).unwrap_err().to_string();
+        assert!(refused.contains("another evaluation is at work"), "{refused}");
+        drop(shared);
+        let _alone = Store::open(folder.path(), &settings(1)).unwrap();
+        assert!(Store::open_shared(folder.path(), &settings(1)).is_err());
+    }
+}

@@ -1,0 +1,68 @@
+//! Pictures: how far beside the truth detections are, and how many false alarms there are.
+
+use sdg_report::{Cell, Column, Table, Tone};
+
+use super::titled::{Titled, number, share, ways};
+use crate::simulated::summary::Summary;
+use crate::trial::{RIGHT_DEGREES, RIGHT_MM};
+
+/// Detections beside the simulator's truth.
+pub(super) fn accuracy(summary: &Summary) -> Titled {
+    let mut table = Table::new(vec![
+        Column::text("model"),
+        Column::text("right"),
+        Column::number("right").unit("%"),
+        Column::number("median").unit("mm").group("place"),
+        Column::number("90 %").unit("mm").group("place"),
+        Column::number("median").unit("°").group("turn"),
+        Column::number("90 %").unit("°").group("turn"),
+        Column::number("images a second"),
+    ]);
+    for model in &summary.models {
+        for (name, figures) in ways(model) {
+            table = table.row(vec![
+                Cell::text(name),
+                share(figures.right, Tone::Plain),
+                number(figures.right.percent(), 1),
+                number(figures.median_mm, 2),
+                number(figures.p90_mm, 2),
+                number(figures.median_deg, 2),
+                number(figures.p90_deg, 2),
+                number(figures.frames_per_second, 1),
+            ]);
+        }
+    }
+    Titled {
+        title: "Detection against the truth".to_owned(),
+        lead: format!(
+            "{} unseen pictures of each part from the look-out pose. Right: found within {RIGHT_MM:.0} mm and \
+             {RIGHT_DEGREES:.0}°. Errors are of all that was found, right or not; turns that a part's symmetry hides do \
+             not count. \"alone\": without the check against the demonstration.",
+            summary.settings.views
+        ),
+        table,
+    }
+}
+
+/// Seen where it is not.
+pub(super) fn false_alarms(summary: &Summary) -> Titled {
+    let mut table =
+        Table::new(vec![Column::text("model"), Column::text("false alarms"), Column::text("false alarms, alone")]);
+    for model in &summary.models {
+        let tone = if model.verified.false_alarms.count == 0 { Tone::Good } else { Tone::Bad };
+        table = table.row(vec![
+            Cell::text(model.model.letter()),
+            share(model.verified.false_alarms, tone),
+            model.alone.as_ref().map_or(Cell::missing(), |alone| share(alone.false_alarms, Tone::Plain)),
+        ]);
+    }
+    Titled {
+        title: "Pictures without the part".to_owned(),
+        lead: format!(
+            "{} pictures for each part with unseen things and others made to resemble parts; in every second one lies \
+             another shipped part, too.",
+            summary.settings.scenes
+        ),
+        table,
+    }
+}

@@ -1,0 +1,113 @@
+//! A network is taught on a part and kept.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use anyhow::Result;
+use sdg_demonstration::Demonstration;
+use sdg_grasp::{
+    CameraOverTable, History, Lengths, Preset, StepRecord, TeachOptions, TeachingEvent, seen_from_above, teach,
+};
+use sdg_inputs::one_line;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::views::demonstration_view;
+
+use super::cell::{Cell, Marks};
+use super::jitter::{MARKS_JITTER_PX, with_jittered_marks};
+use super::looking::part_seed;
+use super::one_unit::caught;
+use super::records::{LOSS_STEPS, TeachingRecord};
+use super::store::Store;
+use crate::shipped;
+
+/// Where and how networks are taught.
+pub(super) struct Teaching<'a> {
+    /// What is taught is kept here.
+    pub store: &'a Store,
+    /// Network, training and augmentation: what the store's settings name.
+    pub preset: Preset,
+    /// How many units run side by side.
+    pub jobs: usize,
+}
+
+impl Teaching<'_> {
+    /// Teaches a cell's network and keeps it; in words what came of it, `None` when it was interrupted.
+    ///
+    /// # Errors
+    /// Files that cannot be written. A teaching that leads to no model is a result.
+    pub(super) fn teach(
+        &self,
+        cell: Cell,
+        marks: Marks,
+        is_interrupted: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<String>> {
+        let settings = self.store.settings();
+        let object = ObjectSpec::by_name(cell.object)?;
+        let shipped = shipped::demonstration(cell.object)?;
+        let (demonstration, lengths) = match marks {
+            Marks::Shipped => (shipped, None),
+            Marks::Jittered => {
+                (with_jittered_marks(&shipped, MARKS_JITTER_PX, part_seed(settings.seed, &object)), None)
+            }
+            Marks::InPlanView => {
+                let (demonstration, lengths) = in_plan_view(&object, shipped)?;
+                (demonstration, Some(lengths))
+            }
+        };
+        let mut options = TeachOptions::new(settings.seed);
+        options.kind = cell.network().model;
+        options.preset = self.preset;
+        options.symmetry = object.symmetry;
+        options.steps = settings.steps.map(|steps| steps as usize);
+        options.time_budget = settings.time_budget.map(|secs| Duration::from_secs(secs.into()));
+        options.lengths = lengths;
+        // An interrupted teaching keeps the best network so far, which would not be the one of an uninterrupted run.
+        let mut interrupted = false;
+        let mut observe = |_: &TeachingEvent| {
+            interrupted |= is_interrupted();
+            if interrupted { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let taught = caught(|| Ok(teach(std::slice::from_ref(&demonstration), &options, &mut observe)?));
+        if interrupted {
+            return Ok(None);
+        }
+        let (record, summary) = match taught {
+            Ok(taught) => {
+                let bytes = taught.model.to_bytes()?;
+                // The record last: it says that the model is whole.
+                self.store.write_bytes(&cell.model_file(marks), &bytes)?;
+                let facts = taught.model.facts().clone();
+                let summary = facts.validation.map_or("nothing to train".to_owned(), |validation| {
+                    format!("finds {:.0} % of held-back samples", 100.0 * validation.hit_rate)
+                });
+                let losses = taught.history.as_ref().map_or_else(Vec::new, mean_losses);
+                (
+                    TeachingRecord::Taught { facts: Box::new(facts), bytes: bytes.len(), jobs: self.jobs, losses },
+                    summary,
+                )
+            }
+            Err(error) => {
+                self.store.remove(&cell.model_file(marks))?;
+                let why = one_line(&error);
+                let summary = format!("failed, all its attempts count as failures: {why}");
+                (TeachingRecord::Failed { why }, summary)
+            }
+        };
+        self.store.write_made_with(&cell.teaching_file(marks), &settings.teaching(), &record)?;
+        Ok(Some(summary))
+    }
+}
+
+/// The shipped demonstration in the plan view of the simulator's camera, which took it.
+fn in_plan_view(object: &ObjectSpec, shipped: Demonstration) -> Result<(Demonstration, Lengths)> {
+    let camera = demonstration_view(object)?.view.camera;
+    let over_table = CameraOverTable { camera, table_height_m: 0.0, workspace: None };
+    let (mut seen, lengths) = seen_from_above(&[shipped], &over_table, object.mark_height_m, object.grasp_height_m)?;
+    Ok((seen.remove(0), lengths))
+}
+
+/// The curve of a teaching, coarse enough to keep.
+fn mean_losses(history: &History) -> Vec<f64> {
+    let mean = |steps: &[StepRecord]| steps.iter().map(|step| step.losses.total()).sum::<f64>() / steps.len() as f64;
+    history.steps.chunks(LOSS_STEPS).map(mean).collect()
+}

@@ -1,0 +1,49 @@
+//! What there is to say of a teaching, for people.
+
+use sdg_demonstration::Demonstration;
+use sdg_grasp::{Ending, GraspModel, Taught};
+use sdg_kinematics::HAND_OPENING_MAX_M;
+
+/// Where the jaws would have to open farther than the hand can: then nothing that is found can be grasped.
+pub fn too_wide(model: &GraspModel) -> Option<String> {
+    let pixels_per_m = model.facts().lengths?.pixels_per_m;
+    let widest = model.demonstrations().iter().map(|taught| taught.marks.width_px / pixels_per_m).fold(0.0, f64::max);
+    (widest > HAND_OPENING_MAX_M).then(|| {
+        format!(
+            "the marked jaws open {:.0} mm, and the hand {:.0} mm at most: mark the grasp where the part is narrower, or turn it",
+            1e3 * widest,
+            1e3 * HAND_OPENING_MAX_M
+        )
+    })
+}
+
+/// Jaws that open as wide as the box, for want of an outline: more than the part needs, where it lies askew.
+pub fn openings_by_the_box(model: &GraspModel, demonstrations: &[Demonstration]) -> Vec<String> {
+    let told = model.demonstrations().iter().zip(demonstrations).filter_map(|(taught, demonstration)| {
+        let annotation = &demonstration.annotation;
+        (annotation.outline.is_none() && annotation.jaw_width.is_none()).then(|| {
+            format!(
+                "the opening of the jaws, {:.0} px, is taken from the box of \"{}\", which may be wider than the part: draw its \
+                 outline, or mark the jaws (`sdg annotate`)",
+                taught.marks.width_px, annotation.label
+            )
+        })
+    });
+    told.collect()
+}
+
+/// How the network's teaching went, for people; nothing for a model without.
+pub fn training(taught: &Taught) -> String {
+    let facts = taught.model.facts();
+    let Some(history) = &taught.history else { return String::new() };
+    let ending = match history.ending {
+        Ending::Completed => "",
+        Ending::EarlyStop => ", stopped early: good enough",
+        Ending::TimeBudget => ", stopped by the time budget",
+        Ending::Interrupted => ", interrupted",
+    };
+    let orientation = facts.orientation.map_or(String::new(), |cnn| {
+        format!("; its angles alone: {:.0} % within 10°, median {:.1}°", 100.0 * cnn.hit_rate, cnn.error_degrees)
+    });
+    format!(" ({} steps{ending}{orientation})", facts.steps)
+}

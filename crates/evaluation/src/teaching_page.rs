@@ -1,0 +1,229 @@
+//! A teaching as a page: demonstrations, samples, losses and validation.
+
+use anyhow::Result;
+use image::RgbImage;
+use sdg_cell::drawing;
+use sdg_demonstration::{AugmentationConfig, Augmenter, Demonstration};
+use sdg_geometry::PlanarGrasp;
+use sdg_grasp::{
+    GraspModel, HIT_DEGREES, HIT_PX, History, Taught, TaughtDemonstration, ValidationRecord, Verification,
+};
+use sdg_report::{
+    Axis, Chart, Color, Figure, GallerySize, KeyFigure, Pen, Report, Section, Series, Tone, draw_box,
+    draw_demonstration, draw_line,
+};
+
+use crate::footer::FOOTER;
+use crate::held_back::HeldBackFigures;
+use crate::machine::machine;
+
+/// Augmented samples shown.
+const SHEET: u64 = 24;
+/// Samples that the finished model is tried on.
+const TRIED: u64 = 6;
+/// Where those begin: far beyond the samples of any training.
+const FIRST_TRIED: u64 = 1 << 40;
+
+/// The page of `sdg teach`.
+pub struct TeachingPage<'a> {
+    /// The model, and how its network was trained.
+    pub taught: &'a Taught,
+    /// What the finished model made of held-back samples.
+    pub figures: &'a HeldBackFigures,
+    /// The photos and their marks.
+    pub demonstrations: &'a [Demonstration],
+    pub seed: u64,
+    /// The command that makes the same model again.
+    pub command: &'a str,
+}
+
+impl TeachingPage<'_> {
+    /// Photo and marks, samples, curves, and what the model says of samples that it has not seen.
+    ///
+    /// # Errors
+    /// Samples that cannot be made, and errors of detection.
+    pub fn report(&self) -> Result<Report> {
+        let model = &self.taught.model;
+        let facts = model.facts();
+        let name = model.object().replace('_', " ");
+        let photos = match self.demonstrations.len() {
+            1 => "one photo".to_owned(),
+            several => format!("{several} photos"),
+        };
+        let mut report = Report::new(format!("{name}, taught from {photos}"))
+            .kicker("Teaching")
+            .lead(format!(
+                "Model {} was shown {photos} with the grasp marked. This is what it learnt from, and how well it then \
+                 finds the part in samples that it had not seen.",
+                model.kind()
+            ))
+            .key_figure(KeyFigure::new(format!("{:.0}", facts.seconds), "s", format!("to teach, from {photos}")));
+        let (found, false_alarms) = (self.figures.found(), self.figures.false_alarms());
+        let tone = match found.percent() {
+            Some(percent) if percent >= 80.0 => Tone::Good,
+            Some(percent) if percent < 50.0 => Tone::Bad,
+            _ => Tone::Warning,
+        };
+        let bad_if = |is_bad: bool| if is_bad { Tone::Bad } else { Tone::Good };
+        report = report
+            .key_figure(
+                KeyFigure::new(found.count.to_string(), format!("of {}", found.of), "held-back parts found").tone(tone),
+            )
+            .key_figure(
+                KeyFigure::new(self.figures.wrong().to_string(), "", "found where they are not")
+                    .tone(bad_if(self.figures.wrong() > 0)),
+            )
+            .key_figure(
+                KeyFigure::new(
+                    false_alarms.count.to_string(),
+                    format!("of {}", false_alarms.of),
+                    "false alarms without the part",
+                )
+                .tone(bad_if(false_alarms.count > 0)),
+            );
+        if let Some(((off, unit), [_, deg])) = self.figures.median_distance().zip(self.figures.median_errors()) {
+            report = report
+                .key_figure(KeyFigure::new(format!("{off:.1}"), unit, "median error of place"))
+                .key_figure(KeyFigure::new(format!("{deg:.1}"), "°", "median error of turn"));
+        }
+        let mut report = report.section(demonstration(model, self.demonstrations, self.seed)?);
+        if let Some(history) = &self.taught.history {
+            report = report.section(teaching(history));
+        }
+        Ok(report.section(self.tried()?).section(self.this_run()).footer(FOOTER))
+    }
+
+    fn tried(&self) -> Result<Section> {
+        let model = &self.taught.model;
+        // Frames as large as the photo: the part then has a size at which the model looks for it.
+        let augmenter = Augmenter::new(self.demonstrations, AugmentationConfig::default(), self.seed)?;
+        let mut figures = Vec::new();
+        for i in 0..TRIED {
+            let sample = augmenter.sample(FIRST_TRIED + i);
+            let detections = model.detect(&sample.image, Verification::ByShape)?;
+            let best = detections.iter().map(|detection| detection.score).fold(0.0, f64::max);
+            let there = if sample.objects.is_empty() { "no part here" } else { "the part is here" };
+            let figure = Figure::photo(drawing::with_detections(&sample.image, &detections));
+            figures.push(figure.caption(format!("{there}; score {best:.2}")));
+        }
+        Ok(Section::new("Tried")
+            .lead("Samples that it was not taught on, with what the finished model says of them; at least 0.5 is accepted.")
+            .gallery(GallerySize::Medium, figures))
+    }
+
+    fn this_run(&self) -> Section {
+        let model = &self.taught.model;
+        let facts = model.facts();
+        Section::new("This run")
+            .lead("Everything needed to make the same model again.")
+            .facts([
+                ("object", model.object().to_owned()),
+                ("grasp model", format!("{}, preset {}", model.kind(), model.preset())),
+                ("taught with", format!("seed {}, {} samples, {} steps", facts.seed, facts.samples, facts.steps)),
+                ("base weights", facts.base_weights_sha256.clone().unwrap_or_else(|| "none".to_owned())),
+                ("machine", machine()),
+                ("version", format!("sdg {}", env!("CARGO_PKG_VERSION"))),
+            ])
+            .command(self.command)
+    }
+}
+
+/// The photos as they are and as they were marked, and samples made from them.
+pub fn demonstration(model: &GraspModel, demonstrations: &[Demonstration], seed: u64) -> Result<Section> {
+    let mut pictures = Vec::new();
+    for (at, Demonstration { image, annotation }) in demonstrations.iter().enumerate() {
+        let mut marked = image.clone();
+        let grasp = annotation.grasp.map(|line| PlanarGrasp::from_line(&line, jaw_width_px(model, at)));
+        draw_demonstration(
+            &mut marked,
+            &annotation.bbox,
+            annotation.outline.as_ref(),
+            annotation.grasp.as_ref(),
+            grasp.as_ref(),
+        );
+        pictures.push(Figure::photo(image.clone()).caption("As the camera saw it."));
+        pictures.push(Figure::photo(marked).caption(
+            "As marked: box (blue), outline (yellow), grasp line (dashed), and the jaws that follow (orange).",
+        ));
+    }
+    Ok(Section::new("Demonstration")
+        .lead("All that a person gave: a photo, a box, an outline, and a line along which to grasp.")
+        .gallery(GallerySize::Large, pictures)
+        .captioned_gallery(
+            GallerySize::Small,
+            sheet(demonstrations, seed)?.into_iter().map(Figure::photo).collect(),
+            if model.kind().has_network() {
+                "Samples that the network learnt from, all made from that photo: other backgrounds, light, blur, noise, \
+                 things in the way. Scenes without a box lack the part, so that the model learns to reject."
+            } else {
+                "What a network would learn from, all made from that photo: other backgrounds, light, blur, noise, \
+                 things in the way. Model S has none; it looks for the photo's part itself."
+            },
+        ))
+}
+
+fn jaw_width_px(model: &GraspModel, at: usize) -> f64 {
+    model.demonstrations().get(at).map_or(0.0, |TaughtDemonstration { marks, .. }| marks.width_px)
+}
+
+/// The first training samples with their marks.
+fn sheet(demonstrations: &[Demonstration], seed: u64) -> Result<Vec<RgbImage>> {
+    let config = AugmentationConfig::default().with_output_size(320, 240);
+    let augmenter = Augmenter::new(demonstrations, config, seed)?;
+    Ok((0..SHEET)
+        .map(|i| {
+            let sample = augmenter.sample(i);
+            let mut drawn = sample.image;
+            for object in &sample.objects {
+                draw_box(&mut drawn, &object.bbox, &Pen::new(Color::BOX));
+                if let (Some(start), Some(end)) = (object.keypoints.first(), object.keypoints.last()) {
+                    draw_line(&mut drawn, start.point(), end.point(), &Pen::new(Color::GRASP).width(3.0));
+                }
+            }
+            drawn
+        })
+        .collect())
+}
+
+/// Losses and validation, step by step.
+pub fn teaching(history: &History) -> Section {
+    let loss = |pick: fn(&sdg_grasp::LossValues) -> f64| -> Vec<(f64, f64)> {
+        history.steps.iter().map(|record| (record.step as f64, pick(&record.losses))).collect()
+    };
+    let losses = Chart::new("Training loss", Axis::new("step"), Axis::new("loss").logarithmic())
+        .series(Series::new("keypoints", loss(|l| l.keypoint)).noisy())
+        .series(Series::new("class and box", loss(|l| l.cls + l.box_reg)).noisy())
+        .series(Series::new("proposals", loss(|l| l.rpn_cls + l.rpn_loc)).noisy())
+        .caption("Each step, and its running mean.");
+    let curve = |pick: fn(&ValidationRecord) -> f64| -> Vec<(f64, f64)> {
+        history.validations.iter().map(|record| (record.steps_done as f64, pick(record))).collect()
+    };
+    let kept = history.best.steps_done as f64;
+    let place = Chart::new("Held-back samples: place", Axis::new("step"), Axis::new("error").unit("px").from_zero())
+        .series(Series::new("median", curve(|r| r.validation.median_error_px)).with_markers())
+        .moment(kept, "kept")
+        .caption("The network alone, in pixels of the photo; before the demonstration is laid over.");
+    let angle = Chart::new("Held-back samples: angle", Axis::new("step"), Axis::new("error").unit("°").from_zero())
+        .series(Series::new("median", curve(|r| r.validation.median_error_degrees)).with_markers())
+        .moment(kept, "kept");
+    let found = Chart::new("Held-back samples: found", Axis::new("step"), Axis::new("share").unit("%").from_zero())
+        .series(
+            Series::new(format!("within {HIT_PX} px and {HIT_DEGREES}°"), curve(|r| 100.0 * r.validation.hit_rate()))
+                .with_markers(),
+        )
+        .series(
+            Series::new(
+                "false alarms",
+                curve(|r| 100.0 * r.validation.false_alarms as f64 / r.validation.negatives.max(1) as f64),
+            )
+            .with_markers(),
+        )
+        .caption("The network alone: what is left of its false alarms, the demonstration refuses.");
+    Section::new("Teaching")
+        .lead(format!(
+            "{} steps in {:.0} s; the network with the best validation was kept.",
+            history.steps.len(),
+            history.elapsed_secs
+        ))
+        .charts(vec![losses, place, angle, found])
+}

@@ -1,0 +1,84 @@
+//! A model tried on pictures of the simulator that it has never seen, against the simulator's truth.
+
+use anyhow::Result;
+use image::RgbImage;
+use sdg_cell::drawing;
+use sdg_grasp::{GraspDetection, GraspModel, Verification};
+use sdg_report::DetectionError;
+use sdg_simulation::objects::ObjectSpec;
+use sdg_simulation::views::{TestView, test_views};
+
+use crate::against_truth::{grasp_error, grasp_pose};
+
+/// Largest distance at which a detection counts as right, in millimetres.
+pub const RIGHT_MM: f64 = 10.0;
+/// Largest turn at which a detection counts as right, in degrees.
+pub const RIGHT_DEGREES: f64 = 10.0;
+
+/// One picture and the model's detections in it.
+pub struct Trial {
+    /// The picture with all detections drawn on it.
+    pub drawn: RgbImage,
+    /// Whether the part is in the picture.
+    pub present: bool,
+    /// Score of the best detection, accepted or not; zero for none.
+    pub best_score: f64,
+    /// Agreement of the best detection, where it was verified.
+    pub best_agreement: Option<f64>,
+    /// The network's score of the best detection; zero for none.
+    pub network_score: f64,
+    /// Error of the accepted detection, where the part is there and was found.
+    pub error: Option<DetectionError>,
+    /// Error of the best detection even if it was refused.
+    pub best_error: Option<DetectionError>,
+    /// Time of the detection.
+    pub seconds: f64,
+}
+
+impl Trial {
+    /// Whether the part was there and a grasp was found near enough to the truth.
+    pub fn is_right(&self) -> bool {
+        self.error.is_some_and(|e| e.distance_mm <= RIGHT_MM && e.angle_deg <= RIGHT_DEGREES)
+    }
+
+    /// Whether the part was not there and something was accepted all the same.
+    pub fn is_false_alarm(&self) -> bool {
+        !self.present && self.best_score >= 0.5
+    }
+}
+
+/// Shows a model `count` pictures, seeds from `seed` on, with the part or without.
+pub fn try_views(
+    model: &GraspModel,
+    object: &ObjectSpec,
+    present: bool,
+    count: usize,
+    seed: u64,
+    verification: Verification,
+) -> Result<Vec<Trial>> {
+    test_views(object, present, count, seed).map(|seen| try_view(model, object, &seen?, verification)).collect()
+}
+
+/// Shows a model one picture; the part is in it if the picture knows the truth about it.
+pub fn try_view(model: &GraspModel, object: &ObjectSpec, seen: &TestView, verification: Verification) -> Result<Trial> {
+    let start = std::time::Instant::now();
+    let detections = model.detect(&seen.view.image, verification)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let best = detections.first();
+    let error = |detection: &GraspDetection| -> Option<DetectionError> {
+        let truth = seen.truth.as_ref()?;
+        let pose = grasp_pose(object, &seen.view.camera, &detection.grasp).ok()?;
+        Some(grasp_error(object, &truth.base_from_object, &pose.base_from_tcp))
+    };
+    let best_error = best.and_then(error);
+    Ok(Trial {
+        drawn: drawing::with_detections(&seen.view.image, &detections),
+        present: seen.truth.is_some(),
+        best_score: best.map_or(0.0, |d| d.score),
+        best_agreement: best.and_then(|d| d.agreement),
+        network_score: best.map_or(0.0, |d| d.network_score),
+        error: best_error.filter(|_| best.is_some_and(GraspDetection::is_accepted)),
+        best_error,
+        seconds,
+    })
+}

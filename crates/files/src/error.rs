@@ -1,0 +1,89 @@
+//! What can go wrong with a file.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// The result of what this crate does.
+pub type Result<T, E = FileError> = std::result::Result<T, E>;
+
+/// A file that could not be read, written or locked; every message names it.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the messages say what the fields are")]
+pub enum FileError {
+    /// The system refused a step.
+    #[error("{}: cannot {step}", path.display())]
+    System {
+        path: PathBuf,
+        /// What was being done, such as `read` or `make this folder`.
+        step: &'static str,
+        source: std::io::Error,
+    },
+    /// More bytes than the file may have.
+    #[error("{}: expected at most {max_bytes} bytes, found {}", path.display(), found.map_or("more".to_owned(), |found| found.to_string()))]
+    TooLarge {
+        path: PathBuf,
+        max_bytes: u64,
+        /// Its length, where that is known.
+        found: Option<u64>,
+    },
+    /// A folder in the place of a file.
+    #[error("{}: expected a {expected}, found a folder", path.display())]
+    Folder {
+        path: PathBuf,
+        /// What is done with it: `file`, or `file to write`.
+        expected: &'static str,
+    },
+    /// The output's path leads to an input.
+    #[error("{}: expected a name of its own for what is written, found an input of this command", path.display())]
+    Input { path: PathBuf },
+    /// A file of another kind has the output's name.
+    #[error("{}: expected a new name, or {written} to replace, found {found}", path.display())]
+    OtherKind {
+        path: PathBuf,
+        /// The kind of what was to be written.
+        written: String,
+        /// The kind of the file that is there.
+        found: String,
+    },
+    /// Another picture than a drawing of ours has the drawing's name.
+    #[error("{}: expected a new name, or an earlier drawing to replace, found another file", path.display())]
+    NoDrawing { path: PathBuf },
+    /// A drawing that could not be encoded.
+    #[error("{}: cannot encode the drawing", path.display())]
+    Png { path: PathBuf, source: png::EncodingError },
+    /// A picture that could not be encoded.
+    #[error("{}: cannot encode the picture", path.display())]
+    Picture { path: PathBuf, source: image::ImageError },
+    /// A file could not be written; its previous contents, if any, are untouched.
+    #[error("cannot write {}: {step} failed: {source}; nothing was changed", path.display())]
+    Write {
+        path: PathBuf,
+        /// What was being done: creating, writing, flushing or renaming.
+        step: &'static str,
+        source: std::io::Error,
+    },
+    /// The path names no file: it ends in `..`, is empty, or is a folder.
+    #[error("cannot write {}: expected the path of a file, found {found}", path.display())]
+    NotAFile {
+        path: PathBuf,
+        /// What the path is instead.
+        found: &'static str,
+    },
+    /// Another process writes the file.
+    #[error("{}: expected a file that nobody else writes, found one of {holder}", path.display())]
+    Held {
+        path: PathBuf,
+        /// The process, as it named itself.
+        holder: String,
+    },
+}
+
+impl FileError {
+    /// For `map_err`: the system's reason at a step with a file.
+    pub(crate) fn at(path: &std::path::Path, step: &'static str) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::System { path, step, source }
+    }
+}

@@ -1,0 +1,155 @@
+//! The files that this process has read, which what it writes replaces none of.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::atomic::write_atomically;
+use crate::error::{FileError, Result};
+use crate::folder::{check_folder_writable, folder_of};
+use crate::kind::check_replaces_its_kind;
+
+/// What this process has opened to read: [`write`] replaces none of it.
+static INPUTS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// The file and its length.
+pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
+    let file = File::open(path).map_err(FileError::at(path, "read"))?;
+    let metadata = file.metadata().map_err(FileError::at(path, "read"))?;
+    if metadata.is_dir() {
+        return Err(FileError::Folder { path: path.to_owned(), expected: "file" });
+    }
+    if let Ok(path) = path.canonicalize() {
+        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).insert(path);
+    }
+    Ok((file, metadata.len()))
+}
+
+/// Whether a file can be opened.
+///
+/// # Errors
+/// Its name and what the system says; a folder.
+pub fn check_readable(path: &Path) -> Result<()> {
+    open(path).map(drop)
+}
+
+/// Whether two paths lead to one file that is there, whatever links they go through.
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
+}
+
+/// Makes sure that no input of this process would be replaced, but for `own`.
+///
+/// # Errors
+/// A path that leads to one.
+fn check_is_no_input(path: &Path, own: Option<&Path>) -> Result<()> {
+    let is_input = |path: PathBuf| INPUTS.lock().unwrap_or_else(PoisonError::into_inner).contains(&path);
+    if !own.is_some_and(|own| is_same_file(path, own)) && path.canonicalize().is_ok_and(is_input) {
+        return Err(FileError::Input { path: path.to_owned() });
+    }
+    Ok(())
+}
+
+/// Makes sure that no input of this process is replaced by what it will write, before it writes the first.
+///
+/// # Errors
+/// A path that leads to one.
+pub fn check_are_no_inputs(paths: impl IntoIterator<Item = PathBuf>) -> Result<()> {
+    paths.into_iter().try_for_each(|path| check_is_no_input(&path, None))
+}
+
+/// Keeps [`write`] from replacing a file, or the files of a folder, that others than this crate read.
+pub fn keep(path: &Path) {
+    let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|entry| entry.path());
+    let kept = entries.chain([path.to_owned()]).filter_map(|path| path.canonicalize().ok());
+    INPUTS.lock().unwrap_or_else(PoisonError::into_inner).extend(kept);
+}
+
+/// Writes a file whole or not at all, and never over an input of this process, or over a file of another kind.
+///
+/// # Errors
+/// A path that leads to such a file; the system's reason.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    extend(path, None, bytes)
+}
+
+/// The same for a file that may be `own`, which this process read to keep what stands in it.
+///
+/// # Errors
+/// As [`write`].
+pub fn extend(path: &Path, own: Option<&Path>, bytes: &[u8]) -> Result<()> {
+    check_is_no_input(path, own)?;
+    check_replaces_its_kind(path, bytes)?;
+    write_atomically(path, bytes)
+}
+
+/// Makes sure, before minutes of work, that a file can be written at `path` later, and that it is no input.
+///
+/// # Errors
+/// A folder or an input at `path`; a folder that cannot be written.
+pub fn check_writable(path: &Path) -> Result<()> {
+    check_extendable(path, None)
+}
+
+/// The same of a file that may be `own`, as for [`extend`].
+///
+/// # Errors
+/// As [`check_writable`].
+pub fn check_extendable(path: &Path, own: Option<&Path>) -> Result<()> {
+    check_is_no_input(path, own)?;
+    if path.is_dir() {
+        return Err(FileError::Folder { path: path.to_owned(), expected: "file to write" });
+    }
+    check_folder_writable(folder_of(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bounded::read;
+    use image::RgbImage;
+
+    #[test]
+    fn a_folder_that_is_not_there_cannot_be_written() {
+        let error = check_writable(Path::new("/nowhere/at/all.sdg")).unwrap_err();
+        assert_eq!(error.to_string(), "/nowhere/at: cannot write into this folder");
+    }
+
+    #[test]
+    fn an_input_is_not_replaced_whatever_path_names_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let [photo, other] = ["photo.png", "other.png"].map(|name| folder.path().join(name));
+        fs::write(&photo, "photo").unwrap();
+        read(&photo, 10).unwrap();
+        let by_detour = folder.path().join(".").join("photo.png");
+        for path in [&photo, &by_detour] {
+            let error = write(path, b"drawing").unwrap_err().to_string();
+            assert!(error.contains("found an input of this command"), "{error}");
+            assert!(check_writable(path).is_err());
+        }
+        assert_eq!(fs::read(&photo).unwrap(), b"photo");
+        assert!(extend(&photo, Some(&other), b"more").is_err());
+        extend(&photo, Some(&by_detour), b"photo").unwrap();
+        write(&other, b"drawing").unwrap();
+        assert_eq!(fs::read(&other).unwrap(), b"drawing");
+    }
+
+    #[test]
+    fn a_file_is_replaced_by_its_own_kind_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let [photo, marks, camera] = ["photo.png", "photo.json", "camera.yaml"].map(|name| folder.path().join(name));
+        RgbImage::new(4, 3).save(&photo).unwrap();
+        fs::write(&marks, "{\"shapes\": []}").unwrap();
+        fs::write(&camera, "image_width: 4\n").unwrap();
+        for (path, found) in [(&photo, "found a picture (Png)"), (&marks, "found JSON"), (&camera, "found text")] {
+            let before = fs::read(path).unwrap();
+            let error = write(path, b"<svg/>").unwrap_err().to_string();
+            assert!(error.contains("or XML or HTML to replace") && error.contains(found), "{error}");
+            assert_eq!(fs::read(path).unwrap(), before);
+            write(path, &before).unwrap();
+        }
+        fs::write(&camera, "").unwrap();
+        write(&camera, b"<svg/>").unwrap();
+    }
+}

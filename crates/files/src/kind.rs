@@ -1,0 +1,40 @@
+//! The kind of a file, by its first bytes.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::error::{FileError, Result};
+
+/// The bytes that tell a picture's format.
+const MAX_SIGNATURE: u64 = 64;
+
+/// Makes sure that a file is replaced by one of its kind: no photo by a report, no marks by a camera.
+///
+/// # Errors
+/// A file of another kind.
+pub(crate) fn check_replaces_its_kind(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut start = Vec::new();
+    let _ = File::open(path).and_then(|file| file.take(MAX_SIGNATURE).read_to_end(&mut start));
+    let (found, written) = (kind_of(&start), kind_of(&bytes[..bytes.len().min(MAX_SIGNATURE as usize)]));
+    if found.is_some() && found != written {
+        let [found, written] = [found, written].map(Option::unwrap_or_default);
+        return Err(FileError::OtherKind { path: path.to_owned(), written, found });
+    }
+    Ok(())
+}
+
+/// The kind of a file by its first bytes, in words; `None` for an empty one.
+fn kind_of(start: &[u8]) -> Option<String> {
+    let first = start.iter().find(|byte| !byte.is_ascii_whitespace())?;
+    let kind = match (image::guess_format(start), first) {
+        (Ok(format), _) => return Some(format!("a picture ({format:?})")),
+        _ if start.starts_with(b"%PDF") => "a PDF",
+        _ if start.get(8) == Some(&b'{') && start[4..8] == [0; 4] => "a model",
+        (_, b'<') => "XML or HTML",
+        (_, b'{' | b'[') => "JSON",
+        _ if start.contains(&0) => "another file",
+        _ => "text",
+    };
+    Some(kind.to_owned())
+}

@@ -1,0 +1,45 @@
+//! Files on disk: read with a bound, written whole or not at all, locked between processes.
+//!
+//! ```text
+//! path ─ read (bounded, remembered as an input) ─ bytes
+//! bytes ─ write: no input, no file of another kind is replaced ─ write_atomically: temporary file, sync, rename ─ path
+//! path ─ Lock: alone or shared, until it is dropped; WriterLock: tells who writes a file
+//! ```
+//!
+//! Errors name the path and the system's reason. What is deliberately absent: what the bytes mean, options, and words for a user of
+//! one command.
+//!
+//! ```
+//! # fn main() -> Result<(), sdg_files::FileError> {
+//! # let folder = std::env::temp_dir().join(format!("sdg-files-example-{}", std::process::id()));
+//! sdg_files::prepare_folder(&folder)?;
+//! let path = folder.join("result.json");
+//! sdg_files::write(&path, b"{}")?;
+//! assert_eq!(sdg_files::read(&path, 100)?, b"{}");
+//! // It is an input now, and no output replaces it.
+//! assert!(sdg_files::write(&path, b"[]").is_err());
+//! # std::fs::remove_dir_all(&folder).ok();
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod atomic;
+mod bounded;
+mod drawing;
+mod error;
+mod folder;
+mod inputs;
+mod kind;
+mod lock;
+
+pub use atomic::{AtomicFile, write_atomically};
+pub use bounded::{read, read_bounded};
+pub use drawing::{write_drawing, write_png};
+pub use error::{FileError, Result};
+pub use folder::{entries, has_extension, prepare_folder};
+pub use inputs::{
+    check_are_no_inputs, check_extendable, check_readable, check_writable, extend, is_same_file, keep, write,
+};
+pub use lock::{Access, Lock, WriterLock};

@@ -1,0 +1,149 @@
+//! Locks between processes. The system gives a lock back when its process ends, however it ends.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{FileError, Result};
+
+/// Who else may hold a lock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Access {
+    /// Nobody.
+    Alone,
+    /// All who ask for the same.
+    Shared,
+}
+
+/// The lock of a file, held until it is dropped. A file system without locks gives it to everyone, so that it does not keep anyone
+/// from working alone.
+#[derive(Debug)]
+pub struct Lock(#[allow(dead_code, reason = "the system keeps the lock as long as the file is open")] File);
+
+impl Lock {
+    /// Takes the lock of the file at `path`, which is made if it is missing; `None` where another process holds it.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn take(path: &Path, access: Access) -> Result<Option<Self>> {
+        let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path);
+        let (file, is_taken) = try_lock(file.map_err(FileError::at(path, "write"))?, access);
+        Ok(is_taken.then_some(Self(file)))
+    }
+
+    /// Whether nobody holds the lock of a file; not so where there is no such file, or no locks.
+    pub fn is_free(path: &Path) -> bool {
+        File::open(path).is_ok_and(|file| file.try_lock_shared().is_ok())
+    }
+}
+
+/// The file, and whether its lock was taken.
+fn try_lock(file: File, access: Access) -> (File, bool) {
+    let locked = match access {
+        Access::Alone => file.try_lock(),
+        Access::Shared => file.try_lock_shared(),
+    };
+    (file, !matches!(locked, Err(TryLockError::WouldBlock)))
+}
+
+/// The lock of who writes a file, in a hidden file beside it that says who that is. The hidden file is removed in the end; where it
+/// stays, the next holder takes it over.
+#[derive(Debug)]
+pub struct WriterLock {
+    path: PathBuf,
+    _lock: Lock,
+}
+
+impl WriterLock {
+    /// Takes the lock for a file that will be written; `None` where nothing can be written.
+    ///
+    /// # Errors
+    /// [`FileError::Held`] where another process holds it.
+    pub fn take(written: &Path) -> Result<Option<Self>> {
+        let name = written.file_name().unwrap_or_default().to_string_lossy();
+        let path = written.with_file_name(format!(".{name}.lock"));
+        loop {
+            let file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&path);
+            let Ok(file) = file else { return Ok(None) };
+            let (mut file, is_taken) = try_lock(file, Access::Alone);
+            if !is_taken {
+                let mut holder = String::new();
+                // It may hold it since a moment ago alone, without its name.
+                let _ = file.read_to_string(&mut holder);
+                let holder = if holder.is_empty() { "process unknown" } else { holder.trim() }.to_owned();
+                return Err(FileError::Held { path: written.to_owned(), holder });
+            }
+            // The holder before may have removed the file after it was opened here.
+            if is_at(&file, &path) {
+                let named = file
+                    .set_len(0)
+                    .and_then(|()| file.rewind())
+                    .and_then(|()| writeln!(file, "process {}", std::process::id()));
+                named.map_err(FileError::at(&path, "write"))?;
+                return Ok(Some(Self { path, _lock: Lock(file) }));
+            }
+        }
+    }
+}
+
+impl Drop for WriterLock {
+    fn drop(&mut self) {
+        // What stays is taken over.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+    matches!((file.metadata(), fs::metadata(path)), (Ok(file), Ok(path)) if id(file.clone()) == id(path.clone()))
+}
+
+/// Elsewhere an open file is not removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lock_is_held_alone_or_shared() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        assert!(!Lock::is_free(&path));
+        let shared = [1, 2].map(|_| Lock::take(&path, Access::Shared).unwrap().unwrap());
+        assert!(Lock::take(&path, Access::Alone).unwrap().is_none());
+        drop(shared);
+        assert!(Lock::is_free(&path));
+        let alone = Lock::take(&path, Access::Alone).unwrap();
+        assert!(!Lock::is_free(&path) && Lock::take(&path, Access::Shared).unwrap().is_none());
+        drop(alone);
+        assert!(Lock::take(&path, Access::Alone).unwrap().is_some());
+        let error = Lock::take(&folder.path().join("no/folder"), Access::Alone).unwrap_err().to_string();
+        assert!(error.ends_with("no/folder: cannot write"), "{error}");
+    }
+
+    #[test]
+    fn one_writer_at_a_time_and_one_that_died_is_taken_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let marks = folder.path().join("part.json");
+        let file = folder.path().join(".part.json.lock");
+        let held = WriterLock::take(&marks).unwrap();
+        let error = WriterLock::take(&marks).err().unwrap();
+        let process = format!("process {}", std::process::id());
+        assert!(matches!(&error, FileError::Held { path, holder } if *path == marks && *holder == process), "{error}");
+        assert!(WriterLock::take(&folder.path().join("other.json")).unwrap().is_some());
+        assert!(WriterLock::take(&folder.path().join("no/folder.json")).unwrap().is_none());
+        drop(held);
+        assert!(!file.exists());
+        // Of a process that ended without removing it.
+        fs::write(&file, "process 1\n").unwrap();
+        let taken = WriterLock::take(&marks).unwrap();
+        assert_eq!(fs::read_to_string(&file).unwrap(), format!("{process}\n"));
+        drop(taken);
+    }
+}

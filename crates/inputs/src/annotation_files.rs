@@ -1,0 +1,210 @@
+//! Annotation files on disk: some formats keep labels in a second file.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use image::RgbImage;
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, WrittenAnnotation};
+
+use crate::marks_check::MarkedPhoto;
+
+/// Larger annotations than any tool writes, embedded image included.
+pub const MAX_ANNOTATION_BYTES: u64 = 512 << 20;
+/// What a YOLO dataset calls the file of its labels.
+pub const DATA_YAML: &str = "data.yaml";
+/// What else people call it; looked for after the former in each folder.
+const OTHER_DATA_YAML: [&str; 3] = ["data.yml", "dataset.yaml", "dataset.yml"];
+/// How many folders above a label file its data.yaml may stand: labels/train/a.txt.
+const FOLDERS_UP: usize = 3;
+
+/// An annotation file that was read, with what stands beside it.
+pub struct AnnotationFile {
+    /// The format by the content.
+    pub format: AnnotationFormat,
+    path: PathBuf,
+    bytes: Vec<u8>,
+    beside: Option<(PathBuf, Vec<u8>)>,
+}
+
+impl AnnotationFile {
+    /// Reads a file of any format.
+    ///
+    /// # Errors
+    /// Files that cannot be read, and content of no known format.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = sdg_files::read(path, MAX_ANNOTATION_BYTES)?;
+        let format = AnnotationFormat::of(&bytes).with_context(|| path.display().to_string())?;
+        let beside = match beside(path, format) {
+            Some(beside) => {
+                let bytes = sdg_files::read(&beside, MAX_ANNOTATION_BYTES)?;
+                Some((beside, bytes))
+            }
+            None => None,
+        };
+        Ok(Self { format, path: path.to_owned(), bytes, beside })
+    }
+
+    /// What is marked on one image.
+    ///
+    /// # Errors
+    /// Whatever [`Annotation::read_with`] refuses.
+    pub fn objects(&self, image: &ImageFacts) -> Result<Vec<Annotation>> {
+        let beside = self.beside.as_ref().map(|(_, bytes)| bytes.as_slice());
+        Annotation::read_with(&self.bytes, beside, image).with_context(|| match &self.beside {
+            Some((beside, _)) => format!("{} with {}", self.path.display(), beside.display()),
+            None => self.path.display().to_string(),
+        })
+    }
+
+    /// The marks on a photo, read upright and checked against its pixels, with a notice of marks of other things.
+    ///
+    /// # Errors
+    /// Those of [`Self::objects`] and of [`MarkedPhoto::checked`].
+    pub fn objects_on(&self, photo: &Path, image: &RgbImage) -> Result<Vec<Annotation>> {
+        let path = std::path::absolute(photo).unwrap_or_else(|_| photo.to_owned());
+        let marked = MarkedPhoto { photo, image, marks: &self.path, bytes: &self.bytes, file_name: path.to_str() };
+        let objects = marked.checked(|facts| self.objects(facts))?;
+        objects.iter().try_for_each(Annotation::check).with_context(|| self.path.display().to_string())?;
+        // After all that may fail, which is told in one line.
+        self.tell_passed_over();
+        Ok(objects)
+    }
+
+    /// Prints the file's entries that mark no part.
+    pub fn tell_passed_over(&self) {
+        for foreign in Annotation::passed_over(&self.bytes) {
+            eprintln!("{}: passed over {foreign}", self.path.display());
+        }
+    }
+
+    /// The content of the file itself.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+/// The marks that stand beside a photo: `photo.coco.json` (what `sdg annotate` writes where another tool's photo.json is to stay),
+/// `photo.json` (what it writes otherwise, or LabelMe), `photo.txt` (YOLO-pose), or the same below `labels` where a YOLO dataset keeps its pictures below `images`.
+///
+/// # Errors
+/// None of them is there; the message says which were looked for, and what makes one.
+pub fn beside_photo(photo: &Path) -> Result<PathBuf> {
+    let in_labels = || {
+        let folder = photo.parent()?;
+        let mut parts: Vec<_> = folder.components().map(|part| part.as_os_str()).collect();
+        let images = parts.iter().rposition(|part| *part == "images")?;
+        parts[images] = "labels".as_ref();
+        let folder: PathBuf = parts.into_iter().collect();
+        Some(folder.join(photo.with_extension("txt").file_name()?))
+    };
+    let looked_for: Vec<PathBuf> = ["coco.json", "json", "txt"]
+        .map(|extension| photo.with_extension(extension))
+        .into_iter()
+        .chain(in_labels())
+        .collect();
+    match looked_for.iter().find(|path| path.is_file()) {
+        Some(found) => Ok(found.clone()),
+        None => {
+            let listed: Vec<String> = looked_for.iter().map(|path| path.display().to_string()).collect();
+            bail!(
+                "{0}: expected its marks beside it (.json: COCO or LabelMe; .txt: YOLO-pose), found none of {1}; `sdg annotate \
+                 {0}` makes them, IMAGE:ANNOTATION names another file",
+                photo.display(),
+                listed.join(", ")
+            )
+        }
+    }
+}
+
+/// The file that belongs to `path`, if it is there.
+fn beside(path: &Path, format: AnnotationFormat) -> Option<PathBuf> {
+    match format {
+        AnnotationFormat::OpenDr => {
+            let name = path.file_name()?.to_str()?;
+            let other = match (name.strip_prefix("boxes"), name.strip_prefix("kps")) {
+                (Some(rest), _) => format!("kps{rest}"),
+                (_, Some(rest)) => format!("boxes{rest}"),
+                _ => return None,
+            };
+            Some(path.with_file_name(other)).filter(|other| other.exists())
+        }
+        AnnotationFormat::YoloPose => {
+            let names = || std::iter::once(DATA_YAML).chain(OTHER_DATA_YAML);
+            let folders = path.ancestors().skip(1).take(FOLDERS_UP);
+            folders.flat_map(|folder| names().map(|name| folder.join(name))).find(|file| file.exists())
+        }
+        _ => None,
+    }
+}
+
+/// Writes the labels beside the output; their file. A data.yaml that is there already stays as it is.
+///
+/// # Errors
+/// One that is there and says otherwise; files that cannot be read or written.
+pub fn write_data_yaml(
+    output: &Path,
+    written: &WrittenAnnotation,
+    image: &ImageFacts,
+    objects: &[Annotation],
+) -> Result<Option<PathBuf>> {
+    let Some(text) = &written.data_yaml else { return Ok(None) };
+    let path = output.with_file_name(DATA_YAML);
+    if !path.exists() {
+        sdg_files::write(&path, text.as_bytes())?;
+        return Ok(Some(path));
+    }
+    let there = sdg_files::read(&path, MAX_ANNOTATION_BYTES)?;
+    let read = Annotation::read_with(written.text.as_bytes(), Some(&there), image)
+        .with_context(|| path.display().to_string())?;
+    for (found, expected) in read.iter().zip(objects) {
+        if found.label != expected.label {
+            bail!(
+                "{}: expected its first classes to be named as in this annotation (`{}`), found `{}`: \
+                 write into another folder",
+                path.display(),
+                expected.label,
+                found.label
+            );
+        }
+    }
+    Ok(Some(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn marks_stand_beside_their_photo() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("images/train")).unwrap();
+        fs::create_dir_all(at("labels/train")).unwrap();
+        let none = beside_photo(&at("images/train/a.jpg")).unwrap_err().to_string();
+        for looked_for in ["images/train/a.json", "images/train/a.txt", "labels/train/a.txt", "sdg annotate"] {
+            assert!(none.contains(looked_for), "{none}");
+        }
+        // From the least to the most preferred, so that each is found although the former ones are there.
+        for name in ["labels/train/a.txt", "images/train/a.txt", "images/train/a.json", "images/train/a.coco.json"] {
+            fs::write(at(name), "").unwrap();
+            assert_eq!(beside_photo(&at("images/train/a.jpg")).unwrap(), at(name));
+        }
+    }
+
+    #[test]
+    fn what_stands_beside_is_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir_all(at("labels/train")).unwrap();
+        for name in ["boxes_train.npy", "kps_train.npy", "boxes_val.npy", DATA_YAML, "labels/train/a.txt"] {
+            fs::write(at(name), "").unwrap();
+        }
+        let found = |name: &str, format| beside(&at(name), format);
+        assert_eq!(found("boxes_train.npy", AnnotationFormat::OpenDr), Some(at("kps_train.npy")));
+        assert_eq!(found("kps_train.npy", AnnotationFormat::OpenDr), Some(at("boxes_train.npy")));
+        assert_eq!(found("boxes_val.npy", AnnotationFormat::OpenDr), None);
+        assert_eq!(found("labels/train/a.txt", AnnotationFormat::YoloPose), Some(at(DATA_YAML)));
+        assert_eq!(found("labels/train/a.json", AnnotationFormat::Coco), None);
+    }
+}

@@ -1,0 +1,129 @@
+//! Files of calibrated cameras over a table.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use image::RgbImage;
+use sdg_calibration::CalibratedCamera;
+use sdg_cell::{CellError, Perception, PlacedCamera};
+use sdg_demonstration::Demonstration;
+use sdg_geometry::PinholeCamera;
+use sdg_grasp::{CameraOverTable, GraspError, GraspModel, Lengths, pictures_from_above, seen_from_above};
+use sdg_robot::workcell::Workcell;
+
+/// Larger camera files than any tool writes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// A camera's file, read.
+#[derive(Debug, Clone)]
+pub struct CameraFile {
+    camera: CalibratedCamera,
+    /// Where the camera is.
+    pub over_table: CameraOverTable,
+}
+
+impl CameraFile {
+    /// Reads the intrinsics of a file, with or without the camera's pose.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_intrinsics(path: &Path) -> Result<PinholeCamera> {
+        Ok(read(path)?.0.intrinsics)
+    }
+
+    /// Reads a file that has the camera's pose.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has no pose.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (camera, _) = read(path)?;
+        let (posed, table) = camera.posed().with_context(|| path.display().to_string())?;
+        let over_table = CameraOverTable { camera: posed, table_height_m: table.height_m, workspace: table.workspace };
+        Ok(Self { over_table, camera })
+    }
+
+    /// A model that looks through it.
+    ///
+    /// # Errors
+    /// A model that was taught without a camera; a camera that does not see the plane of the marks.
+    pub fn perception(&self, model: GraspModel) -> Result<Perception> {
+        Ok(Perception::calibrated(model, &self.camera)?)
+    }
+
+    /// Width and height of its pictures.
+    pub fn size_px(&self) -> [u32; 2] {
+        [self.camera.intrinsics.width, self.camera.intrinsics.height]
+    }
+
+    /// Whether a picture can be this camera's.
+    ///
+    /// # Errors
+    /// A picture of another size.
+    pub fn check_picture(&self, picture: &RgbImage) -> Result<()> {
+        self.check_size(picture.dimensions())
+    }
+
+    /// The same by its width and height.
+    ///
+    /// # Errors
+    /// Another size.
+    pub fn check_size(&self, size: (u32, u32)) -> Result<()> {
+        Ok(self.camera.check_picture(size)?)
+    }
+
+    /// Photos of this camera and their marks in the plan view of the marks' plane; heights over the table in metres.
+    ///
+    /// # Errors
+    /// A photo of another size, and marks outside what the camera sees of the plane.
+    pub fn seen_from_above(
+        &self,
+        photos: &[Demonstration],
+        mark_height_m: f64,
+        grasp_height_m: f64,
+    ) -> Result<(Vec<Demonstration>, Lengths)> {
+        photos.iter().try_for_each(|photo| self.check_picture(&photo.image))?;
+        Ok(seen_from_above(photos, &self.over_table, mark_height_m, grasp_height_m)?)
+    }
+
+    /// Pictures of this camera without the part in the same plan view.
+    ///
+    /// # Errors
+    /// A picture of another size than the camera's.
+    pub fn pictures_from_above(&self, pictures: &[RgbImage], lengths: &Lengths) -> Result<Vec<RgbImage>> {
+        pictures.iter().try_for_each(|picture| self.check_picture(picture))?;
+        Ok(pictures_from_above(pictures, &self.over_table, lengths)?)
+    }
+}
+
+/// Puts the model of a file behind the camera of a file, if one is given.
+///
+/// # Errors
+/// A camera file that cannot be used, or that does not see the plane of the marks, with its name; a model that was taught without a
+/// camera, with its file's name.
+pub fn perception(model: GraspModel, model_file: &Path, camera: Option<&Path>) -> Result<Perception> {
+    let Some(path) = camera else { return Ok(Perception::of_any_camera(model)) };
+    CameraFile::read(path)?.perception(model).map_err(|error| {
+        // A plane that is not seen is the camera's fault.
+        let is_of_camera = matches!(error.downcast_ref(), Some(CellError::Grasp(GraspError::PlanView(_))));
+        let file = if is_of_camera { path } else { model_file };
+        error.context(file.display().to_string())
+    })
+}
+
+/// The camera of a file where the workcell mounts it.
+///
+/// # Errors
+/// A file without the pose that the mounting needs.
+pub fn placed(camera: &CalibratedCamera, workcell: &Workcell, path: &Path) -> Result<PlacedCamera> {
+    PlacedCamera::new(camera, workcell.mounting, workcell.table_height_m).with_context(|| path.display().to_string())
+}
+
+/// Reads a camera's file, with or without the camera's pose: the camera, and the text for whom writes it again.
+pub fn read(path: &Path) -> Result<(CalibratedCamera, String)> {
+    let bytes = sdg_files::read(path, MAX_BYTES)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        bail!("{}: expected YAML, found bytes that are no text", path.display());
+    };
+    let camera = CalibratedCamera::from_yaml(&text).with_context(|| path.display().to_string())?;
+    Ok((camera, text))
+}

@@ -1,0 +1,78 @@
+//! Checkpoints as detectors: which one a file is for, and whether it gives what the original gave.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use image::RgbImage;
+use sdg_detection::RcnnConfig;
+use sdg_detection::golden::{self, GoldenReport};
+use sdg_grasp::Device;
+use sdg_layers::state_dict::{self, StateDict, WeightTensor};
+use sdg_weights_conversion::{Checkpoint, Conversion, Naming, naming_of};
+
+use crate::base_weights::open;
+use crate::detector_config::{architecture_of, preset, preset_for};
+
+/// The detector that a checkpoint is for: as configured, as the file itself says, or as its names say.
+///
+/// # Errors
+/// Names of no program that is known, or that fit no preset; [`ConfigError`](crate::ConfigError) where a configuration would help.
+pub fn config_of(checkpoint: &Checkpoint, config: Option<RcnnConfig>, preset_name: Option<&str>) -> Result<RcnnConfig> {
+    if let Some(config) = config {
+        return Ok(config);
+    }
+    let naming = naming_of(checkpoint)?;
+    let stored = checkpoint.metadata.get("network").filter(|_| naming == Naming::Ours && preset_name.is_none());
+    match (stored, preset_name) {
+        (Some(network), _) => RcnnConfig::from_json(network).context("metadata \"network\""),
+        (None, Some(name)) => preset(name, checkpoint),
+        (None, None) => preset(preset_for(naming)?, checkpoint),
+    }
+}
+
+/// Builds the detector of a checkpoint, fills it, and compares it stage by stage with outputs of the original for an image.
+///
+/// # Errors
+/// Files that cannot be read, a checkpoint that does not fill the detector, outputs of other shapes.
+pub fn verify_checkpoint(
+    file: &Path,
+    config: Option<RcnnConfig>,
+    image: &RgbImage,
+    against: &Path,
+    device: &Device,
+) -> Result<GoldenReport> {
+    let named = || file.display().to_string();
+    let (mut source, checkpoint) = open(file)?;
+    let config = config_of(&checkpoint, config, None).with_context(named)?.without_sampling();
+    let reference = read_reference(against)?;
+    let conversion = Conversion::plan(&checkpoint, &architecture_of(&config), &[]).with_context(named)?;
+    let weights: StateDict = conversion
+        .values(&mut source)
+        .with_context(named)?
+        .into_iter()
+        .map(|(name, (shape, values))| (name, WeightTensor { shape, values }))
+        .collect();
+    let (detector, imported) = state_dict::import(config.init(&device.clone().autodiff(), 0)?, &weights);
+    if !imported.is_complete() {
+        bail!("{}: expected a tensor for every parameter, found {} missing", named(), imported.missing.len());
+    }
+    golden::verify(&detector, image, &reference).with_context(|| against.display().to_string())
+}
+
+/// The original's outputs; gradients keep the names of the program that made them.
+fn read_reference(path: &Path) -> Result<StateDict> {
+    const GRADIENTS: &str = "gradients.";
+    let (mut source, outputs) = open(path)?;
+    let parameters = outputs.tensors.keys().filter_map(|name| name.strip_prefix(GRADIENTS));
+    let naming = Naming::detect(parameters).unwrap_or(Naming::Ours);
+    let mut reference = StateDict::new();
+    for (name, tensor) in &outputs.tensors {
+        let ours = match name.strip_prefix(GRADIENTS) {
+            Some(parameter) => naming.our_name(parameter).map(|ours| format!("{GRADIENTS}{ours}")),
+            None => Some(name.clone()),
+        };
+        let values = tensor.numbers(&mut source).with_context(|| path.display().to_string())?;
+        reference.insert(ours.unwrap_or_else(|| name.clone()), WeightTensor { shape: tensor.shape().to_vec(), values });
+    }
+    Ok(reference)
+}

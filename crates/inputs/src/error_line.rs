@@ -1,0 +1,30 @@
+//! An error of several causes as one line.
+
+/// The error and its causes on one line, each cause once: messages often quote the cause that they carry.
+pub fn one_line(error: &anyhow::Error) -> String {
+    let mut line = String::new();
+    for cause in error.chain() {
+        let text = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        if line.is_empty() {
+            line = text;
+        } else if !line.contains(&text) {
+            line = format!("{line}: {text}");
+        }
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+    use std::io;
+
+    #[test]
+    fn causes_follow_each_other_once() {
+        let cause: anyhow::Result<()> = Err(io::Error::other("disk\nfull")).context("model.sdg: cannot write");
+        assert_eq!(one_line(&cause.unwrap_err()), "model.sdg: cannot write: disk full");
+        let quoted: anyhow::Result<()> = Err(io::Error::other("full")).context("cannot write: full");
+        assert_eq!(one_line(&quoted.unwrap_err()), "cannot write: full");
+    }
+}

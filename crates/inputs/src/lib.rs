@@ -1,0 +1,53 @@
+//! A user's files as values: photos with their marks, cameras, workcells, models, weights to start from.
+//!
+//! ```text
+//! photo, marks (COCO, LabelMe, YOLO-pose, OpenDR) ─ AnnotationFile ─ MarkedPhoto: are they this photo's? ─ Demonstration
+//! camera.yaml ─ CameraFile ─ Perception, plan views of photos     TeachingFiles: all that a model is taught from
+//! model.sdg ─ GraspModel          checkpoint of any format ─ BaseWeights
+//! ```
+//!
+//! Every error names the file. What is deliberately absent: arguments of commands, and what is written.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use sdg_inputs::annotation_files::beside_photo;
+//! use sdg_inputs::demonstrations::read_pair;
+//!
+//! # fn main() -> anyhow::Result<()> {
+//! let photo = Path::new("part.png");
+//! let demonstration = read_pair(photo, &beside_photo(photo)?)?;
+//! println!("{}", demonstration.annotation.label);
+//! # Ok(())
+//! # }
+//! ```
+#![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "the functions have docs; fields are named for what they are")]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod annotation_files;
+pub mod base_weights;
+pub mod camera_files;
+pub mod checkpoints;
+pub mod demonstrations;
+pub mod detector_config;
+mod error;
+mod error_line;
+pub mod marks_check;
+mod models;
+mod picture_inputs;
+mod pictures;
+mod teaching_files;
+mod workcell_files;
+
+pub use annotation_files::MAX_ANNOTATION_BYTES;
+pub use error::ConfigError;
+pub use error_line::one_line;
+pub use models::{check_replaces_a_model, read_model};
+pub use picture_inputs::{PictureInput, PictureInputs, STANDARD_INPUT, pictures_of_argument};
+pub use pictures::{
+    UNREADABLE_EXTENSIONS, check_is_not_turned, read_image, read_image_in, read_sensor_pixels_if_turned,
+    read_standard_input_image,
+};
+pub use teaching_files::TeachingFiles;
+pub use workcell_files::read_workcell;

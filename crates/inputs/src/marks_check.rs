@@ -1,0 +1,155 @@
+//! Whether marks are those of the photo that they are read for: as it is shown, in its pixels, of no other picture.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail};
+use image::RgbImage;
+use sdg_demonstration::{Annotation, AnnotationFormat, ImageFacts, marks_fit, other_reading};
+
+use crate::pictures;
+
+/// Marks that fit one of two pictures so much better were made on it. Chosen by hand.
+const MIN_GAIN: f64 = 1.25;
+/// Two files of one picture agree by more where the marks are, as the correlation of their grey values: one of them may be a strongly
+/// compressed JPEG, a copy without colours or a darker one. Chosen by hand.
+const MIN_CORRELATION: f64 = 0.9;
+
+/// A photo, upright, and the files that it and its marks stand in.
+pub struct MarkedPhoto<'a> {
+    pub photo: &'a Path,
+    pub image: &'a RgbImage,
+    /// The marks' file.
+    pub marks: &'a Path,
+    /// Its content.
+    pub bytes: &'a [u8],
+    /// The photo's name in it.
+    pub file_name: Option<&'a str>,
+}
+
+impl MarkedPhoto<'_> {
+    /// The marks that `read` gives for the photo as viewers show it; several, or none where the part is not there.
+    ///
+    /// # Errors
+    /// Those of `read`; marks that fit the pixels as they are stored at least as well.
+    pub fn upright<T>(
+        &self,
+        read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
+        annotation: impl Fn(&T) -> &Annotation,
+    ) -> Result<Vec<T>> {
+        let (marked, is_turned) = self.read_upright(read, annotation)?;
+        self.tell_if(is_turned);
+        Ok(marked)
+    }
+
+    /// Says that an orientation was heeded, after all that may fail.
+    fn tell_if(&self, is_turned: bool) {
+        if is_turned {
+            eprintln!(
+                "{}: turned as its Exif orientation says; the marks are read on the turned photo",
+                self.photo.display()
+            );
+        }
+    }
+
+    /// The marks, and whether an orientation turns the photo.
+    fn read_upright<T>(
+        &self,
+        read: impl Fn(&ImageFacts) -> Result<Vec<T>>,
+        annotation: impl Fn(&T) -> &Annotation,
+    ) -> Result<(Vec<T>, bool)> {
+        let read_on = |image: &RgbImage| {
+            read(&ImageFacts { width: image.width(), height: image.height(), file_name: self.file_name })
+        };
+        let fit =
+            |image: &RgbImage, marked: &[T]| marked.iter().map(|one| marks_fit(image, annotation(one))).sum::<f64>();
+        let marked = read_on(self.image);
+        let mut is_turned = false;
+        if let Some(sensor) = pictures::read_sensor_pixels_if_turned(self.photo)? {
+            let of_sensor = read_on(&sensor).unwrap_or_default();
+            let as_shown = marked.as_ref().map_or(0.0, |marked| fit(self.image, marked));
+            let as_stored = fit(&sensor, &of_sensor);
+            let has_marks = !of_sensor.is_empty() || marked.as_ref().is_ok_and(|marked| !marked.is_empty());
+            // Marks that fit neither have another fault, which is told behind this.
+            if as_stored > 0.0 && as_shown <= MIN_GAIN * as_stored {
+                let as_well = if as_stored > MIN_GAIN * as_shown { "" } else { " just as well" };
+                bail!(
+                    "{}: expected marks on the photo as viewers show it, found marks that fit its pixels as they are \
+                     stored{as_well}: an Exif orientation turns {}, which tools of marks may ignore; save the photo upright \
+                     without the tag and mark it anew",
+                    self.marks.display(),
+                    self.photo.display()
+                );
+            }
+            is_turned = has_marks;
+        }
+        Ok((marked?, is_turned))
+    }
+
+    /// The same of a demonstration, whose part is seen well.
+    ///
+    /// # Errors
+    /// Those of [`Self::upright`]; marks that fit in another reading, or that name another picture which is there.
+    pub fn checked(&self, read: impl Fn(&ImageFacts) -> Result<Vec<Annotation>>) -> Result<Vec<Annotation>> {
+        let (marked, is_turned) = self.read_upright(read, |annotation| annotation)?;
+        let annotations: Vec<&Annotation> = marked.iter().collect();
+        if let Some(other) = self.other_picture(&annotations) {
+            bail!("{}: {other}", self.marks.display());
+        }
+        // Marks without a grasp are not taught from, and the missing points are named.
+        let grasps: Vec<&Annotation> = annotations.into_iter().filter(|one| one.grasp.is_some()).collect();
+        if let Some(reading) = other_reading(self.image, &grasps) {
+            bail!(
+                "{}: expected marks in pixels of {}, found marks that {}",
+                self.marks.display(),
+                self.photo.display(),
+                reading.in_words()
+            );
+        }
+        self.tell_if(is_turned);
+        Ok(marked)
+    }
+
+    /// The error where the file names another picture that exists and that its marks fit as well.
+    fn other_picture(&self, marked: &[&Annotation]) -> Option<String> {
+        let (field, name) = AnnotationFormat::named_picture(self.bytes)?;
+        let base_name = name.rsplit(['/', '\\']).next().filter(|name| !name.is_empty())?;
+        let beside = |file: &Path| file.parent().map(|folder| folder.join(base_name));
+        let relative = self.marks.parent().map(|folder| folder.join(&name));
+        let places: [Option<PathBuf>; 3] = [relative, beside(self.marks), beside(self.photo)];
+        let places: Vec<PathBuf> = places.into_iter().flatten().filter(|path| path.is_file()).collect();
+        if places.is_empty() || places.iter().any(|path| sdg_files::is_same_file(path, self.photo)) {
+            return None;
+        }
+        let other = places.iter().find_map(|path| pictures::read_image(path).ok())?;
+        if other.dimensions() != self.image.dimensions() || self.is_same_picture(&other, marked) {
+            return None;
+        }
+        let fit = |image: &RgbImage| marked.iter().map(|one| marks_fit(image, one)).sum::<f64>();
+        (fit(self.image) <= MIN_GAIN * fit(&other)).then(|| {
+            format!(
+                "{field}: expected {} or a name that is no other picture\'s, found `{base_name}`, another picture that is \
+                 there and that the marks fit as well",
+                self.photo.display()
+            )
+        })
+    }
+
+    fn is_same_picture(&self, other: &RgbImage, marked: &[&Annotation]) -> bool {
+        let grey = |image: &RgbImage, x, y| image.get_pixel(x, y).0.iter().map(|value| f64::from(*value)).sum::<f64>();
+        let mut pairs = Vec::new();
+        for bbox in marked.iter().map(|one| one.bbox) {
+            let columns = bbox.x1.max(0.0) as u32..(bbox.x2.max(0.0) as u32).min(other.width());
+            for y in bbox.y1.max(0.0) as u32..(bbox.y2.max(0.0) as u32).min(other.height()) {
+                pairs.extend(columns.clone().map(|x| [grey(self.image, x, y), grey(other, x, y)]));
+            }
+        }
+        let count = pairs.len().max(1) as f64;
+        let [mean, other_mean] = [0, 1].map(|k| pairs.iter().map(|pair| pair[k]).sum::<f64>() / count);
+        let product = |a: usize, b: usize| {
+            let means = [mean, other_mean];
+            pairs.iter().map(|pair| (pair[a] - means[a]) * (pair[b] - means[b])).sum::<f64>()
+        };
+        // Of one colour both are the same for these marks.
+        product(0, 1) >= MIN_CORRELATION * (product(0, 0) * product(1, 1)).sqrt()
+    }
+}

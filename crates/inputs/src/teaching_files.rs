@@ -1,0 +1,51 @@
+//! The files that a model is taught from.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use sdg_demonstration::{Demonstration, PixelFrame};
+use sdg_grasp::TeachOptions;
+
+use crate::camera_files::CameraFile;
+use crate::demonstrations::read_pair;
+use crate::pictures::{check_is_not_turned, read_image_in};
+
+/// Photos with their marks, and what else there is.
+#[derive(Debug, Clone, Copy)]
+pub struct TeachingFiles<'a> {
+    /// Photo and marks of each demonstration.
+    pub demonstrations: &'a [(PathBuf, PathBuf)],
+    /// Pictures without the part.
+    pub negatives: &'a [PathBuf],
+    /// The calibrated camera that took them all, and the heights over the table of the marks and of the grasp, in metres.
+    pub camera: Option<(&'a Path, [f64; 2])>,
+}
+
+impl TeachingFiles<'_> {
+    /// The demonstrations, in the plan view of the marks' plane where there is a camera; pictures without the part and the lengths
+    /// go into the options.
+    ///
+    /// # Errors
+    /// Files that cannot be read; with a camera, photos that an Exif orientation turns, that are of another size, or whose marks
+    /// the camera does not see.
+    pub fn read(&self, options: &mut TeachOptions) -> Result<Vec<Demonstration>> {
+        let mut pixel_frame = PixelFrame::Upright;
+        if self.camera.is_some() {
+            self.demonstrations.iter().try_for_each(|(photo, _)| check_is_not_turned(photo))?;
+            pixel_frame = PixelFrame::Sensor;
+        }
+        let read = self.demonstrations.iter().map(|(photo, marks)| read_pair(photo, marks));
+        let demonstrations = read.collect::<Result<Vec<_>>>()?;
+        options.negatives =
+            self.negatives.iter().map(|path| read_image_in(path, pixel_frame)).collect::<Result<_>>()?;
+        let Some((path, [mark_height_m, grasp_height_m])) = self.camera else { return Ok(demonstrations) };
+        let camera = CameraFile::read(path)?;
+        for (demonstration, (photo, _)) in demonstrations.iter().zip(self.demonstrations) {
+            camera.check_picture(&demonstration.image).with_context(|| photo.display().to_string())?;
+        }
+        let (seen, lengths) = camera.seen_from_above(&demonstrations, mark_height_m, grasp_height_m)?;
+        options.negatives = camera.pictures_from_above(&options.negatives, &lengths)?;
+        options.lengths = Some(lengths);
+        Ok(seen)
+    }
+}

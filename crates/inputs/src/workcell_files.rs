@@ -1,0 +1,23 @@
+//! Workcells on disk.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use sdg_robot::workcell::Workcell;
+
+/// Larger workcell files than any person writes.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Reads a workcell's file; the camera's file is found beside it.
+///
+/// # Errors
+/// A file that cannot be read, with the line.
+pub fn read_workcell(path: &Path) -> Result<(Workcell, Option<PathBuf>)> {
+    let Ok(text) = String::from_utf8(sdg_files::read(path, MAX_BYTES)?) else {
+        bail!("{}: expected TOML, found bytes that are no text", path.display());
+    };
+    let workcell = Workcell::from_toml(&text).with_context(|| path.display().to_string())?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let camera_file = workcell.camera_file.as_ref().map(|file| folder.join(file));
+    Ok((workcell, camera_file))
+}

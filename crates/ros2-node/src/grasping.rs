@@ -1,0 +1,227 @@
+//! `~/grasp`: the grasp sequence with an arm behind ROS 2, in a thread.
+
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
+
+use anyhow::{Context, Result};
+use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
+use sdg_grasp::{GraspError, GraspModel};
+use sdg_robot::workcell::Workcell;
+use sdg_robot::{
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, Pace, PartFinder, PlannedArm, Robot, RobotError,
+    StepObserver, StopReason, Watch,
+};
+use sdg_ros2::dds::TrajectoryArm;
+use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
+
+use crate::pictures::Shared;
+use crate::settings::IsInterrupted;
+
+/// How long a picture that was taken after the arm stopped is waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// What a grasp needs besides an arm and a model.
+#[derive(Debug, Clone)]
+pub struct GraspSettings {
+    /// The cell, with the limits of motions in it.
+    pub workcell: Workcell,
+    /// The camera of the pictures.
+    pub camera: PlacedCamera,
+    /// Share of the joints' velocity limits, unless a request says another.
+    pub speed: f64,
+    /// The frame of poses in answers.
+    pub base_frame: String,
+}
+
+/// The newest picture of the topic, once the arm is at rest.
+#[derive(Clone)]
+struct TopicPictures(Arc<Shared>);
+
+impl<A: Arm> Pictures<A> for TopicPictures {
+    fn take(&mut self, _arm: &mut A) -> sdg_robot::Result<TakenPicture> {
+        let picture = self.0.newer_than(SystemTime::now(), PATIENCE).ok_or_else(|| {
+            let secs = PATIENCE.as_secs();
+            RobotError::Perception(format!("no picture for {secs} s that was taken after the arm stopped"))
+        })?;
+        let age = SystemTime::now().duration_since(picture.captured).unwrap_or_default();
+        Ok(TakenPicture { picture: (*picture.picture).clone(), taken: Instant::now().checked_sub(age) })
+    }
+}
+
+/// Remembers the last step that was begun.
+struct LastStep(GraspStep);
+
+impl<A: Arm> StepObserver<A> for LastStep {
+    fn before(&mut self, _arm: &mut A, step: GraspStep) -> sdg_robot::Result<()> {
+        self.0 = step;
+        Ok(())
+    }
+}
+
+type Ended = (TrajectoryArm, GraspResponse, Option<String>);
+
+/// The arm, and a grasp under way.
+pub(super) struct Grasping {
+    settings: Arc<GraspSettings>,
+    pictures: TopicPictures,
+    is_interrupted: IsInterrupted,
+    arm: Option<TrajectoryArm>,
+    running: Option<JoinHandle<Ended>>,
+    /// Why nothing moves any more.
+    latched: Option<String>,
+}
+
+impl Grasping {
+    pub(super) fn new(
+        settings: GraspSettings,
+        arm: TrajectoryArm,
+        pictures: Arc<Shared>,
+        is_interrupted: &IsInterrupted,
+    ) -> Self {
+        Self {
+            settings: Arc::new(settings),
+            pictures: TopicPictures(pictures),
+            is_interrupted: Arc::clone(is_interrupted),
+            arm: Some(arm),
+            running: None,
+            latched: None,
+        }
+    }
+
+    /// Begins a grasp.
+    ///
+    /// # Errors
+    /// A speed that is none, a model without lengths, and an arm that stopped before.
+    pub(super) fn begin(&mut self, request: &GraspRequest, model: &GraspModel) -> Result<()> {
+        if let Some(why) = &self.latched {
+            anyhow::bail!("nothing moves until a person has looked and starts the node again: {why}");
+        }
+        let speed = if request.speed > 0.0 { request.speed } else { self.settings.speed };
+        let pace = Pace::at_speed(speed)?;
+        if model.facts().lengths.is_none() {
+            return Err(GraspError::NoLengths.into());
+        }
+        let config = GraspConfig {
+            pace,
+            max_detection_age_secs: 1.0,
+            part: part_shape(model),
+            ..self.settings.workcell.grasp_config()
+        };
+        let mut arm = self.arm.take().context("the arm is lost")?;
+        let (settings, is_interrupted) = (Arc::clone(&self.settings), Arc::clone(&self.is_interrupted));
+        let mut finder = ModelFinder::new(model.clone(), settings.camera, self.pictures.clone());
+        let is_dry_run = request.dry_run;
+        self.running = Some(std::thread::spawn(move || {
+            let (answer, latched) = if is_dry_run {
+                (planned(&settings, &config, &mut arm, &mut finder), None)
+            } else {
+                grasped(&settings, &config, &mut arm, &mut finder, &is_interrupted)
+            };
+            (arm, answer, latched)
+        }));
+        Ok(())
+    }
+
+    /// What became of the grasp; `None` while it goes on.
+    pub(super) fn finished(&mut self) -> Option<GraspResponse> {
+        if !self.running.as_ref().is_some_and(JoinHandle::is_finished) {
+            return None;
+        }
+        match self.running.take()?.join() {
+            Ok((arm, answer, latched)) => {
+                self.arm = Some(arm);
+                self.latched = latched;
+                Some(answer)
+            }
+            Err(_) => Some(GraspResponse { message: "the grasp panicked".to_owned(), ..GraspResponse::default() }),
+        }
+    }
+}
+
+fn grasped(
+    settings: &GraspSettings,
+    config: &GraspConfig,
+    arm: &mut TrajectoryArm,
+    finder: &mut ModelFinder<TopicPictures>,
+    is_interrupted: &IsInterrupted,
+) -> (GraspResponse, Option<String>) {
+    let mut robot = Robot::new(arm, settings.workcell.safety_limits(), watch(is_interrupted));
+    let mut step = LastStep(GraspStep::Detect);
+    let ended = sdg_robot::grasp(&mut robot, finder, &mut step, settings.camera.mount(), config);
+    let latched = robot.latched().map(str::to_owned);
+    let answer = match ended {
+        Ok(report) => {
+            let target = report.targets.iter().rev().flatten().next();
+            let (success, message) = match &report.outcome {
+                GraspOutcome::Held => (true, "the part is held".to_owned()),
+                GraspOutcome::Failed { step, why } => (false, format!("{step}: {why}")),
+            };
+            GraspResponse {
+                success,
+                message,
+                step: step.0.name().to_owned(),
+                pose: pose(settings, target),
+                closed_width_m: report.closed.map_or(0.0, |hand| hand.opening_m),
+            }
+        }
+        Err(error) => {
+            let (step, message) = (step.0.name().to_owned(), error.to_string());
+            GraspResponse { message, step, ..GraspResponse::default() }
+        }
+    };
+    (answer, latched)
+}
+
+/// Stops the arm where the node is to end.
+fn watch(is_interrupted: &IsInterrupted) -> Watch {
+    let is_interrupted = Arc::clone(is_interrupted);
+    Watch::new(Box::new(move || is_interrupted().then_some(StopReason::Interrupted)))
+}
+
+/// The same with an arm that moves nothing, from where the real one stands.
+fn planned(
+    settings: &GraspSettings,
+    config: &GraspConfig,
+    arm: &mut TrajectoryArm,
+    finder: &mut ModelFinder<TopicPictures>,
+) -> GraspResponse {
+    let refused = |message: String| GraspResponse { message, step: "detect".to_owned(), ..GraspResponse::default() };
+    let seen = arm.state().and_then(|state| Ok((state, arm.hand()?, finder.find(arm)?)));
+    let (state, hand, target) = match seen {
+        Ok((state, hand, Some(target))) if target.score >= sdg_robot::SURE => (state, hand, target),
+        Ok(_) => return refused("the part was not found".to_owned()),
+        Err(error) => return refused(error.to_string()),
+    };
+    let mut planned = PlannedArm::new(state.q, hand.opening_m);
+    let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
+    let mut step = LastStep(GraspStep::Detect);
+    let ended = sdg_robot::grasp(&mut robot, &mut Known(target), &mut step, settings.camera.mount(), config);
+    let (success, message) = match ended.map(|report| report.outcome) {
+        Ok(GraspOutcome::Held) => (true, "the part can be grasped".to_owned()),
+        Ok(GraspOutcome::Failed { step, why }) => (false, format!("{step}: {why}")),
+        Err(error) => (false, error.to_string()),
+    };
+    GraspResponse {
+        success,
+        message,
+        step: step.0.name().to_owned(),
+        pose: pose(settings, Some(&target)),
+        closed_width_m: target.jaw_width_m,
+    }
+}
+
+/// Finds the part where it was found before.
+struct Known(GraspTarget);
+
+impl PartFinder<PlannedArm> for Known {
+    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
+        Ok(Some(self.0))
+    }
+}
+
+fn pose(settings: &GraspSettings, target: Option<&GraspTarget>) -> PoseStamped {
+    let header = Header { stamp: Time::from_system(SystemTime::now()), frame_id: settings.base_frame.clone() };
+    let pose = target.map(|target| target.base_from_tcp.into()).unwrap_or_default();
+    PoseStamped { header, pose }
+}

@@ -1,0 +1,92 @@
+//! A node of ROS 2 that detects, teaches and grasps.
+//!
+//! ```text
+//! image ─ PictureReader: a thread ─ queue ─┐                     ┌─ Topics: pose, detections, overlay, tf, diagnostics
+//! camera_info, tf ─ CameraPlace: threads ──┴─ Searcher ─ Searched ┴─ Services: who waits for a picture
+//!                                             run: this thread       Teaching, Grasping: a thread each, while they go on
+//! ```
+//!
+//! What is deliberately absent: arguments and the reading of files but of the model that was taught. Settings come in as [`Settings`]
+//! and [`GraspSettings`], teaching as a function of a [`TeachJob`], so that the node teaches as its caller does.
+//!
+//! Without the feature `dds` the crate is empty: a build of the whole workspace compiles no RustDDS.
+#![cfg(feature = "dds")]
+#![forbid(unsafe_code)]
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod grasping;
+mod lines;
+mod pictures;
+mod place;
+mod publishing;
+mod searching;
+mod services;
+mod settings;
+mod teaching;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::Result;
+use sdg_ros2::dds::{Node, TrajectoryArm};
+
+pub use grasping::GraspSettings;
+pub use place::PlaceSource;
+pub use settings::{IsInterrupted, Settings};
+pub use teaching::{Teach, TeachJob};
+
+use grasping::Grasping;
+use lines::Lines;
+use pictures::PictureReader;
+use place::CameraPlace;
+use publishing::Topics;
+use sdg_inputs::one_line;
+use searching::Searcher;
+use services::{Change, Services};
+
+/// Without a picture, requests are looked at so often.
+const LOOK_EVERY: Duration = Duration::from_millis(5);
+
+/// Works until `is_interrupted` says so.
+///
+/// # Errors
+/// What cannot be opened on the network; nothing that arrives ends the node.
+pub fn run(
+    mut node: Node,
+    settings: Settings,
+    arm: Option<(GraspSettings, TrajectoryArm)>,
+    is_interrupted: &IsInterrupted,
+) -> Result<()> {
+    let lines = Arc::<Lines>::default();
+    let mut topics = Topics::open(&mut node, &lines)?;
+    let place = CameraPlace::open(&mut node, settings.place, settings.max_transform_age_secs, &lines)?;
+    let reader = PictureReader::open(&mut node, settings.is_compressed, settings.picture_qos, settings.queue, &lines)?;
+    let grasping = arm.map(|(grasp, arm)| Grasping::new(grasp, arm, Arc::clone(&reader.shared), is_interrupted));
+    let mut services = Services::open(&mut node, settings.teach, settings.trigger_teaching, grasping, &lines)?;
+    let mut searcher = Searcher::new(settings.model, settings.min_score);
+    eprintln!("sdg ros2: pictures from {}; publishes {}; Ctrl-C ends it", reader.topic, topics.names());
+    while !is_interrupted() {
+        if let Some(picture) = reader.shared.next(LOOK_EVERY) {
+            let placed = place.at(&picture.header).map_err(anyhow::Error::from);
+            match placed.and_then(|over_table| searcher.search(&picture, over_table.as_ref())) {
+                Ok(searched) => {
+                    topics.publish(&node, &searched);
+                    services.searched(Ok(&searched), picture.arrived);
+                }
+                Err(error) => {
+                    let error = one_line(&error);
+                    lines.complain(&error);
+                    topics.failed(picture.arrived);
+                    services.searched(Err(error), picture.arrived);
+                }
+            }
+        }
+        if let Some(Change::UseModel(path)) = services.work(&reader.topic, searcher.model())
+            && let Err(error) = searcher.change_model(&path, &settings.device)
+        {
+            lines.complain(&one_line(&error));
+        }
+        topics.diagnose(&reader, searcher.model().is_some());
+    }
+    Ok(())
+}

@@ -1,0 +1,142 @@
+//! Where the camera is: as its file says, or by tf at the picture's time.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use sdg_geometry::{PinholeCamera, PosedCamera};
+use sdg_grasp::CameraOverTable;
+use sdg_ros2::dds::{Node, Qos};
+use sdg_ros2::messages::{CameraInfo, Header, TfMessage};
+use sdg_ros2::{RosError, Transforms, camera_info};
+
+use crate::lines::Lines;
+
+/// How often a thread looks whether it is to end.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
+
+/// Where the camera's place comes from.
+#[derive(Debug, Clone)]
+pub enum PlaceSource {
+    /// Nowhere: detections have no poses.
+    Unknown,
+    /// The camera's file.
+    File(CameraOverTable),
+    /// tf; intrinsics of the camera's file, or else of camera_info.
+    Transforms {
+        /// The frame of the robot's base.
+        base_frame: String,
+        /// z of the table in that frame.
+        table_height_m: f64,
+        /// Those of the camera's file.
+        intrinsics: Option<PinholeCamera>,
+    },
+}
+
+struct Known {
+    transforms: Transforms,
+    sent: Option<Result<PinholeCamera, String>>,
+}
+
+/// Follows tf and camera_info in threads.
+pub(super) struct CameraPlace {
+    source: PlaceSource,
+    known: Arc<Mutex<Known>>,
+    is_stopped: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl CameraPlace {
+    pub(super) fn open(
+        node: &mut Node,
+        source: PlaceSource,
+        max_age_secs: f64,
+        lines: &Arc<Lines>,
+    ) -> Result<Self, RosError> {
+        let known = Arc::new(Mutex::new(Known { transforms: Transforms::new(max_age_secs), sent: None }));
+        let is_stopped = Arc::<AtomicBool>::default();
+        let mut place = Self { source, known, is_stopped, threads: Vec::new() };
+        let infos = node.subscribe::<CameraInfo>("camera_info", Qos::SENSORS)?;
+        place.spawn(lines, move |known| {
+            let Some(received) = infos.receive(LOOK_EVERY)? else { return Ok(()) };
+            let read = camera_info::read_camera_info(&received.message);
+            lock(known).sent = Some(read.as_ref().copied().map_err(ToString::to_string));
+            read.map(drop)
+        });
+        if let PlaceSource::Transforms { .. } = place.source {
+            for (topic, qos, is_static) in
+                [("/tf", Qos::TRANSFORMS, false), ("/tf_static", Qos::STATIC_TRANSFORMS, true)]
+            {
+                let messages = node.subscribe::<TfMessage>(topic, qos)?;
+                place.spawn(lines, move |known| {
+                    let Some(received) = messages.receive(LOOK_EVERY)? else { return Ok(()) };
+                    match lock(known).transforms.add(&received.message, is_static) {
+                        0 => Ok(()),
+                        num_refused => Err(RosError::Transform {
+                            target_frame: received.message.transforms[0].header.frame_id.clone(),
+                            source_frame: received.message.transforms[0].child_frame_id.clone(),
+                            why: format!("{num_refused} on {topic} are no transforms"),
+                        }),
+                    }
+                });
+            }
+        }
+        Ok(place)
+    }
+
+    fn spawn(&mut self, lines: &Arc<Lines>, receive: impl Fn(&Mutex<Known>) -> Result<(), RosError> + Send + 'static) {
+        let (known, is_stopped, lines) = (Arc::clone(&self.known), Arc::clone(&self.is_stopped), Arc::clone(lines));
+        self.threads.push(std::thread::spawn(move || {
+            while !is_stopped.load(Ordering::SeqCst) {
+                if let Err(error) = receive(&known) {
+                    lines.complain(&error.to_string());
+                }
+            }
+        }));
+    }
+
+    /// The camera over the table when a picture was taken; `None` where nothing says where it is.
+    pub(super) fn at(&self, header: &Header) -> Result<Option<CameraOverTable>, RosError> {
+        let known = lock(&self.known);
+        let refused = |expected: &str, found: String| RosError::CameraInfo { expected: expected.to_owned(), found };
+        match &self.source {
+            PlaceSource::Unknown => Ok(None),
+            PlaceSource::File(over_table) => {
+                // A camera_info that cannot be read says nothing against the file.
+                if let Some(Ok(sent)) = &known.sent {
+                    camera_info::check_same_camera(&over_table.camera.intrinsics, sent)?;
+                }
+                Ok(Some(*over_table))
+            }
+            PlaceSource::Transforms { base_frame, table_height_m, intrinsics } => {
+                let intrinsics = match (intrinsics, &known.sent) {
+                    (Some(of_file), Some(Ok(sent))) => {
+                        camera_info::check_same_camera(of_file, sent)?;
+                        *of_file
+                    }
+                    (Some(of_file), _) => *of_file,
+                    (None, Some(Ok(sent))) => *sent,
+                    (None, Some(Err(why))) => return Err(refused("a camera_info that can be used", why.clone())),
+                    (None, None) => return Err(refused("a camera_info beside the pictures", "none yet".to_owned())),
+                };
+                let base_from_camera = known.transforms.lookup(base_frame, &header.frame_id, header.stamp)?;
+                let camera = PosedCamera { intrinsics, world_from_camera: base_from_camera };
+                Ok(Some(CameraOverTable { camera, table_height_m: *table_height_m, workspace: None }))
+            }
+        }
+    }
+}
+
+fn lock(known: &Mutex<Known>) -> MutexGuard<'_, Known> {
+    known.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Drop for CameraPlace {
+    fn drop(&mut self) {
+        self.is_stopped.store(true, Ordering::SeqCst);
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! A picture searched: what was found, in pixels and over the table.
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use image::RgbImage;
+use nalgebra::Point2;
+use sdg_cell::{Found, Perception};
+use sdg_grasp::{CameraOverTable, Device, GraspDetection, GraspModel, Verification};
+use sdg_ros2::found::FoundPart;
+use sdg_ros2::messages::Header;
+
+use crate::pictures::Picture;
+
+/// A grasp model, and the camera behind which it looks.
+pub(super) struct Searcher {
+    /// As it was read, for the grasps of an arm.
+    model: Option<GraspModel>,
+    perception: Option<Perception>,
+    min_score: f64,
+}
+
+/// A picture's result.
+pub(super) struct Searched {
+    pub(super) header: Header,
+    pub(super) arrived: Instant,
+    /// Best first.
+    pub(super) found: Vec<FoundPart>,
+    /// The same as they are drawn.
+    pub(super) detections: Vec<GraspDetection>,
+    pub(super) picture: std::sync::Arc<RgbImage>,
+    pub(super) search_secs: f64,
+}
+
+impl Searcher {
+    pub(super) fn new(model: Option<GraspModel>, min_score: f64) -> Self {
+        let perception = model.clone().map(Perception::of_any_camera);
+        Self { model, perception, min_score }
+    }
+
+    /// Uses another model from now on.
+    ///
+    /// # Errors
+    /// A file that is no model.
+    pub(super) fn change_model(&mut self, path: &Path, device: &Device) -> Result<()> {
+        *self = Self::new(Some(sdg_inputs::read_model(path, device)?), self.min_score);
+        Ok(())
+    }
+
+    pub(super) fn model(&self) -> Option<&GraspModel> {
+        self.model.as_ref()
+    }
+
+    /// Searches a picture; `place` is where its camera was, which a node knows of each picture or of none.
+    ///
+    /// # Errors
+    /// No model, one without lengths behind a calibrated camera, a picture of another size than the camera's.
+    pub(super) fn search(&mut self, picture: &Picture, place: Option<&CameraOverTable>) -> Result<Searched> {
+        const NO_MODEL: &str = "no grasp model yet: start the node with one, or call the service teach";
+        let perception = self.perception.as_mut().context(NO_MODEL)?;
+        let started = Instant::now();
+        if let Some(place) = place {
+            perception.move_to(place)?;
+        }
+        let name = perception.model().object();
+        let part = |Found { detection, pose }: &Found| FoundPart {
+            name: name.to_owned(),
+            score: detection.score,
+            corners: [
+                Point2::new(detection.bbox.x1, detection.bbox.y1),
+                Point2::new(detection.bbox.x2, detection.bbox.y2),
+            ],
+            grasp: pose.zip(place).map(|(pose, place)| {
+                (place.camera.world_from_camera.inverse() * pose.frame_from_tcp(), pose.opening_m)
+            }),
+        };
+        let seen = perception.detect(&picture.picture, Verification::ByShape)?;
+        let found: Vec<_> = seen.iter().map(part).collect();
+        let detections = seen.into_iter().map(|found| found.detection);
+        let is_kept = |score: f64| score >= self.min_score;
+        Ok(Searched {
+            header: picture.header.clone(),
+            arrived: picture.arrived,
+            found: found.into_iter().filter(|part| is_kept(part.score)).collect(),
+            detections: detections.filter(|detection| is_kept(detection.score)).collect(),
+            picture: std::sync::Arc::clone(&picture.picture),
+            search_secs: started.elapsed().as_secs_f64(),
+        })
+    }
+}

@@ -1,0 +1,286 @@
+//! The services: each in full, and as std_srvs/Trigger for who has not built `sdg_interfaces`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use sdg_ros2::RosError;
+use sdg_ros2::cdr::Cdr;
+use sdg_ros2::dds::{Node, RequestId, Server, ServiceType};
+use sdg_ros2::found::{to_detections, to_pose};
+use sdg_ros2::messages::{
+    DetectRequest, DetectResponse, GraspRequest, GraspResponse, TeachRequest, TeachResponse, TriggerRequest,
+    TriggerResponse,
+};
+
+use crate::grasping::Grasping;
+use crate::lines::Lines;
+use crate::searching::Searched;
+use crate::teaching::{Teach, TeachJob, Teaching};
+
+/// How long a picture is waited for unless the request says.
+const DETECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// Nobody waits longer.
+const MAX_DETECT_TIMEOUT_SECS: f64 = 60.0;
+
+const TRIGGER: ServiceType = ServiceType { package: "std_srvs", name: "Trigger" };
+
+/// A service and its Trigger variant.
+struct Pair<Q: Cdr + 'static, A: Cdr + 'static> {
+    full: Server<Q, A>,
+    trigger: Server<TriggerRequest, TriggerResponse>,
+}
+
+/// Who asked.
+#[derive(Clone, Copy)]
+enum Asker {
+    Full(RequestId),
+    Trigger(RequestId),
+}
+
+impl<Q: Cdr + Clone + Default + 'static, A: Cdr + 'static> Pair<Q, A> {
+    fn open(node: &mut Node, name: &'static str, type_name: &'static str) -> Result<Self, RosError> {
+        let of = ServiceType { package: "sdg_interfaces", name: type_name };
+        Ok(Self {
+            full: node.serve(&format!("~/{name}"), of)?,
+            trigger: node.serve(&format!("~/{name}_trigger"), TRIGGER)?,
+        })
+    }
+
+    /// The requests that wait; a Trigger is the request with nothing filled in.
+    fn requests(&self, lines: &Lines) -> Vec<(Asker, Result<Q, RosError>)> {
+        let mut requests = Vec::new();
+        loop {
+            match self.full.receive(Duration::ZERO) {
+                Ok(Some((id, request))) => requests.push((Asker::Full(id), request)),
+                Ok(None) => break,
+                Err(error) => lines.complain(&error.to_string()),
+            }
+        }
+        loop {
+            match self.trigger.receive(Duration::ZERO) {
+                Ok(Some((id, request))) => requests.push((Asker::Trigger(id), request.map(|_| Q::default()))),
+                Ok(None) => break,
+                Err(error) => lines.complain(&error.to_string()),
+            }
+        }
+        requests
+    }
+
+    fn answer(&self, asker: Asker, full: A, success: bool, message: String, lines: &Lines) {
+        let sent = match asker {
+            Asker::Full(id) => self.full.answer(id, full),
+            Asker::Trigger(id) => self.trigger.answer(id, TriggerResponse { success, message }),
+        };
+        if let Err(error) = sent {
+            lines.complain(&error.to_string());
+        }
+    }
+}
+
+/// A detection that waits for a picture.
+struct Detecting {
+    asker: Asker,
+    request: DetectRequest,
+    asked: Instant,
+    deadline: Instant,
+}
+
+/// What a service changed in the node.
+pub(super) enum Change {
+    /// The node is to detect with this model.
+    UseModel(PathBuf),
+}
+
+/// All of them.
+pub(super) struct Services {
+    detect: Pair<DetectRequest, DetectResponse>,
+    detecting: Vec<Detecting>,
+    teach: Pair<TeachRequest, TeachResponse>,
+    teaching: Option<(Asker, Teaching)>,
+    teach_with: Arc<Teach>,
+    trigger_teaching: Option<TeachJob>,
+    grasp: Option<(Pair<GraspRequest, GraspResponse>, Grasping)>,
+    grasping: Option<Asker>,
+    lines: Arc<Lines>,
+}
+
+impl Services {
+    pub(super) fn open(
+        node: &mut Node,
+        teach_with: Arc<Teach>,
+        trigger_teaching: Option<TeachJob>,
+        grasping: Option<Grasping>,
+        lines: &Arc<Lines>,
+    ) -> Result<Self, RosError> {
+        let grasp = match grasping {
+            Some(grasping) => Some((Pair::open(node, "grasp", "Grasp")?, grasping)),
+            None => None,
+        };
+        Ok(Self {
+            detect: Pair::open(node, "detect", "Detect")?,
+            detecting: Vec::new(),
+            teach: Pair::open(node, "teach", "Teach")?,
+            teaching: None,
+            teach_with,
+            trigger_teaching,
+            grasp,
+            grasping: None,
+            lines: Arc::clone(lines),
+        })
+    }
+
+    /// Takes requests and answers what is done.
+    pub(super) fn work(&mut self, topic: &str, model: Option<&sdg_grasp::GraspModel>) -> Option<Change> {
+        self.take_detections();
+        self.give_up_detections(topic);
+        self.take_grasps(model);
+        self.take_teachings();
+        self.finish_teaching()
+    }
+
+    fn take_detections(&mut self) {
+        for (asker, request) in self.detect.requests(&self.lines) {
+            let request = match request {
+                Ok(request) => request,
+                Err(error) => {
+                    self.answer_detection(asker, Err(error.to_string()));
+                    continue;
+                }
+            };
+            let timeout = match request.timeout_secs {
+                secs if secs > 0.0 => Duration::from_secs_f64(secs.min(MAX_DETECT_TIMEOUT_SECS)),
+                _ => DETECT_TIMEOUT,
+            };
+            let asked = Instant::now();
+            self.detecting.push(Detecting { asker, request, asked, deadline: asked + timeout });
+        }
+    }
+
+    fn give_up_detections(&mut self, topic: &str) {
+        let now = Instant::now();
+        let (late, waiting) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.deadline < now);
+        self.detecting = waiting;
+        for Detecting { asker, asked, .. } in late {
+            let secs = asked.elapsed().as_secs_f64();
+            self.answer_detection(asker, Err(format!("no picture on {topic} within {secs:.1} s")));
+        }
+    }
+
+    /// Answers who waits for a picture that was taken after the call.
+    pub(super) fn searched(&mut self, searched: Result<&Searched, String>, arrived: Instant) {
+        let (waiting, ready) = std::mem::take(&mut self.detecting).into_iter().partition(|one| one.asked > arrived);
+        self.detecting = waiting;
+        for Detecting { asker, request, .. } in ready {
+            let answer = searched.clone().map(|searched| detect_response(&request, searched));
+            self.answer_detection(asker, answer);
+        }
+    }
+
+    fn answer_detection(&self, asker: Asker, answer: Result<DetectResponse, String>) {
+        let answer =
+            answer.unwrap_or_else(|message| DetectResponse { success: false, message, ..DetectResponse::default() });
+        // Who gets a yes or no alone wants to know whether the part is there.
+        let found = answer.success && !answer.detections.detections.is_empty();
+        let message = answer.message.clone();
+        self.detect.answer(asker, answer, found, message, &self.lines);
+    }
+
+    fn take_grasps(&mut self, model: Option<&sdg_grasp::GraspModel>) {
+        let Some((pair, grasping)) = &mut self.grasp else { return };
+        for (asker, request) in pair.requests(&self.lines) {
+            let begun = match (request, model, self.grasping.is_some()) {
+                (Err(error), ..) => Err(error.to_string()),
+                (_, None, _) => {
+                    Err("no grasp model yet: start the node with one, or call the service teach".to_owned())
+                }
+                (_, _, true) => Err("a grasp is under way".to_owned()),
+                (Ok(request), Some(model), false) => {
+                    grasping.begin(&request, model).map_err(|error| format!("{error:#}"))
+                }
+            };
+            match begun {
+                Ok(()) => self.grasping = Some(asker),
+                Err(message) => {
+                    let answer = GraspResponse { message: message.clone(), ..GraspResponse::default() };
+                    pair.answer(asker, answer, false, message, &self.lines);
+                }
+            }
+        }
+        if let Some(asker) = self.grasping
+            && let Some(answer) = grasping.finished()
+        {
+            self.grasping = None;
+            let (success, message) = (answer.success, answer.message.clone());
+            pair.answer(asker, answer, success, message, &self.lines);
+        }
+    }
+
+    fn take_teachings(&mut self) {
+        for (asker, request) in self.teach.requests(&self.lines) {
+            let begun = match (asker, request, &self.trigger_teaching) {
+                _ if self.teaching.is_some() => Err("a teaching is under way".to_owned()),
+                (Asker::Trigger(_), Ok(_), Some(job)) => Ok(Teaching::begin(job.clone(), &self.teach_with)),
+                (Asker::Trigger(_), Ok(_), None) => {
+                    Err("expected a node that was started with a demonstration and a file to teach".to_owned())
+                }
+                (_, Ok(request), _) => {
+                    Teaching::of_request(&request, &self.teach_with).map_err(|error| format!("{error:#}"))
+                }
+                (_, Err(error), _) => Err(error.to_string()),
+            };
+            match begun {
+                Ok(teaching) => self.teaching = Some((asker, teaching)),
+                Err(message) => self.answer_teaching(asker, Err(message)),
+            }
+        }
+    }
+
+    fn finish_teaching(&mut self) -> Option<Change> {
+        let (asker, mut teaching) = self.teaching.take()?;
+        let Some(taught) = teaching.finished() else {
+            self.teaching = Some((asker, teaching));
+            return None;
+        };
+        let is_used = teaching.is_used;
+        let (path, secs) = match taught {
+            Ok(done) => done,
+            Err(message) => {
+                self.answer_teaching(asker, Err(message));
+                return None;
+            }
+        };
+        self.answer_teaching(asker, Ok((path.as_path(), secs)));
+        is_used.then_some(Change::UseModel(path))
+    }
+
+    fn answer_teaching(&self, asker: Asker, taught: Result<(&Path, f64), String>) {
+        let answer = match taught {
+            Ok((path, seconds)) => TeachResponse {
+                success: true,
+                message: format!("taught in {seconds:.0} s"),
+                model_path: path.display().to_string(),
+                seconds,
+            },
+            Err(message) => TeachResponse { message, ..TeachResponse::default() },
+        };
+        let (success, message) = (answer.success, answer.message.clone());
+        self.teach.answer(asker, answer, success, message, &self.lines);
+    }
+}
+
+fn detect_response(request: &DetectRequest, searched: &Searched) -> DetectResponse {
+    let found: Vec<_> = searched.found.iter().filter(|part| part.score >= request.min_score).cloned().collect();
+    let grasps: Vec<_> = found.iter().filter_map(|part| part.grasp).collect();
+    DetectResponse {
+        success: true,
+        message: match found.first() {
+            Some(best) => format!("{} found, the best with score {:.2}", found.len(), best.score),
+            None => "nothing found".to_owned(),
+        },
+        detections: to_detections(&searched.header, &found),
+        poses: grasps.iter().map(|(pose, _)| to_pose(&searched.header, pose)).collect(),
+        openings_m: grasps.iter().map(|(_, opening_m)| *opening_m).collect(),
+    }
+}

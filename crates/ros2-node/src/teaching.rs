@@ -1,0 +1,139 @@
+//! `~/teach`: a teaching in a thread, so that pictures are searched meanwhile.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use sdg_inputs::one_line;
+use sdg_ros2::messages::TeachRequest;
+
+/// What is to be taught.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TeachJob {
+    /// The photo, and after a colon its marks where they have a file of another place.
+    pub photo: String,
+    /// The marks' file, where the request named or brought one.
+    pub marks: Option<PathBuf>,
+    /// The file to write.
+    pub out: PathBuf,
+    /// The grasp model, by letter or name.
+    pub model: String,
+    /// Decides every random choice.
+    pub seed: u64,
+    /// The most that the network's training may take.
+    pub time_budget: Option<Duration>,
+    /// Height of the marks over the table, where the camera's file is to be used.
+    pub mark_height_mm: Option<f64>,
+    /// Whether the node is to detect with it.
+    pub is_used: bool,
+}
+
+/// Teaches as the caller's own command does, and writes the model.
+pub type Teach = dyn Fn(&TeachJob) -> Result<()> + Send + Sync;
+
+impl TeachJob {
+    /// What is taught where a request leaves it open.
+    pub const DEFAULT_MODEL: &str = "C";
+    /// The seed where a request names none.
+    pub const DEFAULT_SEED: u64 = 1;
+
+    /// The job of a request, and the marks that came with it.
+    fn read(request: &TeachRequest) -> Result<(Self, Option<MarksFile>)> {
+        if request.photo_path.is_empty() || request.out_path.is_empty() {
+            bail!("expected photo_path and out_path, found \"{}\" and \"{}\"", request.photo_path, request.out_path);
+        }
+        let brought = match request.annotation.as_str() {
+            "" => None,
+            text => {
+                let path = std::env::temp_dir().join(format!("sdg-marks-{}.json", std::process::id()));
+                std::fs::write(&path, text).with_context(|| path.display().to_string())?;
+                Some(MarksFile(path))
+            }
+        };
+        let named = || (!request.annotation_path.is_empty()).then(|| PathBuf::from(&request.annotation_path));
+        let (model, budget_secs) = (request.model.as_str(), request.time_budget_secs);
+        let job = Self {
+            photo: request.photo_path.clone(),
+            marks: brought.as_ref().map(|file| file.0.clone()).or_else(named),
+            out: PathBuf::from(&request.out_path),
+            model: if model.is_empty() { Self::DEFAULT_MODEL } else { model }.to_owned(),
+            seed: if request.seed == 0 { Self::DEFAULT_SEED } else { request.seed },
+            time_budget: (budget_secs > 0.0)
+                .then(|| Duration::try_from_secs_f64(budget_secs).context("time_budget_secs"))
+                .transpose()?,
+            mark_height_mm: Some(request.mark_height_mm).filter(|&height_mm| height_mm > 0.0),
+            is_used: request.use_it,
+        };
+        Ok((job, brought))
+    }
+}
+
+/// Marks that a request brought, as a file that lives as long as the teaching.
+struct MarksFile(PathBuf);
+
+impl Drop for MarksFile {
+    fn drop(&mut self) {
+        // What is left in the system's folder for such files harms nobody.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// A teaching under way.
+pub(super) struct Teaching {
+    thread: Option<JoinHandle<Result<(), String>>>,
+    out: PathBuf,
+    started: Instant,
+    pub(super) is_used: bool,
+    /// Has the marks that came with the request; removed with it.
+    _marks: Option<MarksFile>,
+}
+
+impl Teaching {
+    /// Begins what a request asks for.
+    ///
+    /// # Errors
+    /// What is no request.
+    pub(super) fn of_request(request: &TeachRequest, teach: &Arc<Teach>) -> Result<Self> {
+        let (job, marks) = TeachJob::read(request)?;
+        Ok(Self { _marks: marks, ..Self::begin(job, teach) })
+    }
+
+    pub(super) fn begin(job: TeachJob, teach: &Arc<Teach>) -> Self {
+        let (out, is_used, teach) = (job.out.clone(), job.is_used, Arc::clone(teach));
+        let thread = std::thread::spawn(move || teach(&job).map_err(|error| one_line(&error)));
+        Self { thread: Some(thread), out, started: Instant::now(), is_used, _marks: None }
+    }
+
+    /// The model's file and how long it took, or why there is none; `None` while it goes on.
+    pub(super) fn finished(&mut self) -> Option<Result<(PathBuf, f64), String>> {
+        if !self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
+            return None;
+        }
+        let taught = self.thread.take()?.join().unwrap_or_else(|_| Err("teaching panicked".to_owned()));
+        Some(taught.map(|()| (self.out.clone(), self.started.elapsed().as_secs_f64())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_is_a_job_with_defaults_and_its_marks_are_a_file_for_its_time() {
+        let request = TeachRequest {
+            photo_path: "part.png".to_owned(),
+            out_path: "part.sdg".to_owned(),
+            annotation: "{}".to_owned(),
+            ..TeachRequest::default()
+        };
+        let (job, brought) = TeachJob::read(&request).unwrap();
+        let marks = job.marks.unwrap();
+        assert_eq!((job.model.as_str(), job.seed, job.time_budget, job.mark_height_mm), ("C", 1, None, None));
+        assert_eq!(std::fs::read_to_string(&marks).unwrap(), "{}");
+        drop(brought);
+        assert!(!marks.exists());
+        assert!(TeachJob::read(&TeachRequest { out_path: String::new(), ..request }).is_err());
+    }
+}

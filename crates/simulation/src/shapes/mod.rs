@@ -1,0 +1,6 @@
+//! What bodies are made of: meshes, solids, textures, and their outlines on the table.
+
+pub mod footprint;
+pub mod mesh;
+pub mod solids;
+pub mod texture;

@@ -1,0 +1,108 @@
+//! The camera higher, lower or tilted, the part always whole in the picture.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use rand::Rng;
+use sdg_geometry::PosedCamera;
+use sdg_robot::{LOOK_AT_M, LOOK_HEIGHT_M, camera_looking_down};
+
+use super::request::{AxisParameter, Drawn, Request};
+use crate::error::{Result, SimulationError};
+use crate::scene::PlacedObject;
+use crate::views::shows_whole;
+use crate::workcell::{Workcell, WorkcellConfig};
+
+/// Heights of the camera over the usual one.
+const HEIGHT_FACTORS: std::ops::Range<f64> = 0.75..1.3;
+
+/// Tilts of the camera in degrees; less is an ordinary picture.
+const TILTS_DEG: std::ops::Range<f64> = 5.0..20.0;
+
+/// How far beside the part a tilted camera looks, in metres.
+const MAX_LOOK_OFFSET_M: f64 = 0.06;
+
+/// Directions of tilt that are tried until the arm reaches the camera's pose and the part is in the picture.
+const MAX_TRIES: usize = 40;
+
+/// The picture from another height, straight down, as near to the usual place as shows the whole part.
+pub(super) fn draw_from_another_height(request: &mut Request<'_>) -> Result<Drawn> {
+    let scene = request.ordinary_scene();
+    let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
+    let factor = request.between(HEIGHT_FACTORS);
+    let [x, y] = LOOK_AT_M;
+    let height_m = LOOK_HEIGHT_M * factor;
+    let part = part_in(&cell)?;
+    let above = part.base_from_object.translation.vector;
+    // From the usual place to straight above the part.
+    let places = (0..=10).map(|step| {
+        let share = f64::from(step) / 10.0;
+        camera_looking_down(x + share * (above.x - x), y + share * (above.y - y), height_m, 0.0)
+    });
+    let view = first_view(&mut cell, &part, places)?;
+    let description = format!("camera {:.0} mm above the table, {factor:.2} of the usual height", height_m * 1e3);
+    Ok(Drawn {
+        cell,
+        scene,
+        view,
+        parameter: AxisParameter { value: factor, unit: "of the usual height", description },
+    })
+}
+
+/// The picture of a tilted camera at the usual distance that looks at the part or somewhat beside it.
+pub(super) fn draw_tilted(request: &mut Request<'_>) -> Result<Drawn> {
+    let scene = request.ordinary_scene();
+    let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
+    let tilt_deg = request.between(TILTS_DEG);
+    let distance_m = LOOK_HEIGHT_M;
+    let part = part_in(&cell)?;
+    let at = part.base_from_object.translation.vector;
+    let rng = &mut request.rng;
+    let places: Vec<Isometry3<f64>> = (0..MAX_TRIES)
+        .map(|_| {
+            let axis_rad: f64 = rng.random_range(-PI..PI);
+            let offset = [0; 2].map(|_: i32| rng.random_range(-MAX_LOOK_OFFSET_M..MAX_LOOK_OFFSET_M));
+            let aim = Vector3::new(at.x + offset[0], at.y + offset[1], 0.0);
+            let axis = Unit::new_normalize(Vector3::new(axis_rad.cos(), axis_rad.sin(), 0.0));
+            let tilted = UnitQuaternion::from_axis_angle(&axis, tilt_deg.to_radians());
+            let about_aim = Translation3::from(aim) * tilted * Translation3::from(-aim);
+            about_aim * camera_looking_down(aim.x, aim.y, distance_m, 0.0)
+        })
+        .collect();
+    let view = first_view(&mut cell, &part, places)?;
+    let description = format!("camera tilted by {tilt_deg:.1} degrees");
+    Ok(Drawn { cell, scene, view, parameter: AxisParameter { value: tilt_deg, unit: "degrees", description } })
+}
+
+fn part_in(cell: &Workcell) -> Result<PlacedObject> {
+    cell.config().scene.object.clone().ok_or_else(|| SimulationError::Configuration {
+        field: "scene.object",
+        expected: "a part".into(),
+        found: "none".into(),
+    })
+}
+
+/// The picture of the first place that the arm reaches and that shows the whole part.
+fn first_view(
+    cell: &mut Workcell,
+    part: &PlacedObject,
+    places: impl IntoIterator<Item = Isometry3<f64>>,
+) -> Result<crate::camera::CameraView> {
+    let intrinsics = cell.wrist_view()?.camera.intrinsics;
+    let mut unreached = None;
+    for base_from_camera in places {
+        let camera = PosedCamera { intrinsics, world_from_camera: base_from_camera };
+        if !shows_whole(&camera, part) {
+            continue;
+        }
+        match cell.view_from(&base_from_camera) {
+            Err(error @ SimulationError::Configuration { .. }) => unreached = Some(error),
+            other => return other,
+        }
+    }
+    Err(unreached.unwrap_or_else(|| SimulationError::Configuration {
+        field: "camera",
+        expected: "a place that shows the whole part".into(),
+        found: format!("none for {} at {}", part.spec.name, part.base_from_object.translation.vector),
+    }))
+}

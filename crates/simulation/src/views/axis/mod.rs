@@ -1,0 +1,225 @@
+//! Pictures in which one thing is harder than in an ordinary scene: the axes along which models are measured.
+//!
+//! ```text
+//! (part, axis, number, seed) ─> ordinary random scene ─> changed along the axis ─> picture, truths, how much it was changed
+//!                               SceneVariation::sample    camera, things, image
+//! ```
+//!
+//! An axis has [`PICTURES_PER_AXIS`] pictures. The number of a picture is its **stratum**: what the axis changes runs from
+//! its mildest in picture 0 to its hardest in the last one, within each stratum at random, so that 20 pictures cover the
+//! whole range evenly. The same part, axis, number and seed give the same picture to the bit. All pictures are the wrist
+//! camera's with the arm holding it, as in an attempt.
+
+mod axis_name;
+mod camera_pose;
+mod clutter;
+mod cover;
+mod image_faults;
+mod instances;
+mod request;
+mod visible;
+
+use rand::Rng;
+
+pub use axis_name::Axis;
+pub use request::{AxisParameter, PICTURES_PER_AXIS};
+use request::{Drawn, Request};
+pub use visible::InstanceTruth;
+
+use super::base_from_look_camera;
+use crate::camera::CameraView;
+use crate::error::Result;
+use crate::objects::{LookAlikeKind, ObjectSpec};
+use crate::scene::{SceneVariation, VariationConfig};
+use crate::workcell::{Workcell, WorkcellConfig};
+
+/// A picture of an axis with the truth about it.
+#[derive(Debug, Clone)]
+pub struct AxisView {
+    /// The axis along which the picture is harder.
+    pub axis: Axis,
+    /// Which of the axis' pictures it is.
+    pub number: u64,
+    /// What was drawn.
+    pub scene: SceneVariation,
+    /// The picture and its camera.
+    pub view: CameraView,
+    /// All instances of the part; none among the look-alikes.
+    pub truths: Vec<InstanceTruth>,
+    /// How much the axis changed.
+    pub parameter: AxisParameter,
+    /// In what the part on the table differs from the part that is asked for; only among the look-alikes.
+    pub look_alike: Option<LookAlikeKind>,
+}
+
+/// Draws picture `number` of an axis.
+///
+/// # Errors
+/// As [`Workcell::new`]; [`SimulationError::Configuration`] where no place of camera or cover gives the picture that the
+/// axis asks for.
+pub fn axis_view(spec: &ObjectSpec, axis: Axis, number: u64, seed: u64) -> Result<AxisView> {
+    let mut request = Request::new(spec, axis, number, seed);
+    if axis == Axis::LookAlikes {
+        return look_alike_view(&mut request);
+    }
+    let Drawn { mut cell, scene, view, parameter } = match axis {
+        Axis::Height => camera_pose::draw_from_another_height(&mut request)?,
+        Axis::Tilt => camera_pose::draw_tilted(&mut request)?,
+        Axis::Covered => cover::draw_covered(&mut request)?,
+        Axis::Clutter => clutter::draw_cluttered(&mut request)?,
+        Axis::Instances => instances::draw_three(&mut request)?,
+        Axis::Dark | Axis::Blur | Axis::Tint | Axis::LookAlikes => {
+            let scene = request.ordinary_scene();
+            let mut cell = Workcell::new(&WorkcellConfig::new(scene.clone()))?;
+            let mut view = cell.view_from(&base_from_look_camera())?;
+            let parameter = match axis {
+                Axis::Dark => image_faults::darken(&mut view.image, &mut request),
+                Axis::Blur => image_faults::blur(&mut view.image, &mut request),
+                _ => image_faults::tint(&mut view.image, &mut request),
+            };
+            Drawn { cell, scene, view, parameter }
+        }
+    };
+    let truths = visible::instance_truths(&mut cell, &scene, &view.camera)?;
+    Ok(AxisView { axis, number, scene, view, truths, parameter, look_alike: None })
+}
+
+/// An ordinary picture with a look-alike in the part's place; the kinds take turns.
+fn look_alike_view(request: &mut Request<'_>) -> Result<AxisView> {
+    let kinds = request.spec.look_alike_kinds()?;
+    let kind = kinds[(request.number % kinds.len() as u64) as usize];
+    let look_alike = request.spec.look_alike(kind, request.rng.random())?;
+    let scene = SceneVariation::sample(Some(&look_alike.spec), &VariationConfig::default(), request.scene_seed);
+    let mut cell = Workcell::new(&WorkcellConfig::new(scene))?;
+    let view = cell.view_from(&base_from_look_camera())?;
+    Ok(AxisView {
+        axis: Axis::LookAlikes,
+        number: request.number,
+        scene: cell.config().scene.clone(),
+        view,
+        truths: Vec::new(),
+        parameter: AxisParameter { value: 1.0, unit: "look-alike", description: look_alike.description },
+        look_alike: Some(kind),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point2, Point3, Vector2};
+
+    use super::visible::instance_bodies;
+    use super::*;
+    use crate::scene::PlacedObject;
+    use crate::shapes::footprint;
+
+    /// Pixels between the middle of the drawn part and of its projected top: a wall of 12 mm seen from 20 degrees beside
+    /// it takes 4 px on one side and moves the middle by half of that; the rest is the raster of a millimetre.
+    const MIDDLE_TOLERANCE_PX: f64 = 3.0;
+
+    #[test]
+    fn names_are_read_as_they_are_written() {
+        for axis in Axis::ALL {
+            assert_eq!(axis.name().parse::<Axis>().unwrap(), axis);
+        }
+        let message = "tilted".parse::<Axis>().unwrap_err().to_string();
+        assert!(message.contains("axis") && message.contains("tilted") && message.contains("look-alikes"), "{message}");
+    }
+
+    #[test]
+    fn strata_divide_the_range() {
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        for number in 0..PICTURES_PER_AXIS {
+            let level = Request::new(&spec, Axis::Height, number, 3).level;
+            assert_eq!((level * PICTURES_PER_AXIS as f64) as u64, number);
+        }
+        assert_eq!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Height, 4, 3).level);
+        assert_ne!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Height, 4, 4).level);
+        assert_ne!(Request::new(&spec, Axis::Height, 4, 3).level, Request::new(&spec, Axis::Tilt, 4, 3).level);
+    }
+
+    #[test]
+    fn the_truth_lies_on_the_drawn_part_from_any_camera_pose() {
+        for (name, axis, number) in [
+            ("cranfield_face", Axis::Tilt, 19),
+            ("fuel_line", Axis::Tilt, 10),
+            ("fuel_line", Axis::Height, 0),
+            ("cranfield_face", Axis::Height, 19),
+        ] {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            let mut request = Request::new(&spec, axis, number, 5);
+            let mut drawn = match axis {
+                Axis::Tilt => camera_pose::draw_tilted(&mut request).unwrap(),
+                _ => camera_pose::draw_from_another_height(&mut request).unwrap(),
+            };
+            let truth = &visible::instance_truths(&mut drawn.cell, &drawn.scene, &drawn.view.camera).unwrap()[0];
+            let projected: Vec<Point2<f64>> = spec
+                .height_map(0.001)
+                .unwrap()
+                .filled()
+                .map(|(at, z, _)| truth.grasp.base_from_object * Point3::new(at.x, at.y, z))
+                .map(|p| drawn.view.camera.project(&p).unwrap())
+                .collect();
+            let body = instance_bodies(&drawn.cell, 1).unwrap()[0];
+            let segmentation = drawn.cell.wrist_segmentation().unwrap();
+            let model = drawn.cell.data().model();
+            let shown: Vec<Point2<f64>> = segmentation
+                .pixels_where(|geom| model.body_of(geom) == body)
+                .map(|(x, y)| Point2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))
+                .collect();
+            let middle =
+                |points: &[Point2<f64>]| points.iter().map(|p| p.coords).sum::<Vector2<f64>>() / points.len() as f64;
+            let apart = (middle(&projected) - middle(&shown)).norm();
+            assert!(apart < MIDDLE_TOLERANCE_PX, "{name} {axis} {number}: {apart} px");
+            let line = truth.grasp.line;
+            // The marks are where the truth has them, within the part's outline.
+            assert!((line.center().coords - middle(&shown)).norm() < 60.0, "{name} {axis}: {:?}", line.center());
+            let range = if axis == Axis::Tilt { 5.0..20.0 } else { 0.75..1.3 };
+            assert!(range.contains(&drawn.parameter.value), "{}", drawn.parameter.description);
+        }
+    }
+
+    #[test]
+    fn covers_hide_what_their_stratum_says() {
+        for (name, number) in [("fuel_line", 0), ("housing", 19)] {
+            let spec = ObjectSpec::by_name(name).unwrap();
+            let shown = axis_view(&spec, Axis::Covered, number, 8).unwrap();
+            let stratum = |number: u64| 0.10 + 0.30 * number as f64 / PICTURES_PER_AXIS as f64;
+            let covered = 1.0 - shown.truths[0].visible_share;
+            // The cover stops within two percent of the wanted share.
+            assert!(
+                (stratum(number) - 0.02..stratum(number + 1) + 0.02).contains(&covered),
+                "{name} {number}: {covered}"
+            );
+            assert!((covered - shown.parameter.value).abs() < 1e-9, "{covered} and {}", shown.parameter.value);
+        }
+    }
+
+    #[test]
+    fn instances_keep_apart_and_things_in_clutter_do_not_cover() {
+        let spec = ObjectSpec::by_name("rod_end").unwrap();
+        let shown = axis_view(&spec, Axis::Instances, 3, 8).unwrap();
+        assert_eq!(shown.truths.len(), 3);
+        let outlines: Vec<_> =
+            shown.scene.object.iter().chain(&shown.scene.instances).map(PlacedObject::footprint).collect();
+        for (idx, one) in outlines.iter().enumerate() {
+            assert!(shown.truths[idx].visible_share > 0.9, "{}", shown.truths[idx].visible_share);
+            for other in &outlines[..idx] {
+                assert!(footprint::separation(one, other) > 0.0);
+            }
+        }
+        let cluttered = axis_view(&spec, Axis::Clutter, 12, 8).unwrap();
+        assert!((10..=15).contains(&cluttered.scene.distractors.len()));
+        // Tall things beside the part hide a little of it from a camera that is not straight above.
+        assert!(cluttered.truths[0].visible_share > 0.85, "{}", cluttered.truths[0].visible_share);
+    }
+
+    #[test]
+    fn a_picture_is_the_same_to_the_bit_and_look_alikes_have_no_truth() {
+        let spec = ObjectSpec::by_name("fuel_line").unwrap();
+        let [one, again] = [0; 2].map(|_| axis_view(&spec, Axis::Dark, 7, 2).unwrap());
+        assert_eq!(one.view, again.view);
+        let shown = axis_view(&spec, Axis::LookAlikes, 0, 2).unwrap();
+        assert_eq!(shown.look_alike, Some(LookAlikeKind::Mirrored));
+        assert!(shown.truths.is_empty() && shown.scene.object.unwrap().spec.name == "fuel_line_mirrored");
+    }
+}

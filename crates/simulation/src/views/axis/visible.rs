@@ -1,0 +1,77 @@
+//! How much of each instance of the part a picture shows.
+
+use nalgebra::{Isometry3, Translation3};
+use sdg_geometry::PosedCamera;
+
+use crate::error::Result;
+use crate::model::{Body, Id, Joint};
+use crate::render::Segmentation;
+use crate::scene::{PlacedObject, SceneVariation};
+use crate::views::GraspTruth;
+use crate::workcell::Workcell;
+
+/// One of the part's instances in a picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InstanceTruth {
+    /// Where it is, and its grasp.
+    pub grasp: GraspTruth,
+    /// Share of its pixels that the picture shows, of those that it would show with nothing else on the table.
+    pub visible_share: f64,
+}
+
+/// Where things are put that shall not be seen: below the floor.
+const OUT_OF_SIGHT_M: f64 = -10.0;
+
+/// The truth about each instance, with the share of it that shows.
+pub(super) fn instance_truths(
+    cell: &mut Workcell,
+    scene: &SceneVariation,
+    camera: &PosedCamera,
+) -> Result<Vec<InstanceTruth>> {
+    let instances: Vec<PlacedObject> = scene.object.iter().chain(&scene.instances).cloned().collect();
+    let bodies = instance_bodies(cell, instances.len())?;
+    let shown = cell.wrist_segmentation()?;
+    for index in 0..scene.distractors.len() {
+        hide_distractor(cell, index)?;
+    }
+    let alone = cell.wrist_segmentation()?;
+    Ok(instances
+        .iter()
+        .zip(bodies)
+        .filter_map(|(instance, body)| {
+            let pixels = |segmentation: &Segmentation| num_pixels(cell, segmentation, body) as f64;
+            let visible_share = pixels(&shown) / pixels(&alone).max(1.0);
+            GraspTruth::new(instance, camera).map(|grasp| InstanceTruth { grasp, visible_share })
+        })
+        .collect())
+}
+
+/// The bodies of the part's instances in the scene's order.
+pub(super) fn instance_bodies(cell: &Workcell, count: usize) -> Result<Vec<Id<Body>>> {
+    let model = cell.data().model();
+    (0..count)
+        .map(|idx| match idx {
+            0 => model.id("object"),
+            _ => model.id(&format!("instance_{}", idx - 1)),
+        })
+        .collect()
+}
+
+/// How many pixels show a body.
+pub(super) fn num_pixels(cell: &Workcell, segmentation: &Segmentation, body: Id<Body>) -> usize {
+    let model = cell.data().model();
+    segmentation.pixels_where(|geom| model.body_of(geom) == body).count()
+}
+
+/// Takes a distractor out of the picture, for the truths about what remains.
+pub(super) fn hide_distractor(cell: &mut Workcell, index: usize) -> Result<()> {
+    let below = Isometry3::from_parts(Translation3::new(index as f64, 0.0, OUT_OF_SIGHT_M), Default::default());
+    place_distractor(cell, index, &below)
+}
+
+/// Puts a distractor somewhere.
+pub(super) fn place_distractor(cell: &mut Workcell, index: usize, base_from_distractor: &Isometry3<f64>) -> Result<()> {
+    let joint = cell.data().model().id::<Joint>(&format!("distractor_{index}_joint"))?;
+    cell.data.place(joint, base_from_distractor);
+    cell.data.forward()
+}

@@ -1,0 +1,240 @@
+//! Cameras beside the robot's own, each with a lens, a resolution and a place of its own over the table.
+//!
+//! ```text
+//! (part, camera, number, seed) ─ ordinary scene, the arm turned away ─ camera at a height and tilt ─ picture with distortion
+//! ```
+//! They are to the wrist camera what a user's second camera is to the one that took the photo.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use sdg_geometry::{PinholeCamera, PlumbBob, PosedCamera};
+use sdg_robot::camera_looking_down;
+
+use super::{GraspTruth, shows_whole};
+use crate::camera::CameraView;
+use crate::data::Data;
+use crate::error::{Result, SimulationError};
+use crate::lens::Frustum;
+use crate::objects::{LookAlikeKind, ObjectSpec};
+use crate::panda::PandaIds;
+use crate::render::{RenderConfig, Renderer};
+use crate::scene::{PlacedObject, SceneVariation, VariationConfig, pose_attributes};
+use crate::workcell::{WorkcellConfig, build_model};
+
+/// A camera model and where it may hang.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OtherCamera {
+    /// The name in tables.
+    pub name: &'static str,
+    /// Resolution, focal length, axis and lens.
+    pub intrinsics: PinholeCamera,
+    /// Distances to the place on the table that it looks at, in metres.
+    pub distances_m: [f64; 2],
+}
+
+/// Three cameras of other focal lengths, lenses and heights than the wrist camera (640 × 480, 550 px, 0.58 m).
+pub const OTHER_CAMERAS: [OtherCamera; 3] = [
+    OtherCamera {
+        name: "webcam",
+        intrinsics: PinholeCamera {
+            width: 640,
+            height: 480,
+            fx: 452.0,
+            fy: 449.0,
+            cx: 327.0,
+            cy: 233.5,
+            lens: PlumbBob { k1: -0.27, k2: 0.08, p1: 0.0012, p2: -0.0008, k3: 0.0 },
+        },
+        distances_m: [0.42, 0.55],
+    },
+    OtherCamera {
+        name: "phone",
+        intrinsics: PinholeCamera {
+            width: 960,
+            height: 720,
+            fx: 742.0,
+            fy: 742.0,
+            cx: 475.0,
+            cy: 364.0,
+            lens: PlumbBob { k1: 0.09, k2: -0.16, p1: -0.0004, p2: 0.0006, k3: 0.0 },
+        },
+        distances_m: [0.50, 0.75],
+    },
+    OtherCamera {
+        name: "overhead",
+        intrinsics: PinholeCamera {
+            width: 1280,
+            height: 720,
+            fx: 921.0,
+            fy: 923.0,
+            cx: 648.5,
+            cy: 352.0,
+            lens: PlumbBob { k1: -0.12, k2: 0.04, p1: 0.0, p2: 0.0011, k3: 0.0 },
+        },
+        distances_m: [0.72, 0.94],
+    },
+];
+
+/// Tilts from straight down, in degrees.
+const TILTS_DEG: [f64; 2] = [0.0, 25.0];
+/// How far beside the part the camera looks, in metres.
+const MAX_LOOK_OFFSET_M: f64 = 0.05;
+/// Places that are tried until the whole part is in the picture.
+const MAX_TRIES: usize = 40;
+/// The first joint's angle at which the arm points away from the table, in radians.
+const TURNED_AWAY_RAD: f64 = 2.7;
+
+/// What lies on the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnTable {
+    /// The part.
+    Part,
+    /// The part in another size, in percent of its own.
+    Scaled(u32),
+}
+
+/// A picture with the truth about it.
+#[derive(Debug, Clone)]
+pub struct OtherView {
+    /// The picture and its camera.
+    pub view: CameraView,
+    /// `None` where something else lies in the part's place.
+    pub truth: Option<GraspTruth>,
+    /// Height of the camera over the table, in metres.
+    pub height_m: f64,
+    /// Tilt from straight down, in degrees.
+    pub tilt_deg: f64,
+}
+
+/// Draws picture `number` of a part by a camera: distance and tilt run through their ranges with the number, `of` numbers in all.
+///
+/// # Errors
+/// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] where no place shows the whole part.
+pub fn other_view(
+    spec: &ObjectSpec,
+    on_table: OnTable,
+    camera: &OtherCamera,
+    (number, of): (u64, u64),
+    seed: u64,
+) -> Result<OtherView> {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, number, seed));
+    let scene_seed = rng.random();
+    let shown = match on_table {
+        OnTable::Part => spec.clone(),
+        OnTable::Scaled(percent) => spec.look_alike(LookAlikeKind::Scaled { percent }, rng.random())?.spec,
+    };
+    let scene = SceneVariation::sample(Some(&shown), &VariationConfig::default(), scene_seed);
+    let part = scene.object.clone().ok_or_else(|| no_place(camera, &spec.name))?;
+    let within = |[low, high]: [f64; 2], share: f64| low + share.clamp(0.0, 1.0) * (high - low);
+    // Distance and tilt run through their ranges in other orders, so that they vary apart from each other.
+    let share = |k: u64| (k % of) as f64 / of.max(1) as f64;
+    let tilt_deg = within(TILTS_DEG, share(number) + rng.random_range(0.0..1.0 / of.max(1) as f64));
+    let distance_m = within(camera.distances_m, share(7 * number + 3) + rng.random_range(0.0..1.0 / of.max(1) as f64));
+    let posed = (0..MAX_TRIES)
+        .map(|_| PosedCamera {
+            intrinsics: camera.intrinsics,
+            world_from_camera: looking_at(&part, distance_m, tilt_deg, &mut rng),
+        })
+        .find(|posed| shows_whole(posed, &part))
+        .ok_or_else(|| no_place(camera, &spec.name))?;
+    let image = draw(scene, &posed)?;
+    let truth = match on_table {
+        OnTable::Part => Some(GraspTruth::new(&part, &posed).ok_or_else(|| no_place(camera, &spec.name))?),
+        OnTable::Scaled(_) => None,
+    };
+    let height_m = posed.world_from_camera.translation.z;
+    Ok(OtherView { view: CameraView { image, camera: posed }, truth, height_m, tilt_deg })
+}
+
+/// A picture of a scene by a camera that stands still beside the robot, whose arm is turned away.
+///
+/// # Errors
+/// As [`crate::Workcell::new`]; [`SimulationError::Configuration`] for a lens that does not reach its picture's corners.
+fn draw(scene: SceneVariation, camera: &PosedCamera) -> Result<image::RgbImage> {
+    let frustum = Frustum::around(&camera.intrinsics)?;
+    // MuJoCo's cameras look along -z with y up.
+    let mujoco = camera.world_from_camera * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    let named = format!(
+        "<worldbody><camera name=\"beside\" {} fovy=\"{:.12}\"/></worldbody>",
+        pose_attributes(&mujoco),
+        frustum.vertical_field_of_view_rad().to_degrees()
+    );
+    let model = build_model(&WorkcellConfig::new(scene), &named)?;
+    let mut renderer = Renderer::new(&model, frustum.render_config(&RenderConfig::default()))?;
+    let mut data = Data::new(model.clone())?;
+    let arm = PandaIds::find(&model)?;
+    let mut q = sdg_kinematics::ready_pose();
+    q[0] = TURNED_AWAY_RAD;
+    arm.set_position(&mut data, &q);
+    data.forward()?;
+    let drawn = renderer.image(&mut data, model.id("beside")?)?;
+    Ok(frustum.resample(&drawn, &camera.intrinsics))
+}
+
+fn looking_at(part: &PlacedObject, distance_m: f64, tilt_deg: f64, rng: &mut Pcg64Mcg) -> Isometry3<f64> {
+    let at = part.base_from_object.translation.vector;
+    let offset = [0; 2].map(|_: i32| rng.random_range(-MAX_LOOK_OFFSET_M..MAX_LOOK_OFFSET_M));
+    let aim = Vector3::new(at.x + offset[0], at.y + offset[1], 0.0);
+    let [axis_rad, yaw_rad]: [f64; 2] = [0; 2].map(|_: i32| rng.random_range(-PI..PI));
+    let axis = Unit::new_normalize(Vector3::new(axis_rad.cos(), axis_rad.sin(), 0.0));
+    let tilted = UnitQuaternion::from_axis_angle(&axis, tilt_deg.to_radians());
+    let about_aim = Translation3::from(aim) * tilted * Translation3::from(-aim);
+    about_aim * camera_looking_down(aim.x, aim.y, distance_m, yaw_rad)
+}
+
+fn no_place(camera: &OtherCamera, part: &str) -> SimulationError {
+    SimulationError::Configuration {
+        field: "camera",
+        expected: "a place that shows the whole part".into(),
+        found: format!("none of {} for {part}", camera.name),
+    }
+}
+
+/// FNV-1a over the names, mixed with the numbers.
+fn seed_of(part: &str, camera: &str, number: u64, seed: u64) -> u64 {
+    let names = part.bytes().chain([0]).chain(camera.bytes());
+    let named =
+        names.fold(0xcbf2_9ce4_8422_2325u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+    named ^ seed.wrapping_mul(0xd134_2543_de82_ef95) ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_camera_shows_the_part_where_the_truth_says() {
+        let spec = ObjectSpec::by_name("cranfield_face").unwrap();
+        for camera in &OTHER_CAMERAS {
+            let [first, again] = [0, 1].map(|_| other_view(&spec, OnTable::Part, camera, (18, 20), 3).unwrap());
+            assert_eq!(first.view, again.view);
+            assert!((20.0..25.0).contains(&first.tilt_deg), "{}", first.tilt_deg);
+            assert!((0.35..0.95).contains(&first.height_m), "{}", first.height_m);
+            let empty = SceneVariation { object: None, ..scene_of(&spec, camera) };
+            let without = draw(empty, &first.view.camera).unwrap();
+            // The middle of what the part changed lies within the part's size of its marks.
+            let changed: Vec<Vector3<f64>> = first
+                .view
+                .image
+                .enumerate_pixels()
+                .filter(|&(x, y, color)| (0..3).any(|c| color[c].abs_diff(without.get_pixel(x, y)[c]) > 40))
+                .map(|(x, y, _)| Vector3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, 0.0))
+                .collect();
+            let middle = changed.iter().sum::<Vector3<f64>>() / changed.len() as f64;
+            let marks = first.truth.as_ref().unwrap().line.center();
+            assert!(
+                changed.len() > 500 && (middle.xy() - marks.coords).norm() < 60.0,
+                "{}: {middle}, {marks}",
+                camera.name
+            );
+        }
+    }
+
+    fn scene_of(spec: &ObjectSpec, camera: &OtherCamera) -> SceneVariation {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed_of(&spec.name, camera.name, 18, 3));
+        SceneVariation::sample(Some(spec), &VariationConfig::default(), rng.random())
+    }
+}
