@@ -31,6 +31,7 @@ mod arm;
 mod arm_state;
 mod error;
 mod franka;
+pub mod height;
 mod impedance;
 mod lying_part;
 mod pace;
@@ -66,7 +67,7 @@ pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
-    CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
+    CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
     PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
 pub use surroundings::{Destination, Surroundings, Way};

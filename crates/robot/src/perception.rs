@@ -7,6 +7,7 @@ use nalgebra::Isometry3;
 
 use crate::arm::Arm;
 use crate::error::Result;
+use crate::height::Sighting;
 
 /// Where the hand should close, as perception sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,15 @@ pub trait PartFinder<A: Arm> {
     /// As [`PartFinder::find`].
     fn find_nearest(&mut self, arm: &mut A, _base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         self.find(arm)
+    }
+
+    /// Takes a picture and tells where it shows parts that may be the one at a grasp, wherever in height: for a height that is not known.
+    /// Nothing where it shows none, and for perception that measures no heights.
+    ///
+    /// # Errors
+    /// As [`PartFinder::find`].
+    fn sight(&mut self, _arm: &mut A, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
+        Ok(Vec::new())
     }
 
     /// What else the picture of the last call shows for sure: parts of the same kind that lie beside the one that was found.
