@@ -12,13 +12,14 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point2, Point3};
 use sdg_camera::LatestFrame;
 use sdg_geometry::Polygon;
-use sdg_grasp::{CameraOverTable, GraspModel, Verification};
+use sdg_grasp::{CameraOverTable, Circumstances, ErrorLength, GraspModel, Verification};
 use sdg_kinematics::Panda;
-use sdg_robot::height::Sighting;
+use sdg_robot::height::{MeasuredHeight, Sighting};
 use sdg_robot::{Arm, GraspTarget, PartFinder, Place, RobotError};
 
 use crate::perception::{Found, Perception};
 use crate::placed_camera::PlacedCamera;
+use crate::surface::{PartOnSurface, PosedPicture, surface_height};
 
 /// How long a picture that was taken after the arm stopped is waited for.
 const MAX_WAIT: Duration = Duration::from_secs(5);
@@ -98,8 +99,17 @@ pub struct ModelFinder<P> {
     others: Vec<GraspTarget>,
     /// How much higher than on the table parts may lie, m; `None` where they lie on it.
     heights_m: Option<RangeInclusive<f64>>,
+    /// The pictures that heights are measured by, with what each shows.
+    sights: Vec<Sights>,
     /// Where parts are put down: those that lie there are not to be taken.
     pub places: Vec<Place>,
+}
+
+/// A picture with the parts in it, each with the corners of its outline in the plane of [`Sighting::middle_m`], base frame, m.
+#[derive(Debug)]
+struct Sights {
+    picture: PosedPicture,
+    parts: Vec<(Sighting, Polygon)>,
 }
 
 /// How much higher than on the table parts may lie where nothing is told of it, m.
@@ -112,6 +122,11 @@ const BY_SIZE_WITHIN_M: f64 = 0.015;
 const SAME_PART_M: f64 = 0.040;
 /// Sizes of demonstrations that differ by more say nothing of a height.
 const MAX_SIZE_DIFFERENCE: f64 = 0.003;
+/// A part may be so much higher than its marks, m.
+const TOP_LEEWAY_M: f64 = 0.002;
+/// The surface that a part lies on is looked for within so many standard deviations of where the part's pose puts it, between these bounds in m.
+const SURFACE_SIGMAS: f64 = 3.5;
+const SURFACE_WITHIN_M: [f64; 2] = [0.006, 0.012];
 /// Radius that holds 68 % of a place's errors over their standard deviation along x and along y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
 
@@ -129,6 +144,7 @@ impl<P> ModelFinder<P> {
             seen: None,
             others: Vec::new(),
             heights_m: None,
+            sights: Vec::new(),
             places: Vec::new(),
         }
     }
@@ -158,6 +174,7 @@ impl<P> ModelFinder<P> {
     where
         P: Pictures<A>,
     {
+        self.sights.clear();
         let heights_m = self.heights_m.clone();
         let sightings = self.look(arm, 0.0, heights_m.as_ref())?;
         if heights_m.is_none() {
@@ -224,13 +241,15 @@ impl<P> ModelFinder<P> {
             Some(pixel) => place.camera.at_height(&pixel, marks_z_m)?,
             None => Point3::new(target.base_from_tcp.translation.x, target.base_from_tcp.translation.y, marks_z_m),
         };
-        let uncertainty = found.pose?.uncertainty;
+        let pose = found.pose?;
+        // What walls do to a pose is the relief's part, and alike in both pictures.
+        let noise_m = ErrorLength::POSITION.metres(&Circumstances { mark_height_m: 0.0, ..pose.circumstances });
         Some(Sighting {
             camera_m: place.camera.world_from_camera.translation.vector.into(),
             middle_m,
-            place_sigma_m: uncertainty.position_m / SIGMAS_OF_RADIUS,
+            place_sigma_m: noise_m / SIGMAS_OF_RADIUS,
             size: self.size_of(found),
-            size_sigma: uncertainty.yaw_rad,
+            size_sigma: pose.uncertainty.yaw_rad,
             target,
         })
     }
@@ -253,6 +272,45 @@ impl<P> ModelFinder<P> {
         let corners = &found.detection.outline.as_ref()?.vertices;
         let outline_in_base = corners.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
         Some(SeenOutline { outline_in_base, z_m: [table_m, mark_m] })
+    }
+
+    /// Keeps the last picture and the outlines of what it shows.
+    fn keep_sights(&mut self, sightings: &[Sighting]) {
+        let (Some((picture, found)), Some(place)) = (&self.last, self.perception.place()) else { return };
+        let outlines = found.iter().filter(|found| found.pose.is_some()).map(|found| found.detection.outline.as_ref());
+        let parts = sightings.iter().zip(outlines).filter_map(|(sighting, outline)| {
+            let on_plane = |pixel| place.camera.at_height(pixel, sighting.middle_m.z).map(|p_in_base| p_in_base.xy());
+            let vertices = outline?.vertices.iter().map(on_plane).collect::<Option<Vec<_>>>()?;
+            Some((*sighting, Polygon { vertices }))
+        });
+        let parts = parts.collect();
+        self.sights.push(Sights { picture: PosedPicture::new(picture, place.camera), parts });
+    }
+
+    /// The surface beside a part that two of the kept pictures show.
+    fn surface_of(&self, pair: &[Sighting; 2], expected: &MeasuredHeight) -> Option<MeasuredHeight> {
+        let lengths = self.perception.model().facts().lengths?;
+        let kept = |sighting: &Sighting| {
+            let shows = |(shown, _): &&(Sighting, Polygon)| shown == sighting;
+            self.sights.iter().find_map(|sights| Some((&sights.picture, &sights.parts.iter().find(shows)?.1)))
+        };
+        let ([one, other], [(first, outline), (second, _)]) = (*pair, [kept(&pair[0])?, kept(&pair[1])?]);
+        // The first picture's outline, at its height and where both pictures show it.
+        let marks_m = expected.height_m + lengths.mark_height_m;
+        let [here, there] = [one.middle_at(marks_m), other.middle_at(marks_m)];
+        let share = (one.camera_m.z - marks_m) / one.distance_m();
+        let foot = one.camera_m.xy();
+        let corner = |p: &Point2<f64>| foot + (p - foot) * share + 0.5 * (there - here);
+        let outline_m = Polygon { vertices: outline.vertices.iter().map(corner).collect() };
+        let part = PartOnSurface {
+            outline_m: &outline_m,
+            // Marks are in the middle of a round bar and on top of others.
+            top_m: lengths.mark_height_m.max(2.0 * lengths.grasp_height_m) + TOP_LEEWAY_M,
+            expected_m: expected.height_m,
+            within_m: (SURFACE_SIGMAS * expected.sigma_m).clamp(SURFACE_WITHIN_M[0], SURFACE_WITHIN_M[1]),
+        };
+        let found = surface_height([first, second], &part)?;
+        Some(MeasuredHeight { height_m: found.height_m, sigma_m: found.sigma_m })
     }
 
     fn keep_others(&mut self, found: Vec<GraspTarget>, chosen: Option<&GraspTarget>) {
@@ -305,7 +363,16 @@ impl<A: Arm, P: Pictures<A>> PartFinder<A> for ModelFinder<P> {
             let apart = sighting.target.base_from_tcp.translation.vector - expected_at.vector;
             sighting.target.score >= sdg_robot::CONFIRMED && apart.xy().norm() <= SAME_PART_M
         };
+        self.keep_sights(&sightings);
         Ok(sightings.into_iter().filter(is_near).collect())
+    }
+
+    fn surface_beside(
+        &mut self,
+        pair: &[Sighting; 2],
+        expected: &MeasuredHeight,
+    ) -> sdg_robot::Result<Option<MeasuredHeight>> {
+        Ok(self.surface_of(pair, expected))
     }
 
     fn others(&self) -> Vec<GraspTarget> {

@@ -9,6 +9,7 @@ mod live_tracker;
 mod part_shape;
 mod perception;
 mod placed_camera;
+mod surface;
 
 pub use error::{CellError, Result};
 pub use finder::{LivePictures, ModelFinder, Pictures, SeenOutline, TakenPicture, UNKNOWN_HEIGHTS_M};

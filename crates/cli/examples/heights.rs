@@ -148,7 +148,7 @@ impl Case {
             pose: CameraPose::OnFlange(cell.told_flange_from_camera()),
             table_height_m: told_table_m,
         };
-        let mut finder = ModelFinder::new(model.clone(), camera, WristPictures).with_heights(UNKNOWN_HEIGHTS_M);
+        let mut finder = ModelFinder::new(model.clone(), camera, WristPictures(format!("{}_{}", self.spec.name, self.seed))).with_heights(UNKNOWN_HEIGHTS_M);
         let config = GraspConfig {
             part: Some(part_shape(&self.spec)?),
             height: height_measurement(model, None),
@@ -166,11 +166,23 @@ impl Case {
 }
 
 /// What the simulated wrist camera sees.
-struct WristPictures;
+struct WristPictures(String);
 
 impl Pictures<Workcell> for WristPictures {
     fn take(&mut self, cell: &mut Workcell) -> sdg_robot::Result<TakenPicture> {
-        Ok(TakenPicture { picture: cell.wrist_view()?.image, taken: None })
+        let view = cell.wrist_view()?;
+        if let Ok(folder) = std::env::var("HEIGHTS_PICTURES") {
+            for number in 0.. {
+                let path = format!("{folder}/{}_{number}", self.0);
+                if !std::path::Path::new(&format!("{path}.png")).exists() {
+                    view.image.save(format!("{path}.png")).unwrap();
+                    let m = view.camera.world_from_camera.to_homogeneous();
+                    std::fs::write(format!("{path}.json"), json!(m.as_slice()).to_string()).unwrap();
+                    break;
+                }
+            }
+        }
+        Ok(TakenPicture { picture: view.image, taken: None })
     }
 }
 
@@ -230,8 +242,11 @@ impl Found {
         let looks = self.report.targets.iter().flatten().map(|target| target.base_from_tcp.translation.z + over_grasp_m);
         json!({
             "part": case.spec.name, "seed": case.seed, "higher": case.higher_m, "marks": self.marks_m, "mark_height": case.spec.mark_height_m,
-            "sightings": sightings.collect::<Vec<_>>(), "looks": looks.collect::<Vec<_>>(), "why_not": why_not, "why": self.why(),
-            "measured": self.error_m(),
+            "sightings": sightings.collect::<Vec<_>>(), "looks": looks.collect::<Vec<_>>(), "marked": case.scene.object.as_ref().map(|object| case.spec.marks_in_base(&object.base_from_object).map(|mark| [mark.x, mark.y, mark.z])),
+            "jaw_width": case.spec.jaw_width_m, "outline": case.scene.object.as_ref().map(|object| object.footprint().iter().map(|p| [p.x, p.y]).collect::<Vec<_>>()),
+            "why_not": why_not, "why": self.why(),
+            "measured": self.error_m(), "by_part": self.report.height.as_ref().and_then(|height| height.by_part)
+                .map(|by_part| [by_part.height_m - self.marks_m, by_part.sigma_m]),
         })
         .to_string()
     }
@@ -243,7 +258,7 @@ fn summary(cases: &[Found], is_grasping: bool) -> String {
     let num_within = absolute.iter().filter(|error| **error <= WITHIN_M).count();
     let normalised = errors.iter().map(|[error, sigma]| error / sigma);
     let spread = (normalised.map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
-    let median_mm = median(&absolute).unwrap_or(f64::NAN) * 1e3;
+    let median_mm = median(absolute.iter().copied()).unwrap_or(f64::NAN) * 1e3;
     let bias_mm = errors.iter().map(|[error, _]| error * 1e3).sum::<f64>() / errors.len().max(1) as f64;
     let held = match is_grasping {
         true => format!("; {} held", cases.iter().filter(|case| case.is_held).count()),
@@ -262,7 +277,7 @@ fn is_as_asked(cases: &[Found], is_grasping: bool) -> bool {
     let share = |count: usize| count as f64 / cases.len().max(1) as f64;
     let num_within = absolute.iter().filter(|error| **error <= WITHIN_M).count();
     let num_held = cases.iter().filter(|case| case.is_held).count();
-    median(&absolute).is_some_and(|median_m| median_m <= MAX_MEDIAN_M)
+    median(absolute.iter().copied()).is_some_and(|median_m| median_m <= MAX_MEDIAN_M)
         && share(num_within) >= MIN_SHARE_WITHIN
         && (!is_grasping || share(num_held) >= MIN_SHARE_HELD)
 }

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 
 use crate::arm::Arm;
 use crate::error::Result;
-use crate::height::Sighting;
+use crate::height::{MeasuredHeight, Sighting};
 
 /// Where the hand should close, as perception sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +44,15 @@ pub trait PartFinder<A: Arm> {
     /// As [`PartFinder::find`].
     fn sight(&mut self, _arm: &mut A, _expected: &GraspTarget) -> Result<Vec<Sighting>> {
         Ok(Vec::new())
+    }
+
+    /// z of the surface beside a part that two sightings of the last calls of [`PartFinder::sight`] show, looked for about where it is expected;
+    /// `None` where nothing is seen of it.
+    ///
+    /// # Errors
+    /// As [`PartFinder::find`].
+    fn surface_beside(&mut self, _pair: &[Sighting; 2], _expected: &MeasuredHeight) -> Result<Option<MeasuredHeight>> {
+        Ok(None)
     }
 
     /// What else the picture of the last call shows for sure: parts of the same kind that lie beside the one that was found.

@@ -15,7 +15,7 @@ mod triangulation;
 
 pub use settle::{HeightSource, SettledHeight, ToldHeight, settle};
 pub use sighting::Sighting;
-pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, Relief, triangulate, triangulate_nearest};
+pub use triangulation::{HeightError, MIN_BASELINE_M, MeasuredHeight, RELIEF_M, triangulate, triangulate_nearest};
 
 /// How the height of a part is measured on the way down to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,8 +28,8 @@ pub struct HeightMeasurement {
     pub mark_height_m: f64,
     /// Height of the grasp over what the part lies on, m.
     pub grasp_height_m: f64,
-    /// How deep below its marks a part of this kind is seen.
-    pub relief: Relief,
+    /// How far a part may be seen above or below its marks, one standard deviation, m.
+    pub relief_m: f64,
     /// The height of the marks as it was told; z of the base.
     pub told: Option<ToldHeight>,
 }
@@ -45,9 +45,16 @@ impl HeightMeasurement {
             baseline_m: 0.12,
             mark_height_m,
             grasp_height_m,
-            relief: Relief::of_marks(mark_height_m),
+            relief_m: RELIEF_M,
             told: None,
         }
+    }
+
+    /// The height of the marks by the part's own height and by the surface beside it, where both agree.
+    pub fn combined(&self, by_part: &MeasuredHeight, surface: Option<&MeasuredHeight>) -> MeasuredHeight {
+        let Some(surface) = surface else { return *by_part };
+        let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
+        on_surface.mean(by_part).unwrap_or(*by_part)
     }
 
     /// How far the grasp lies below the marks, m.
@@ -61,8 +68,10 @@ impl HeightMeasurement {
 pub struct HeightReport {
     /// The height that the grasp uses.
     pub settled: Option<SettledHeight>,
-    /// What was triangulated.
+    /// What was measured: the lines of sight to the part, and the surface beside it where it was seen.
     pub measured: Option<MeasuredHeight>,
+    /// The same by the lines of sight alone.
+    pub by_part: Option<MeasuredHeight>,
     /// Why nothing was triangulated.
     pub why_not: Option<String>,
     /// What the pictures showed, in their order.

@@ -19,7 +19,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
     pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
         let Some(measurement) = self.config.height else { return Ok(*seen) };
         let mut report = HeightReport::default();
-        let measured = self.look_from_two_places(seen, &measurement, &mut report.sightings);
+        let measured = self.look_from_two_places(seen, &measurement, &mut report);
         let measured = match measured {
             Ok(measured) => Ok(measured),
             // The arm stands still and may go on.
@@ -58,7 +58,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         &mut self,
         seen: &GraspTarget,
         measurement: &HeightMeasurement,
-        all: &mut Vec<Sighting>,
+        report: &mut HeightReport,
     ) -> Steps<(MeasuredHeight, [Sighting; 2])> {
         let table_height_m = self.robot.limits().table_height_m;
         let camera_m = table_height_m + measurement.camera_height_m;
@@ -90,10 +90,14 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 continue;
             }
             for earlier in &pictures {
-                match triangulate_nearest(earlier, &shown, &measurement.relief) {
+                match triangulate_nearest(earlier, &shown, measurement.relief_m) {
                     Some(Ok((height, pair))) => {
-                        all.extend(pair);
-                        return Ok((height, pair));
+                        report.sightings.extend(pair);
+                        report.by_part = Some(height);
+                        let surface_m = height.height_m - measurement.mark_height_m;
+                        let expected = MeasuredHeight { height_m: surface_m, ..height };
+                        let surface = self.finder.surface_beside(&pair, &expected)?;
+                        return Ok((measurement.combined(&height, surface.as_ref()), pair));
                     }
                     // Pictures at a right angle to each other may be too near.
                     Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
@@ -103,7 +107,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
             }
             pictures.push(shown);
         }
-        all.extend(pictures.iter().filter_map(|shown| shown.first()));
+        report.sightings.extend(pictures.iter().filter_map(|shown| shown.first()));
         let min_mm = MIN_BASELINE_M * 1e3;
         Err(fails(why.unwrap_or_else(|| format!("no two pictures from places {min_mm:.0} mm apart show the part"))))
     }

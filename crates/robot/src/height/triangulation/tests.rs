@@ -25,16 +25,12 @@ fn pair(height_m: f64, plane_m: f64) -> [Sighting; 2] {
     [[0.44, 0.3], [0.56, 0.3]].map(|camera| shown(camera, 0.51, height_m, plane_m))
 }
 
-const SIZED: Relief = Relief { depth_m: 0.0, sigma_m: 0.002, photo_distance_m: Some(0.56) };
-
 #[test]
 fn lines_of_sight_cross_where_the_part_is() {
     for height_m in [-0.01, 0.0, 0.016, 0.08] {
         let [one, other] = pair(height_m, 0.02);
-        let found = triangulate(&one, &other, &Relief::NONE).unwrap();
+        let found = triangulate(&one, &other, 0.0).unwrap();
         assert!((found.height_m - height_m).abs() < 1e-9, "{found:?}");
-        let sized = triangulate(&one, &other, &SIZED).unwrap();
-        assert!((sized.height_m - height_m).abs() < 1e-9, "{sized:?}");
         let target = one.at_height(height_m).target;
         assert!((target.base_from_tcp.translation.x - 0.51).abs() < 1e-9, "{target:?}");
         assert!((target.base_from_tcp.translation.z - height_m + 0.005).abs() < 1e-9);
@@ -46,45 +42,25 @@ fn lines_of_sight_cross_where_the_part_is() {
 fn sigma_is_that_of_the_places_over_the_baseline() {
     // 0.2 mm in both pictures, seen from 0.3 m and 0.12 m apart: √2 · 0.2 · 0.3 / 0.12 mm.
     let [one, other] = pair(0.0, 0.0);
-    let found = triangulate(&one, &other, &Relief::NONE).unwrap();
+    let found = triangulate(&one, &other, 0.0).unwrap();
     assert!((found.sigma_m - 0.707_107e-3).abs() < 1e-8, "{found:?}");
     // Edges that may lie 1 mm deeper or higher than the marks add theirs.
-    let relief = Relief { depth_m: 0.0, sigma_m: 0.001, photo_distance_m: None };
-    let found = triangulate(&one, &other, &relief).unwrap();
+    let found = triangulate(&one, &other, 0.001).unwrap();
     assert!((found.sigma_m - 0.707_107e-3_f64.hypot(1e-3)).abs() < 1e-8, "{found:?}");
     // A longer baseline is more exact.
-    let wide = triangulate(&shown([0.40, 0.3], 0.5, 0.0, 0.0), &shown([0.60, 0.3], 0.5, 0.0, 0.0), &Relief::NONE);
+    let wide = triangulate(&shown([0.40, 0.3], 0.5, 0.0, 0.0), &shown([0.60, 0.3], 0.5, 0.0, 0.0), 0.0);
     assert!(wide.unwrap().sigma_m < 0.5e-3);
-}
-
-#[test]
-fn sizes_undo_walls() {
-    // Edges lie 6 mm below the marks in reality; photo from 0.56 m. Seen from 0.28 m above the marks, sizes err by half of that.
-    let (height_m, depth_m, camera_z_m) = (0.02, 0.006, 0.30);
-    let sighting = |camera_x_m: f64| {
-        let mut seen = shown([camera_x_m, camera_z_m], 0.5, height_m - depth_m, height_m);
-        let (distance_m, photo_m) = (camera_z_m - height_m, 0.56);
-        seen.size = Some(distance_m / (distance_m + depth_m) * (photo_m + depth_m) / photo_m);
-        seen.size_sigma = 1e-4;
-        seen.place_sigma_m = 1e-5;
-        seen
-    };
-    let relief = Relief { sigma_m: 0.01, ..SIZED };
-    let found = triangulate(&sighting(0.44), &sighting(0.56), &relief).unwrap();
-    assert!((found.height_m - height_m).abs() < 0.2e-3, "{found:?}");
-    let unsized_pair = triangulate(&sighting(0.44), &sighting(0.56), &Relief::NONE).unwrap();
-    assert!((unsized_pair.height_m - (height_m - depth_m)).abs() < 1e-9, "{unsized_pair:?}");
 }
 
 #[test]
 fn pictures_that_tell_no_height_are_refused() {
     let at = |x_m: f64, z_m: f64| shown([x_m, z_m], 0.5, 0.0, 0.0);
-    let refused = |one: &Sighting, other: &Sighting| triangulate(one, other, &SIZED).unwrap_err().to_string();
+    let refused = |one: &Sighting, other: &Sighting| triangulate(one, other, 0.0).unwrap_err().to_string();
     // Twice from one place, and from two that are too near.
     let why = refused(&at(0.5, 0.3), &at(0.5, 0.3));
     assert_eq!(why, "expected two pictures from places at least 80 mm apart sideways, found 0.0 mm");
     assert!(refused(&at(0.5, 0.3), &at(0.579, 0.3)).ends_with("found 79.0 mm"));
-    assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), &SIZED).is_ok());
+    assert!(triangulate(&at(0.46, 0.3), &at(0.541, 0.3), 0.0).is_ok());
     // A metre above each other sideways is nothing.
     assert!(refused(&at(0.5, 0.3), &at(0.5, 0.9)).contains("at least 80 mm apart"));
     // From afar lines of sight are parallel.
@@ -111,11 +87,11 @@ fn of_several_parts_the_pair_is_found_that_is_one_part() {
     let look = |camera_x_m: f64| parts_m.map(|part_x_m| shown([camera_x_m, 0.3], part_x_m, 0.016, 0.02));
     let (ones, mut others) = (look(0.44), look(0.56));
     others.reverse();
-    let (height, pair) = triangulate_nearest(&ones, &others, &SIZED).unwrap().unwrap();
+    let (height, pair) = triangulate_nearest(&ones, &others, 0.0).unwrap().unwrap();
     assert!((height.height_m - 0.016).abs() < 1e-6, "{height:?}");
     let apart = pair[0].at_height(height.height_m).middle_m - pair[1].at_height(height.height_m).middle_m;
     assert!(apart.norm() < 1e-9, "{apart}");
-    assert!(triangulate_nearest(&[], &others, &SIZED).is_none());
+    assert!(triangulate_nearest(&[], &others, 0.0).is_none());
 }
 
 proptest! {
@@ -125,7 +101,16 @@ proptest! {
         plane_m in 0.0..0.1f64,
     ) {
         let [one, other] = [left_m, right_m].map(|x_m| shown([x_m, camera_m], part_m, height_m, plane_m));
-        let found = triangulate(&one, &other, &SIZED).unwrap();
+        let found = triangulate(&one, &other, 0.0).unwrap();
         prop_assert!((found.height_m - height_m).abs() < 1e-9, "{found:?}");
     }
+}
+
+#[test]
+fn the_mean_of_two_measurements_is_nearer_to_the_more_certain_one() {
+    let at = |height_mm: f64, sigma_mm: f64| MeasuredHeight { height_m: 1e-3 * height_mm, sigma_m: 1e-3 * sigma_mm };
+    // Variances of 1 and 4: weights of 0.8 and 0.2.
+    let mean = at(10.0, 1.0).mean(&at(15.0, 2.0)).unwrap();
+    assert!((mean.height_m - 0.011).abs() < 1e-12 && (mean.sigma_m - 0.8e-3_f64.sqrt() * 1e-3_f64.sqrt()).abs() < 1e-9);
+    assert_eq!(at(10.0, 1.0).mean(&at(19.0, 2.0)), None);
 }
