@@ -221,6 +221,12 @@ impl<P> ModelFinder<P> {
             (low * (1.0 - SIZE_LEEWAY)).clamp(0.5, 1.0)..=(high * (1.0 + SIZE_LEEWAY)).clamp(1.0, 2.0)
         }))?;
         let found = self.perception.detect(&picture, self.verification)?;
+        if std::env::var("DBG").is_ok() {
+            eprintln!("look higher {higher_m:.4} distance {distance_m:.4}");
+            for f in found.iter().take(2) {
+                eprintln!("  {:.3} agr {:?} size {:?} {:?} {:?}", f.detection.score, f.detection.agreement, self.size_of(f), f.detection.refused(), f.detection.evidence);
+            }
+        }
         self.seen = found.first().and_then(|best| self.outline_of(best, &place));
         let sightings = found.iter().filter_map(|found| self.sighting(found, &place)).collect();
         self.last = Some((picture, found));

@@ -36,10 +36,12 @@ const INLIER_M: f64 = 0.001;
 const INLIER_SPREADS: f64 = 2.5;
 /// So many of them are on the surface, at least: where it is less, there are two.
 const MIN_INLIER_SHARE: f64 = 0.5;
+/// They lie in so many of the four quadrants around the part, at least: what lies beside the part is on one side of it.
+const MIN_QUADRANTS: usize = 3;
 /// Windows overlap: of so many one counts.
 const WINDOWS_PER_VOTE: f64 = 4.0;
 /// What resampling errs by in every window alike, m. Fitted with WINDOWS_PER_VOTE by `heights`, so that errors over their sigmas spread by 1.
-const COMMON_SIGMA_M: f64 = 0.05e-3;
+const COMMON_SIGMA_M: f64 = 0.12e-3;
 
 /// A picture and its camera.
 #[derive(Debug, Clone)]
@@ -107,30 +109,31 @@ impl PosedPicture {
 /// The height of the surface beside a part; `None` where it shows nothing, or several surfaces.
 pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<'_>) -> Option<SurfaceHeight> {
     let offsets = window();
-    let mut heights = Vec::new();
+    let mut windows: Vec<(Point2<f64>, f64)> = Vec::new();
     for middle in middles(pictures, part) {
         if let Some(height_m) = height_of_window(pictures, &middle, &offsets, part) {
-            heights.push(height_m);
-            if heights.len() == MAX_WINDOWS {
+            windows.push((middle, height_m));
+            if windows.len() == MAX_WINDOWS {
                 break;
             }
         }
     }
-    if heights.len() < MIN_WINDOWS {
+    let middle_m = median(windows.iter().map(|(_, height_m)| *height_m))?;
+    let spread_m = 1.48 * median(windows.iter().map(|(_, height_m)| (height_m - middle_m).abs()))?;
+    let max_m = INLIER_M.max(INLIER_SPREADS * spread_m);
+    let num_windows = windows.len() as f64;
+    windows.retain(|(_, height_m)| (height_m - middle_m).abs() <= max_m);
+    let center = part.outline_m.centroid();
+    let is_in_quadrant = |quadrant: (bool, bool)| {
+        windows.iter().any(|(p, _)| (p.x > center.x, p.y > center.y) == quadrant)
+    };
+    let quadrants = [(false, false), (false, true), (true, false), (true, true)];
+    let count = windows.len() as f64;
+    let is_one_surface = spread_m <= INLIER_M && windows.len() >= MIN_WINDOWS && count >= MIN_INLIER_SHARE * num_windows;
+    if !is_one_surface || quadrants.into_iter().filter(|quadrant| is_in_quadrant(*quadrant)).count() < MIN_QUADRANTS {
         return None;
     }
-    let middle_m = median(heights.iter().copied())?;
-    let spread_m = 1.48 * median(heights.iter().map(|height_m| (height_m - middle_m).abs()))?;
-    let inliers: Vec<f64> = heights
-        .iter()
-        .copied()
-        .filter(|height_m| (height_m - middle_m).abs() <= INLIER_M.max(INLIER_SPREADS * spread_m))
-        .collect();
-    let is_one_surface = spread_m <= INLIER_M && inliers.len() >= MIN_WINDOWS;
-    if !is_one_surface || (inliers.len() as f64) < MIN_INLIER_SHARE * heights.len() as f64 {
-        return None;
-    }
-    let count = inliers.len() as f64;
+    let inliers: Vec<f64> = windows.iter().map(|(_, height_m)| *height_m).collect();
     let height_m = inliers.iter().sum::<f64>() / count;
     let variance = inliers.iter().map(|inlier| (inlier - height_m).powi(2)).sum::<f64>() / count;
     let sigma_m = (variance / (count / WINDOWS_PER_VOTE).max(1.0)).sqrt().hypot(COMMON_SIGMA_M);

@@ -33,6 +33,7 @@ mod error;
 mod franka;
 pub mod height;
 mod impedance;
+mod known_target;
 mod lying_part;
 mod pace;
 mod part_shape;
@@ -57,6 +58,7 @@ pub use arm_state::{
 pub use error::{Result, RobotError};
 pub use franka::{FrankaArm, RobotAddress, Scheduling, check_real_time};
 pub use impedance::{Impedance, ImpedanceControl, TcpReference};
+pub use known_target::KnownTarget;
 pub use lying_part::LyingPart;
 pub use pace::{DEFAULT_SPEED, MAX_SPEED, Pace};
 pub use part_shape::PartShape;

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, anyhow};
-use nalgebra::Isometry3;
 use sdg_cell::SeenOutline;
 use sdg_kinematics::collision::Obstacle;
 use sdg_robot::{
-    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, PartFinder, PlaceGoal, PlacingConfig, PlannedAction,
+    ArmState, CameraMount, GraspConfig, GraspStep, GraspTarget, KnownTarget, PlaceGoal, PlacingConfig, PlannedAction,
     PlannedArm, Robot, SafetyLimits, Watch,
 };
 
@@ -20,24 +19,6 @@ pub(crate) struct DryRun {
     opening_m: f64,
     arm: PlannedArm,
     failed: Option<(GraspStep, String)>,
-}
-
-/// Finds the same target, or none, wherever the arm is.
-struct FixedTarget(Option<GraspTarget>);
-
-impl PartFinder<PlannedArm> for FixedTarget {
-    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(self.0)
-    }
-
-    /// What was put down lies where it was to lie.
-    fn find_nearest(
-        &mut self,
-        _arm: &mut PlannedArm,
-        base_from_tcp: &Isometry3<f64>,
-    ) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(self.0.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
-    }
 }
 
 impl DryRun {
@@ -57,7 +38,7 @@ impl DryRun {
         let mut arm = PlannedArm::new(start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let Ended { failed, .. } =
-            run_sequence(&mut robot, &mut FixedTarget(target), mount, config, place).map_err(anyhow::Error::from)?;
+            run_sequence(&mut robot, &mut KnownTarget::new(target, mount, config), mount, config, place).map_err(anyhow::Error::from)?;
         Ok(Self { start, opening_m, arm, failed })
     }
 

@@ -6,11 +6,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result};
-use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, part_shape};
+use sdg_cell::{ModelFinder, Pictures, PlacedCamera, TakenPicture, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
 use sdg_grasp::{GraspError, GraspModel};
+use sdg_robot::height::ToldHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, PartFinder, PlannedArm, Robot, RobotError, StepObserver,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, PartFinder, PlannedArm, Robot, RobotError, StepObserver,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};
@@ -29,6 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub(crate) struct GraspSettings {
     workcell: Workcell,
     camera: PlacedCamera,
+    told: Option<ToldHeight>,
     speed: f64,
     base_frame: String,
 }
@@ -51,7 +53,8 @@ impl GraspSettings {
         let (calibrated, _) = camera_files::read(&camera_path)?;
         let camera = camera_files::placed(&calibrated, &workcell, &camera_path)?;
         let base_frame = args.base_frame.clone().unwrap_or_else(|| "panda_link0".to_owned());
-        Ok(Self { workcell, camera, speed: args.arm.speed, base_frame })
+        let told = args.arm.height.told(workcell.table_height_m);
+        Ok(Self { workcell, camera, told, speed: args.arm.speed, base_frame })
     }
 }
 
@@ -123,7 +126,9 @@ impl Grasping {
         if model.facts().lengths.is_none() {
             return Err(GraspError::NoLengths.into());
         }
+        let camera = self.settings.camera.with_marks_at(model, self.settings.told.as_ref());
         let config = GraspConfig {
+            height: height_measurement(model, &camera, self.settings.told),
             pace,
             max_detection_age_secs: 1.0,
             part: part_shape(model),
@@ -131,7 +136,10 @@ impl Grasping {
         };
         let mut arm = self.arm.take().context("the arm is lost")?;
         let (settings, interrupt) = (Arc::clone(&self.settings), self.interrupt.clone());
-        let mut finder = ModelFinder::new(model.clone(), settings.camera, self.pictures.clone());
+        let mut finder = ModelFinder::new(model.clone(), camera, self.pictures.clone());
+        if config.height.is_some() {
+            finder = finder.with_heights(UNKNOWN_HEIGHTS_M);
+        }
         let is_dry_run = request.dry_run;
         self.running = Some(std::thread::spawn(move || {
             let (answer, latched) = if is_dry_run {
@@ -211,7 +219,9 @@ fn planned(
     let mut planned = PlannedArm::new(state.q, hand.opening_m);
     let mut robot = Robot::new(&mut planned, settings.workcell.safety_limits(), Default::default());
     let mut step = LastStep(GraspStep::Detect);
-    let ended = sdg_robot::grasp(&mut robot, &mut Known(target), &mut step, settings.camera.mount(), config);
+    let mount = settings.camera.mount();
+    let mut known = KnownTarget::new(Some(target), mount, config);
+    let ended = sdg_robot::grasp(&mut robot, &mut known, &mut step, mount, config);
     let (success, message) = match ended.map(|report| report.outcome) {
         Ok(GraspOutcome::Held) => (true, "the part can be grasped".to_owned()),
         Ok(GraspOutcome::Failed { step, why }) => (false, format!("{step}: {why}")),
@@ -223,15 +233,6 @@ fn planned(
         step: step.0.name().to_owned(),
         pose: pose(settings, Some(&target)),
         closed_width_m: target.jaw_width_m,
-    }
-}
-
-/// Finds the part where it was found before.
-struct Known(GraspTarget);
-
-impl PartFinder<PlannedArm> for Known {
-    fn find(&mut self, _arm: &mut PlannedArm) -> sdg_robot::Result<Option<GraspTarget>> {
-        Ok(Some(self.0))
     }
 }
 

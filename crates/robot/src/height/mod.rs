@@ -51,8 +51,7 @@ impl HeightMeasurement {
     }
 
     /// The height of the marks by the part's own height and by the surface beside it, where both agree.
-    pub fn combined(&self, by_part: &MeasuredHeight, surface: Option<&MeasuredHeight>) -> MeasuredHeight {
-        let Some(surface) = surface else { return *by_part };
+    pub fn combined(&self, by_part: &MeasuredHeight, surface: &MeasuredHeight) -> MeasuredHeight {
         let on_surface = MeasuredHeight { height_m: surface.height_m + self.mark_height_m, ..*surface };
         on_surface.mean(by_part).unwrap_or(*by_part)
     }

@@ -46,14 +46,13 @@ impl<A: Arm> Sequence<'_, '_, A> {
         };
         let mut target = target.unwrap_or(*seen);
         target.base_from_tcp.translation.z = settled.height_m - measurement.marks_over_grasp_m();
-        if self.targets.last().is_some_and(Option::is_some) {
-            self.targets.push(Some(target));
-        }
+        self.targets.push(Some(target));
         self.passed(GraspStep::Detect)?;
         Ok(target)
     }
 
-    /// Takes pictures across the marked line, then along it, until two of them give a height.
+    /// Takes pictures across the marked line, then along it, until two of them give a height by what lies beside the part: along wooden grain only one of
+    /// both directions does. Else the part's own height is the best there is.
     fn look_from_two_places(
         &mut self,
         seen: &GraspTarget,
@@ -72,6 +71,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
         }
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
+        let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
         for [across_m, along_m] in [[half_m, 0.0], [-half_m, 0.0], [0.0, half_m], [0.0, -half_m]] {
             if let Err(stop) = self.go_beside(seen, [along_m, across_m], measurement.camera_height_m) {
                 match stop {
@@ -92,12 +92,15 @@ impl<A: Arm> Sequence<'_, '_, A> {
             for earlier in &pictures {
                 match triangulate_nearest(earlier, &shown, measurement.relief_m) {
                     Some(Ok((height, pair))) => {
-                        report.sightings.extend(pair);
-                        report.by_part = Some(height);
                         let surface_m = height.height_m - measurement.mark_height_m;
                         let expected = MeasuredHeight { height_m: surface_m, ..height };
                         let surface = self.finder.surface_beside(&pair, &expected)?;
-                        return Ok((measurement.combined(&height, surface.as_ref()), pair));
+                        let (first, _) = by_part.get_or_insert((height, pair));
+                        report.by_part = Some(*first);
+                        if let Some(surface) = surface {
+                            report.sightings.extend(pair);
+                            return Ok((measurement.combined(&height, &surface), pair));
+                        }
                     }
                     // Pictures at a right angle to each other may be too near.
                     Some(Err(error @ HeightError::SamePlace { .. })) => why = why.or(Some(error.to_string())),
@@ -106,6 +109,10 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
             }
             pictures.push(shown);
+        }
+        if let Some((height, pair)) = by_part {
+            report.sightings.extend(pair);
+            return Ok((height, pair));
         }
         report.sightings.extend(pictures.iter().filter_map(|shown| shown.first()));
         let min_mm = MIN_BASELINE_M * 1e3;
