@@ -125,8 +125,8 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 /// A part may be so much higher than its marks, m.
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface that a part lies on is looked for within so many standard deviations of where the part's pose puts it, between these bounds in m.
-const SURFACE_SIGMAS: f64 = 3.5;
-const SURFACE_WITHIN_M: [f64; 2] = [0.006, 0.012];
+const SURFACE_SIGMAS: f64 = 2.5;
+const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.007];
 /// Radius that holds 68 % of a place's errors over their standard deviation along x and along y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
 
@@ -216,17 +216,12 @@ impl<P> ModelFinder<P> {
         let distance_m = place.camera.world_from_camera.translation.z - self.marks_z_m(&place);
         self.perception.look_for_sizes(heights_m.map(|heights_m| {
             // What lies higher is nearer to the camera, and larger.
-            let size = |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
+            let size =
+                |height_m: f64| (distance_m / (distance_m + higher_m - height_m).max(0.5 * distance_m)).max(0.51);
             let [low, high] = [size(*heights_m.start()), size(*heights_m.end())];
             (low * (1.0 - SIZE_LEEWAY)).clamp(0.5, 1.0)..=(high * (1.0 + SIZE_LEEWAY)).clamp(1.0, 2.0)
         }))?;
         let found = self.perception.detect(&picture, self.verification)?;
-        if std::env::var("DBG").is_ok() {
-            eprintln!("look higher {higher_m:.4} distance {distance_m:.4}");
-            for f in found.iter().take(2) {
-                eprintln!("  {:.3} agr {:?} size {:?} {:?} {:?}", f.detection.score, f.detection.agreement, self.size_of(f), f.detection.refused(), f.detection.evidence);
-            }
-        }
         self.seen = found.first().and_then(|best| self.outline_of(best, &place));
         let sightings = found.iter().filter_map(|found| self.sighting(found, &place)).collect();
         self.last = Some((picture, found));
@@ -267,7 +262,8 @@ impl<P> ModelFinder<P> {
         let pixels_per_m = model.facts().lengths?.pixels_per_m;
         let widths_px = model.demonstrations().iter().map(|demonstration| demonstration.marks.width_px);
         let width_px = model.demonstrations().first()?.marks.width_px;
-        let is_one_size = widths_px.into_iter().all(|other_px| (other_px / width_px - 1.0).abs() <= MAX_SIZE_DIFFERENCE);
+        let is_one_size =
+            widths_px.into_iter().all(|other_px| (other_px / width_px - 1.0).abs() <= MAX_SIZE_DIFFERENCE);
         is_one_size.then_some(found.pose?.opening_m * pixels_per_m / width_px)
     }
 

@@ -93,7 +93,8 @@ impl PosedPicture {
         for offset in offsets {
             let p = at + by_x * offset.x + by_y * offset.y - Vector2::new(0.5, 0.5);
             let (left, top) = (p.x.floor(), p.y.floor());
-            let is_inside = left >= 0.0 && top >= 0.0 && left + 1.0 < self.width as f64 && top + 1.0 < self.height as f64;
+            let is_inside =
+                left >= 0.0 && top >= 0.0 && left + 1.0 < self.width as f64 && top + 1.0 < self.height as f64;
             if !is_inside {
                 return false;
             }
@@ -124,12 +125,12 @@ pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<
     let num_windows = windows.len() as f64;
     windows.retain(|(_, height_m)| (height_m - middle_m).abs() <= max_m);
     let center = part.outline_m.centroid();
-    let is_in_quadrant = |quadrant: (bool, bool)| {
-        windows.iter().any(|(p, _)| (p.x > center.x, p.y > center.y) == quadrant)
-    };
+    let is_in_quadrant =
+        |quadrant: (bool, bool)| windows.iter().any(|(p, _)| (p.x > center.x, p.y > center.y) == quadrant);
     let quadrants = [(false, false), (false, true), (true, false), (true, true)];
     let count = windows.len() as f64;
-    let is_one_surface = spread_m <= INLIER_M && windows.len() >= MIN_WINDOWS && count >= MIN_INLIER_SHARE * num_windows;
+    let is_one_surface =
+        spread_m <= INLIER_M && windows.len() >= MIN_WINDOWS && count >= MIN_INLIER_SHARE * num_windows;
     if !is_one_surface || quadrants.into_iter().filter(|quadrant| is_in_quadrant(*quadrant)).count() < MIN_QUADRANTS {
         return None;
     }

@@ -2,9 +2,11 @@
 //! how many grasps hold. Model S, taught from the shipped photos.
 //!
 //! ```text
-//! heights grasp|measure [ATTEMPTS [SEED [PART]…]]      10 1: ten of each part; odd ones on a table 0 to 40 mm higher than told, even ones on a
-//!                                                      block 5 to 30 mm high. measure ends each once the height is measured; raw prints, too, what
-//! heights raw …                                        the pictures showed, as JSON lines
+//! heights grasp [ATTEMPTS [SEED [PART]…]]   10 1: ten of each part; odd seeds on a table 0 to 40 mm higher than told, even ones on a block
+//!                                           5 to 30 mm high
+//! heights measure …                         the same, each ended once the height is measured
+//! heights raw …                             prints what the pictures showed, too, as JSON lines
+//! heights told …                            the same scenes with their true heights told and nothing measured, to compare with
 //! ```
 //! Ends with an error where the median of the errors is above 0.7 mm, fewer than 95 of 100 are within 2 mm, or fewer than 116 of 120 grasps hold.
 
@@ -40,12 +42,13 @@ const LIFTED_M: f64 = 0.10;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [how, rest @ ..] = &arguments[..] else { return Err("expected grasp, measure or raw".into()) };
-    let is_raw = how == "raw";
-    let is_grasping = match how.as_str() {
-        "grasp" => true,
-        "measure" | "raw" => false,
-        other => return Err(format!("expected grasp, measure or raw, found {other}").into()),
+    let [how, rest @ ..] = &arguments[..] else { return Err("expected grasp, measure, raw or told".into()) };
+    let how = match how.as_str() {
+        "grasp" => How::Grasp,
+        "measure" => How::Measure,
+        "raw" => How::Raw,
+        "told" => How::Told,
+        other => return Err(format!("expected grasp, measure, raw or told, found {other}").into()),
     };
     let num_attempts: u64 = rest.first().map_or(Ok(10), |text| text.parse())?;
     let first_seed: u64 = rest.get(1).map_or(Ok(1), |text| text.parse())?;
@@ -60,19 +63,30 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut cases = Vec::new();
         for number in 0..num_attempts {
             let case = Case::draw(&spec, first_seed + number);
-            let found = case.run(&model, is_grasping)?;
-            if is_raw {
-                println!("{}", found.raw(&case));
-            } else {
-                println!("{}", found.line(&case));
-            }
+            let found = case.run(&model, how)?;
+            println!("{}", if how == How::Raw { found.raw(&case) } else { found.line(&case) });
             cases.push(found);
         }
-        println!("{name}: {}", summary(&cases, is_grasping));
+        println!("{name}: {}", summary(&cases, how));
         all.extend(cases);
     }
-    println!("all: {}", summary(&all, is_grasping));
-    if is_as_asked(&all, is_grasping) { Ok(()) } else { Err("not as asked for".into()) }
+    println!("all: {}", summary(&all, how));
+    if is_as_asked(&all, how) { Ok(()) } else { Err("not as asked for".into()) }
+}
+
+/// What is done with each case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum How {
+    Grasp,
+    Measure,
+    Raw,
+    Told,
+}
+
+impl How {
+    fn is_grasping(self) -> bool {
+        matches!(self, Self::Grasp | Self::Told)
+    }
 }
 
 /// Model S from the shipped photo, with the lengths of the camera that took it.
@@ -121,9 +135,8 @@ impl Case {
             let ([x, half_x], [y, half_y]) = (side(|p| p.x), side(|p| p.y));
             let under = Translation3::new(x, y, 0.5 * block_m - spec.rest_height_m);
             let base_from_obstacle = object.base_from_object * Isometry3::from(under);
-            let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[right, up]| {
-                (base_from_obstacle * nalgebra::Point3::new(right * half_x, up * half_y, 0.0)).xy()
-            });
+            let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(|[right, up]| (base_from_obstacle * nalgebra::Point3::new(right * half_x, up * half_y, 0.0)).xy());
             scene.distractors.retain(|other| separation(&other.footprint, &corners) > 0.004);
             object.base_from_object.translation.z += block_m;
             let shape = Shape::Box { half_m: [half_x, half_y, 0.5 * block_m] };
@@ -137,9 +150,9 @@ impl Case {
         self.higher_m[1] + self.spec.mark_height_m
     }
 
-    fn run(&self, model: &GraspModel, is_grasping: bool) -> Result<Found, Box<dyn Error>> {
-        let told = std::env::var("HEIGHTS_TOLD").is_ok();
-        let told_table_m = if told { self.higher_m[1] } else { -self.higher_m[0] };
+    fn run(&self, model: &GraspModel, how: How) -> Result<Found, Box<dyn Error>> {
+        let is_told = how == How::Told;
+        let told_table_m = if is_told { self.higher_m[1] } else { -self.higher_m[0] };
         let mut cell = Workcell::new(&WorkcellConfig {
             obstacles: self.block.iter().cloned().collect(),
             ..WorkcellConfig::new(self.scene.clone())
@@ -149,11 +162,13 @@ impl Case {
             pose: CameraPose::OnFlange(cell.told_flange_from_camera()),
             table_height_m: told_table_m,
         };
-        let mut finder = ModelFinder::new(model.clone(), camera, WristPictures(format!("{}_{}", self.spec.name, self.seed)));
-        if !told { finder = finder.with_heights(UNKNOWN_HEIGHTS_M); }
+        let mut finder = ModelFinder::new(model.clone(), camera, WristPictures);
+        if !is_told {
+            finder = finder.with_heights(UNKNOWN_HEIGHTS_M);
+        }
         let config = GraspConfig {
             part: Some(part_shape(&self.spec)?),
-            height: height_measurement(model, &camera, None).filter(|_| !told),
+            height: height_measurement(model, &camera, None).filter(|_| !is_told),
             ..GraspConfig::default()
         };
         cell.reset_for_attempt(&config, self.seed)?;
@@ -161,30 +176,18 @@ impl Case {
         let mount = cell.wrist_mount();
         let before_m = cell.object_height_m().unwrap_or(0.0);
         let mut robot = Robot::new(&mut cell, limits, Watch::default());
-        let report = grasp(&mut robot, &mut finder, &mut Until { is_grasping }, mount, &config)?;
+        let report = grasp(&mut robot, &mut finder, &mut Until { is_grasping: how.is_grasping() }, mount, &config)?;
         let is_lifted = cell.object_height_m().is_some_and(|height_m| height_m >= before_m + LIFTED_M);
         Ok(Found { marks_m: self.marks_m(), is_held: report.outcome.is_held() && is_lifted, report })
     }
 }
 
 /// What the simulated wrist camera sees.
-struct WristPictures(String);
+struct WristPictures;
 
 impl Pictures<Workcell> for WristPictures {
     fn take(&mut self, cell: &mut Workcell) -> sdg_robot::Result<TakenPicture> {
-        let view = cell.wrist_view()?;
-        if let Ok(folder) = std::env::var("HEIGHTS_PICTURES") {
-            for number in 0.. {
-                let path = format!("{folder}/{}_{number}", self.0);
-                if !std::path::Path::new(&format!("{path}.png")).exists() {
-                    view.image.save(format!("{path}.png")).unwrap();
-                    let m = view.camera.world_from_camera.to_homogeneous();
-                    std::fs::write(format!("{path}.json"), json!(m.as_slice()).to_string()).unwrap();
-                    break;
-                }
-            }
-        }
-        Ok(TakenPicture { picture: view.image, taken: None })
+        Ok(TakenPicture { picture: cell.wrist_view()?.image, taken: None })
     }
 }
 
@@ -227,7 +230,11 @@ impl Found {
             None => "not measured".to_owned(),
         };
         let Case { spec, seed, .. } = case;
-        format!("  {} {seed}: table {table_mm:.1} mm higher, on {block_mm:.1} mm: {measured}; {}", spec.name, self.why())
+        format!(
+            "  {} {seed}: table {table_mm:.1} mm higher, on {block_mm:.1} mm: {measured}; {}",
+            spec.name,
+            self.why()
+        )
     }
 
     /// What the pictures showed.
@@ -241,7 +248,8 @@ impl Found {
             })
         });
         let over_grasp_m = case.spec.mark_height_m - case.spec.grasp_height_m;
-        let looks = self.report.targets.iter().flatten().map(|target| target.base_from_tcp.translation.z + over_grasp_m);
+        let looks =
+            self.report.targets.iter().flatten().map(|target| target.base_from_tcp.translation.z + over_grasp_m);
         json!({
             "part": case.spec.name, "seed": case.seed, "higher": case.higher_m, "marks": self.marks_m, "mark_height": case.spec.mark_height_m,
             "sightings": sightings.collect::<Vec<_>>(), "looks": looks.collect::<Vec<_>>(), "marked": case.scene.object.as_ref().map(|object| case.spec.marks_in_base(&object.base_from_object).map(|mark| [mark.x, mark.y, mark.z])),
@@ -254,7 +262,7 @@ impl Found {
     }
 }
 
-fn summary(cases: &[Found], is_grasping: bool) -> String {
+fn summary(cases: &[Found], how: How) -> String {
     let errors: Vec<[f64; 2]> = cases.iter().filter_map(Found::error_m).collect();
     let absolute: Vec<f64> = errors.iter().map(|[error, _]| error.abs()).collect();
     let num_within = absolute.iter().filter(|error| **error <= WITHIN_M).count();
@@ -262,7 +270,7 @@ fn summary(cases: &[Found], is_grasping: bool) -> String {
     let spread = (normalised.map(|error| error * error).sum::<f64>() / errors.len().max(1) as f64).sqrt();
     let median_mm = median(absolute.iter().copied()).unwrap_or(f64::NAN) * 1e3;
     let bias_mm = errors.iter().map(|[error, _]| error * 1e3).sum::<f64>() / errors.len().max(1) as f64;
-    let held = match is_grasping {
+    let held = match how.is_grasping() {
         true => format!("; {} held", cases.iter().filter(|case| case.is_held).count()),
         false => String::new(),
     };
@@ -274,12 +282,12 @@ fn summary(cases: &[Found], is_grasping: bool) -> String {
     )
 }
 
-fn is_as_asked(cases: &[Found], is_grasping: bool) -> bool {
+fn is_as_asked(cases: &[Found], how: How) -> bool {
     let absolute: Vec<f64> = cases.iter().filter_map(Found::error_m).map(|[error, _]| error.abs()).collect();
     let share = |count: usize| count as f64 / cases.len().max(1) as f64;
     let num_within = absolute.iter().filter(|error| **error <= WITHIN_M).count();
     let num_held = cases.iter().filter(|case| case.is_held).count();
-    median(absolute.iter().copied()).is_some_and(|median_m| median_m <= MAX_MEDIAN_M)
-        && share(num_within) >= MIN_SHARE_WITHIN
-        && (!is_grasping || share(num_held) >= MIN_SHARE_HELD)
+    let is_exact = median(absolute.iter().copied()).is_some_and(|median_m| median_m <= MAX_MEDIAN_M)
+        && share(num_within) >= MIN_SHARE_WITHIN;
+    (is_exact || how == How::Told) && (!how.is_grasping() || share(num_held) >= MIN_SHARE_HELD)
 }

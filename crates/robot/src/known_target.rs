@@ -3,12 +3,12 @@
 use nalgebra::{Isometry3, Point3};
 use sdg_kinematics::Panda;
 
+use crate::Arm;
 use crate::error::Result;
 use crate::height::{MeasuredHeight, Sighting};
 use crate::perception::{GraspTarget, PartFinder};
 use crate::planned_arm::PlannedArm;
 use crate::sequence::{CameraMount, GraspConfig};
-use crate::Arm;
 
 /// Places and sizes are exact to so much, m and as a share.
 const EXACT: f64 = 1e-4;
@@ -36,11 +36,7 @@ impl PartFinder<PlannedArm> for KnownTarget {
     }
 
     /// What was put down lies where it was to lie.
-    fn find_nearest(
-        &mut self,
-        _arm: &mut PlannedArm,
-        base_from_tcp: &Isometry3<f64>,
-    ) -> Result<Option<GraspTarget>> {
+    fn find_nearest(&mut self, _arm: &mut PlannedArm, base_from_tcp: &Isometry3<f64>) -> Result<Option<GraspTarget>> {
         Ok(self.target.map(|target| GraspTarget { base_from_tcp: *base_from_tcp, ..target }))
     }
 

@@ -69,8 +69,8 @@ pub use playback::{JointReference, Playback, STOP_SECS};
 pub use robot::Robot;
 pub use safety::{CheckedMotion, LinkCapsules, SafetyLimits, SelfCollision, Violation, WorkspaceBox};
 pub use sequence::{
-    CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M, LookOut,
-    PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
+    CONFIRMED, CameraMount, FREE_CLEARANCE_M, GraspConfig, GraspOutcome, GraspReport, LOOK_AT_M, LOOK_HEIGHT_M,
+    LookOut, PlaceOutcome, PlaceReport, PlacingConfig, SURE, camera_looking_down, grasp, grasp_and_place, grasp_softly,
 };
 pub use surroundings::{Destination, Surroundings, Way};
 pub use touch::{Descent, TouchDown, Touched};

@@ -6,7 +6,9 @@ use std::time::Instant;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use sdg_camera::{Address, LatestFrame, PixelFrame};
-use sdg_cell::{LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, UNKNOWN_HEIGHTS_M, height_measurement, part_shape};
+use sdg_cell::{
+    LivePictures, ModelFinder, Pictures, PlacedCamera, SeenOutline, UNKNOWN_HEIGHTS_M, height_measurement, part_shape,
+};
 use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::height::HeightReport;
 use sdg_robot::workcell::Workcell;

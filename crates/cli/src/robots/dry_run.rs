@@ -38,7 +38,8 @@ impl DryRun {
         let mut arm = PlannedArm::new(start.q_commanded, opening_m);
         let mut robot = Robot::new(&mut arm, limits, Watch::default());
         let Ended { failed, .. } =
-            run_sequence(&mut robot, &mut KnownTarget::new(target, mount, config), mount, config, place).map_err(anyhow::Error::from)?;
+            run_sequence(&mut robot, &mut KnownTarget::new(target, mount, config), mount, config, place)
+                .map_err(anyhow::Error::from)?;
         Ok(Self { start, opening_m, arm, failed })
     }
 

@@ -11,7 +11,8 @@ use sdg_grasp::{GraspError, GraspModel};
 use sdg_robot::height::ToldHeight;
 use sdg_robot::workcell::Workcell;
 use sdg_robot::{
-    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, PartFinder, PlannedArm, Robot, RobotError, StepObserver,
+    Arm, GraspConfig, GraspOutcome, GraspStep, GraspTarget, KnownTarget, PartFinder, PlannedArm, Robot, RobotError,
+    StepObserver,
 };
 use sdg_ros2::dds::TrajectoryArm;
 use sdg_ros2::messages::{GraspRequest, GraspResponse, Header, PoseStamped, Time};

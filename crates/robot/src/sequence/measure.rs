@@ -150,3 +150,6 @@ fn between(sightings: &[Sighting], height_m: f64) -> Option<GraspTarget> {
 fn fails(why: String) -> Stop {
     Stop::Failed(GraspStep::Detect, why)
 }
+
+#[cfg(test)]
+mod tests;
