@@ -125,8 +125,8 @@ const MAX_SIZE_DIFFERENCE: f64 = 0.003;
 /// A part may be so much higher than its marks, m.
 const TOP_LEEWAY_M: f64 = 0.002;
 /// The surface that a part lies on is looked for within so many standard deviations of where the part's pose puts it, between these bounds in m.
-const SURFACE_SIGMAS: f64 = 2.5;
-const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.007];
+const SURFACE_SIGMAS: f64 = 3.5;
+const SURFACE_WITHIN_M: [f64; 2] = [0.004, 0.009];
 /// Radius that holds 68 % of a place's errors over their standard deviation along x and along y.
 const SIGMAS_OF_RADIUS: f64 = 1.51;
 

@@ -3,7 +3,7 @@
 //! ```text
 //! outline of the part ─ windows around it, the nearest first, but for what the part hides from a camera
 //! window ─ at each height: both pictures resampled there ─ correlation ─ the height of its one clear maximum
-//! heights of the windows ─ median and inliers ─ SurfaceHeight
+//! heights of the windows ─ the highest that many of them all around the part share ─ SurfaceHeight
 //! ```
 //! A part's own edges lie anywhere between its foot and its top, and which of them a picture is matched by changes with the view. What lies beside it is
 //! one plane, and grain, scratches, shadows and edges on it are in that plane.
@@ -31,11 +31,11 @@ const LEAD_BEYOND_M: f64 = 0.003;
 /// The surface is what the nearest windows show: so many at most and at least.
 const MAX_WINDOWS: usize = 60;
 const MIN_WINDOWS: usize = 5;
-/// Windows further off the median than this, m, or than so many spreads of all are on something else.
+/// Windows further from the median of a surface than this are on something else, m; so often the median is taken anew.
 const INLIER_M: f64 = 0.001;
-const INLIER_SPREADS: f64 = 2.5;
-/// So many of them are on the surface, at least: where it is less, there are two.
-const MIN_INLIER_SHARE: f64 = 0.5;
+const NUM_SHIFTS: usize = 4;
+/// So many of all windows are on a surface, at least.
+const MIN_SHARE: f64 = 0.15;
 /// They lie in so many of the four quadrants around the part, at least: what lies beside the part is on one side of it.
 const MIN_QUADRANTS: usize = 3;
 /// Windows overlap: of so many one counts.
@@ -119,24 +119,35 @@ pub(crate) fn surface_height(pictures: [&PosedPicture; 2], part: &PartOnSurface<
             }
         }
     }
-    let middle_m = median(windows.iter().map(|(_, height_m)| *height_m))?;
-    let spread_m = 1.48 * median(windows.iter().map(|(_, height_m)| (height_m - middle_m).abs()))?;
-    let max_m = INLIER_M.max(INLIER_SPREADS * spread_m);
-    let num_windows = windows.len() as f64;
-    windows.retain(|(_, height_m)| (height_m - middle_m).abs() <= max_m);
     let center = part.outline_m.centroid();
-    let is_in_quadrant =
-        |quadrant: (bool, bool)| windows.iter().any(|(p, _)| (p.x > center.x, p.y > center.y) == quadrant);
+    let min_windows = MIN_WINDOWS.max((MIN_SHARE * windows.len() as f64).ceil() as usize);
+    // What a part lies on is higher than what is around that.
+    windows.sort_by(|one, other| other.1.total_cmp(&one.1));
+    windows.iter().find_map(|(_, height_m)| one_surface(&windows, *height_m, &center, min_windows))
+}
+
+/// The surface that windows at about a height are on, where there are enough of them and they lie around the part.
+fn one_surface(
+    windows: &[(Point2<f64>, f64)],
+    about_m: f64,
+    center: &Point2<f64>,
+    min_windows: usize,
+) -> Option<SurfaceHeight> {
+    let near = |about_m: f64| windows.iter().filter(move |(_, height_m)| (height_m - about_m).abs() <= INLIER_M);
+    let mut middle_m = about_m;
+    for _ in 0..NUM_SHIFTS {
+        middle_m = median(near(middle_m).map(|(_, height_m)| *height_m))?;
+    }
+    let inliers: Vec<(Point2<f64>, f64)> = near(middle_m).copied().collect();
+    let is_in = |quadrant: (bool, bool)| inliers.iter().any(|(p, _)| (p.x > center.x, p.y > center.y) == quadrant);
     let quadrants = [(false, false), (false, true), (true, false), (true, true)];
-    let count = windows.len() as f64;
-    let is_one_surface =
-        spread_m <= INLIER_M && windows.len() >= MIN_WINDOWS && count >= MIN_INLIER_SHARE * num_windows;
-    if !is_one_surface || quadrants.into_iter().filter(|quadrant| is_in_quadrant(*quadrant)).count() < MIN_QUADRANTS {
+    if inliers.len() < min_windows || quadrants.into_iter().filter(|quadrant| is_in(*quadrant)).count() < MIN_QUADRANTS
+    {
         return None;
     }
-    let inliers: Vec<f64> = windows.iter().map(|(_, height_m)| *height_m).collect();
-    let height_m = inliers.iter().sum::<f64>() / count;
-    let variance = inliers.iter().map(|inlier| (inlier - height_m).powi(2)).sum::<f64>() / count;
+    let count = inliers.len() as f64;
+    let height_m = inliers.iter().map(|(_, height_m)| height_m).sum::<f64>() / count;
+    let variance = inliers.iter().map(|(_, inlier_m)| (inlier_m - height_m).powi(2)).sum::<f64>() / count;
     let sigma_m = (variance / (count / WINDOWS_PER_VOTE).max(1.0)).sqrt().hypot(COMMON_SIGMA_M);
     Some(SurfaceHeight { height_m, sigma_m })
 }

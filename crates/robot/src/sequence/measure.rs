@@ -14,6 +14,9 @@ use crate::perception::{GraspStep, GraspTarget};
 /// The camera is at least so far from the part, m: nearer, pictures show too little of it.
 const MIN_DISTANCE_M: f64 = 0.18;
 
+/// Share of the way sideways of a picture in place of one that showed nothing: with the one on the other side it is far enough apart.
+const NEARER: f64 = 0.5;
+
 impl<A: Arm> Sequence<'_, '_, A> {
     /// Measures how high the part lies, where that is asked for; the grasp at that height.
     pub(super) fn measure_height(&mut self, seen: &GraspTarget) -> Steps<GraspTarget> {
@@ -72,7 +75,16 @@ impl<A: Arm> Sequence<'_, '_, A> {
         let half_m = 0.5 * measurement.baseline_m;
         let (mut pictures, mut why): (Vec<Vec<Sighting>>, Option<String>) = (Vec::new(), None);
         let mut by_part: Option<(MeasuredHeight, [Sighting; 2])> = None;
-        for [across_m, along_m] in [[half_m, 0.0], [-half_m, 0.0], [0.0, half_m], [0.0, -half_m]] {
+        // Where one of the first two shows nothing, the next is nearer to the part: long parts fill the picture, and gloss moves.
+        let nearer_m = NEARER * half_m;
+        let mut shown_at_m = None;
+        for [across_m, along_m] in
+            [[half_m, 0.0], [-half_m, 0.0], [nearer_m, 0.0], [-nearer_m, 0.0], [0.0, half_m], [0.0, -half_m]]
+        {
+            let is_nearer = across_m.abs() == nearer_m;
+            if is_nearer && (pictures.len() != 1 || shown_at_m.is_some_and(|shown_m: f64| shown_m * across_m > 0.0)) {
+                continue;
+            }
             if let Err(stop) = self.go_beside(seen, [along_m, across_m], measurement.camera_height_m) {
                 match stop {
                     Stop::Failed(_, because) if self.robot.latched().is_none() => {
@@ -109,6 +121,7 @@ impl<A: Arm> Sequence<'_, '_, A> {
                 }
             }
             pictures.push(shown);
+            shown_at_m.get_or_insert(across_m);
         }
         if let Some((height, pair)) = by_part {
             report.sightings.extend(pair);

@@ -110,13 +110,18 @@ fn a_picture_that_does_not_show_the_part_is_the_reason() {
     let (report, _, num_sights) = grasped(&config(None), &[true, false], true);
     let GraspOutcome::Failed { step: GraspStep::Detect, why } = report.outcome else { panic!("{report:?}") };
     assert!(why.ends_with("none was told: the second picture does not show the part"), "{why}");
-    assert_eq!(num_sights, 4);
+    assert_eq!(num_sights, 5);
     let (report, ..) = grasped(&config(None), &[false], true);
     let GraspOutcome::Failed { why, .. } = report.outcome else { panic!("{report:?}") };
     assert!(why.ends_with("the first picture does not show the part"), "{why}");
-    // The third picture, along the marked line, is as good as the second.
-    let (report, ..) = grasped(&config(None), &[true, false, true], true);
-    assert_eq!(report.outcome, GraspOutcome::Held);
+    // A third picture, nearer to the part, is as good as the second; and one along the marked line.
+    for shows in [&[true, false, true][..], &[false, true, true], &[true, false, false, true]] {
+        let (report, places, num_sights) = grasped(&config(None), shows, true);
+        assert_eq!((report.outcome, num_sights), (GraspOutcome::Held, shows.len()));
+        let [.., last] = &places[..] else { panic!("{places:?}") };
+        let first = places[usize::from(!shows[0])];
+        assert!((first - last).xy().norm() >= 0.080, "{places:?}");
+    }
 }
 
 #[test]
