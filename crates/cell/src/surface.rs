@@ -35,7 +35,7 @@ const MIN_WINDOWS: usize = 5;
 const INLIER_M: f64 = 0.001;
 const NUM_SHIFTS: usize = 4;
 /// So many of all windows are on a surface, at least.
-const MIN_SHARE: f64 = 0.15;
+const MIN_SHARE: f64 = 0.3;
 /// They lie in so many of the four quadrants around the part, at least: what lies beside the part is on one side of it.
 const MIN_QUADRANTS: usize = 3;
 /// Windows overlap: of so many one counts.
